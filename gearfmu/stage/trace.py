@@ -1,0 +1,170 @@
+"""Trace: sampled signals of one run, the same type for the solver, the FMU and coupled runs, and its HDF5 file."""
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from gearfmu.errors import GearfmuError
+from gearfmu.files import written_whole
+
+FORMAT = "gearfmu-trace"
+FORMAT_VERSION = 1
+
+
+class TraceError(GearfmuError):
+    """A trace, or a file that should hold one, is not valid."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One sampled signal: `values (n,)` in `unit` ("" for none; units as in the FMU, e.g. "N.m", "rad/s")."""
+
+    values: np.ndarray
+    unit: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Signals over one time base.
+
+    time : (n,) float64, s, strictly increasing.
+    channels : name → Channel, each with (n,) finite values; integers and booleans keep their type.
+    meta : what the run was (scene, level, outcome, hashes, …); any JSON value.
+
+    Raises TraceError, naming every bad channel, when lengths, order or numbers are not so.
+    """
+
+    time: np.ndarray
+    channels: dict[str, Channel]
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", np.ascontiguousarray(self.time, dtype=np.float64))
+        object.__setattr__(self, "channels", {name: _as_stored(c) for name, c in self.channels.items()})
+        problems = _problems(self.time, self.channels)
+        if problems:
+            raise TraceError("this is not a trace: " + "; ".join(problems))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of channel `name`; raises TraceError with the names there are."""
+        if name not in self.channels:
+            raise TraceError(f"the trace has no channel '{name}'; it has: {', '.join(sorted(self.channels))}")
+        return self.channels[name].values
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.channels
+
+    def window(self, start: float, end: float = np.inf) -> Trace:
+        """The samples with start ≤ time ≤ end (s), same meta."""
+        keep = (self.time >= start) & (self.time <= end)
+        channels = {name: Channel(c.values[keep], c.unit, c.description) for name, c in self.channels.items()}
+        return Trace(self.time[keep], channels, self.meta)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the HDF5 file (docs/file-formats.md) under a temporary name, then rename it to `path`."""
+        with written_whole(path) as temporary, h5py.File(temporary, "w") as file:
+            file.attrs["format"] = FORMAT
+            file.attrs["format_version"] = FORMAT_VERSION
+            file.attrs["meta"] = json.dumps(self.meta, sort_keys=True, default=_plain)
+            _write(file, "time", Channel(self.time, "s", "time"))
+            group = file.create_group("channels", track_order=True)
+            for name, channel in self.channels.items():
+                _write(group, name, channel)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Trace:
+        """Read a file written by `save`; raises TraceError when it is missing, damaged or of another kind."""
+        source = Path(path)
+        if not source.is_file():
+            raise TraceError(f"{source}: no such file; 'gearfmu run' and 'gearfmu simulate' write traces")
+        try:
+            with h5py.File(source, "r") as file:
+                return _read(file)
+        except TraceError as error:
+            raise TraceError(f"{source}: {error}") from None
+        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise TraceError(f"{source}: damaged or no trace file ({error}); run the scene again") from error
+
+    def to_csv(self, path: str | os.PathLike[str], names: Iterable[str] | None = None) -> None:
+        """Write time and the channels `names` (all when None) as CSV with one header row "name_[unit]"."""
+        chosen = list(self.channels) if names is None else list(names)
+        columns = {"time_[s]": self.time}
+        for name in chosen:
+            values = self[name]
+            columns[heading(name, self.channels[name].unit)] = values
+        write_columns(path, columns)
+
+
+def heading(name: str, unit: str) -> str:
+    """Column heading of a quantity: "mesh.force_[N]", or the bare name without a unit."""
+    return f"{name}_[{unit}]" if unit else name
+
+
+def write_columns(path: str | os.PathLike[str], columns: Mapping[str, np.ndarray]) -> None:
+    """Write equally long 1-D arrays as CSV with the keys as header; numbers read back to the same double."""
+    arrays = [np.asarray(values) for values in columns.values()]
+    plain = [(a.astype(int) if a.dtype == bool else a).tolist() for a in arrays]
+    with written_whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*plain, strict=True))
+
+
+def _plain(value: Any) -> Any:
+    """Python's form of a numpy scalar or array, for JSON."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"meta holds {type(value).__name__}, which JSON cannot; convert it to numbers or text")
+
+
+def _as_stored(channel: Channel) -> Channel:
+    values = np.asarray(channel.values)
+    if values.dtype != bool and not np.issubdtype(values.dtype, np.integer):
+        values = values.astype(np.float64)
+    return Channel(np.ascontiguousarray(values), channel.unit, channel.description)
+
+
+def _problems(time: np.ndarray, channels: Mapping[str, Channel]) -> list[str]:
+    if time.ndim != 1 or time.size == 0:
+        return [f"time has shape {time.shape}, expected (n,) with n ≥ 1"]
+    found = []
+    if not np.all(np.isfinite(time)) or np.any(np.diff(time) <= 0):
+        found.append("time is not strictly increasing and finite")
+    for name, channel in channels.items():
+        if not name or "/" in name or name == ".":
+            found.append(f"channel name '{name}' is not usable (no '/' and not empty)")
+        if channel.values.shape != time.shape:
+            found.append(f"channel '{name}' has shape {channel.values.shape}, time {time.shape}")
+        elif not np.all(np.isfinite(channel.values)):
+            bad = int(np.argmin(np.isfinite(channel.values)))
+            found.append(f"channel '{name}' is not finite at t = {time[bad]:.9g} s")
+    return found
+
+
+def _write(group: h5py.Group, name: str, channel: Channel) -> None:
+    options = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if channel.values.size > 1 else {}
+    dataset = group.create_dataset(name, data=channel.values, **options)
+    dataset.attrs["unit"] = channel.unit
+    dataset.attrs["description"] = channel.description
+
+
+def _read(file: h5py.File) -> Trace:
+    if file.attrs.get("format") != FORMAT:
+        raise TraceError("this HDF5 file is not a gearfmu trace; 'gearfmu inspect' says what it is")
+    version = int(file.attrs["format_version"])
+    if version > FORMAT_VERSION:
+        raise TraceError(f"trace format {version} is newer than this gearfmu reads ({FORMAT_VERSION}); update gearfmu")
+    channels = {
+        name: Channel(dataset[()], str(dataset.attrs["unit"]), str(dataset.attrs["description"]))
+        for name, dataset in file["channels"].items()
+    }
+    return Trace(file["time"][()], channels, json.loads(file.attrs["meta"]))
