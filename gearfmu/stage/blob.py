@@ -1,0 +1,172 @@
+"""The model blob: named constant arrays in one checked block of bytes, read in place by the kernel (layout: docs/file-formats.md, "Model blob").
+
+The same rules are checked here and in gearfmu/kernel/src/gk_blob.c; one content has exactly one sequence of bytes.
+"""
+from __future__ import annotations
+
+import hashlib
+import struct
+from collections.abc import Mapping
+
+import numpy as np
+
+from gearfmu.errors import ModelError
+
+MAGIC = b"GFMB"
+FORMAT = 1
+HEADER = struct.Struct("<4sI32sQI12x")
+ENTRY = struct.Struct("<24sIIQQ")
+ALIGNMENT = 64
+HASHED_FROM = 40
+MOST_SECTIONS = 1024
+LONGEST_NAME = 23
+F64, I32, TEXT = 1, 2, 3
+DTYPE = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1")}
+
+Sections = Mapping[str, "np.ndarray | str"]
+
+
+def write_blob(sections: Sections) -> bytes:
+    """Bytes of a blob with `sections` in the order given.
+
+    Values: arrays of floats (stored as f64, any shape, C order, all finite), arrays of integers or booleans (stored as i32), or text without NUL.
+    Raises ModelError that lists every section that cannot be stored.
+    """
+    problems: list[str] = []
+    if len(sections) > MOST_SECTIONS:
+        problems.append(f"{len(sections)} sections, at most {MOST_SECTIONS} fit")
+    encoded = [(name, *_encode(name, value, problems)) for name, value in sections.items()]
+    if problems:
+        raise ModelError("model blob cannot be written: " + "; ".join(problems))
+    table, contents = bytearray(), bytearray()
+    start = HEADER.size + len(encoded) * ENTRY.size
+    for name, kind, values in encoded:
+        _pad(contents, start)
+        table += ENTRY.pack(name.encode(), kind, 0, values.size, start + len(contents))
+        contents += values.tobytes()
+    _pad(contents, start)
+    return seal(bytes(HEADER.pack(MAGIC, FORMAT, bytes(32), start + len(contents), len(encoded)) + table + contents))
+
+
+def seal(blob: bytes) -> bytes:
+    """`blob` with its SHA-256 computed anew."""
+    return blob[:8] + hashlib.sha256(blob[HASHED_FROM:]).digest() + blob[HASHED_FROM:]
+
+
+def blob_hash(blob: bytes) -> str:
+    """The SHA-256 (64 hex digits) a blob carries: the model's identity."""
+    return blob[8:HASHED_FROM].hex()
+
+
+def read_blob(blob: bytes) -> dict[str, np.ndarray | str]:
+    """Sections of a blob: one-dimensional read-only arrays (float64, int32) and text, in stored order.
+
+    Raises ModelError at the first rule that is broken: nothing after it can be trusted.
+    """
+    count = _check_header(blob)
+    sections: dict[str, np.ndarray | str] = {}
+    end = HEADER.size + count * ENTRY.size
+    for i in range(count):
+        name, kind, size, offset = _entry(blob, i)
+        if offset != _aligned(end):
+            raise ModelError(f"model blob: section '{name}' does not begin where the one before it ends")
+        end = offset + size * DTYPE[kind].itemsize
+        if end > len(blob):
+            raise ModelError(f"model blob: section '{name}' reaches beyond the end")
+        if name in sections:
+            raise ModelError(f"model blob: section '{name}' is there twice")
+        sections[name] = _decode(name, kind, np.frombuffer(blob, DTYPE[kind], size, offset))
+    if _aligned(end) != len(blob):
+        raise ModelError(f"model blob: sections end at {end}, the blob at {len(blob)}")
+    return sections
+
+
+def _encode(name: str, value: np.ndarray | str, problems: list[str]) -> tuple[int, np.ndarray]:
+    """Type and stored values of a section; what is wrong with it is added to `problems`."""
+    if not _name_is_good(name):
+        problems.append(f"section name {name!r}: use 1 to {LONGEST_NAME} printable ASCII characters without space")
+    if isinstance(value, str):
+        return TEXT, _encode_text(name, value, problems)
+    array = np.asarray(value)
+    if array.dtype.kind == "f":
+        if not np.all(np.isfinite(array)):
+            problems.append(f"section '{name}': {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite")
+        return F64, np.ascontiguousarray(array, DTYPE[F64])
+    if array.dtype.kind in "iub":
+        limits = np.iinfo(np.int32)
+        if array.size and (array.min() < limits.min or array.max() > limits.max):
+            problems.append(f"section '{name}': integers beyond 32 bits")
+            return I32, np.zeros(0, DTYPE[I32])
+        return I32, np.ascontiguousarray(array, DTYPE[I32])
+    problems.append(f"section '{name}': {array.dtype} is neither float, integer nor text")
+    return I32, np.zeros(0, DTYPE[I32])
+
+
+def _encode_text(name: str, value: str, problems: list[str]) -> np.ndarray:
+    try:
+        data = value.encode()
+    except UnicodeEncodeError:
+        problems.append(f"section '{name}': text is not valid Unicode")
+        data = b""
+    if b"\0" in data:
+        problems.append(f"section '{name}': text contains NUL")
+    return np.frombuffer(data + b"\0", DTYPE[TEXT])
+
+
+def _decode(name: str, kind: int, values: np.ndarray) -> np.ndarray | str:
+    if kind == F64 and not np.all(np.isfinite(values)):
+        raise ModelError(f"model blob: section '{name}' holds a value that is not finite")
+    if kind != TEXT:
+        return values
+    data = values.tobytes()
+    try:
+        text = data.decode()
+    except UnicodeDecodeError:
+        text = ""
+    if text.find("\0") != len(text) - 1 or not text:
+        raise ModelError(f"model blob: section '{name}' is not UTF-8 text that ends with NUL")
+    return text[:-1]
+
+
+def _check_header(blob: bytes) -> int:
+    """Number of sections of a blob whose header and hash are right."""
+    if len(blob) < HEADER.size:
+        raise ModelError(f"model blob: {len(blob)} bytes are too few for a header of {HEADER.size}")
+    magic, version, digest, size, count = HEADER.unpack_from(blob)
+    if magic != MAGIC:
+        raise ModelError("model blob: does not begin with GFMB, this is not a gearfmu model")
+    if version != FORMAT:
+        raise ModelError(f"model blob: format version {version}, this package reads version {FORMAT}: assemble the stage again")
+    if size != len(blob):
+        raise ModelError(f"model blob: header says {size} bytes, there are {len(blob)}: the blob is cut short or padded")
+    if count > MOST_SECTIONS or HEADER.size + count * ENTRY.size > size:
+        raise ModelError(f"model blob: {count} sections do not fit")
+    if any(blob[52 : HEADER.size]):
+        raise ModelError("model blob: reserved bytes of the header are not zero")
+    if digest != hashlib.sha256(blob[HASHED_FROM:]).digest():
+        raise ModelError("model blob: contents do not match their SHA-256, the blob is damaged")
+    return count
+
+
+def _entry(blob: bytes, i: int) -> tuple[str, int, int, int]:
+    """Name, type, number of elements and offset of section i."""
+    raw, kind, reserved, size, offset = ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)
+    name = raw.rstrip(b"\0").decode("latin-1")
+    if not _name_is_good(name):
+        raise ModelError(f"model blob: the name of section {i} is not 1 to {LONGEST_NAME} printable characters")
+    if kind not in DTYPE or reserved:
+        raise ModelError(f"model blob: section '{name}' is of unknown type {kind}")
+    return name, kind, size, offset
+
+
+def _name_is_good(name: str) -> bool:
+    return 0 < len(name) <= LONGEST_NAME and all(" " < c <= "~" for c in name)
+
+
+def _aligned(n: int) -> int:
+    return -(-n // ALIGNMENT) * ALIGNMENT
+
+
+def _pad(contents: bytearray, start: int) -> None:
+    """Fill with zeros up to the next aligned position; `contents` begin at byte `start` of the blob."""
+    contents += bytes(_aligned(start + len(contents)) - start - len(contents))
