@@ -1,0 +1,227 @@
+"""Builds the one shared library of the project from gearfmu/kernel/src/*.c: the gk_ API and the FMI 2 entry points.
+
+One source list, one set of flags (docs/architecture.md, Kernel): contraction of products and sums is off and there is
+no fast-math, so that gcc, clang and zig, Linux and Windows give the same bits. `-Bsymbolic` and hidden visibility keep
+a second FMU in the same process from running the first one's kernel.
+
+    python -m gearfmu.kernel.build [--platform win64] [--sanitize]
+
+This file is also loaded by setup.py before anything is installed: it imports the standard library and gearfmu.errors.
+"""
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib.util
+import os
+import platform as _platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from gearfmu.errors import GearfmuError
+
+HERE = Path(__file__).resolve().parent
+STEM = "gearfmu_kernel"
+SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
+ZIG_TARGET = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
+FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden",
+         "-Wall", "-Wextra", "-Werror")
+REBUILD = "python -m gearfmu.kernel.build"
+CROSS = 'pip install "gearfmu[cross]"'
+
+
+class BuildError(GearfmuError):
+    """The kernel library cannot be built, is missing or does not belong to the sources beside it."""
+
+
+def host_platform() -> str:
+    """FMI 2 name of this machine's platform: "linux64", "win64" or "darwin64".
+
+    Raises BuildError on a 32-bit or unknown system."""
+    name = {"Linux": "linux64", "Windows": "win64", "Darwin": "darwin64"}.get(_platform.system())
+    if name is None or sys.maxsize <= 2**32:
+        raise BuildError(f"no kernel for this system ({_platform.system()} {_platform.machine()}): "
+                         f"gearfmu runs on 64-bit {', '.join(SUFFIX)}")
+    return name
+
+
+def sources(folder: Path = HERE) -> list[Path]:
+    """C sources, headers and tables below `folder`/src in a fixed order; empty when there are none."""
+    found = (p for p in (folder / "src").glob("*") if p.suffix in (".c", ".h", ".inc"))
+    return sorted(found, key=lambda p: p.name)
+
+
+def source_hash(files: Sequence[Path]) -> str:
+    """SHA-256 (hex) over names and contents of `files` and over the flags: what decides the bits of the library.
+
+    Line ends count as one, so that a checkout on Windows has the same hash."""
+    digest = hashlib.sha256("\n".join(FLAGS).encode())
+    for path in files:
+        digest.update(b"\0" + path.name.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n"))
+    return digest.hexdigest()
+
+
+def library_path(platform: str = "host") -> Path:
+    """The built library of `platform` ("host", "linux64", "win64"), known to come from the sources beside it.
+
+    Raises BuildError, naming the remedy, when there is none or when it was built from other sources."""
+    name = _platform_name(platform)
+    option = "" if platform == "host" else f" --platform {name}"
+    folders = _package_folders()
+    found = [f / "lib" / name / (STEM + SUFFIX[name]) for f in folders]
+    library = next((p for p in found if p.is_file()), None)
+    if library is None:
+        needs = "" if name == host_platform() else f" (it needs the cross compiler: {CROSS})"
+        raise BuildError(f"no kernel library for {name} (looked for {', '.join(map(str, found))}): "
+                         f"build it with `{REBUILD}{option}`{needs}")
+    files = next((s for s in map(sources, folders) if s), [])
+    if files and _built_from(library) != source_hash(files):
+        raise BuildError(f"{library} was built from other sources than those in {files[0].parent}: "
+                         f"rebuild it with `{REBUILD}{option}`")
+    return library
+
+
+def build_library(platform: str = "host", sanitize: bool = False, pattern: bool = False, real: str = "float",
+                  out: str | Path | None = None, compiler: Sequence[str] | None = None) -> Path:
+    """Compile and link the library; returns its path.
+
+    platform: "host", or "linux64" / "win64" cross-compiled with ziglang.
+    sanitize: AddressSanitizer and UBSan, any finding ends the process (system compiler).
+    pattern:  uninitialised variables are filled with a pattern (-ftrivial-auto-var-init).
+    real:     type of modal rows and states, "float" (product) or "double" (tests: -DGK_DOUBLE_MODES).
+    out:      file to write; default lib/<platform>[-variant]/ in the package.
+    compiler: another command with flags of its own, e.g. ("gcc", "-O0"); its flags come last.
+    Written under a temporary name, then renamed; a text file beside it holds the hash of the sources.
+    Raises BuildError with the compiler's messages."""
+    name, files = _platform_name(platform), sources()
+    if real not in ("float", "double"):
+        raise BuildError(f"real = {real!r}: use 'float' or 'double'")
+    if not files:
+        raise BuildError(f"no kernel sources in {HERE / 'src'}: reinstall gearfmu")
+    variant = [("sanitize", sanitize), ("pattern", pattern), ("double", real == "double"), ("other", compiler)]
+    folder = HERE / "lib" / "-".join([name, *(label for label, on in variant if on)])
+    target = Path(out) if out else folder / (STEM + SUFFIX[name])
+    command, own_flags = (compiler[:1], compiler[1:]) if compiler else (_compiler(name, sanitize), ())
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=".build-") as work:
+        made = Path(work) / target.name
+        _run([*command, *FLAGS, *_variant_flags(sanitize, pattern, real), *_link_flags(name, sanitize),
+              f"-I{fmi_headers()}", *own_flags, "-o", str(made), *[str(p) for p in files if p.suffix == ".c"]])
+        digest = Path(work) / "digest"
+        digest.write_text(source_hash(files) + "\n")
+        os.replace(made, target)
+        os.replace(digest, _sidecar(target))
+    return target
+
+
+def compile_program(source: Path, out: Path, platform: str = "host") -> Path:
+    """Compile one C program that loads FMUs (tests, benchmarks) with the library's compiler and flags; returns `out`.
+
+    Raises BuildError with the compiler's messages."""
+    name = _platform_name(platform)
+    libraries = [] if name == "win64" else ["-ldl"]
+    _run([*_compiler(name, sanitize=False), *FLAGS, f"-I{fmi_headers()}", f"-I{HERE / 'src'}",
+          "-o", str(out), str(source), *libraries])
+    return out
+
+
+def fmi_headers() -> Path:
+    """Folder of the FMI 2 headers in the installed fmpy (2-clause BSD); raises BuildError when fmpy is missing."""
+    spec = importlib.util.find_spec("fmpy")
+    for place in (spec.submodule_search_locations or []) if spec else []:
+        for folder in (Path(place) / "c-code", Path(place) / "c-code" / "include"):
+            if (folder / "fmi2Functions.h").is_file():
+                return folder
+    raise BuildError("the FMI 2 headers come with the package fmpy, which is not installed here: pip install fmpy")
+
+
+def _platform_name(platform: str) -> str:
+    name = host_platform() if platform == "host" else platform
+    if name not in SUFFIX:
+        raise BuildError(f"unknown platform {name!r}: use host, {', '.join(SUFFIX)}")
+    return name
+
+
+def _package_folders() -> list[Path]:
+    """Folders of gearfmu.kernel: with an editable install sources and library may lie in different ones."""
+    package = sys.modules.get("gearfmu.kernel")
+    folders = [Path(p).resolve() for p in getattr(package, "__path__", [])]
+    return folders if HERE in folders else [HERE, *folders]
+
+
+def _compiler(name: str, sanitize: bool) -> tuple[str, ...]:
+    """ziglang when installed (old glibc, cross-compiling), else the system's compiler; sanitizers need the latter."""
+    serves = name != host_platform() or _platform.machine().lower() in ("x86_64", "amd64")
+    if not sanitize and serves and name in ZIG_TARGET and importlib.util.find_spec("ziglang"):
+        return (sys.executable, "-m", "ziglang", "cc", "-target", ZIG_TARGET[name], "-fno-sanitize=undefined")
+    if name != host_platform():
+        raise BuildError(f"cross-compiling for {name} needs ziglang: {CROSS}")
+    for command in filter(None, (os.environ.get("CC"), "cc", "gcc", "clang")):
+        if shutil.which(command):
+            return (command,)
+    raise BuildError(f"no C compiler found: install gcc or clang, or {CROSS}")
+
+
+def _variant_flags(sanitize: bool, pattern: bool, real: str) -> list[str]:
+    flags = ["-DGK_DOUBLE_MODES"] if real == "double" else []
+    flags += ["-ftrivial-auto-var-init=pattern"] if pattern else []
+    checks = ["-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    return flags + (checks if sanitize else [])
+
+
+def _link_flags(name: str, sanitize: bool) -> list[str]:
+    if name == "win64":
+        return ["-shared", "-Wl,-s"]
+    if name == "darwin64":
+        return ["-fPIC", "-shared"]
+    return ["-fPIC", "-shared", "-Wl,-Bsymbolic", *([] if sanitize else ["-Wl,--no-undefined", "-Wl,-s"])]
+
+
+def _run(command: Sequence[str]) -> None:
+    cache = _cache_folder()
+    folders = {"ZIG_GLOBAL_CACHE_DIR": str(cache / "zig-global"), "ZIG_LOCAL_CACHE_DIR": str(cache / "zig-local")}
+    done = subprocess.run(command, capture_output=True, text=True, env={**folders, **os.environ})
+    if done.returncode:
+        raise BuildError(f"the compiler failed: {' '.join(command)}\n{done.stdout}{done.stderr}".rstrip())
+
+
+def _cache_folder() -> Path:
+    """zig's caches: in a checkout below build/, else in a folder of the user's among the temporary files."""
+    root = HERE.parents[1]
+    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    return root / "build" if (root / "pyproject.toml").is_file() else Path(tempfile.gettempdir()) / f"gearfmu-{user}"
+
+
+def _sidecar(library: Path) -> Path:
+    return library.with_suffix(".sources")
+
+
+def _built_from(library: Path) -> str:
+    try:
+        return _sidecar(library).read_text().strip()
+    except OSError:
+        return ""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line of this module; exit code 0 on success, 1 with one message when the build failed."""
+    parser = argparse.ArgumentParser(prog=REBUILD, description="Build the kernel library from the package's C sources.")
+    parser.add_argument("--platform", default="host", help="host (default), linux64 or win64")
+    parser.add_argument("--sanitize", action="store_true", help="with ASan and UBSan, in a folder of its own")
+    parser.add_argument("--pattern", action="store_true", help="fill uninitialised variables, in a folder of its own")
+    parser.add_argument("--real", default="float", choices=("float", "double"), help="type of modal rows and states")
+    chosen = parser.parse_args(arguments)
+    try:
+        print(build_library(chosen.platform, chosen.sanitize, chosen.pattern, chosen.real))
+    except BuildError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

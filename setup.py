@@ -1,0 +1,61 @@
+"""Builds the kernel library into the package; everything else is in pyproject.toml.
+
+A source install builds the host's kernel only. GEARFMU_PLATFORMS="linux64 win64" (make wheel, with ziglang) puts
+several into one wheel."""
+import importlib.util
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from setuptools import Distribution, setup
+from setuptools.command.bdist_wheel import bdist_wheel
+from setuptools.command.build_py import build_py
+
+ROOT = Path(__file__).resolve().parent
+WHEEL_TAG = {"linux64": "manylinux2014_x86_64.manylinux_2_17_x86_64", "win64": "win_amd64"}
+
+
+def kernel_build():
+    """gearfmu/kernel/build.py, without importing the package: its dependencies are not installed yet."""
+    sys.path.insert(0, str(ROOT))
+    spec = importlib.util.spec_from_file_location("gearfmu_kernel_build", ROOT / "gearfmu" / "kernel" / "build.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def chosen_platforms():
+    return os.environ.get("GEARFMU_PLATFORMS", "").split()
+
+
+class BuildWithKernel(build_py):
+    def run(self):
+        build = kernel_build()
+        libraries = [build.build_library(platform) for platform in chosen_platforms() or [build.host_platform()]]
+        super().run()
+        if not self.editable_mode:  # an editable install finds both in the checkout
+            for library in libraries:
+                self.copy_folder(library.parent, f"kernel/lib/{library.parent.name}")
+            self.copy_folder(ROOT / "reduced_models", "reduced_models")
+
+    def copy_folder(self, source, place):
+        """Into the package that is being built; what an earlier build left there is removed."""
+        target = Path(self.build_lib) / "gearfmu" / place
+        shutil.rmtree(target, ignore_errors=True)
+        shutil.copytree(source, target, ignore=shutil.ignore_patterns(".*", "*.tmp"))
+
+
+class PlatformWheel(bdist_wheel):
+    def get_tag(self):
+        platforms = chosen_platforms()
+        tag = ".".join(WHEEL_TAG[p] for p in platforms) if platforms else super().get_tag()[2]
+        return "py3", "none", tag
+
+
+class BinaryDistribution(Distribution):
+    def has_ext_modules(self):
+        return True
+
+
+setup(distclass=BinaryDistribution, cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel})
