@@ -1,0 +1,67 @@
+"""Text such as "600 N*m" to SI floats. Only the TOML border and the command line call this; everything behind them is SI."""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+
+from gearfmu.errors import UnitError
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
+_UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
+_SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ": "µ"})
+_PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
+_NEWTON_METRE = re.compile(r"\b([kM]?)Nm\b")
+
+
+def to_si(text: object, unit: str) -> float:
+    """The SI value of `text` ("0.1 mm"), which must have the dimension of the SI unit `unit` ("m").
+
+    Angles count: "50 Hz" is no angular speed and "N*m" no torsional stiffness ("N*m/rad"). The result is rounded to 15 significant
+    digits, so that "82.46 mm" and "0.08246 m" are the same number. An empty `unit` means a plain number.
+    Raises UnitError with the remedy.
+    """
+    if isinstance(text, bool) or not isinstance(text, (str, int, float)):
+        raise UnitError(f'expected a quantity such as "1 {unit}"')
+    if not isinstance(text, str):
+        raise UnitError(f'the unit is missing: write "{text:g} {unit}" or another unit of the same kind')
+    match = _NUMBER.match(text)
+    if not match:
+        raise UnitError(f'not a number with a unit: write it like "1.5 {unit}"')
+    number, unit_text = float(match[1]), _plain_unit(match[2])
+    if not unit_text and unit:
+        raise UnitError(f'the unit is missing: write "{match[1]} {unit}" or another unit of the same kind')
+    value = number * _factor(unit_text, unit)
+    if not math.isfinite(value):
+        raise UnitError("the value is not finite")
+    return float(f"{value:.15g}")
+
+
+def _plain_unit(text: str) -> str:
+    return _NEWTON_METRE.sub(r"\1N*m", _PRODUCT_DOT.sub("*", text.translate(_SPELLINGS)))
+
+
+@lru_cache(maxsize=512)
+def _factor(unit_text: str, unit: str) -> float:
+    """How many `unit` one `unit_text` is."""
+    if unit_text == unit:
+        return 1.0
+    if not _UNIT_TEXT.match(unit_text):
+        raise UnitError(f'"{unit_text}" is no unit: use one like "{unit}"')
+    registry = _registry()
+    try:
+        given = registry.Quantity(1.0, registry.parse_units(unit_text)).to_root_units()
+    except Exception as error:  # pint raises its own, tokenize's and arithmetic errors for odd text
+        raise UnitError(f'unknown unit "{unit_text}": use one like "{unit}"') from error
+    wanted = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
+    if given.units != wanted.units:
+        raise UnitError(f'"{unit_text}" is a unit of another kind: use one like "{unit}"')
+    return float(given.magnitude / wanted.magnitude)
+
+
+@lru_cache(maxsize=1)
+def _registry():
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
