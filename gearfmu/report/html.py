@@ -1,0 +1,186 @@
+"""The report of one run: report.html, the data of every plot as CSV, summary.json."""
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfmu.files import write_text
+from gearfmu.report import page, plots, plots_nvh
+from gearfmu.report.metrics import MetricsError
+from gearfmu.report.plots import Plot
+from gearfmu.report.results import key_results, strict
+from gearfmu.report.signals import angle_of_mesh, teeth, window_of_interest
+from gearfmu.stage.trace import Trace, write_columns
+
+
+def write(
+    trace: Trace,
+    summary: Mapping[str, Any],
+    out_dir: str | os.PathLike[str],
+    model: Any = None,
+    bodies: Sequence[Any] | None = None,
+) -> Path:
+    """Write report.html, summary.json and data/<plot>.csv into `out_dir` and return the path of the page.
+
+    trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
+    summary : fields of docs/file-formats.md; what is missing is shown as "not given".
+    model : StageModel, for tooth numbers and the picture; bodies : its ReducedBody objects, for the deformed pair.
+    Raises OSError when the folder cannot be written.
+    """
+    folder = Path(out_dir)
+    results = key_results(trace)
+    made, missing = _plots(trace, model, bodies)
+    for plot in made:
+        write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
+    write_text(folder / "summary.json", json.dumps(strict({**summary, "results": results}), indent=2) + "\n")
+    write_text(folder / "report.html", _document(trace, summary, (made, missing), bodies))
+    return folder / "report.html"
+
+
+def _plots(trace: Trace, model: Any, bodies: Sequence[Any] | None) -> tuple[list[Plot], list[str]]:
+    """Every plot the trace allows, and in words why others are not there."""
+    angle = angle_of_mesh(trace, teeth(trace, model))
+    window = window_of_interest(trace)
+    makers: list[Callable[[], Plot | None]] = [
+        lambda: plots.torque_and_slip(trace),
+        lambda: plots.speeds(trace),
+        lambda: plots.mesh_force_and_error(trace),
+        lambda: plots.mesh_force_and_error(trace, detail_window(trace, angle)),
+        lambda: plots.bearing_forces(trace),
+        lambda: plots_nvh.force_spectrum(trace, window, angle),
+        lambda: plots_nvh.order_cuts(trace, angle),
+        lambda: plots_nvh.force_spectrogram(trace, angle),
+    ]
+    made, missing = [], []
+    for maker in makers:
+        try:
+            plot = maker()
+        except MetricsError as error:
+            missing.append(str(error))
+            continue
+        if plot is not None:
+            made.append(plot)
+    if angle is None:
+        missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
+    return made, list(dict.fromkeys(missing))
+
+
+def detail_window(trace: Trace, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
+    """The last `periods` mesh periods (s), or the last twentieth of the run where mesh angle or motion is missing."""
+    end = float(trace.time[-1])
+    if angle is None or angle[-1] < 2 * np.pi * periods:
+        return end - 0.05 * (end - float(trace.time[0])), end
+    return float(np.interp(angle[-1] - 2 * np.pi * periods, angle, trace.time)), end
+
+
+def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[list[Plot], list[str]], bodies: Sequence[Any] | None) -> str:
+    made, missing = plots_and_gaps
+    title = str(summary.get("scene") or trace.meta.get("scene") or "simulation")
+    stage = str(summary.get("stage") or trace.meta.get("stage") or "stage not named")
+    about = " · ".join(str(summary[key]) for key in ("description", "started") if summary.get(key))
+    body = [
+        page.head(title, str(summary.get("outcome", "outcome not given")), f"{stage}{' · ' + about if about else ''}"),
+        page.facts(_facts(summary)),
+        page.section("Results", _results(trace), _octaves(trace)),
+        *[page.figure(plot) for plot in made],
+        page.section("Accuracy and cost", *_accuracy(summary, bodies)),
+        page.details("Where it comes from", page.pairs_table(_provenance(summary)), _channels(trace)),
+    ]
+    if missing:
+        body.insert(3, page.section("Not shown", *[page.note(reason) for reason in missing]))
+    return page.page(f"{title} – {stage}", body)
+
+
+def _facts(summary: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        "fidelity level": _text(summary, "level"),
+        "dynamic modes, both gears": _text(summary, "n_dyn"),
+        "slices": _text(summary, "slices"),
+        "internal step": _text(summary, "h", 1e6, "µs"),
+        "communication step": _text(summary, "H", 1e6, "µs"),
+        "simulated": _text(summary, "simulated_s", 1, "s"),
+        "CPU time": _text(summary, "cpu_s", 1, "s"),
+        "CPU time per simulated second": _text(summary, "realtime_factor"),
+    }
+
+
+def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = "") -> str:
+    value = summary.get(key)
+    if value is None:
+        return "not given"
+    if isinstance(value, (bool, str)):
+        return str(value)
+    return f"{value * scale:.4g} {unit}".strip()
+
+
+NAMES = {
+    "mesh_force_mean_N": "mesh force, mean, N", "mesh_force_rms_ac_N": "mesh force, rms without mean, N",
+    "te_mean_um": "transmission error, mean, µm", "te_rms_ac_um": "transmission error, rms without mean, µm",
+    "contact_loss_percent": "teeth apart, % of the samples, whole run", "coast_contact_percent": "coast flanks carry, % of the samples, whole run",
+    "impacts": "impacts, whole run", "lock_time_s": "clutch locked from, s",
+}  # fmt: skip
+
+
+def _results(trace: Trace) -> str:
+    window = window_of_interest(trace)
+    rows = []
+    for key, value in key_results(trace).items():
+        bearing = key.removeprefix("bearing_").removesuffix("_rms_ac_N")
+        rows.append((NAMES.get(key, f"bearing {bearing}, rms of both directions without mean, N"), f"{value:.5g}"))
+    where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise."
+    return page.table(("", "value"), rows) + page.note(where) if rows else page.note("The trace holds no mesh or bearing channel.")
+
+
+def _octaves(trace: Trace) -> str:
+    try:
+        levels = plots_nvh.octave_table(trace, window_of_interest(trace))
+    except MetricsError:
+        return ""
+    bands = list(dict.fromkeys(band for row in levels.values() for band in row))
+    if not bands:
+        return ""
+    rows = [(name, *(f"{row[band]:.1f}" for band in bands)) for name, row in levels.items()]
+    return "<h3>Octave bands, dB re 1 N (rms)</h3>" + page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
+
+
+def _accuracy(summary: Mapping[str, Any], bodies: Sequence[Any] | None) -> list[str]:
+    rows = {
+        "Coupling error (Richardson, relative)": _text(summary, "coupling_error"),
+        "Energy residual (relative)": _text(summary, "energy_residual"),
+        "CPU time per simulated second": _text(summary, "realtime_factor"),
+    }
+    parts = [page.pairs_table({name: "not measured in this run" if text == "not given" else text for name, text in rows.items()})]
+    for level, numbers in dict(summary.get("level_errors") or {}).items():
+        parts.append(page.pairs_table({f"level {level}": ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())}))
+    for body in bodies or ():
+        parts.append(page.note(_frf_words(body)))
+    if not summary.get("level_errors"):
+        parts.append(page.note("The error of this fidelity level against the full model was not measured for this run."))
+    return parts
+
+
+def _frf_words(body: Any) -> str:
+    worst = int(np.argmax(body.frf.error))
+    return (f"Body {body.name}: largest relative error of the reduced frequency response {body.frf.error[worst]:.2e} "
+            f"at {body.frf.frequency[worst]:.0f} Hz, band {body.frf.band[0]:g} to {body.frf.band[1]:g} Hz.")  # fmt: skip
+
+
+def _provenance(summary: Mapping[str, Any]) -> dict[str, str]:
+    shown = {"scene", "stage", "outcome", "level", "n_dyn", "slices", "h", "H", "simulated_s", "cpu_s", "realtime_factor", "level_errors"}
+    flat: dict[str, str] = {}
+    for key, value in summary.items():
+        if isinstance(value, Mapping) and key not in shown:
+            flat |= {f"{key}.{inner}": str(item) for inner, item in value.items()}
+        elif key not in shown:
+            flat[key] = str(value)
+    return flat
+
+
+def _channels(trace: Trace) -> str:
+    rows = [(f"{name} – {c.description}" if c.description else name, c.unit) for name, c in trace.channels.items()]
+    return "<h3>Channels in trace.h5</h3>" + page.table(("name", "unit"), rows)

@@ -1,0 +1,162 @@
+"""Figures over time: torque and slip, speeds, mesh force and transmission error, bearing forces."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gearfmu.report.signals import LOCKED, lock_time, shafts, spans
+from gearfmu.report.style import COAST, INK, MUTED, OPEN, panels, styled, svg
+from gearfmu.stage.trace import Trace, heading
+
+TORQUES = (".clutch.capacity", ".clutch.tau", ".shaft.tau", ".tau")
+RPM = 30 / np.pi
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure of the report: file name of its data, title, caption, picture (an element), columns of its CSV."""
+
+    name: str
+    title: str
+    caption: str
+    picture: str
+    columns: dict[str, np.ndarray]
+
+
+def torque_and_slip(trace: Trace) -> Plot | None:
+    """Torques of the drivetrain, and below them the slip of every clutch with its lock-up; None without torques."""
+    torques = [name for suffix in TORQUES for name in trace.channels if name.endswith(suffix)]
+    torques = [name for name in dict.fromkeys(torques) if not _twin(trace, name)]
+    slips = [name for name in trace.channels if name.endswith(".slip")]
+    if not torques:
+        return None
+    with styled():
+        figure, axes = panels((2.5, 1.3) if slips else (2.5,))
+        for name in torques:
+            capacity = name.endswith(".capacity")
+            axes[0].plot(trace.time, trace[name], label=name, **(_DASHED if capacity else {}))
+        _finish(axes[0], "torque in N·m")
+        for name in slips:
+            axes[1].plot(trace.time, trace[name], label=name)
+            _finish(axes[1], "slip in rad/s")
+        _mark_lock(trace, axes)
+        axes[-1].set_xlabel("time in s")
+        picture = svg(figure, "torque")
+    locked = lock_time(trace)
+    caption = "" if locked is None else f"The clutch stays locked from {locked:.4f} s on."
+    return Plot("torque", "Torque and slip", caption, picture, columns(trace, torques + slips))
+
+
+def speeds(trace: Trace) -> Plot | None:
+    """Speed of everything that turns, in rpm, without sign; None when nothing does."""
+    names = [name for name in trace.channels if name.endswith(".w") and trace.channels[name].unit == "rad/s"]
+    if not names:
+        return None
+    with styled():
+        figure, (axis,) = panels((2.3,))
+        for name in names:
+            axis.plot(trace.time, np.abs(trace[name]) * RPM, label=name)
+        _finish(axis, "speed in rpm")
+        axis.set_xlabel("time in s")
+        picture = svg(figure, "speed")
+    return Plot("speed", "Speeds", "Magnitudes; the data keep sign and rad/s.", picture, columns(trace, names))
+
+
+def mesh_force_and_error(trace: Trace, window: tuple[float, float] | None = None) -> Plot | None:
+    """Mesh force and transmission error over the run or a window (s); shaded where the teeth are apart or on the coast
+    flanks; None without either channel."""
+    names = [name for name in ("mesh.force", "mesh.te") if name in trace]
+    if not names:
+        return None
+    part = trace if window is None else trace.window(*window)
+    with styled():
+        figure, axes = panels((1.9,) * len(names))
+        for axis, name in zip(axes, names, strict=True):
+            scale, label = (1e-3, "mesh force in kN") if name == "mesh.force" else (1e6, "transmission error in µm")
+            axis.plot(part.time, part[name] * scale, lw=0.8 if window is None else 1.2)
+            axis.set_ylabel(label)
+            axis.margins(x=0)
+        _shade_contact(part, axes)
+        axes[-1].set_xlabel("time in s")
+        name = "mesh" if window is None else "mesh_detail"
+        picture = svg(figure, name)
+    title = "Mesh force and transmission error" + ("" if window is None else ", detail")
+    extra = [n for n in ("mesh.contact", "mesh.pairs") if n in part]
+    return Plot(name, title, _contact_words(part), picture, columns(part, names + extra))
+
+
+def bearing_forces(trace: Trace) -> Plot | None:
+    """Bearing forces x and y of every shaft over time; None without them."""
+    bearings = [shaft for shaft in shafts(trace) if f"bearing.{shaft}.fx" in trace]
+    if not bearings:
+        return None
+    with styled():
+        figure, axes = panels((1.7,) * len(bearings))
+        for axis, shaft in zip(axes, bearings, strict=True):
+            for direction in ("fx", "fy"):
+                name = f"bearing.{shaft}.{direction}"
+                axis.plot(trace.time, trace[name] * 1e-3, label=name, lw=0.8)
+            _finish(axis, "force in kN")
+        axes[-1].set_xlabel("time in s")
+        picture = svg(figure, "bearing")
+    names = [f"bearing.{shaft}.{direction}" for shaft in bearings for direction in ("fx", "fy")]
+    caption = "Force of the gear on its bearing; x points from pinion to wheel."
+    return Plot("bearing", "Bearing forces", caption, picture, columns(trace, names))
+
+
+def columns(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Time and the named channels under headings that carry the unit, as CSV columns."""
+    found = {"time_[s]": trace.time}
+    for name in names:
+        found[heading(name, trace.channels[name].unit)] = trace[name]
+    return found
+
+
+_DASHED = {"ls": "--", "color": MUTED, "lw": 1.2}
+
+
+def _twin(trace: Trace, name: str) -> bool:
+    """A port torque that repeats the same shaft's own torque is shown once."""
+    stem = name.removesuffix(".tau")
+    other = f"{stem}.shaft.tau"
+    return name != other and other in trace and name == f"{stem}.tau" and np.array_equal(trace[name], trace[other])
+
+
+def _finish(axis: Axes, label: str) -> None:
+    axis.set_ylabel(label)
+    axis.margins(x=0)
+    axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
+
+
+def _mark_lock(trace: Trace, axes: list[Axes]) -> None:
+    for name in trace.channels:
+        if name.endswith(LOCKED):
+            for start, end in spans(trace.time, trace[name].astype(bool)):
+                for axis in axes:
+                    axis.axvspan(start, end, color=COAST, alpha=0.45, lw=0)
+                axes[-1].annotate("locked", (start, 1), (4, -4), xycoords=("data", "axes fraction"), color=INK,
+                                  textcoords="offset points", va="top", fontsize=8.5)  # fmt: skip
+
+
+def _shade_contact(trace: Trace, axes: list[Axes]) -> None:
+    if "mesh.contact" not in trace:
+        return
+    for state, colour in ((0, OPEN), (-1, COAST), (2, GREY_BOTH)):
+        for start, end in spans(trace.time, trace["mesh.contact"] == state):
+            for axis in axes:
+                axis.axvspan(start, end, color=colour, lw=0)
+
+
+GREY_BOTH = "#dcdfe3"
+
+
+def _contact_words(trace: Trace) -> str:
+    if "mesh.contact" not in trace:
+        return ""
+    state = trace["mesh.contact"]
+    shares = [(0, "the teeth are apart", "orange"), (-1, "coast flanks carry", "blue"), (2, "both flanks touch", "grey")]
+    words = [f"{text} in {np.mean(state == code):.1%} of the samples ({shade})" for code, text, shade in shares if np.any(state == code)]
+    return "; ".join(words).capitalize() + "." if words else "The drive flanks carry at every sample."

@@ -1,0 +1,183 @@
+"""Figures over frequency: spectra of the bearing and mesh forces, cuts along mesh orders, spectrogram."""
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gearfmu.report import metrics
+from gearfmu.report.plots import Plot
+from gearfmu.report.signals import Window, shafts
+from gearfmu.report.style import COLOURS, INK, MUTED, panels, styled, svg
+from gearfmu.stage.trace import Trace
+
+RANGE_DB = 90
+ORDERS = 5
+
+
+def force_channels(trace: Trace) -> list[str]:
+    """The channels whose sound matters, most important first: bearing forces, then the mesh force."""
+    names = [f"bearing.{shaft}.{direction}" for shaft in shafts(trace) for direction in ("fx", "fy")]
+    return [name for name in [*names, "mesh.force"] if name in trace]
+
+
+def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) -> Plot | None:
+    """Level of every bearing force and of the mesh force over frequency, mesh orders marked; None without forces."""
+    names = force_channels(trace)
+    if not names:
+        return None
+    part = trace.window(window.start, window.end)
+    step = metrics.sample_step(part.time)
+    spectra = {name: metrics.amplitude_spectrum(part[name], step, _segment(part.time.size)) for name in names}
+    with styled():
+        figure, axes = panels((2.6, 1.9) if "mesh.force" in spectra and len(spectra) > 1 else (2.8,))
+        for index, (name, spectrum) in enumerate(spectra.items()):
+            axis = axes[-1] if name == "mesh.force" else axes[0]
+            colour = INK if name == "mesh.force" else COLOURS[index % len(COLOURS)]
+            axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, color=colour, lw=0.9)
+        for axis in axes:
+            _level_axis(axis, "level in dB re 1 N")
+            _mark_orders(axis, trace, window, mesh_angle)
+        axes[-1].set_xlabel("frequency in kHz")
+        picture = svg(figure, "spectrum")
+    first = next(iter(spectra.values()))
+    caption = (f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
+               f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). {_sampling_words(step)}")  # fmt: skip
+    return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
+
+
+def order_cuts(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
+    """Level of the first mesh orders of every bearing force along the run; None without forces or without the speed."""
+    names = [name for name in force_channels(trace) if not name.endswith(".fx") or len(shafts(trace)) < 2]
+    if mesh_angle is None or not names:
+        return None
+    cuts = {name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS) for name in names}
+    with styled():
+        figure, axes = panels((1.6,) * len(cuts))
+        for axis, (name, cut) in zip(axes, cuts.items(), strict=True):
+            for row, order in enumerate(cut.orders):
+                if np.any(np.isfinite(cut.amplitude[row])):
+                    axis.plot(cut.time, metrics.level(cut.amplitude[row]), label=f"order {order}")
+            _level_axis(axis, "dB re 1 N", trace.time[-1])
+            axis.set_title(name, loc="left", color=INK)
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=ORDERS, borderaxespad=0.1)
+        axes[-1].set_xlabel("time in s")
+        picture = svg(figure, "orders")
+    first = next(iter(cuts.values()))
+    low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
+    caption = (f"Mesh order k = k × mesh frequency, which runs from {low:.0f} to {high:.0f} Hz; Hann window of 8 mesh periods in "
+               "angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate are left out.")  # fmt: skip
+    return Plot("orders", "Mesh orders along the run", caption, picture, _order_columns(cuts))
+
+
+def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
+    """Level of one force over time and frequency with the mesh orders on top; None without forces."""
+    names = force_channels(trace)
+    if not names:
+        return None
+    name = next((n for n in names if n.endswith(".fy")), names[0])
+    step = metrics.sample_step(trace.time)
+    segment = _segment(trace.time.size, windows=14)
+    picture_data = metrics.spectrogram(trace[name], step, segment, max(segment // 16, 1))
+    values = metrics.level(picture_data.amplitude)
+    top = float(np.ceil(values.max() / 5) * 5)
+    with styled():
+        figure, (axis,) = panels((3.3,))
+        time = picture_data.time + trace.time[0]
+        image = axis.pcolormesh(time, picture_data.frequency / 1e3, values.T, vmin=top - RANGE_DB, vmax=top, shading="nearest")
+        figure.colorbar(image, ax=axis, label="level in dB re 1 N", pad=0.01, aspect=30)
+        axis.grid(False)
+        axis.set(xlabel="time in s", ylabel="frequency in kHz", xlim=(time[0], time[-1]), ylim=(0, 0.5e-3 / step))
+        _overlay_orders(axis, trace, mesh_angle, 0.5 / step)
+        picture = _png(figure)
+    caption = (f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
+               f"Dashed: mesh orders from the instantaneous speed. {_sampling_words(step)}")  # fmt: skip
+    data = {"time_[s]": np.repeat(time, picture_data.frequency.size),
+            "frequency_[Hz]": np.tile(picture_data.frequency, time.size), "level_[dB re 1 N]": values.ravel()}  # fmt: skip
+    return Plot("spectrogram", "Spectrogram", caption, picture, data)
+
+
+def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
+    """Octave-band levels in dB re 1 N by channel over `window`, from one full-length Hann window."""
+    part = trace.window(window.start, window.end)
+    step = metrics.sample_step(part.time)
+    return {name: metrics.octave_levels(metrics.amplitude_spectrum(part[name], step)) for name in force_channels(trace)}
+
+
+def _segment(samples: int, windows: int = 3) -> int:
+    """Samples a Hann window for about `windows` windows in the record: a power of two, at least 64 where there are as many."""
+    wanted = max(64, 2 ** int(np.round(np.log2(max(samples / windows, 1)))))
+    return min(wanted, samples)
+
+
+def _sampling_words(step: float) -> str:
+    return f"Sampled every {step * 1e6:.3g} µs without a filter: what the teeth do above {0.5e-3 / step:.3g} kHz folds back."
+
+
+def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:
+    """Limit the level axis to RANGE_DB below the highest line, so that a silent line does not squeeze the rest."""
+    tops = [np.nanmax(line.get_ydata()) for line in axis.lines]
+    lows = [np.nanmin(line.get_ydata()) for line in axis.lines]
+    top = np.ceil((max(tops) + 3) / 10) * 10
+    axis.set_ylim(max(np.floor((min(lows) - 3) / 10) * 10, top - RANGE_DB), top)
+    axis.set_ylabel(label)
+    axis.margins(x=0)
+    if end is not None:
+        axis.set_xlim(0, end)
+    elif len(axis.lines) > 1 or axis.lines[0].get_label():
+        axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
+
+
+def _mark_orders(axis: Axes, trace: Trace, window: Window, mesh_angle: np.ndarray | None) -> None:
+    """Mark mesh orders where the speed is steady enough (5 %) for an order to be a line."""
+    if mesh_angle is None:
+        return
+    inside = (trace.time >= window.start) & (trace.time <= window.end)
+    frequency = np.gradient(mesh_angle, trace.time)[inside] / (2 * np.pi)
+    if np.ptp(frequency) > 0.05 * frequency.mean() or frequency.mean() <= 0:
+        return
+    limit = axis.get_xlim()[1]
+    for order in range(1, int(limit * 1e3 / frequency.mean()) + 1)[:12]:
+        axis.axvline(order * frequency.mean() / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
+        axis.annotate(str(order), (order * frequency.mean() / 1e3, 1), (2, -8), xycoords=("data", "axes fraction"),
+                      textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
+
+
+def _overlay_orders(axis: Axes, trace: Trace, mesh_angle: np.ndarray | None, limit: float) -> None:
+    if mesh_angle is None:
+        return
+    frequency = np.gradient(mesh_angle, trace.time) / (2 * np.pi)
+    for order in range(1, ORDERS + 1):
+        curve = np.where(order * frequency < limit, order * frequency, np.nan)
+        if np.any(np.isfinite(curve)):
+            axis.plot(trace.time, curve / 1e3, color="white", lw=0.8, ls=(0, (4, 4)), alpha=0.75)
+            last = np.flatnonzero(np.isfinite(curve))[-1]
+            x = min(trace.time[last], axis.get_xlim()[1])
+            axis.annotate(f"{order}", (x, curve[last] / 1e3), (-9, 3), textcoords="offset points", color="white", fontsize=8.5)
+
+
+def _spectrum_columns(spectra: Mapping[str, metrics.Spectrum]) -> dict[str, np.ndarray]:
+    found = {"frequency_[Hz]": next(iter(spectra.values())).frequency}
+    for name, spectrum in spectra.items():
+        found[f"{name}_rms_[N]"] = spectrum.amplitude
+        found[f"{name}_[dB re 1 N]"] = metrics.level(spectrum.amplitude)
+    return found
+
+
+def _order_columns(cuts: Mapping[str, metrics.OrderCuts]) -> dict[str, np.ndarray]:
+    first = next(iter(cuts.values()))
+    found = {"time_[s]": first.time, "mesh_frequency_[Hz]": first.mesh_frequency}
+    for name, cut in cuts.items():
+        for row, order in enumerate(cut.orders):
+            found[f"{name}_order_{order}_rms_[N]"] = cut.amplitude[row]
+    return found
+
+
+def _png(figure: object) -> str:
+    """The figure as an <img> element with its PNG inside (for pictures of many cells)."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=170, metadata={"Software": None})  # type: ignore[attr-defined]
+    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'

@@ -1,0 +1,49 @@
+"""The numbers to compare runs by, and their strict JSON."""
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gearfmu.report.metrics import rms_ac
+from gearfmu.report.signals import lock_time, shafts, window_of_interest
+from gearfmu.stage.trace import Trace
+
+
+def key_results(trace: Trace) -> dict[str, float]:
+    """The numbers to compare runs by, over the window of interest; names carry the unit. Peaks are left out: they do not repeat."""
+    window = window_of_interest(trace)
+    part = trace.window(window.start, window.end)
+    found: dict[str, float] = {}
+    if "mesh.force" in part:
+        found |= {"mesh_force_mean_N": float(np.mean(part["mesh.force"])), "mesh_force_rms_ac_N": rms_ac(part["mesh.force"])}
+    if "mesh.te" in part:
+        found |= {"te_mean_um": 1e6 * float(np.mean(part["mesh.te"])), "te_rms_ac_um": 1e6 * rms_ac(part["mesh.te"])}
+    for shaft in shafts(part):
+        forces = [part[f"bearing.{shaft}.{d}"] for d in ("fx", "fy") if f"bearing.{shaft}.{d}" in part]
+        if len(forces) == 2:
+            found[f"bearing_{shaft}_rms_ac_N"] = math.hypot(rms_ac(forces[0]), rms_ac(forces[1]))
+    if "mesh.contact" in trace:
+        found["contact_loss_percent"] = 100 * float(np.mean(trace["mesh.contact"] == 0))
+        found["coast_contact_percent"] = 100 * float(np.mean(trace["mesh.contact"] == -1))
+    if "mesh.impacts" in trace:
+        found["impacts"] = float(trace["mesh.impacts"][-1])
+    locked = lock_time(trace)
+    if locked is not None:
+        found["lock_time_s"] = locked
+    return found
+
+
+def strict(value: Any) -> Any:
+    """`value` as plain JSON: numpy scalars become Python's, numbers that are not finite become null."""
+    if isinstance(value, Mapping):
+        return {str(key): strict(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [strict(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, (int, float, str, type(None))) else str(value)

@@ -1,0 +1,58 @@
+"""One calm look for every figure, and how a figure becomes part of a page."""
+from __future__ import annotations
+
+import io
+import re
+from contextlib import AbstractContextManager
+
+import matplotlib
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+COLOURS = ("#1f5a92", "#c8642b", "#3f8f5f", "#8a5a9e", "#9a8a2f", "#4c4f56", "#b23a48", "#2f9aa0")
+INK, MUTED, GRID, OPEN, COAST = "#23262b", "#6a7079", "#e3e6ea", "#f3d9c8", "#d8e4f2"
+WIDTH = 9.6
+RC = {
+    "font.family": "sans-serif", "font.sans-serif": ["Helvetica Neue", "Arial", "Liberation Sans", "DejaVu Sans"],
+    "font.size": 9.5, "axes.titlesize": 9.5, "axes.labelsize": 9.5, "axes.edgecolor": MUTED, "axes.labelcolor": INK,
+    "axes.linewidth": 0.7, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": GRID,
+    "grid.linewidth": 0.7, "axes.axisbelow": True, "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK, "lines.linewidth": 1.1, "legend.frameon": False, "legend.fontsize": 8.8,
+    "legend.handlelength": 1.6, "svg.fonttype": "none", "axes.unicode_minus": True, "image.cmap": "magma",
+}  # fmt: skip
+
+
+def styled() -> AbstractContextManager[None]:
+    """Context in which figures take this look; leaves the caller's matplotlib settings alone."""
+    cycle = matplotlib.cycler(color=COLOURS)
+    return matplotlib.rc_context({**RC, "axes.prop_cycle": cycle})
+
+
+def panels(heights: tuple[float, ...], share: bool = True) -> tuple[Figure, list[matplotlib.axes.Axes]]:
+    """A figure of stacked panels with the given heights in inches and, when `share`, one common horizontal axis."""
+    figure = Figure(figsize=(WIDTH, sum(heights) + 0.55), layout="constrained")
+    axes = figure.subplots(len(heights), 1, sharex=share, squeeze=False, height_ratios=heights)[:, 0]
+    return figure, list(axes)
+
+
+def svg(figure: Figure, name: str) -> str:
+    """`figure` as an <svg> element for a page: scales with the page, names no outside address, same bytes every time."""
+    buffer = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+    text = buffer.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    return _without_unused_ids(_bare_head(text))
+
+
+def _bare_head(text: str) -> str:
+    """Drop namespaces (HTML knows them) and the fixed size from the <svg> tag."""
+    head, body = text.split(">", 1)
+    head = re.sub(r'\s(xmlns(:\w+)?|version|width|height)="[^"]*"', "", head)
+    return f'{head} role="img">{body}'
+
+
+def _without_unused_ids(text: str) -> str:
+    """Several figures share a page: keep only the ids that are referred to (those carry the figure's salt)."""
+    used = set(re.findall(r"#(\w+)", text))
+    return re.sub(r' id="([^"]*)"', lambda match: match.group(0) if match.group(1) in used else "", text)
