@@ -1,0 +1,1 @@
+"""Elastic gear stages as FMUs."""

@@ -1,0 +1,9 @@
+"""Involute flank, trochoid root, pair geometry: pure functions of numbers (ISO 21771)."""
+
+from __future__ import annotations
+
+from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry.pair import PairGeometry
+from gearfmu.geometry.relief import ReliefCurve
+
+__all__ = ["GearGeometry", "PairGeometry", "ReliefCurve"]

@@ -1,0 +1,174 @@
+"""One external spur gear: reference data, flank, root and cross-section."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gearfmu.geometry import involute
+from gearfmu.geometry.root import RackRounding
+
+_GAUSS = np.polynomial.legendre.leggauss(40)
+
+
+@dataclass(frozen=True)
+class GearGeometry:
+    """An external spur gear in its body frame: tooth 0 centred on +x (ISO 21771:2007 symbols; lengths m, angles rad).
+
+    z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient. r_b, r, r_a: base, reference and tip radius.
+    r_bore: bore radius. tip_edge: radius of the tip edge rounding. h_fp, rho_fp: dedendum and tip rounding of the basic rack (m, not factors).
+    """
+
+    z: int
+    m: float
+    alpha: float
+    x: float
+    r_a: float
+    r_bore: float
+    tip_edge: float
+    h_fp: float
+    rho_fp: float
+
+    @classmethod
+    def of(cls, gear: Any, pair: Any) -> GearGeometry:
+        """The geometry of a GearSpec of a PairSpec."""
+        m = pair.normal_module
+        return cls(
+            z=gear.teeth, m=m, alpha=pair.pressure_angle, x=gear.profile_shift, r_a=gear.tip_diameter / 2,
+            r_bore=gear.bore_diameter / 2, tip_edge=gear.tip_edge_radius,
+            h_fp=gear.rack.dedendum * m, rho_fp=gear.rack.fillet_radius * m,
+        )  # fmt: skip
+
+    @property
+    def r(self) -> float:
+        return self.m * self.z / 2
+
+    @property
+    def r_b(self) -> float:
+        return self.r * math.cos(self.alpha)
+
+    @property
+    def r_f(self) -> float:
+        """Root radius r − h_fP + x m (ISO 21771:2007, eq. 24)."""
+        return self.r - self.h_fp + self.x * self.m
+
+    @property
+    def half_pitch(self) -> float:
+        """Half the angle of a tooth and a space, π/z."""
+        return math.pi / self.z
+
+    @property
+    def psi_b(self) -> float:
+        """Half tooth-thickness angle at the base circle: ψ + inv α (ISO 21771:2007, eqs. 33 and 39)."""
+        return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha))
+
+    @property
+    def rounding(self) -> RackRounding:
+        """The rack's tip rounding that generates the root."""
+        return RackRounding(
+            r=self.r, alpha=self.alpha, centre_depth=self.h_fp - self.rho_fp - self.x * self.m, radius=self.rho_fp,
+            centre_offset=self.m * math.pi / 4 - (self.h_fp - self.rho_fp) * math.tan(self.alpha) - self.rho_fp / math.cos(self.alpha),
+            half_pitch=self.half_pitch,
+        )  # fmt: skip
+
+    @property
+    def s_form(self) -> float:
+        """Roll of the root form point, where the trochoid takes over (negative: undercut)."""
+        return float(self.rounding.form_roll)
+
+    @property
+    def s_a(self) -> float:
+        """Roll of the involute's intersection with the tip circle."""
+        return float(involute.roll_at_radius(self.r_a, self.r_b))
+
+    @property
+    def s_tip(self) -> float:
+        """Roll of the tip form point, where the tip edge rounding (tangent to flank and tip circle) begins."""
+        return self.tip_edge + float(involute.roll_at_radius(self.r_a - self.tip_edge, self.r_b))
+
+    @property
+    def tip_half_angle(self) -> float:
+        """Half tooth-thickness angle at the tip circle, edge rounding left away; negative for a pointed tooth."""
+        return float(involute.flank_angle(self.s_a, self.r_b, self.psi_b))
+
+    @property
+    def tip_land_half_angle(self) -> float:
+        """Half angle of the tip land between the two edge roundings; negative when they do not fit."""
+        roll = self.s_tip - self.tip_edge
+        return self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b)
+
+    def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Points (..., 2) in m of the flank of tooth 0."""
+        return involute.flank_point(roll, self.r_b, self.psi_b, sg)
+
+    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Unit normals (..., 2) out of tooth 0."""
+        return involute.flank_normal(roll, self.r_b, self.psi_b, sg)
+
+    def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
+        """Half tooth-thickness angle (rad) on a circle of `radius` (m) between form and tip circle."""
+        return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
+
+    def tip_edge_centre(self, sg: int = 1) -> np.ndarray:
+        """Centre (2,) in m of the tip edge rounding."""
+        return self.flank_point(self.s_tip, sg) - self.tip_edge * self.flank_normal(self.s_tip, sg)
+
+    def profile(self, points: int = 32) -> np.ndarray:
+        """Outline (P, 2) in m of tooth 0, counter-clockwise from the middle of one space to the middle of the next, tip edges sharp.
+
+        `points` on either flank and trochoid, a quarter of that on root land and half the tip land.
+        """
+        few = max(points // 4, 2)
+        rounding = self.rounding
+        land = self.half_pitch - rounding.land_angle * np.linspace(0, 1, few, endpoint=False)
+        tau = np.linspace(math.pi / 2, self.alpha, points, endpoint=False)
+        roll = np.linspace(self.s_form, self.s_a, points, endpoint=False)
+        tip = self.tip_half_angle * np.linspace(1, 0, few)
+        root = self.r_f * np.stack([np.cos(land), np.sin(land)], axis=-1)
+        top = self.r_a * np.stack([np.cos(tip), np.sin(tip)], axis=-1)
+        half = np.concatenate([root, rounding.point(tau), self.flank_point(roll), top])
+        return np.concatenate([half * [1, -1], half[-2::-1]])
+
+    def radius_moment(self, power: int) -> float:
+        """∫ r^power dθ over the outline of one sector (both sides), tip edges sharp; dθ along the outline from the middle of the tooth."""
+        tip = self.tip_half_angle * self.r_a**power
+        land = self.rounding.land_angle * self.r_f**power
+        return 2 * (tip + land + self._flank_moment(power) + self._root_moment(power))
+
+    def _flank_moment(self, power: int) -> float:
+        """dθ = u²/(1+u²) du with u = s/r_b."""
+        low, high = self.s_form / self.r_b, self.s_a / self.r_b
+        u = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
+        values = u * u / (1 + u * u) * (self.r_b * np.sqrt(1 + u * u)) ** power
+        return float(0.5 * (high - low) * np.dot(_GAUSS[1], values))
+
+    def _root_moment(self, power: int) -> float:
+        edges = np.linspace(self.alpha, math.pi / 2, 5)
+        total = 0.0
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            tau = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
+            total += 0.5 * (high - low) * float(np.dot(_GAUSS[1], self.rounding.polar(tau)[0] ** power * self._root_slope(tau)))
+        return total
+
+    def _root_slope(self, tau: np.ndarray) -> np.ndarray:
+        """dθ/dτ of the trochoid (θ from the tooth's middle)."""
+        g = self.rounding
+        sin, cos = np.sin(tau), np.cos(tau)
+        across, up = g.radius * cos + g.centre_depth * cos / sin, g.r - g.centre_depth - g.radius * sin
+        d_across, d_up = -g.radius * sin - g.centre_depth / sin**2, -g.radius * cos
+        turn = g.centre_depth / sin**2 / g.r
+        return -((d_across * up - across * d_up) / (across**2 + up**2) + turn)
+
+    @property
+    def sector_area(self) -> float:
+        """Area (m²) of the cross-section of one tooth with half a space on either side, down to the bore."""
+        return 0.5 * self.radius_moment(2) - self.half_pitch * self.r_bore**2
+
+    @property
+    def sector_polar_moment(self) -> float:
+        """Second polar moment ∫ r² dA (m⁴) of one sector's cross-section about the gear's axis."""
+        return 0.25 * self.radius_moment(4) - 0.5 * self.half_pitch * self.r_bore**4

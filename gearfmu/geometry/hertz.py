@@ -1,0 +1,24 @@
+"""Hertz's line contact, for the check of the load strip."""
+
+from __future__ import annotations
+
+import math
+
+
+def contact_modulus(modulus: tuple[float, float], poisson: tuple[float, float]) -> float:
+    """E* (Pa) with 1/E* = (1−ν₁²)/E₁ + (1−ν₂²)/E₂."""
+    return 1.0 / sum((1 - nu * nu) / e for e, nu in zip(modulus, poisson, strict=True))
+
+
+def half_width(load: float, radius: float, e_star: float) -> float:
+    """Half width b (m) of the contact of cylinders: √(4 w ρ/(π E*)); load w in N/m, relative radius of curvature ρ in m.
+
+    Johnson, *Contact Mechanics*, eq. 4.43.
+    """
+    return math.sqrt(4 * load * radius / (math.pi * e_star))
+
+
+def largest_relative_radius(length: float, low: float, high: float) -> float:
+    """Largest s (L − s)/L for s in [low, high]: relative radius of curvature of two involutes along the path of contact (m)."""
+    roll = min(max(length / 2, low), high)
+    return roll * (length - roll) / length
