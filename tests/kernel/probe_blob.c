@@ -18,7 +18,7 @@ int probe_blob_sum(const void *bytes, size_t size, const char *name, int type, d
     *sum = 0;
     *count = UINT64_MAX;
     if (outcome != GK_OK) return outcome;
-    uint64_t n;
+    uint64_t n = 0;
     const double *f = type == 1 ? gk_blob_f64(&blob, name, &n) : NULL;
     const int32_t *k = type == 2 ? gk_blob_i32(&blob, name, &n) : NULL;
     const char *t = type == 3 ? gk_blob_text(&blob, name, &n) : NULL;

@@ -1,0 +1,17 @@
+"""Shared by the kernel's tests: helper modules of this folder can be imported by name, and the probe library is compiled once."""
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from probes import Probes, compile_probes  # noqa: E402  (found through the line above)
+
+
+@pytest.fixture(scope="session")
+def probes(tmp_path_factory: pytest.TempPathFactory) -> Probes:
+    """gk_math.c, gk_blob.c and gk_sha256.c behind array functions, with the project's flags and the system's compiler."""
+    return Probes(compile_probes(tmp_path_factory.mktemp("probes") / "probes.so"))

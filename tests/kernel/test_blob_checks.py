@@ -1,0 +1,127 @@
+"""The kernel's checks of a blob: SHA-256 against hashlib, each rule broken once, and the same verdict as the Python reader on random damage."""
+from __future__ import annotations
+
+import hashlib
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mutations import mutated
+from probes import Probes
+
+from gearfmu.errors import ModelError
+from gearfmu.stage.blob import ENTRY, HEADER, F64, I32, TEXT, blob_hash, read_blob, seal, write_blob
+
+BAD_BLOB = 1
+SAMPLE = {"name": "fzg_c µ", "roll": np.arange(1.0, 20.0), "teeth": np.array([16, -24]), "none": np.zeros(0), "more": np.full(8, -2.5)}
+BLOB = write_blob(SAMPLE)
+TYPE, COUNT, OFFSET = 24, 32, 40  # places in a table entry
+
+
+def entry(i: int) -> int:
+    return HEADER.size + i * ENTRY.size
+
+
+def patched(place: int, data: bytes) -> bytes:
+    return seal(BLOB[:place] + data + BLOB[place + len(data) :])
+
+
+def test_opens_anywhere_on_8_bytes(probes: Probes) -> None:
+    for shift in (0, 8, 16, 56):
+        assert probes.blob_open(BLOB, shift) == (0, "", blob_hash(BLOB), len(SAMPLE))
+    outcome, message, _, sections = probes.blob_open(BLOB, 4)
+    assert outcome == BAD_BLOB and "aligned to 8 bytes" in message and sections == 0
+
+
+def test_sections_are_found_by_name_and_type(probes: Probes) -> None:
+    assert probes.blob_sum(BLOB, "roll", F64) == (190.0, 19)
+    assert probes.blob_sum(BLOB, "teeth", I32) == (-8.0, 2)
+    assert probes.blob_sum(BLOB, "none", F64) == (0.0, 0)
+    assert probes.blob_sum(BLOB, "name", TEXT)[1] == len("fzg_c µ".encode()) + 1
+    assert probes.blob_sum(BLOB, "roll", I32) is None
+    assert probes.blob_sum(BLOB, "rol", F64) is None and probes.blob_sum(BLOB, "rolls", F64) is None
+
+
+@pytest.mark.parametrize("length", [*range(0, 132), 1000, 10**6])
+def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
+    blob = bytearray(write_blob({"t": "x" * length}))
+    outcome, message, digest, _ = probes.blob_open(bytes(blob))
+    assert (outcome, message) == (0, "") and digest == hashlib.sha256(blob[40:]).hexdigest()
+
+
+@pytest.mark.parametrize(("damage", "words"), [
+    (BLOB[:10], "10 bytes are too few"),
+    (b"GFMC" + BLOB[4:], "does not begin with GFMB"),
+    (patched(4, b"\x02"), "format version 2, this kernel reads version 1"),
+    (BLOB[:-64], "cut short"),
+    (patched(40, struct.pack("<Q", len(BLOB) + 1)), "cut short"),
+    (patched(48, struct.pack("<I", 2**32 - 1)), "sections do not fit"),
+    (patched(48, struct.pack("<I", 1000)), "sections do not fit"),
+    (patched(48, struct.pack("<I", 4)), "does not begin where"),
+    (patched(63, b"\1"), "reserved bytes"),
+    (BLOB[:-100] + b"\1" + BLOB[-99:], "do not match their SHA-256"),
+    (patched(entry(1), b" "), "name of section 1"),
+    (patched(entry(1), b"\0"), "name of section 1"),
+    (patched(entry(1) + 20, b"x"), "name of section 1"),
+    (patched(entry(0), b"y" * 24), "name of section 0"),
+    (patched(entry(2), b"name\0"), "'name' is there twice"),
+    (patched(entry(1) + TYPE, b"\4"), "'roll' is of unknown type 4"),
+    (patched(entry(1) + TYPE + 4, b"\1"), "'roll' is of unknown type"),
+    (patched(entry(2) + COUNT, struct.pack("<Q", 2**62)), "'teeth' reaches beyond the end"),
+    (patched(entry(2) + COUNT, struct.pack("<Q", 2**64 - 1)), "'teeth' reaches beyond the end"),
+    (patched(entry(1) + COUNT, struct.pack("<Q", 8)), "'teeth' does not begin where"),
+    (patched(entry(1) + OFFSET, struct.pack("<Q", 2**64 - 64)), "'roll' does not begin where"),
+    (patched(entry(4) + COUNT, struct.pack("<Q", 9)), "'more' reaches beyond the end"),
+    (patched(entry(4) + COUNT, struct.pack("<Q", 0)), "sections end at"),
+    (patched(len(BLOB) - 8, struct.pack("<d", np.inf)), "'more' holds a value that is not finite"),
+    (patched(len(BLOB) - 8, struct.pack("<d", np.nan)), "'more' holds a value that is not finite"),
+    (patched(entry(0) + COUNT, b"\7"), "'name' is not UTF-8 text that ends with NUL"),
+    (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\xff"), "'name' is not UTF-8"),
+    (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\0"), "'name' is not UTF-8"),
+])
+def test_each_rule(probes: Probes, damage: bytes, words: str) -> None:
+    outcome, message, _, sections = probes.blob_open(damage)
+    assert outcome == BAD_BLOB and words in message and sections == 0
+    with pytest.raises(ModelError, match=words.replace("kernel", "package").replace("(", r"\(")):
+        read_blob(damage)
+
+
+@settings(max_examples=300)
+@given(st.binary(min_size=1, max_size=12))
+def test_utf8_verdict_is_python_s(probes: Probes, data: bytes) -> None:
+    blob = bytearray(write_blob({"t": "x" * len(data)}))
+    start = ENTRY.unpack_from(blob, HEADER.size)[4]
+    blob[start : start + len(data)] = data
+    try:
+        good = "\0" not in data.decode()
+    except UnicodeDecodeError:
+        good = False
+    assert (probes.blob_open(seal(bytes(blob)))[0] == 0) == good
+
+
+def test_every_unicode_boundary(probes: Probes) -> None:
+    text = "".join(map(chr, (1, 0x7F, 0x80, 0x7FF, 0x800, 0xD7FF, 0xE000, 0xFFFF, 0x10000, 0x10FFFF)))
+    assert probes.blob_open(write_blob({"t": text}))[0] == 0
+    for wrong in (b"\xc0\x80", b"\xe0\x80\x80", b"\xed\xa0\x80", b"\xf0\x80\x80\x80", b"\xf4\x90\x80\x80", b"\xf5\x80\x80\x80", b"\x80", b"\xe2\x82"):
+        blob = bytearray(write_blob({"t": "x" * len(wrong)}))
+        start = ENTRY.unpack_from(blob, HEADER.size)[4]
+        blob[start : start + len(wrong)] = wrong
+        assert probes.blob_open(seal(bytes(blob)))[0] == BAD_BLOB, wrong
+
+
+def test_kernel_and_python_agree_on_random_damage(probes: Probes) -> None:
+    rng = np.random.default_rng(3)
+    accepted = 0
+    for _ in range(3000):
+        damage = mutated(BLOB, rng)
+        try:
+            read_blob(damage)
+            expected = 0
+        except ModelError:
+            expected = BAD_BLOB
+        outcome, message, _, _ = probes.blob_open(damage)
+        assert outcome == expected and bool(message) == bool(outcome), (expected, outcome, message)
+        accepted += outcome == 0
+    assert 100 < accepted < 2900  # both sides of the border were visited

@@ -1,0 +1,151 @@
+"""Elementary functions of the kernel against mpmath: at most 2 ulp everywhere, exact at the special points, the same bits from every compiler."""
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import minimax
+import mpmath as mp
+import numpy as np
+import pytest
+from probes import Probes, compile_probes, compilers, source_folder
+
+LIMIT = 2.0  # ulp
+RNG = np.random.default_rng(20150712)
+N = 3000
+
+HALF_PI = mp.pi / 2
+
+
+def near_multiples_of_half_pi(count: int) -> np.ndarray:
+    """Doubles next to k π/2 for k below 6.3e8, where the reduction loses the most."""
+    k = np.unique(np.concatenate([np.arange(1, 200), RNG.integers(1, int(6.3e8), count)]))
+    return np.array([float(int(i) * HALF_PI) for i in k])
+
+
+def signed(x: np.ndarray) -> np.ndarray:
+    return np.concatenate([x, -x])
+
+
+EXP_POINTS = np.concatenate([
+    RNG.uniform(-745, 709.7, N), signed(10.0 ** RNG.uniform(-20, 0, N)), np.arange(-708, 709) * np.log(2),
+    RNG.uniform(-745.13, -708, 500)])
+LOG_POINTS = np.concatenate([
+    np.exp(RNG.uniform(-700, 700, N)), RNG.uniform(0.5, 2, N), 1 + signed(10.0 ** RNG.uniform(-15.5, -1, N)),
+    10.0 ** RNG.uniform(-323, -308, 500), np.sqrt(0.5) * (1 + np.arange(-20, 20) * 2.0**-53)])
+CIRCLE_POINTS = np.concatenate([
+    signed(10.0 ** RNG.uniform(-300, 9, N)), RNG.uniform(-8, 8, N), near_multiples_of_half_pi(N), np.array([1e9, -1e9])])
+ACOS_POINTS = np.concatenate([
+    RNG.uniform(-1, 1, N), 1 - 10.0 ** RNG.uniform(-16, 0, N), -1 + 10.0 ** RNG.uniform(-16, 0, N),
+    signed(10.0 ** RNG.uniform(-300, 0, N)), 0.5 + np.arange(-20, 20) * 2.0**-54, -0.5 + np.arange(-20, 20) * 2.0**-54])
+
+
+def ulps(value: np.ndarray, exact: list[mp.mpf]) -> np.ndarray:
+    """Error in units of the last place of the exact value."""
+    unit = [mp.mpf(float(np.spacing(abs(float(e))))) for e in exact]
+    return np.array([float(abs(mp.mpf(float(v)) - e) / u) for v, e, u in zip(value, exact, unit, strict=True)])
+
+
+@pytest.mark.parametrize(("name", "function", "points"), [
+    ("exp", mp.exp, EXP_POINTS), ("log", mp.log, LOG_POINTS), ("sin", mp.sin, CIRCLE_POINTS),
+    ("cos", mp.cos, CIRCLE_POINTS), ("acos", mp.acos, ACOS_POINTS)])
+def test_error_of_functions_of_one_variable(probes: Probes, name: str, function: Callable, points: np.ndarray) -> None:
+    error = ulps(probes.one(name, points), [function(mp.mpf(float(x))) for x in points])
+    worst = int(np.argmax(error))
+    assert error[worst] <= LIMIT, f"{name}({points[worst]!r}) is {error[worst]:.3f} ulp off"
+
+
+def test_error_of_atan2(probes: Probes) -> None:
+    radius, angle = 10.0 ** RNG.uniform(-150, 150, 3 * N), RNG.uniform(-np.pi, np.pi, 3 * N)
+    y = np.concatenate([radius * np.sin(angle), signed(10.0 ** RNG.uniform(-320, 308, N)), RNG.uniform(0.41, 0.42, N)])
+    x = np.concatenate([radius * np.cos(angle), signed(10.0 ** RNG.uniform(-320, 308, N)), np.ones(N)])
+    exact = [mp.atan2(mp.mpf(float(a)), mp.mpf(float(b))) for a, b in zip(y, x, strict=True)]
+    error = ulps(probes.atan2(y, x), exact)
+    worst = int(np.argmax(error))
+    assert error[worst] <= LIMIT, f"atan2({y[worst]!r}, {x[worst]!r}) is {error[worst]:.3f} ulp off"
+
+
+@pytest.mark.full
+def test_error_against_long_double_on_a_dense_net(probes: Probes) -> None:
+    if np.finfo(np.longdouble).nmant < 63:
+        pytest.skip("this machine's long double is no wider than double: nothing to compare with; run on x86-64")
+    rng, n = np.random.default_rng(7), 4_000_000
+    for name, function, x in (
+        ("exp", np.exp, rng.uniform(-700, 709, n)), ("exp", np.exp, rng.uniform(-1, 1, n)),
+        ("log", np.log, np.exp(rng.uniform(-700, 700, n))), ("log", np.log, rng.uniform(0.5, 2, n)),
+        ("sin", np.sin, rng.uniform(-1e5, 1e5, n)), ("cos", np.cos, rng.uniform(-10, 10, n)),
+        ("acos", np.arccos, rng.uniform(-1, 1, n)),
+    ):
+        exact = function(x.astype(np.longdouble))
+        error = np.abs(probes.one(name, x) - exact) / np.spacing(np.abs(exact.astype(float)))
+        assert error.max() <= 1.0, f"{name}({x[np.argmax(error)]!r}) is {error.max():.3f} ulp off"
+
+
+def test_special_points(probes: Probes) -> None:
+    inf, nan = np.inf, np.nan
+    for name, x, y in (
+        ("exp", [0.0, -0.0, 710.0, -746.0, inf, -inf, nan], [1, 1, inf, 0, inf, 0, nan]),
+        ("log", [1.0, 0.0, -1.0, inf, -inf, nan], [0, -inf, nan, inf, nan, nan]),
+        ("acos", [1.0, -1.0, 0.0, 1.0000000000000002, nan, inf], [0, np.pi, np.pi / 2, nan, nan, nan]),
+    ):
+        np.testing.assert_array_equal(probes.one(name, np.array(x)), y)
+    outside = np.array([1.0000000000000002e9, -2e9, inf, -inf, nan])
+    assert np.all(np.isnan(probes.one("sin", outside))) and np.all(np.isnan(probes.one("cos", outside)))
+
+
+def test_signs_of_zero_and_quadrants(probes: Probes) -> None:
+    assert list(np.signbit(probes.one("sin", np.array([-0.0, 0.0])))) == [True, False]
+    values = np.array([0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, 1.7e308])
+    y, x = (v.ravel() for v in np.meshgrid(values, values))
+    with np.errstate(all="ignore"):
+        expected = np.arctan2(y, x)
+    got = probes.atan2(y, x)
+    np.testing.assert_allclose(got, expected, rtol=4e-16)
+    np.testing.assert_array_equal(np.signbit(got[~np.isnan(got)]), np.signbit(expected[~np.isnan(got)]))
+
+
+def test_identities_that_the_geometry_uses(probes: Probes) -> None:
+    x = RNG.uniform(-1e6, 1e6, 20000)
+    sine, cosine = probes.one("sin", x), probes.one("cos", x)
+    np.testing.assert_allclose(sine**2 + cosine**2, 1.0, rtol=0, atol=5e-16)
+    turned = x - 2 * np.pi * np.round(x / (2 * np.pi))
+    np.testing.assert_allclose(probes.atan2(sine, cosine), turned, rtol=0, atol=2e-10)
+    assert np.array_equal(probes.one("sin", -x), -sine) and np.array_equal(probes.one("cos", -x), cosine)
+
+
+def test_monotone_across_the_joints(probes: Probes) -> None:
+    """Neighbouring doubles around the joints of the reductions do not step back by more than the error bound."""
+    for name, joint, sign in (("exp", np.log(2) / 2, 1), ("log", np.sqrt(0.5), 1), ("acos", 0.5, -1), ("acos", -0.5, -1), ("sin", np.pi / 4, 1)):
+        x = joint + np.arange(-3000, 3000) * np.spacing(joint)
+        y = sign * probes.one(name, x)
+        assert np.diff(y).min() >= -2 * np.spacing(abs(y).max()), name
+
+
+def test_coefficients_in_the_source_are_those_of_the_generator() -> None:
+    text = (source_folder() / "gk_math.c").read_text()
+    for name, expected in [(k.name, minimax.coefficients(k)) for k in minimax.KERNELS] + [("PIO2", minimax.pio2_parts())]:
+        found = re.search(rf"static const double {name}\[\] = \{{([^}}]*)\}}", text)
+        assert found, f"no array {name} in gk_math.c"
+        assert [float.fromhex(c) for c in found.group(1).replace("\n", " ").split(",")] == expected, name
+
+
+def outputs_hash(probes: Probes) -> str:
+    """SHA-256 over the bits of every function on a fixed set of points."""
+    rng = np.random.default_rng(1)
+    parts = [probes.one("exp", rng.uniform(-745, 709, 20000)), probes.one("log", np.exp(rng.uniform(-700, 700, 20000))),
+             probes.one("sin", rng.uniform(-1e9, 1e9, 20000)), probes.one("cos", rng.uniform(-10, 10, 20000)),
+             probes.one("acos", rng.uniform(-1, 1, 20000)), probes.atan2(rng.normal(size=20000), rng.normal(size=20000))]
+    return hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest()
+
+
+FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": ("-O3",), "native": ("-O3", "-march=native")}
+QUICK = {("gcc", "O0"), ("gcc", "native"), ("clang", "O3")}
+VARIANTS = [pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full]) for c in compilers() for f in FLAG_SETS]
+
+
+@pytest.mark.parametrize(("compiler", "flags"), VARIANTS)
+def test_same_bits_from_every_compiler(probes: Probes, compiler: str, flags: str, tmp_path: Path) -> None:
+    other = Probes(compile_probes(tmp_path / "other.so", compilers()[compiler], FLAG_SETS[flags]))
+    assert outputs_hash(other) == outputs_hash(probes)

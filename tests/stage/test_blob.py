@@ -1,0 +1,77 @@
+"""The model blob in Python: what is written is read back, one content has one sequence of bytes, and what is wrong is said."""
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as stn
+
+from gearfmu.errors import ModelError
+from gearfmu.stage.blob import ENTRY, HEADER, blob_hash, read_blob, seal, write_blob
+
+SAMPLE = {"name": "fzg_c µm", "roll": np.linspace(0.01, 0.02, 7), "teeth": np.array([16, 24]), "empty": np.zeros(0), "flags": np.array([True, False])}
+
+names = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=23)
+values = st.one_of(
+    st.text(st.characters(min_codepoint=1, codec="utf-8"), max_size=70),
+    stn.arrays(np.float64, stn.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=9), elements=st.floats(allow_nan=False, allow_infinity=False)),
+    stn.arrays(np.int32, st.integers(0, 40)),
+)
+
+
+@given(st.dictionaries(names, values, max_size=8))
+def test_what_is_written_is_read_back(sections: dict) -> None:
+    blob = write_blob(sections)
+    back = read_blob(blob)
+    assert list(back) == list(sections)
+    for name, value in sections.items():
+        if isinstance(value, str):
+            assert back[name] == value
+        else:
+            assert back[name].tobytes() == value.tobytes() and back[name].dtype == value.dtype
+    assert write_blob(back) == blob
+
+
+def test_layout() -> None:
+    blob = write_blob(SAMPLE)
+    assert blob[:4] == b"GFMB" and len(blob) % 64 == 0
+    assert blob_hash(blob) == hashlib.sha256(blob[40:]).hexdigest()
+    for i in range(len(SAMPLE)):
+        assert ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)[4] % 64 == 0
+
+
+def test_arrays_read_are_constant() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        read_blob(write_blob(SAMPLE))["roll"][0] = 1.0
+
+
+def test_all_problems_of_a_write_at_once() -> None:
+    bad = {"": np.zeros(1), "a name with spaces": np.zeros(1), "x" * 24: np.zeros(1), "inf": np.array([1.0, np.inf, np.nan]),
+           "big": np.array([2**31]), "complex": np.array([1j]), "nul": "a\0b"}
+    with pytest.raises(ModelError) as caught:
+        write_blob(bad)
+    for part in ("''", "'a name with spaces'", "x" * 24, "2 of 3 values", "'big': integers beyond 32 bits", "'complex'", "'nul': text contains NUL"):
+        assert part in str(caught.value)
+
+
+def test_every_changed_byte_is_noticed() -> None:
+    blob = write_blob(SAMPLE)
+    for i in range(len(blob)):
+        with pytest.raises(ModelError):
+            read_blob(blob[:i] + bytes([blob[i] ^ 0x40]) + blob[i + 1 :])
+
+
+def test_every_length_but_the_right_one_is_refused() -> None:
+    blob = write_blob(SAMPLE)
+    for length in (*range(len(blob)), len(blob) + 1):
+        with pytest.raises(ModelError):
+            read_blob((blob + b"\0")[:length])
+
+
+def test_another_version_names_the_remedy() -> None:
+    blob = write_blob(SAMPLE)
+    with pytest.raises(ModelError, match="version 9, this package reads version 1: assemble the stage again"):
+        read_blob(seal(blob[:4] + b"\x09\0\0\0" + blob[8:]))
