@@ -1,0 +1,1 @@
+"""Coupling: units, masters, drivetrain parts and the run of a scene."""

@@ -1,0 +1,57 @@
+"""Functions of time that may jump: what a drivetrain receives from outside (clutch capacity, torque)."""
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+TIME_NOISE = 1e-9  # s: two times closer than this are one (communication points carry rounding noise)
+
+
+class Signal(Protocol):
+    """A function of time, asked for its two ends over an interval: right limit at `t0`, left limit at `t1`."""
+
+    def ends(self, t0: float, t1: float) -> tuple[float, float]: ...
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same value at all times."""
+
+    value: float
+
+    def ends(self, t0: float, t1: float) -> tuple[float, float]:
+        return self.value, self.value
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """A continuous function of time."""
+
+    function: Callable[[float], float]
+
+    def ends(self, t0: float, t1: float) -> tuple[float, float]:
+        return self.function(t0), self.function(t1)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Straight lines through the points (time s, value), constant before the first and after the last.
+
+    The same time twice is a jump. Jumps and corners are exact when they fall on the micro-steps of the unit.
+    """
+
+    points: tuple[tuple[float, float], ...]
+
+    def ends(self, t0: float, t1: float) -> tuple[float, float]:
+        return self._limit(t0 + TIME_NOISE, t0, bisect_right), self._limit(t1 - TIME_NOISE, t1, bisect_left)
+
+    def _limit(self, near: float, time: float, bisect: Callable) -> float:
+        k = bisect([t for t, _ in self.points], near)
+        if k == 0:
+            return self.points[0][1]
+        if k == len(self.points):
+            return self.points[-1][1]
+        (ta, va), (tb, vb) = self.points[k - 1], self.points[k]
+        return va + (vb - va) * min(max((time - ta) / (tb - ta), 0.0), 1.0)

@@ -1,0 +1,24 @@
+"""What a master knows of a unit: names resolved once, then set / step / get / save / restore."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+
+class Unit(Protocol):
+    """One side of a coupling.
+
+    `resolve` is called once for each set of names and returns a handle with its own buffers; `get` fills and returns the handle's buffer (k,), which
+    the next `get` with that handle overwrites. `save` returns a state that `restore` takes back any number of times, bit for bit.
+    `step` raises SimulationError when the unit cannot go on.
+    """
+
+    def initialize(self, time: float) -> None: ...
+    def resolve(self, names: Sequence[str]) -> Any: ...
+    def set(self, handle: Any, values: Sequence[float]) -> None: ...
+    def get(self, handle: Any) -> np.ndarray: ...
+    def step(self, time: float, h: float) -> None: ...
+    def save(self) -> Any: ...
+    def restore(self, state: Any) -> None: ...
