@@ -131,7 +131,7 @@ def _results(trace: Trace) -> str:
     rows = []
     for key, value in key_results(trace).items():
         bearing = key.removeprefix("bearing_").removesuffix("_rms_ac_N")
-        rows.append((NAMES.get(key, f"bearing {bearing}, rms of both directions without mean, N"), f"{value:.5g}"))
+        rows.append((NAMES.get(key, f"bearing {bearing}, rms of both directions without mean, N"), f"{value:.4g}"))
     where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise."
     return page.table(("", "value"), rows) + page.note(where) if rows else page.note("The trace holds no mesh or bearing channel.")
 

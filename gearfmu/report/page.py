@@ -20,19 +20,20 @@ figure{margin:0}
 svg,img{display:block;width:100%;height:auto}
 figcaption,.note{color:var(--muted);font-size:13px;margin:6px 0 4px}
 a{color:var(--accent)}
-.facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:1px;background:var(--line);
+.facts{display:grid;grid-template-columns:repeat(4,1fr);gap:1px;background:var(--line);
 border:1px solid var(--line);border-radius:6px;overflow:hidden;margin:0 0 16px}
 .facts div{background:#fff;padding:9px 14px}
 .facts b{display:block;font-size:18px;font-weight:600;letter-spacing:-.01em;overflow-wrap:anywhere}
 .facts span{color:var(--muted);font-size:12.5px}
 .ok,.bad{display:inline-block;border-radius:4px;padding:1px 9px;font-size:13px;font-weight:600;vertical-align:5px;margin-left:8px}
 .ok{background:#dff0e4;color:#20623a}.bad{background:#f8dcd9;color:#8f2018}
-table{border-collapse:collapse;font-size:13.5px;width:100%}
-th,td{text-align:left;padding:4px 12px 4px 0;border-bottom:1px solid var(--line);vertical-align:top}
+table{border-collapse:collapse;font-size:13.5px;min-width:min(560px,100%)}
+th,td{text-align:left;padding:4px 22px 4px 0;border-bottom:1px solid var(--line);vertical-align:top}
 th{color:var(--muted);font-weight:500}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}
 code{font:12.5px ui-monospace,"DejaVu Sans Mono",Menlo,monospace;overflow-wrap:anywhere}
 details summary{cursor:pointer;font-weight:600}
+@media (max-width:700px){.facts{grid-template-columns:repeat(2,1fr)}}
 @media print{body{background:#fff}section{break-inside:avoid}}
 """
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from gearfmu.report import metrics
 from gearfmu.report.plots import Plot
 from gearfmu.report.signals import Window, shafts
-from gearfmu.report.style import COLOURS, INK, MUTED, panels, styled, svg
+from gearfmu.report.style import INK, MUTED, panels, styled, svg
 from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
@@ -32,20 +32,20 @@ def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) 
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
     spectra = {name: metrics.amplitude_spectrum(part[name], step, _segment(part.time.size)) for name in names}
+    groups = _by_part(names)
     with styled():
-        figure, axes = panels((2.6, 1.9) if "mesh.force" in spectra and len(spectra) > 1 else (2.8,))
-        for index, (name, spectrum) in enumerate(spectra.items()):
-            axis = axes[-1] if name == "mesh.force" else axes[0]
-            colour = INK if name == "mesh.force" else COLOURS[index % len(COLOURS)]
-            axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, color=colour, lw=0.9)
-        for axis in axes:
-            _level_axis(axis, "level in dB re 1 N")
-            _mark_orders(axis, trace, window, mesh_angle)
+        figure, axes = panels((1.7,) * len(groups) if len(groups) > 1 else (2.6,))
+        for axis, group in zip(axes, groups, strict=True):
+            for name in group:
+                spectrum = spectra[name]
+                axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, lw=0.9)
+            _level_axis(axis, "dB re 1 N")
+            _mark_orders(axis, part.time, trace, mesh_angle)
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
     caption = (f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
-               f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). {_sampling_words(step)}")  # fmt: skip
+               f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). Dotted: mesh orders. {_sampling_words(step)}")  # fmt: skip
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
 
 
@@ -107,6 +107,14 @@ def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
     return {name: metrics.octave_levels(metrics.amplitude_spectrum(part[name], step)) for name in force_channels(trace)}
 
 
+def _by_part(names: list[str]) -> list[list[str]]:
+    """The channels of one bearing, or of the mesh, share a panel."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(name.rsplit(".", 1)[0], []).append(name)
+    return list(groups.values())
+
+
 def _segment(samples: int, windows: int = 3) -> int:
     """Samples a Hann window for about `windows` windows in the record: a power of two, at least 64 where there are as many."""
     wanted = max(64, 2 ** int(np.round(np.log2(max(samples / windows, 1)))))
@@ -131,18 +139,17 @@ def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
 
 
-def _mark_orders(axis: Axes, trace: Trace, window: Window, mesh_angle: np.ndarray | None) -> None:
-    """Mark mesh orders where the speed is steady enough (5 %) for an order to be a line."""
+def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndarray | None) -> None:
+    """Mark the mesh orders at the median speed of the window, where nine tenths of it stay within 10 %."""
     if mesh_angle is None:
         return
-    inside = (trace.time >= window.start) & (trace.time <= window.end)
-    frequency = np.gradient(mesh_angle, trace.time)[inside] / (2 * np.pi)
-    if np.ptp(frequency) > 0.05 * frequency.mean() or frequency.mean() <= 0:
+    frequency = np.interp(time, trace.time, np.gradient(mesh_angle, trace.time)) / (2 * np.pi)
+    low, middle, high = np.percentile(frequency, [5, 50, 95])
+    if middle <= 0 or high - low > 0.1 * middle:
         return
-    limit = axis.get_xlim()[1]
-    for order in range(1, int(limit * 1e3 / frequency.mean()) + 1)[:12]:
-        axis.axvline(order * frequency.mean() / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
-        axis.annotate(str(order), (order * frequency.mean() / 1e3, 1), (2, -8), xycoords=("data", "axes fraction"),
+    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 12) + 1):
+        axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
+        axis.annotate(str(order), (order * middle / 1e3, 1), (3, -9), xycoords=("data", "axes fraction"),
                       textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
 
 
