@@ -83,7 +83,7 @@ def test_off_order_tone_does_not_enter_the_cut() -> None:
 
 def test_mesh_angle_is_the_integral_of_the_speed() -> None:
     time, speed, angle = run_up(20, 200)
-    assert angle[-1] == pytest.approx(16 * np.trapezoid(speed, time), rel=1e-12)
+    assert angle[-1] == pytest.approx(16 * 110 * time[-1], rel=1e-12)
 
 
 def test_spectrogram_follows_a_chirp() -> None:
@@ -92,7 +92,7 @@ def test_spectrogram_follows_a_chirp() -> None:
     peak = found.frequency[np.argmax(found.amplitude, axis=1)]
     true = np.interp(found.time, time, speed) * 16 / (2 * np.pi)
     assert np.max(np.abs(peak - true)) < 1.5 * found.frequency[1]
-    assert np.allclose(found.time[[0, -1]] + 0, [511.5 * time[1], (511.5 + 256 * (len(found.time) - 1)) * time[1]])
+    assert np.allclose(found.time[[0, -1]], [511.5 * time[1], (511.5 + 256 * (len(found.time) - 1)) * time[1]])
 
 
 def test_unusable_signals_are_refused_with_the_remedy() -> None:

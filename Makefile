@@ -1,0 +1,60 @@
+# gearfmu: everything a checkout can do. `make` alone lists it.
+PYTHON ?= python3
+VENV   ?= .venv
+RUN     = $(VENV)/bin/python
+STAMP   = $(VENV)/.installed
+JOBS   ?= 2
+OUT    ?= out
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+help:
+	@sed -n 's/^## //p' Makefile
+
+## make demo        environment, install, clutch closure through the exported FMU; report in out/demo/report.html
+demo: $(VENV)/.base
+	$(RUN) -m gearfmu.cli demo --out $(OUT)/demo
+
+## make test        the fast tests
+test: $(STAMP)
+	$(RUN) -m pytest -n $(JOBS) -rs
+
+## make test-full   all tests, the slow ones too
+test-full: $(STAMP)
+	$(RUN) -m pytest -n $(JOBS) -rs -m "full or not full"
+
+## make bench       speed and error of this machine, into out/bench
+bench: $(STAMP)
+	$(RUN) -m benchmarks.run --out $(OUT)/bench
+
+## make wheel       dist/*.whl with the linux64 and win64 kernels
+wheel: $(STAMP)
+	$(RUN) -m pip install --quiet build "ziglang==0.16.0"
+	$(RUN) -m gearfmu.kernel.build --platform linux64
+	$(RUN) -m gearfmu.kernel.build --platform win64
+	$(RUN) -m build --wheel --outdir dist
+
+## make models      reduce the bodies of the model library again from its stage files
+models: $(STAMP)
+	$(RUN) -m gearfmu.cli reduce fzg_c --force
+
+## make docs        regenerate docs/variables.md from the kernel's table
+docs: $(VENV)/.base
+	$(RUN) -m gearfmu.cli schema variables --out docs/variables.md
+
+## make lint        ruff, where it is installed
+lint: $(STAMP)
+	@$(RUN) -m ruff --version >/dev/null 2>&1 || { echo "ruff is not installed: $(RUN) -m pip install ruff"; exit 1; }
+	$(RUN) -m ruff check gearfmu tests
+
+$(VENV)/.base: pyproject.toml setup.py
+	$(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet --upgrade pip
+	$(RUN) -m pip install --quiet -e .
+	@touch $@
+
+$(STAMP): $(VENV)/.base
+	$(RUN) -m pip install --quiet -e ".[test]"
+	@touch $@
+
+.PHONY: help demo test test-full bench wheel models docs lint

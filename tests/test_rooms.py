@@ -1,0 +1,96 @@
+"""The shape of the code: who may import whom, how long files and functions are, what no file may say."""
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = sorted((ROOT / "gearfmu").rglob("*.py"))
+KERNEL_MAY_IMPORT = {"errors", "files", "kernel"}
+
+
+def rooms() -> list[str]:
+    """Room and file names in reading order, from the list in docs/architecture.md."""
+    block = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
+    words = [word for line in block.splitlines() for word in line.split("  ")[0].split()]
+    return [word.removeprefix("gearfmu/").removesuffix("/").removesuffix(".py") for word in words]
+
+
+ORDER = {name: rank for rank, name in enumerate(rooms())}
+
+
+def room_of(module: str) -> str:
+    """Room of "gearfmu.stage.trace" is "stage"; of "gearfmu" itself the empty string, which stands above all."""
+    return (module.split(".") + [""])[1]
+
+
+def imported(text: str, package: list[str]) -> set[str]:
+    """Every module of ours that a file in `package` with this text imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = ".".join(package[: len(package) - node.level + 1]) if node.level else ""
+            module = ".".join(part for part in (base, node.module) if part)
+            found |= {f"{module}.{alias.name}" for alias in node.names} if module == "gearfmu" else {module}
+    return {name for name in found if name.split(".")[0] == "gearfmu"}
+
+
+def imports_of(path: Path) -> set[str]:
+    """`imported` for a file of ours."""
+    package = ["gearfmu", *path.relative_to(ROOT / "gearfmu").parent.parts]
+    return imported(path.read_text(encoding="utf-8"), package)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_point_upward_only(path: Path) -> None:
+    own = room_of("gearfmu." + path.relative_to(ROOT / "gearfmu").with_suffix("").as_posix().replace("/", "."))
+    if own == "__init__":
+        own = "errors"
+    assert own in ORDER, f"{path} is in no room of docs/architecture.md"
+    wrong = [m for m in imports_of(path) if room_of(m) and ORDER.get(room_of(m), len(ORDER)) > ORDER[own]]
+    assert not wrong, f"{path.name} in room '{own}' imports from below: {wrong}"
+    if own == "kernel":
+        assert {room_of(m) for m in imports_of(path)} <= KERNEL_MAY_IMPORT
+
+
+def test_every_way_to_write_an_import_is_seen() -> None:
+    text = "from gearfmu import report\ndef f():\n    from ..stage import trace\nimport gearfmu.cli\nimport numpy"
+    assert imported(text, ["gearfmu", "spec"]) == {"gearfmu.report", "gearfmu.stage", "gearfmu.cli"}
+    assert ORDER["errors"] < ORDER["spec"] < ORDER["stage"] < ORDER["report"] < ORDER["cli"]
+
+
+def functions(path: Path) -> list[tuple[str, int, int]]:
+    """Name, lines and number of arguments (without self) of every function of the file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = [n for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    return [(n.name, (n.end_lineno or n.lineno) - n.lineno + 1, _arguments(n)) for n in nodes]
+
+
+def _arguments(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    names = [a.arg for a in node.args.posonlyargs + node.args.args + node.args.kwonlyargs]
+    return len([name for name in names if name not in ("self", "cls")])
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_files_and_functions_stay_short(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
+    long = [name for name, lines, _ in functions(path) if lines > 70]
+    assert not long, f"functions of more than 70 lines: {long}"
+    wide = [name for name, _, arguments in functions(path) if arguments > 6]
+    assert not wide, f"functions of more than six arguments: {wide}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_modules_say_what_they_are(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    assert ast.get_docstring(tree), "no module docstring"
+    assert not re.search(r"\b(TODO|FIXME|XXX)\b", text)
+    public = [n for n in tree.body if isinstance(n, (ast.FunctionDef, ast.ClassDef)) and not n.name.startswith("_")]
+    silent = [n.name for n in public if not ast.get_docstring(n)]
+    assert not silent, f"public without docstring: {silent}"
