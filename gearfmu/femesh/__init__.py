@@ -1,0 +1,1 @@
+"""Structured hexahedral meshes of gear sectors."""

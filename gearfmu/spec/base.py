@@ -1,0 +1,190 @@
+"""From TOML to frozen typed objects: quantities with units, and every problem of a file at once.
+
+A spec is a pydantic model whose fields are SI floats. In a file a field with a unit is text ("82.46 mm"); in Python it may also be the SI number.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic_core import PydanticCustomError, core_schema
+
+from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.units import to_si
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+FROM_FILE = {"from_file": True}
+_NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*\S+.*$"
+
+
+class Spec(BaseModel):
+    """Base of all specs: frozen, unknown keys refused, numbers finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+SpecType = TypeVar("SpecType", bound=Spec)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Annotation of a float field: its SI unit, its bounds (SI) and words that may stand instead of a number.
+
+    `Annotated[float, Quantity("m", above=0)]` takes "82.46 mm" from a file and 0.08246 from Python. An empty unit means a plain number.
+    """
+
+    unit: str = ""
+    above: float | None = None
+    at_least: float | None = None
+    below: float | None = None
+    at_most: float | None = None
+    words: tuple[str, ...] = ()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.with_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        if not self.unit:
+            limits = {"exclusiveMinimum": self.above, "minimum": self.at_least, "exclusiveMaximum": self.below, "maximum": self.at_most}
+            return {"type": "number", **{key: value for key, value in limits.items() if value is not None}}
+        number = {"type": "string", "pattern": _NUMBER_PATTERN, "examples": [f"1 {self.unit}"]}
+        return {"anyOf": [number, {"enum": list(self.words)}]} if self.words else number
+
+    def _read(self, value: Any, info: core_schema.ValidationInfo) -> float | str:
+        if isinstance(value, str) and value in self.words:
+            return value
+        try:
+            number = self._number(value, bool((info.context or {}).get("from_file")))
+        except UnitError as error:
+            words = "".join(f' or "{word}"' for word in self.words)
+            raise _refuse(f"{error}{words}") from error
+        if message := self._out_of_bounds(number):
+            raise _refuse(message)
+        return number
+
+    def _number(self, value: Any, from_file: bool) -> float:
+        plain = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not plain and not self.unit:
+            raise UnitError("expected a plain number")
+        if plain and not (self.unit and from_file):
+            if not math.isfinite(value):
+                raise UnitError("the number must be finite")
+            return float(value)
+        return to_si(value, self.unit)
+
+    def _out_of_bounds(self, value: float) -> str:
+        checks = (
+            (self.above, lambda limit: value > limit, "greater than"),
+            (self.at_least, lambda limit: value >= limit, "at least"),
+            (self.below, lambda limit: value < limit, "less than"),
+            (self.at_most, lambda limit: value <= limit, "at most"),
+        )
+        failed = [f"{words} {limit:g} {self.unit}".rstrip() for limit, holds, words in checks if limit is not None and not holds(limit)]
+        return f"must be {' and '.join(failed)}" if failed else ""
+
+
+Text = Annotated[str, Strict()]
+Name = Annotated[str, Strict(), Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+Count = Annotated[int, Strict()]
+
+
+def _refuse(remedy: str) -> PydanticCustomError:
+    return PydanticCustomError("refused", "{remedy}", {"remedy": remedy})
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file. SpecError when it is missing, not UTF-8 or not TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        remedy = f"the file cannot be read ({error.strerror}): check the path"
+    except UnicodeDecodeError:
+        remedy = "the file is not UTF-8 text: save it as UTF-8"
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        remedy = f"not valid TOML: {error}"
+    raise SpecError([Problem(str(path), "", "", remedy)])
+
+
+def validate(kind: type[SpecType], raw: Any, file: str) -> tuple[SpecType | None, list[Problem]]:
+    """`raw` tables of `file` as an object of class `kind`, or None and everything that is wrong with them."""
+    try:
+        return kind.model_validate(raw, context=FROM_FILE), []
+    except ValidationError as error:
+        return None, [_problem(kind, raw, file, entry) for entry in error.errors(include_url=False)]
+
+
+def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
+    """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
+    path = ""
+    for part in loc:
+        inside, label = _step(raw, part)
+        path += label if label.startswith("[") or not path else f".{label}"
+        raw = inside
+    return path
+
+
+def _step(raw: Any, part: str | int) -> tuple[Any, str]:
+    if isinstance(raw, dict):
+        key = part if part in raw or isinstance(part, str) else list(raw)[part] if part < len(raw) else str(part)
+        return raw.get(key), str(key)
+    if isinstance(raw, list) and isinstance(part, int) and part < len(raw):
+        name = raw[part].get("name") if isinstance(raw[part], dict) else None
+        return raw[part], name if isinstance(name, str) else f"[{part}]"
+    return None, str(part)
+
+
+def _problem(kind: type[Spec], raw: Any, file: str, entry: Any) -> Problem:
+    loc = entry["loc"]
+    value = "" if entry["type"] == "missing" or not loc else _shown(entry["input"])
+    return Problem(file, field_path(raw, loc), value, _remedy(kind, entry))
+
+
+def _remedy(kind: type[Spec], entry: Any) -> str:
+    loc = entry["loc"]
+    if entry["type"] == "missing":
+        field = _fields_at(kind, loc[:-1]).get(loc[-1])
+        meaning = f" ({field.description})" if field is not None and field.description else ""
+        return f"this field is missing{meaning}: add it"
+    if entry["type"] == "extra_forbidden":
+        return _unknown_key(str(loc[-1]), list(_fields_at(kind, loc[:-1])))
+    if entry["type"] == "string_pattern_mismatch":
+        return "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
+    return entry["msg"][:1].lower() + entry["msg"][1:]
+
+
+def _unknown_key(key: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+    return f'unknown key: did you mean "{near[0]}"?' if near else f"unknown key: known are {', '.join(sorted(known))}"
+
+
+def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
+    """The fields of the model that stands at `loc` inside a `kind`."""
+    for part in loc:
+        if field := kind.model_fields.get(part):
+            inner = inner_model(field.annotation)
+            if inner is None:
+                return {}
+            kind = inner
+    return dict(kind.model_fields)
+
+
+def inner_model(annotation: Any) -> type[BaseModel] | None:
+    """The spec class in an annotation such as `Spec`, `Spec | None`, `tuple[Spec, Spec]` or `dict[str, Spec]`; None without one."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := inner_model(part))), None)
+
+
+def _shown(value: Any) -> str:
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"
