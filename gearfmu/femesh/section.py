@@ -1,0 +1,178 @@
+"""Plane mesh of one tooth with half a space on either side, in three blocks of eight-node quadrilaterals per half.
+
+    tooth: surface = flank, core = middle of the tooth        rows run from the root form point F up to the tip
+    root:  surface = trochoid and root land, core = an arc    rows run from F to the middle of the space
+    rim:   from that arc down to the bore
+Tooth, root and rim meet in one point A on the middle of the tooth. Blocks are transfinite interpolations of exact boundary curves on a lattice
+that has the mid nodes too; the other half is the mirror image.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.errors import MeshError
+from gearfmu.geometry import GearGeometry, involute
+from gearfmu.spec.gear import MeshSpec
+
+_ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
+_RIM_SHARE = 0.45  # … and in parts of the rim
+_CORE_SLOPE = 0.577  # A lies this times the half-thickness at F below F: three blocks of 60° meet there
+
+
+@dataclass(frozen=True)
+class Section:
+    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore, cut_plus, cut_minus: node indices (cuts paired).
+
+    flank: for sg = +1 and −1 (2, F, 3) node indices of its edges (start, end, middle) from form to tip form point. flank_roll: (F, 3) m.
+    """
+
+    nodes: np.ndarray
+    quads: np.ndarray
+    bore: np.ndarray
+    cut_plus: np.ndarray
+    cut_minus: np.ndarray
+    flank: np.ndarray
+    flank_roll: np.ndarray
+
+
+def build_section(gear: GearGeometry, mesh: MeshSpec) -> Section:
+    """The section of `gear` with the counts of `mesh`. MeshError when the rim leaves no room for the root block."""
+    roll = flank_rolls(gear, mesh.count("flank"))
+    tooth, root, rim = _blocks(gear, mesh, roll)
+    upper = np.concatenate([_quads(block) for block in (tooth, root, rim)])
+    points = np.concatenate([upper, _mirrored(upper)])
+    nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
+    find = _Finder(nodes)
+    along = 2 * mesh.count("flank") + 1
+    flank_line, cut = tooth[0, :along], np.concatenate([root[:, -1], rim[1:, -1]])
+    return Section(
+        nodes=nodes, quads=index.reshape(-1, 8),
+        bore=find(np.concatenate([rim[-1], rim[-1, 1:] * [1, -1]])),
+        cut_plus=find(cut), cut_minus=find(cut * [1, -1]),
+        flank=np.stack([_edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
+        flank_roll=_edges(roll[:along]),
+    )  # fmt: skip
+
+
+def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
+    """Rolls (m) of corner and mid nodes along the flank: equal arc lengths up to the tip form point, then one element to the tip circle."""
+    ends = involute.arc_length(np.array([gear.s_form, gear.s_tip, gear.s_a]), gear.r_b)
+    length = np.linspace(ends[0], ends[1], 2 * elements + 1)
+    if gear.s_a > gear.s_tip:
+        length = np.append(length, [0.5 * (ends[1] + ends[2]), ends[2]])
+    roll = involute.roll_at_arc_length(length, gear.r_b)
+    roll[0], roll[2 * elements] = gear.s_form, gear.s_tip
+    return roll
+
+
+def graded(elements: int, growth: float) -> np.ndarray:
+    """(2·elements + 1,) parameters from 0 to 1 of corner and mid nodes; each element is `growth` times as long as the one before."""
+    sizes = growth ** np.arange(elements)
+    corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
+    corners[-1] = 1.0
+    result = np.empty(2 * elements + 1)
+    result[::2] = corners
+    result[1::2] = 0.5 * (corners[1:] + corners[:-1])
+    return result
+
+
+def transfinite(low: np.ndarray, high: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Lattice (P, Q, 2) inside four curves: low, high (P, 2) at the ends of the second index, start, end (Q, 2) at those of the first.
+
+    Gordon and Hall's interpolation with the curves' own arc-length parameters, so that gradings of opposite sides need not agree.
+    """
+    u0, u1, v0, v1 = (_parameter(curve) for curve in (low, high, start, end))
+    du, dv = (u1 - u0)[:, None], (v1 - v0)[None, :]
+    u = (u0[:, None] + du * v0[None, :]) / (1 - du * dv)
+    v = (v0[None, :] + dv * u0[:, None]) / (1 - du * dv)
+    u, v = u[..., None], v[..., None]
+    result = (1 - v) * low[:, None] + v * high[:, None] + (1 - u) * start[None] + u * end[None]
+    result -= (1 - u) * (1 - v) * low[0] + u * (1 - v) * low[-1] + (1 - u) * v * high[0] + u * v * high[-1]
+    result[:, 0], result[:, -1], result[0], result[-1] = low, high, start, end
+    return result
+
+
+def _parameter(curve: np.ndarray) -> np.ndarray:
+    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+
+
+def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    across = graded(mesh.count("thickness"), mesh.thickness_grading)[:, None]
+    down = graded(mesh.count("rim"), mesh.rim_grading)[:, None]
+    share = graded(mesh.count("root"), 1.0)
+    flank, surface = gear.flank_point(roll), root_curve(gear, share)
+    surface[0] = flank[0]
+    space = np.array([math.cos(gear.half_pitch), math.sin(gear.half_pitch)])
+    core, depth = _core_arc(gear, flank[0], share)
+    core[-1], surface[-1] = (gear.r_f - depth) * space, gear.r_f * space
+    middle = core[0] + (gear.r_a - core[0, 0]) * _parameter(flank)[:, None] * [1, 0]
+    tip_angle = gear.tip_half_angle * (1 - across)
+    tip = gear.r_a * np.concatenate([np.cos(tip_angle), np.sin(tip_angle)], axis=1)
+    middle[-1], tip[0], tip[-1] = (gear.r_a, 0.0), flank[-1], (gear.r_a, 0.0)
+    neck = flank[0] + across * (core[0] - flank[0])
+    neck[-1] = core[0]
+    bore = gear.r_bore * np.stack([np.cos(share * gear.half_pitch), np.sin(share * gear.half_pitch)], axis=1)
+    bore[-1] = gear.r_bore * space
+    tooth = transfinite(neck, tip, flank, middle)
+    root = transfinite(neck, surface[-1] - across * depth * space, surface, core)
+    under, below = core[0] + down * (bore[0] - core[0]), core[-1] + down * (bore[-1] - core[-1])
+    return tooth, root, transfinite(under, below, core, bore)
+
+
+def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
+    """Points (P, 2) on trochoid and root land at these shares of its length, from the form point to the middle of the space."""
+    rounding = gear.rounding
+    tau = np.linspace(gear.alpha, math.pi / 2, 2001)
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rounding.point(tau), axis=0), axis=1))])
+    land = rounding.land_angle * gear.r_f
+    wanted = share * (run[-1] + land)
+    angle = gear.half_pitch - rounding.land_angle + np.maximum(wanted - run[-1], 0.0) / gear.r_f
+    on_land = gear.r_f * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    on_trochoid = rounding.point(np.interp(wanted, run, tau))
+    return np.where((wanted > run[-1])[:, None], on_land, on_trochoid)
+
+
+def _core_arc(gear: GearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, float]:
+    """Arc (P, 2) under the root from the middle of the tooth to that of the space, where it ends square at the returned depth."""
+    rim = gear.r_f - gear.r_bore
+    depth = min(_ROOT_DEPTH * gear.m, _RIM_SHARE * rim)
+    middle = max(form[0] - _CORE_SLOPE * form[1], gear.r_f - _RIM_SHARE * rim)
+    radius = gear.r_f - depth + (middle - gear.r_f + depth) * (1 - share) ** 2
+    if rim <= 0 or radius.min() <= gear.r_bore:
+        raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make the bore smaller")
+    angle = share * gear.half_pitch
+    return radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1), depth
+
+
+def _quads(lattice: np.ndarray) -> np.ndarray:
+    """Coordinates (E, 8, 2) of the counter-clockwise quadrilaterals of a lattice (2a+1, 2b+1, 2)."""
+    rows, columns = lattice.shape[0] // 2, lattice.shape[1] // 2
+    steps = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
+    quads = np.stack([lattice[i : i + 2 * rows - 1 : 2, j : j + 2 * columns - 1 : 2] for i, j in steps], axis=2).reshape(-1, 8, 2)
+    first, last = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
+    clockwise = np.median(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]) < 0
+    return quads[:, [0, 3, 2, 1, 7, 6, 5, 4]] if clockwise else quads
+
+
+def _mirrored(quads: np.ndarray) -> np.ndarray:
+    return (quads * [1, -1] + 0.0)[:, [0, 3, 2, 1, 7, 6, 5, 4]]
+
+
+def _edges(line: np.ndarray) -> np.ndarray:
+    """(F, 3) start, end, middle of the elements along a line of 2F + 1 nodes."""
+    return np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1)
+
+
+class _Finder:
+    """Index of points that are rows of a sorted unique array, by exact equality."""
+
+    def __init__(self, nodes: np.ndarray):
+        self._index = {(x, y): k for k, (x, y) in enumerate(nodes.tolist())}
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        return np.array([self._index[x, y] for x, y in (points + 0.0).tolist()])

@@ -1,0 +1,82 @@
+"""The sector of a gear: its plane section, extruded over the face width."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearfmu.errors import MeshError
+from gearfmu.femesh.mesh import FeMesh, FlankGrid
+from gearfmu.femesh.quality import scaled_jacobian
+from gearfmu.femesh.section import Section, build_section
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.gear import MeshSpec
+
+
+def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
+    """One sector of an external spur gear: tooth 0 on +x, half a space on either side, z ∈ [−b/2, b/2], `face_width` b in m.
+
+    Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. The mesh is its own mirror image about z = 0 and about
+    y = 0. MeshError when the geometry leaves no valid element.
+    """
+    section = build_section(geometry, mesh)
+    numbers, nodes = _extruded(section, face_width, mesh.count("width"))
+    result = FeMesh(
+        nodes=nodes,
+        elements=_hexahedra(section.quads, numbers),
+        sets={"bore": _column(section.bore, numbers)},
+        teeth=geometry.z,
+        cut_minus=_column(section.cut_minus, numbers),
+        cut_plus=_column(section.cut_plus, numbers),
+        flank={side: _flank_grid(section, side, numbers, nodes) for side in (0, 1)},
+    )
+    if not (worst := float(scaled_jacobian(result).min())) > 0:
+        raise MeshError(f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape or bore")
+    return result
+
+
+def _extruded(section: Section, width: float, elements: int) -> tuple[np.ndarray, np.ndarray]:
+    """numbers (2·elements + 1, N2): node index at a level of a section's node, −1 where a mid level has none; nodes (N, 3)."""
+    levels = 2 * elements + 1
+    exists = np.zeros((levels, len(section.nodes)), dtype=bool)
+    exists[::2] = True
+    exists[:, np.unique(section.quads[:, :4])] = True
+    numbers = np.where(exists, np.cumsum(exists.ravel()).reshape(exists.shape) - 1, -1)
+    z = 0.5 * width * (np.arange(levels) - elements) / elements
+    level, node = np.nonzero(exists)
+    return numbers, np.column_stack([section.nodes[node], z[level]])
+
+
+def _hexahedra(quads: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    layers = [
+        np.concatenate(
+            [
+                numbers[k][quads[:, :4]], numbers[k + 2][quads[:, :4]],
+                numbers[k][quads[:, 4:]], numbers[k + 2][quads[:, 4:]], numbers[k + 1][quads[:, :4]],
+            ],
+            axis=1,
+        )  # fmt: skip
+        for k in range(0, len(numbers) - 2, 2)
+    ]
+    return np.concatenate(layers)
+
+
+def _column(section_nodes: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """All nodes above these nodes of the section, level by level."""
+    column = numbers[:, section_nodes].ravel()
+    return column[column >= 0]
+
+
+def _flank_grid(section: Section, side: int, numbers: np.ndarray, nodes: np.ndarray) -> FlankGrid:
+    start, end, middle = section.flank[side].T
+    s0, s1, sm = section.flank_roll.T
+    quads, rolls = [], []
+    for k in range(0, len(numbers) - 2, 2):
+        low, mid, high = numbers[k], numbers[k + 1], numbers[k + 2]
+        quads.append([low[start], low[end], high[end], high[start], low[middle], mid[end], high[middle], mid[start]])
+        rolls.append([s0, s1, s1, s0, sm, s1, sm, s0])
+    order = [0, 3, 2, 1, 7, 6, 5, 4] if side == 0 else list(range(8))
+    grid = np.array(quads).transpose(2, 0, 1)[..., order]
+    roll = np.array(rolls).transpose(2, 0, 1)[..., order]
+    shape = grid.shape[:2]
+    grid, roll = grid.reshape(-1, 8), roll.reshape(-1, 8)
+    return FlankGrid(grid, roll, nodes[grid, 2], shape)

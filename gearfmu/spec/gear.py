@@ -1,0 +1,113 @@
+"""What a stage file says about one gear and about the pair (ISO 21771 and REXS terms; SI floats)."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from gearfmu.spec.base import Count, Name, Quantity, Spec
+
+Length = Annotated[float, Quantity("m", above=0)]
+Size = Annotated[float, Quantity("m", at_least=0)]
+Angle = Annotated[float, Quantity("rad")]
+Factor = Annotated[float, Quantity(above=0)]
+Ratio = Annotated[float, Quantity(at_least=0, below=1)]
+Grading = Annotated[float, Quantity(at_least=0.2, at_most=5)]
+
+
+class PairSpec(Spec):
+    """The pair as a whole."""
+
+    center_distance: Length = Field(description="centre distance a")
+    normal_module: Length = Field(description="normal module m_n")
+    pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
+        description="normal pressure angle of the basic rack"
+    )
+    helix_angle: Annotated[float, Quantity("rad", at_least=0, at_most=0)] = Field(
+        default=0.0, description="helix angle; only spur gears so far"
+    )
+    backlash: Size = Field(
+        description="circumferential backlash j_wt of the assembled pair on the working pitch circle; the contact law thins the teeth to it"
+    )
+
+
+class RackSpec(Spec):
+    """Basic rack of the tool, in factors of the module (ISO 53)."""
+
+    addendum: Factor = Field(default=1.0, description="addendum of the basic rack, factor of m")
+    dedendum: Factor = Field(default=1.25, description="dedendum of the basic rack, factor of m")
+    fillet_radius: Factor = Field(default=0.38, description="root fillet radius of the basic rack, factor of m")
+
+
+class Material(Spec):
+    """Linear elastic, isotropic."""
+
+    youngs_modulus: Annotated[float, Quantity("Pa", above=0)] = Field(description="Young's modulus E")
+    poisson_ratio: Annotated[float, Quantity(at_least=0, below=0.49)] = Field(description="Poisson's ratio")
+    density: Annotated[float, Quantity("kg/m^3", above=0)] = Field(description="density")
+
+
+class Bearing(Spec):
+    """Isotropic radial bearing between the bore node and the ground."""
+
+    stiffness: Annotated[float, Quantity("N/m", above=0)] = Field(description="radial stiffness")
+    damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
+
+
+class TipRelief(Spec):
+    """Tip relief on both flanks of every tooth."""
+
+    amount: Length = Field(description="relief normal to the involute at the tip diameter")
+    start_roll: Annotated[float, Quantity("m", above=0, words=("outer_single_contact",))] = Field(
+        default="outer_single_contact",
+        description='roll length of its beginning, or "outer_single_contact"',
+    )
+    kind: Literal["quadratic"] = Field(default="quadratic", description="shape over the roll length")
+
+
+class MeshSpec(Spec):
+    """Element counts of the sector mesh (20-node hexahedra; half a tooth) and how they are graded."""
+
+    flank: Annotated[Count, Field(ge=2, le=200)] = Field(default=20, description="elements along the flank, equal in arc length")
+    thickness: Annotated[Count, Field(ge=1, le=50)] = Field(default=6, description="elements across half the tooth")
+    root: Annotated[Count, Field(ge=2, le=100)] = Field(default=10, description="elements along root fillet and half the root land")
+    rim: Annotated[Count, Field(ge=1, le=100)] = Field(default=6, description="elements from root to bore")
+    width: Annotated[Count, Field(ge=1, le=100)] = Field(default=10, description="elements across the face width")
+    thickness_grading: Grading = Field(default=1.25, description="growth of elements from the surface inwards")
+    rim_grading: Grading = Field(default=1.35, description="growth of elements from the root to the bore")
+    scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(default=1.0, description="factor on all counts")
+
+    def count(self, name: str) -> int:
+        """The scaled count of the field `name`, never below what a valid mesh needs."""
+        least = {"flank": 2, "root": 2}.get(name, 1)
+        return max(least, round(self.scale * getattr(self, name)))
+
+
+class BodySpec(Spec):
+    """How the gear's body is meshed and reduced; with geometry and material it decides the reduced body."""
+
+    strip_half_width: Length = Field(description="half-width, in arc length, of the load strip on the flank; at least 1.5 Hertz half-widths")
+    modes: Annotated[Count, Field(ge=1, le=2000)] = Field(default=200, description="number of elastic modes stored")
+    roll_points: Annotated[Count, Field(ge=4, le=200)] = Field(default=24, description="Chebyshev points along the flank")
+    width_functions: Annotated[Count, Field(ge=1, le=20)] = Field(default=6, description="Legendre functions across the face width")
+    mesh: MeshSpec = Field(default_factory=MeshSpec, description="element counts")
+
+
+class GearSpec(Spec):
+    """One gear; `name` is also its shaft's name."""
+
+    name: Name = Field(description="name of gear and shaft")
+    teeth: Annotated[Count, Field(ge=6, le=400)] = Field(description="number of teeth z")
+    profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(description="profile shift coefficient x")
+    tip_diameter: Length = Field(description="tip diameter d_a")
+    face_width: Length = Field(description="face width b")
+    bore_diameter: Length = Field(description="diameter of the bore")
+    tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
+    rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
+    material: Material = Field(description="material")
+    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
+    bearing: Bearing = Field(description="bearing")
+    body: BodySpec = Field(description="mesh and reduction")
