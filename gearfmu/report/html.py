@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.files import write_text
-from gearfmu.report import page, plots, plots_nvh
+from gearfmu.report import page, picture, plots, plots_nvh
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
 from gearfmu.report.results import key_results, strict
@@ -22,19 +22,19 @@ def write(
     trace: Trace,
     summary: Mapping[str, Any],
     out_dir: str | os.PathLike[str],
-    model: Any = None,
+    spec: Any = None,
     bodies: Sequence[Any] | None = None,
 ) -> Path:
     """Write report.html, summary.json and data/<plot>.csv into `out_dir` and return the path of the page.
 
     trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
     summary : fields of docs/file-formats.md; what is missing is shown as "not given".
-    model : StageModel, for tooth numbers and the picture; bodies : its ReducedBody objects, for the deformed pair.
+    spec : StageSpec, for tooth numbers; bodies : its two ReducedBody objects, for the picture of the deformed pair.
     Raises OSError when the folder cannot be written.
     """
     folder = Path(out_dir)
     results = key_results(trace)
-    made, missing = _plots(trace, model, bodies)
+    made, missing = _plots(trace, spec, bodies)
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
     write_text(folder / "summary.json", json.dumps(strict({**summary, "results": results}), indent=2) + "\n")
@@ -42,9 +42,9 @@ def write(
     return folder / "report.html"
 
 
-def _plots(trace: Trace, model: Any, bodies: Sequence[Any] | None) -> tuple[list[Plot], list[str]]:
+def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[Plot], list[str]]:
     """Every plot the trace allows, and in words why others are not there."""
-    angle = angle_of_mesh(trace, teeth(trace, model))
+    angle = angle_of_mesh(trace, teeth(trace, spec))
     window = window_of_interest(trace)
     makers: list[Callable[[], Plot | None]] = [
         lambda: plots.torque_and_slip(trace),
@@ -55,6 +55,7 @@ def _plots(trace: Trace, model: Any, bodies: Sequence[Any] | None) -> tuple[list
         lambda: plots_nvh.force_spectrum(trace, window, angle),
         lambda: plots_nvh.order_cuts(trace, angle),
         lambda: plots_nvh.force_spectrogram(trace, angle),
+        lambda: picture.deformed_pair(trace, spec, bodies) if spec is not None and bodies else None,
     ]
     made, missing = [], []
     for maker in makers:

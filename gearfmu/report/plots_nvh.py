@@ -1,8 +1,6 @@
 """Figures over frequency: spectra of the bearing and mesh forces, cuts along mesh orders, spectrogram."""
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,7 +9,7 @@ from matplotlib.axes import Axes
 from gearfmu.report import metrics
 from gearfmu.report.plots import Plot
 from gearfmu.report.signals import Window, shafts
-from gearfmu.report.style import INK, MUTED, panels, styled, svg
+from gearfmu.report.style import INK, MUTED, panels, png, styled, svg
 from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
@@ -92,7 +90,7 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
         axis.grid(False)
         axis.set(xlabel="time in s", ylabel="frequency in kHz", xlim=(time[0], time[-1]), ylim=(0, 0.5e-3 / step))
         _overlay_orders(axis, trace, mesh_angle, 0.5 / step)
-        picture = _png(figure)
+        picture = png(figure)
     caption = (f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
                f"Dashed: mesh orders from the instantaneous speed. {_sampling_words(step)}")  # fmt: skip
     data = {"time_[s]": np.repeat(time, picture_data.frequency.size),
@@ -181,10 +179,3 @@ def _order_columns(cuts: Mapping[str, metrics.OrderCuts]) -> dict[str, np.ndarra
         for row, order in enumerate(cut.orders):
             found[f"{name}_order_{order}_rms_[N]"] = cut.amplitude[row]
     return found
-
-
-def _png(figure: object) -> str:
-    """The figure as an <img> element with its PNG inside (for pictures of many cells)."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=170, metadata={"Software": None})  # type: ignore[attr-defined]
-    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'

@@ -10,6 +10,7 @@ from gearfmu.report.metrics import mesh_angle
 from gearfmu.stage.trace import Trace
 
 GEAR_SPEED = ".gear.w"
+GEAR_PHI = ".gear.phi"
 LOCKED = ".clutch.locked"
 
 
@@ -29,10 +30,10 @@ def shafts(trace: Trace) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def teeth(trace: Trace, model: Any = None) -> dict[str, int]:
-    """Tooth numbers by shaft, from the model's specification or the trace's meta "teeth"; empty when neither says."""
-    if model is not None:
-        return {gear.name: int(gear.teeth) for gear in model.spec.gears}
+def teeth(trace: Trace, spec: Any = None) -> dict[str, int]:
+    """Tooth numbers by shaft, from the StageSpec or the trace's meta "teeth"; empty when neither says."""
+    if spec is not None:
+        return {gear.name: int(gear.teeth) for gear in spec.gears}
     return {str(name): int(z) for name, z in dict(trace.meta.get("teeth") or {}).items()}
 
 

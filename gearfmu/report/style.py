@@ -1,6 +1,7 @@
 """One calm look for every figure, and how a figure becomes part of a page."""
 from __future__ import annotations
 
+import base64
 import io
 import re
 from contextlib import AbstractContextManager
@@ -35,14 +36,26 @@ def panels(heights: tuple[float, ...], share: bool = True) -> tuple[Figure, list
     return figure, list(axes)
 
 
-def svg(figure: Figure, name: str) -> str:
-    """`figure` as an <svg> element for a page: scales with the page, names no outside address, same bytes every time."""
+def standalone_svg(figure: Figure, name: str) -> str:
+    """`figure` as the text of an SVG file, the same bytes every time; `name` keeps its ids apart from other figures'."""
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
-    text = buffer.getvalue()
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
+    return buffer.getvalue()
+
+
+def svg(figure: Figure, name: str) -> str:
+    """`figure` as an <svg> element of a page: takes the page's width and names no outside address."""
+    text = standalone_svg(figure, name)
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     return _without_unused_ids(_bare_head(text))
+
+
+def png(figure: Figure) -> str:
+    """`figure` as an <img> element that holds its PNG, for pictures of many cells."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=170, metadata={"Software": None})
+    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'
 
 
 def _bare_head(text: str) -> str:

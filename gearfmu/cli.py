@@ -1,0 +1,101 @@
+"""The command line. Verbs are loaded when they are called, so that help and errors come at once."""
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+USAGE_ERROR = 100
+VERBS = {
+    "new": ("gearfmu.commands.stages:new", "Write a commented stage.toml of your own, from a shipped one."),
+    "mesh": ("gearfmu.commands.stages:mesh", "Mesh the gears of a stage, print the quality, write .vtu files."),
+    "reduce": ("gearfmu.commands.stages:reduce", "Reduce the gears of a stage to .h5 bodies (skipped when up to date)."),
+    "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
+    "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),
+    "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
+    "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),
+    "simulate": ("gearfmu.commands.runs:simulate", "Run a stage alone, without FMU and drivetrain."),
+    "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
+    "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
+    "inspect": ("gearfmu.commands.files:inspect", "Say what one of our files holds."),
+    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; table of FMU variables."),
+}
+
+
+class Verbs(click.Group):
+    """A group that knows its commands by name and imports one only to run it."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in VERBS:
+            return None
+        module, function = VERBS[name][0].split(":")
+        return getattr(importlib.import_module(module), function)  # type: ignore[no-any-return]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Verbs"):
+            formatter.write_dl([(name, text) for name, (_, text) in VERBS.items()])
+
+
+@click.group(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="gearfmu")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def gearfmu(debug: bool) -> None:
+    """Elastic gear stages as FMUs.
+
+    STAGE is the path of a stage.toml or its folder, or the name of a shipped one (fzg_c, fzg_c/stage_relief); SCENE the
+    path of a scene.toml or the name of a shipped one (clutch_closure, clutch_dump, pair_loaded, pair_light).
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: runs the verb and ends the process with its exit code (docs/howto-command-line.md)."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    sys.exit(outcome(given))
+
+
+def outcome(arguments: list[str]) -> int:
+    """Run the command line `arguments` and return the exit code: 0 success, 100 wrong usage, 1 any other error,
+    130 interrupted; counting verbs return their count, at most 99. Errors go to standard error, one clear message each."""
+    try:
+        code = gearfmu.main(args=arguments, prog_name="gearfmu", standalone_mode=False)
+    except click.UsageError as error:
+        error.show()
+        return USAGE_ERROR
+    except click.exceptions.Exit as error:
+        return int(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("gearfmu: interrupted; files that were being written are as they were before", err=True)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except Exception as error:  # the border to the user: everything becomes one message
+        return _failed(error, debug="--debug" in arguments)
+    return code if isinstance(code, int) else 0
+
+
+def _failed(error: Exception, debug: bool) -> int:
+    from gearfmu.errors import GearfmuError
+
+    if debug:
+        traceback.print_exception(error)
+    if isinstance(error, (GearfmuError, click.ClickException)):
+        text = error.message if isinstance(error, click.ClickException) else str(error)
+        click.echo(f"gearfmu: {text}", err=True)
+    elif isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        click.echo(f"gearfmu: {place}{error.strerror or error}", err=True)
+    else:
+        click.echo(f"gearfmu: internal error, {type(error).__name__}: {error}; please report it with the output of --debug", err=True)
+    return 1
+
+
+if __name__ == "__main__":
+    main()

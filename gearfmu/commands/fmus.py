@@ -1,0 +1,57 @@
+"""Verbs of the FMU: export, validate."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+PORT_KINDS = ("spring", "torque", "fixed")
+
+
+@click.command()
+@click.argument("stage")
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; <stage>.fmu when not given.")
+@click.option("--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat.")
+@click.option("--runtime", type=click.Choice(["native", "python"]), default="native", show_default=True,
+              help="native: compiled, needs nothing; python: pythonfmu, for hosts that are Python.")  # fmt: skip
+@click.option("--platform", "platforms", multiple=True, type=click.Choice(["host", "linux64", "win64"]), default=("host",),
+              help="Platforms to put in; others than the host's need the [cross] extra; may repeat.")  # fmt: skip
+def export(stage: str, out: Path | None, ports: tuple[str, ...], runtime: str, platforms: tuple[str, ...]) -> None:
+    """Export STAGE as an FMI 2.0 co-simulation FMU."""
+    from gearfmu import fmu
+    from gearfmu.commands.models import model_of
+
+    model = model_of(stage, port_kinds(ports))
+    path = out or Path(f"{model.spec.name}.fmu")
+    fmu.export(model, path, runtime=runtime, platforms=platforms)
+    click.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {runtime}, model {model.hash[:12]}")
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path), metavar="FMU")
+@click.option("--json", "as_json", is_flag=True, help="Problems as JSON.")
+def validate(path: Path, as_json: bool) -> int:
+    """Check an FMU of ours or of others. Exit code: the number of problems (at most 99), 0 for none."""
+    from gearfmu import fmu
+
+    problems = fmu.validate(path)
+    if as_json:
+        click.echo(json.dumps([str(problem) for problem in problems], indent=2, ensure_ascii=False))
+    else:
+        for problem in problems:
+            click.echo(str(problem))
+        click.echo(f"{path}: {len(problems)} problem{'s' if len(problems) != 1 else ''}")
+    return min(len(problems), 99)
+
+
+def port_kinds(texts: tuple[str, ...]) -> dict[str, str]:
+    """{"pinion": "torque"} from ("pinion=torque",); a usage error for anything else."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        shaft, sign, kind = text.partition("=")
+        if not sign or not shaft or kind not in PORT_KINDS:
+            raise click.BadParameter(f"'{text}' is not SHAFT=KIND with a kind of {', '.join(PORT_KINDS)}", param_hint="--port")
+        found[shaft] = kind
+    return found

@@ -1,0 +1,89 @@
+"""Verbs that simulate and report: run, simulate, report, demo."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gearfmu.commands.shared import INTEGRATORS, LEVELS, Quantity, progress_bar
+
+OUT = click.Path(path_type=Path, file_okay=False)
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
+@click.option("--unit", type=click.Choice(["fmu", "kernel"]), default="fmu", show_default=True, help="Through the exported FMU or the same kernel without it.")
+@click.option("--fmu", "fmu_path", type=click.Path(path_type=Path), help="An FMU exported earlier; exported anew when not given.")
+@click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
+def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool) -> int:
+    """Run SCENE and write trace.h5, summary.json and report.html."""
+    from gearfmu.spec import load_scene
+
+    spec = load_scene(scene)
+    return run_scene(spec, out or Path("out") / spec.name, unit=unit, fmu_path=fmu_path, verify=verify)
+
+
+@click.command()
+@click.option("--out", type=OUT, default=Path("out/demo"), show_default=True, help="Folder of the results.")
+def demo(out: Path) -> int:
+    """Clutch closure on the shipped stage fzg_c through its exported FMU; ends with a report."""
+    from gearfmu.spec import load_scene
+
+    return run_scene(load_scene("clutch_closure"), out, unit="fmu")
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
+@click.option("--stage", help="STAGE of the run, for the picture of the deformed pair.")
+@click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
+def report(path: Path, stage: str | None, out: Path | None) -> None:
+    """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
+    from gearfmu.stage.trace import Trace
+
+    source = path / "trace.h5" if path.is_dir() else path
+    trace = Trace.load(source)
+    click.echo(write_report(trace, out or source.parent, stage or trace.meta.get("stage_path") or trace.meta.get("stage")))
+
+
+def run_scene(scene: Any, out: Path, **options: Any) -> int:
+    """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
+    from gearfmu import cosim
+
+    with progress_bar(scene.name) as progress:
+        trace = cosim.run(scene, out, progress=progress, **options)
+    return finish(trace, out, scene.stage)
+
+
+def finish(trace: Any, out: Path, stage: str | None) -> int:
+    """Write trace.h5 and the report into `out` and print the outcome and the price; 0 for the outcome "ok", else 1."""
+    trace.save(out / "trace.h5")
+    page = write_report(trace, out, stage)
+    meta = trace.meta
+    click.echo(f"{meta.get('outcome')}: {meta.get('simulated_s', 0):.4g} s simulated in {meta.get('cpu_s', 0):.3g} s CPU time "
+               f"({meta.get('realtime_factor', 0):.3g} per simulated second)")  # fmt: skip
+    click.echo(page)
+    return 0 if meta.get("outcome") == "ok" else 1
+
+
+def write_report(trace: Any, out: Path, stage: str | None) -> Path:
+    """The report page of `trace` in `out`; with the stage's bodies, where they are there, for the deformed pair."""
+    from gearfmu import report as room
+
+    return room.write(trace, trace.meta, out, **_stage_objects(stage))
+
+
+def _stage_objects(stage: str | None) -> dict[str, Any]:
+    from gearfmu.body import load_bodies
+    from gearfmu.errors import GearfmuError
+    from gearfmu.spec import load_stage
+
+    if not stage:
+        return {}
+    try:
+        spec = load_stage(stage)
+        return {"spec": spec, "bodies": load_bodies(spec)}
+    except GearfmuError as error:
+        click.echo(f"gearfmu: the report has no picture of the deformed pair: {error}", err=True)
+        return {}

@@ -1,0 +1,70 @@
+"""What several verbs share: quantities with units as options, progress bars, printing of name–value lists."""
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+LEVELS = ("rigid", "fast", "standard", "full", "paper")
+INTEGRATORS = ("dg4", "mix4", "em", "rk45")
+Progress = Callable[..., None]
+
+
+class Quantity(click.ParamType):
+    """An option such as "302 N*m": a number with a unit of the given kind, handed on in SI."""
+
+    def __init__(self, unit: str) -> None:
+        self.unit = unit
+        self.name = f'"<number> {unit}"'
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """SI value of the text; a usage error when number or unit are missing or of another kind."""
+        if isinstance(value, float):
+            return value
+        from gearfmu.errors import GearfmuError
+        from gearfmu.units import to_si
+
+        try:
+            return to_si(value, self.unit)
+        except GearfmuError as error:
+            self.fail(str(error), param, ctx)
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Progress | None]:
+    """A progress bar on standard error when that is a terminal, else nothing.
+
+    Yields `report(fraction, text="")` with fraction 0 … 1, or None: long functions take it as `progress`.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    with Bar(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console, transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda fraction, text="": bar.update(task, completed=fraction, description=f"{title} {text}".strip())
+
+
+def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:
+    """Print a nested name–value mapping, aligned; numbers with six digits."""
+    width = max((len(str(key)) for key in pairs), default=0)
+    for key, value in pairs.items():
+        if isinstance(value, Mapping):
+            click.echo(f"{indent}{key}")
+            echo_pairs(value, indent + "  ")
+        else:
+            click.echo(f"{indent}{key:<{width}}  {_shown(value)}")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_shown(item) for item in value)
+    return str(value)

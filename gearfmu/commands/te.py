@@ -1,0 +1,48 @@
+"""The verb te: loaded transmission error as a table and a picture."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from gearfmu.commands.models import model_of
+from gearfmu.commands.shared import Quantity
+
+
+@click.command()
+@click.argument("stage")
+@click.option("--torque", "torques", multiple=True, required=True, type=Quantity("N*m"), help='Torque on the pinion, "302 N*m"; may repeat.')
+@click.option("--positions", type=click.IntRange(2, 100_000), default=41, show_default=True, help="Positions over one pitch, end point left out.")
+@click.option("--rigid-bearings", is_flag=True, help="Hold the axes.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("te.csv"), show_default=True, help="Table; the plot has the same name.")
+def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, out: Path) -> None:
+    """Loaded transmission error of STAGE over one pitch, wheel held: te_um = 1e6·(r_b1 φ_1 + r_b2 φ_2)."""
+    from gearfmu.report.te import te_svg
+    from gearfmu.files import write_text
+    from gearfmu.stage import loaded_te
+    from gearfmu.stage.trace import write_columns
+
+    model = model_of(stage)
+    result = loaded_te(model, torques=list(torques), positions=positions, rigid_bearings=rigid_bearings)
+    write_columns(out, te_columns(result))
+    picture = out.with_suffix(".svg")
+    write_text(picture, te_svg(result))
+    for torque, row, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):
+        click.echo(f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
+                   f"mesh stiffness {1e-6 * stiffness.mean():.1f} N/µm")  # fmt: skip
+    click.echo(f"{out}, {picture}")
+
+
+def te_columns(result: Any) -> dict[str, np.ndarray]:
+    """Columns of te.csv, torques one below the other: torque_Nm, position, te_um, mesh_stiffness_N_per_um, share_1 …"""
+    rows, positions = result.te.shape
+    columns = {
+        "torque_Nm": np.repeat(result.torque, positions),
+        "position": np.tile(result.position, rows),
+        "te_um": 1e6 * result.te.ravel(),
+        "mesh_stiffness_N_per_um": 1e-6 * result.stiffness.ravel(),
+    }
+    columns |= {f"share_{k + 1}": result.shares[:, :, k].ravel() for k in range(result.shares.shape[2])}
+    return columns

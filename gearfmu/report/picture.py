@@ -1,0 +1,145 @@
+"""The deformed pair at the instant of the largest mesh force, drawn from the bodies' display surfaces."""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gearfmu.geometry import PairGeometry
+from gearfmu.report.plots import Plot
+from gearfmu.report.scene3d import Shape, draw
+from gearfmu.report.signals import GEAR_PHI
+from gearfmu.stage.trace import Trace
+
+SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One tooth pair in contact: tooth number and roll (m) on either gear."""
+
+    teeth: tuple[int, int]
+    rolls: tuple[float, float]
+
+
+def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None:
+    """The pair at the largest |mesh force|: its elastic displacement, enlarged, under that force applied statically and
+    split evenly over the tooth pairs in contact. None without the mesh force or the gear angles.
+
+    spec : StageSpec; bodies : ReducedBody of pinion and wheel with their `display`.
+    """
+    names = [gear.name + GEAR_PHI for gear in spec.gears]
+    if "mesh.force" not in trace or names[0] not in trace or any(body.display is None for body in bodies):
+        return None
+    sample = int(np.argmax(np.abs(trace["mesh.force"])))
+    force = float(trace["mesh.force"][sample])
+    pair = PairGeometry.of(spec)
+    sg = 1 if force >= 0 else -1
+    angles = meshing_angles(pair, float(trace[names[0]][sample]), sg)
+    contacts = contacts_at(pair, angles, sg)
+    if not contacts or force == 0:
+        return None
+    moved = [_displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)]
+    largest = max(float(np.linalg.norm(u, axis=1).max()) for u in moved)
+    scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / largest)
+    shapes = [_shape(bodies[g].display, moved[g], angles[g], (pair.a if g else 0.0), scale) for g in (0, 1)]
+    caption = (f"At t = {trace.time[sample]:.5f} s, mesh force {force / 1e3:.2f} kN on the {'drive' if sg > 0 else 'coast'} flanks, "
+               f"{len(contacts)} tooth pair{'s' if len(contacts) > 1 else ''} in contact. Elastic displacement, enlarged {scale:g} times: that force applied "
+               "statically and split evenly over the pairs in contact; rigid motion and local flattening are left out.")  # fmt: skip
+    return Plot("deformed_pair", "The deformed pair at the largest mesh force", caption, draw(shapes), _columns(shapes, moved, spec))
+
+
+def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
+    """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching (DESIGN of the
+    involute gap: s_A = r_bA sg(β_A − t), s_B = r_bB sg(β_B − t − π), s_A + s_B = L; docs/theory.md)."""
+    a, b = pair.gears
+    t = _action_angle(pair, sg)
+    roll = a.r_b * sg * (phi + sg * a.psi_b - t)
+    beta = t + math.pi + sg * (pair.length - roll) / b.r_b
+    return phi, beta - sg * b.psi_b
+
+
+def contacts_at(pair: PairGeometry, angles: tuple[float, float], sg: int) -> list[Contact]:
+    """The tooth pairs whose contact point lies on both flanks, from the pinion's root outward."""
+    a, b = pair.gears
+    t = _action_angle(pair, sg)
+    found = []
+    for k in range(a.z):
+        roll = a.r_b * sg * _wrapped(angles[0] + 2 * math.pi * k / a.z + sg * a.psi_b - t)
+        opposite = pair.length - roll
+        if a.s_form <= roll <= a.s_tip and b.s_form <= opposite <= b.s_tip:
+            turn = t + math.pi + sg * opposite / b.r_b - sg * b.psi_b - angles[1]
+            found.append(Contact((k, round(turn * b.z / (2 * math.pi)) % b.z), (roll, opposite)))
+    return sorted(found, key=lambda contact: contact.rolls[0])
+
+
+def _action_angle(pair: PairGeometry, sg: int) -> float:
+    a, b = pair.gears
+    return -sg * math.acos((a.r_b + b.r_b) / pair.a)
+
+
+def _wrapped(angle: float) -> float:
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def _displacement(body: Any, teeth: int, loads: Sequence[tuple[int, float]], force: float) -> np.ndarray:
+    """Displacement (P, 3) m in the body frame under `force` (N, negative: on flank 1) split evenly over `loads` (tooth, roll)."""
+    display = body.display
+    total = np.zeros((len(display.points), 3))
+    for tooth, roll in loads:
+        unit = _at_roll(np.asarray(display.loads, dtype=float), np.asarray(display.load_roll, dtype=float), roll)
+        if force < 0:
+            unit = _mirrored(np.asarray(display.points, dtype=float), unit)
+        total -= abs(force) / len(loads) * _on_tooth(unit, tooth, teeth)
+    return total
+
+
+def _at_roll(loads: np.ndarray, rolls: np.ndarray, roll: float) -> np.ndarray:
+    """Linear interpolation of loads (p, P, 3) between rolls (p,)."""
+    order = np.argsort(rolls)
+    position = np.interp(roll, rolls[order], np.arange(rolls.size))
+    low = min(int(position), rolls.size - 2)
+    part = position - low
+    return (1 - part) * loads[order[low]] + part * loads[order[low + 1]]
+
+
+def _on_tooth(unit: np.ndarray, tooth: int, teeth: int) -> np.ndarray:
+    """A field of tooth 0 (z·P, 3), sector after sector, moved to another tooth."""
+    turned = np.roll(unit.reshape(teeth, -1, 3), tooth, axis=0).reshape(-1, 3)
+    return turned @ _rotation(2 * math.pi * tooth / teeth).T
+
+
+def _mirrored(points: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """The field of flank 1 from that of flank 0 by the tooth's mirror plane y = 0."""
+    mirror = np.array([1.0, -1.0, 1.0])
+    _, index = cKDTree(points).query(points * mirror)
+    return unit[index] * mirror
+
+
+def _rotation(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def _shape(display: Any, moved: np.ndarray, angle: float, x: float, scale: float) -> Shape:
+    points = (np.asarray(display.points, dtype=float) + scale * moved) @ _rotation(angle).T + np.array([x, 0, 0])
+    return Shape(points, np.asarray(display.quads, dtype=int), 1e6 * np.linalg.norm(moved, axis=1))
+
+
+def _round_scale(scale: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten below `scale`."""
+    power = 10 ** math.floor(math.log10(scale))
+    return float(next(step * power for step in (5, 2, 1) if step * power <= scale))
+
+
+def _columns(shapes: Sequence[Shape], moved: Sequence[np.ndarray], spec: Any) -> dict[str, np.ndarray]:
+    points = np.vstack([shape.points for shape in shapes])
+    displacement = np.vstack(moved)
+    gear = np.repeat([0, 1], [len(u) for u in moved])
+    columns = {"gear": gear}
+    columns |= {f"drawn_{axis}_[m]": points[:, i] for i, axis in enumerate("xyz")}
+    return columns | {f"body_u{axis}_[m]": displacement[:, i] for i, axis in enumerate("xyz")}
