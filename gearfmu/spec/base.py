@@ -67,9 +67,9 @@ class Quantity:
             number = self._number(value, bool((info.context or {}).get("from_file")))
         except UnitError as error:
             words = "".join(f' or "{word}"' for word in self.words)
-            raise _refuse(f"{error}{words}") from error
+            raise refuse(f"{error}{words}") from error
         if message := self._out_of_bounds(number):
-            raise _refuse(message)
+            raise refuse(message)
         return number
 
     def _number(self, value: Any, from_file: bool) -> float:
@@ -98,7 +98,8 @@ Name = Annotated[str, Strict(), Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Count = Annotated[int, Strict()]
 
 
-def _refuse(remedy: str) -> PydanticCustomError:
+def refuse(remedy: str) -> PydanticCustomError:
+    """The exception for a validator to raise: `remedy` becomes the problem's text."""
     return PydanticCustomError("refused", "{remedy}", {"remedy": remedy})
 
 

@@ -1,0 +1,58 @@
+"""What a reduced body depends on, and its fingerprint."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+from gearfmu.spec.gear import BodySpec, GearSpec
+from gearfmu.spec.stage import StageSpec
+
+_COUNTS = ("flank", "thickness", "root", "rim", "width")
+
+
+def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
+    """Everything that shapes the body of a gear, SI, and nothing else: backlash, tip relief, contact, ports, levels, names and bearings do not.
+
+    The rack's addendum is left out too: the tip diameter says where the tooth ends.
+    """
+    gear, pair = spec.gears[gear_index], spec.pair
+    return {
+        "kind": spec.kind,
+        "teeth": gear.teeth,
+        "normal_module": pair.normal_module,
+        "pressure_angle": pair.pressure_angle,
+        "helix_angle": pair.helix_angle,
+        "profile_shift": gear.profile_shift,
+        "tip_diameter": gear.tip_diameter,
+        "tip_edge_radius": gear.tip_edge_radius,
+        "face_width": gear.face_width,
+        "bore_diameter": gear.bore_diameter,
+        "rack": {"dedendum": gear.rack.dedendum, "fillet_radius": gear.rack.fillet_radius},
+        "material": gear.material.model_dump(),
+        "modal_damping": gear.modal_damping,
+        "body": _reduction(gear),
+    }
+
+
+def _reduction(gear: GearSpec) -> dict[str, Any]:
+    body: BodySpec = gear.body
+    counts = {name: body.mesh.count(name) for name in _COUNTS}
+    grading = {"thickness_grading": body.mesh.thickness_grading, "rim_grading": body.mesh.rim_grading}
+    return {
+        "strip_half_width": body.strip_half_width, "modes": body.modes, "roll_points": body.roll_points,
+        "width_functions": body.width_functions, "mesh": counts | grading,
+    }  # fmt: skip
+
+
+def body_hash(inputs: dict[str, Any]) -> str:
+    """SHA-256 (64 hex digits) of the inputs as JSON with sorted keys; floats by their shortest exact decimal form, −0 as 0."""
+    text = json.dumps(_plain(inputs), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return value + 0.0 if isinstance(value, float) else value

@@ -1,0 +1,48 @@
+"""Where stages are: the user's own files, and the shipped model library."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from pathlib import Path
+from typing import Any
+
+from gearfmu.errors import Problem, SpecError
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def library_roots() -> tuple[Path, ...]:
+    """Existing folders of shipped models: in an installed package, then in a checkout."""
+    candidates = (_PACKAGE / "reduced_models", _PACKAGE.parent / "reduced_models")
+    return tuple(root for root in candidates if root.is_dir())
+
+
+def shipped_stages() -> list[str]:
+    """Names that `find_stage` knows: "fzg_c", and "fzg_c/stage_relief" for further stage files of a folder."""
+    names = set()
+    for root in library_roots():
+        for path in root.glob("*/stage*.toml"):
+            names.add(path.parent.name if path.name == "stage.toml" else f"{path.parent.name}/{path.stem}")
+    return sorted(names)
+
+
+def find_stage(name: str | os.PathLike[str]) -> Path:
+    """The stage file meant by a path, by a folder with a stage.toml or by a shipped name. A path goes before a shipped name.
+
+    SpecError names the nearest shipped stages when there is none.
+    """
+    own = Path(name)
+    for place in (own, *(root / own for root in library_roots() if not own.is_absolute())):
+        for path in (place, place / "stage.toml", place.with_name(f"{place.name}.toml") if place.name else place):
+            if path.is_file():
+                return path
+    shipped = shipped_stages()
+    near = difflib.get_close_matches(str(name), shipped, n=1)
+    hint = f'did you mean "{near[0]}"?' if near else f"give the path of a stage.toml, or one of: {', '.join(shipped)}"
+    raise SpecError([Problem(str(name), "", "", f"there is no such stage: {hint}")])
+
+
+def model_folder(spec: Any) -> Path:
+    """The folder of a StageSpec's file, which also holds its bodies, `<gear name>.h5`."""
+    return Path(spec.source).parent

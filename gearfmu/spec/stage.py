@@ -1,0 +1,154 @@
+"""stage.toml → StageSpec: one external gear pair with its bodies, contact and ports."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.geometry import PairGeometry
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse, validate
+from gearfmu.spec.checks import geometry_problems
+from gearfmu.spec.gear import GearSpec, PairSpec
+from gearfmu.spec.layers import Layers, read_layers
+from gearfmu.spec.library import find_stage
+from gearfmu.units import to_si
+
+Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
+Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
+Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
+Frequency = Annotated[float, Quantity("Hz", above=0)]
+
+
+class ContactSpec(Spec):
+    """Tooth contact."""
+
+    slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
+    damping: Annotated[float, Quantity("N*s/m^2", at_least=0)] = Field(description="contact damping per metre of face width")
+    law: Literal["line"] = Field(default="line", description="contact law")
+
+
+class ChainSpec(Spec):
+    """Inertia, clutch and shaft compiled into a port."""
+
+    inertia: Inertia = Field(description="inertia on the outer side of the clutch, behind the port spring")
+    disc_inertia: Inertia = Field(description="inertia of the clutch disc")
+    shaft_k: Stiffness = Field(description="stiffness of the shaft between disc and bore")
+    shaft_c: Damping = Field(description="damping of that shaft")
+
+
+class PortSpec(Spec):
+    """How a shaft meets the outside. k and c of a port that is no spring are kept for an export that makes it one."""
+
+    kind: Literal["spring", "torque", "fixed"] = Field(default="spring", description="spring: motion in, torque out; torque: torque in, motion out; fixed")
+    k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
+    c: Damping | None = Field(default=None, description="damping of the port spring")
+    chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+
+    @model_validator(mode="after")
+    def _complete(self) -> PortSpec:
+        if self.kind == "spring" and (self.k is None or self.c is None):
+            raise refuse('a spring port needs k and c: add them, e.g. k = "20e3 N*m/rad", c = "0.1 N*m*s/rad"')
+        if self.kind != "spring" and self.chain is not None:
+            raise refuse('a chain hangs on a port spring: write kind = "spring" or leave the chain away')
+        return self
+
+
+class LevelSpec(Spec):
+    """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
+
+    fast_cut: Frequency = Field(default=50e3, description="cut frequency of level fast")
+    standard_cut: Frequency = Field(default=120e3, description="cut frequency of level standard")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LevelSpec:
+        if self.fast_cut > self.standard_cut:
+            raise refuse("fast_cut must not lie above standard_cut")
+        return self
+
+
+class StageSpec(Spec):
+    """A gear stage as its file gives it; SI floats. `source` is that file."""
+
+    name: Name = Field(description="name of the stage, also of its FMU")
+    description: Text = Field(default="", description="one line about the stage")
+    source: Path
+    kind: Literal["external_pair"] = Field(default="external_pair", description="kind of stage")
+    torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest pinion torque the model is made for")
+    speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest pinion speed the model is made for")
+    pair: PairSpec = Field(description="the pair")
+    gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel")
+    contact: ContactSpec = Field(description="tooth contact")
+    ports: dict[str, PortSpec] = Field(description="one port a shaft")
+    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+
+    @field_validator("gears", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        if len(value) != 2 or not all(isinstance(table, dict) for table in value.values()):
+            raise refuse("a pair has two gears: write the tables [gears.pinion] and [gears.wheel]")
+        return tuple(table | {"name": name} for name, table in value.items())
+
+    @model_validator(mode="after")
+    def _ports_of_shafts(self) -> StageSpec:
+        names = {gear.name for gear in self.gears}
+        if set(self.ports) != names:
+            tables = ", ".join(f"[ports.{name}]" for name in sorted(names))
+            raise refuse(f"every shaft needs its port and every port its shaft: write {tables}, not {', '.join(sorted(self.ports)) or 'none'}")
+        return self
+
+
+def load_stage(stage: str | os.PathLike[str]) -> StageSpec:
+    """The stage of a file, a folder (its stage.toml) or a shipped name ("fzg_c", "fzg_c/stage_relief").
+
+    SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that cannot run or carry `torque_max`.
+    """
+    layers = read_layers(find_stage(stage))
+    path, raw = layers.path, layers.tables
+    problems = [_unknown("source", raw)] if "source" in raw else []
+    spec, found = validate(StageSpec, raw | {"source": path}, str(path))
+    problems += found
+    if spec is not None:
+        problems += geometry_problems(str(path), spec.pair, spec.gears, spec.torque_max)
+    else:
+        problems += _geometry_of_what_can_be_read(layers)
+    if problems or spec is None:
+        raise SpecError(layers.attributed(problem) for problem in problems)
+    return _with_relief_rolls(spec)
+
+
+def _unknown(key: str, raw: dict[str, Any]) -> Problem:
+    return Problem("", key, str(raw[key]), "unknown key: remove it")
+
+
+def _geometry_of_what_can_be_read(layers: Layers) -> list[Problem]:
+    """Geometry problems of a file that has other problems too, when pair and gears are readable."""
+    raw, file = layers.tables, str(layers.path)
+    tables = raw.get("gears")
+    if not isinstance(tables, dict) or len(tables) != 2 or not all(isinstance(table, dict) for table in tables.values()):
+        return []
+    pair, _ = validate(PairSpec, raw.get("pair"), file)
+    gears = tuple(validate(GearSpec, table | {"name": name}, file)[0] for name, table in tables.items())
+    if pair is None or None in gears:
+        return []
+    try:
+        torque = to_si(raw.get("torque_max"), "N*m")
+    except UnitError:
+        torque = None
+    return geometry_problems(file, pair, gears, torque)
+
+
+def _with_relief_rolls(spec: StageSpec) -> StageSpec:
+    """The same stage with "outer_single_contact" turned into a roll."""
+    pair, gears = PairGeometry.of(spec), []
+    for index, gear in enumerate(spec.gears):
+        if gear.tip_relief is not None and gear.tip_relief.start_roll == "outer_single_contact":
+            relief = gear.tip_relief.model_copy(update={"start_roll": pair.outer_single_contact(index)})
+            gear = gear.model_copy(update={"tip_relief": relief})
+        gears.append(gear)
+    return spec.model_copy(update={"gears": tuple(gears)})
