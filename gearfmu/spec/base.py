@@ -57,7 +57,7 @@ class Quantity:
         if not self.unit:
             limits = {"exclusiveMinimum": self.above, "minimum": self.at_least, "exclusiveMaximum": self.below, "maximum": self.at_most}
             return {"type": "number", **{key: value for key, value in limits.items() if value is not None}}
-        number = {"type": "string", "pattern": _NUMBER_PATTERN, "examples": [f"1 {self.unit}"]}
+        number = {"type": "string", "pattern": _NUMBER_PATTERN, "unit": self.unit, "examples": [f"1 {self.unit}"]}
         return {"anyOf": [number, {"enum": list(self.words)}]} if self.words else number
 
     def _read(self, value: Any, info: core_schema.ValidationInfo) -> float | str:

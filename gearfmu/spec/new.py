@@ -1,0 +1,120 @@
+"""A new stage file, written from an existing one, with a comment that says meaning and unit at every field."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.base import Quantity, Spec, inner_model
+from gearfmu.spec.layers import read_layers
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.stage import StageSpec, load_stage
+
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
+_HEAD = """# Gear stage "{name}", made like "{like}". Lengths, torques … are text with a unit; a line that begins with "# name =" is a default.
+# Bodies (<gear>.h5) are made beside this file by `gearfmu reduce` and remade when anything that shapes them changes.
+"""
+
+
+def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | os.PathLike[str] = ".") -> Path:
+    """Write `folder`/`name`/stage.toml with the values of the stage `like` and return its path.
+
+    The file is written under a temporary name and appears whole; an existing one is never touched. SpecError when `name` is no name,
+    `like` is no valid stage, or the file exists.
+    """
+    target = Path(folder) / name / "stage.toml"
+    if not _NAME.match(name):
+        remedy = "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
+        raise SpecError([Problem("", "name", f'"{name}"', remedy)])
+    source = find_stage(like)
+    load_stage(source)
+    text = stage_text(read_layers(source).tables | {"name": name}, name, str(like))
+    try:
+        _write_new(target, text)
+    except FileExistsError:
+        raise SpecError([Problem(str(target), "", "", "this file exists already: choose another name, or edit it")]) from None
+    return target
+
+
+def stage_text(raw: dict[str, Any], name: str, like: str) -> str:
+    """The commented file for these tables."""
+    tables = {key: value for key, value in raw.items() if key != "source"}
+    return _HEAD.format(name=name, like=like) + "\n".join(_table(StageSpec, tables, ())) + "\n"
+
+
+def _write_new(target: Path, text: str) -> None:
+    """Like files.write_text, but fails with FileExistsError instead of replacing a file."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = target.with_name(f".{target.name}-{os.getpid()}-{secrets.token_hex(4)}")
+    try:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+        try:
+            os.link(temporary, target)
+        except (PermissionError, NotImplementedError):  # a file system without hard links
+            if target.exists():
+                raise FileExistsError(target) from None
+            os.rename(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _table(kind: type[Spec], raw: dict[str, Any], place: tuple[str, ...]) -> Iterator[str]:
+    """Lines of one table: its own fields first, then its sub-tables."""
+    fields = {key: field for key, field in kind.model_fields.items() if key != "source" and not (key == "name" and place)}
+    for key, field in fields.items():
+        if inner_model(field.annotation) is None and (line := _line(key, field, raw)):
+            yield line
+    for key, field in fields.items():
+        inner = inner_model(field.annotation)
+        if inner is None:
+            continue
+        named = get_origin(field.annotation) in (tuple, dict)
+        for name, table in (raw.get(key, {}).items() if named else [(None, raw.get(key))]):
+            yield from _sub_table(inner, table, (*place, key) if name is None else (*place, key, name), field)
+
+
+def _sub_table(kind: Any, raw: dict[str, Any] | None, place: tuple[str, ...], field: FieldInfo) -> Iterator[str]:
+    header = f"[{'.'.join(place)}]"
+    if raw is None and type(None) in get_args(field.annotation):
+        yield f"\n# {header}  # {field.description}"
+        yield from (line if line.startswith("# ") else f"# {line}" for line in _table(kind, {}, place) if not line.startswith("\n"))
+        return
+    yield f"\n{header}  # {field.description}"
+    yield from _table(kind, raw or {}, place)
+
+
+def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
+    quantity = next((part for part in _metadata(field) if isinstance(part, Quantity)), None)
+    unit = quantity.unit if quantity else ""
+    text = f"{key} = {_toml(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
+    meaning = field.description or ""
+    choices = [part for part in get_args(field.annotation) if isinstance(part, str)] if get_origin(field.annotation) is Literal else []
+    if len(choices) > 1:
+        meaning += f" ({' | '.join(choices)})"
+    return f"{text:<42}  # {meaning}{f' [{unit}]' if unit else ''}"
+
+
+def _metadata(field: FieldInfo) -> Iterator[Any]:
+    """Annotations of a field, also those inside `Annotated[…] | None`."""
+    yield from field.metadata
+    for part in get_args(field.annotation):
+        yield from getattr(part, "__metadata__", ())
+
+
+def _default(field: FieldInfo, unit: str) -> str:
+    if field.is_required() or field.default is None:
+        return f'"… {unit}"' if unit else "…"
+    default = field.default
+    return json.dumps(f"{default:g} {unit}") if unit and isinstance(default, float) else _toml(default)
+
+
+def _toml(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool, int)) else repr(value)
