@@ -23,7 +23,7 @@ class Event(NamedTuple):
     what: str
 
 
-class Margins(NamedTuple):
+class Attempt(NamedTuple):
     """An attempted step: state and input at both ends, capacities at both ends, length s."""
 
     x0: np.ndarray
@@ -72,7 +72,7 @@ def margins(dynamics: Dynamics, mode: Mode, x: np.ndarray, u: np.ndarray, capaci
     return found
 
 
-def first_event(dynamics: Dynamics, mode: Mode, attempt: Margins) -> Found | None:
+def first_event(dynamics: Dynamics, mode: Mode, attempt: Attempt) -> Found | None:
     """The first part that leaves its mode in the attempted step, or None."""
     start = margins(dynamics, mode, attempt.x0, attempt.u0, attempt.capacity0)
     end = margins(dynamics, mode, attempt.x1, attempt.u1, attempt.capacity1)
@@ -86,7 +86,7 @@ def first_event(dynamics: Dynamics, mode: Mode, attempt: Margins) -> Found | Non
     return _found(dynamics, part, fraction, attempt, _state_at(dynamics, mode, attempt, fraction))
 
 
-def _instant(dynamics: Dynamics, mode: Mode, attempt: Margins, part: int) -> float:
+def _instant(dynamics: Dynamics, mode: Mode, attempt: Attempt, part: int) -> float:
     def margin(fraction: float) -> float:
         x = _state_at(dynamics, mode, attempt, fraction)
         return margins(dynamics, mode, x, *_between(attempt, fraction))[part]
@@ -94,7 +94,7 @@ def _instant(dynamics: Dynamics, mode: Mode, attempt: Margins, part: int) -> flo
     return float(brentq(margin, 0.0, 1.0, xtol=FRACTION_TOLERANCE))
 
 
-def _state_at(dynamics: Dynamics, mode: Mode, attempt: Margins, fraction: float) -> np.ndarray:
+def _state_at(dynamics: Dynamics, mode: Mode, attempt: Attempt, fraction: float) -> np.ndarray:
     if fraction == 0.0:
         return attempt.x0
     if fraction == 1.0:
@@ -103,12 +103,12 @@ def _state_at(dynamics: Dynamics, mode: Mode, attempt: Margins, fraction: float)
     return dynamics.transition_once(mode, fraction * attempt.h) @ np.concatenate([attempt.x0, attempt.u0, u])
 
 
-def _between(attempt: Margins, fraction: float) -> tuple[np.ndarray, np.ndarray]:
+def _between(attempt: Attempt, fraction: float) -> tuple[np.ndarray, np.ndarray]:
     u = attempt.u0 + fraction * (attempt.u1 - attempt.u0)
     return u, attempt.capacity0 + fraction * (attempt.capacity1 - attempt.capacity0)
 
 
-def _found(dynamics: Dynamics, part: int, fraction: float, attempt: Margins, x: np.ndarray) -> Found:
+def _found(dynamics: Dynamics, part: int, fraction: float, attempt: Attempt, x: np.ndarray) -> Found:
     n_c, network = dynamics.n_clutches, dynamics.network
     is_clutch = part < n_c
     index = part if is_clutch else part - n_c

@@ -67,7 +67,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Network:
-    """The whole network. `torque_ports`: port → inertia node (torque in, motion out). `motion_ports`: port → driven node (motion in, torque out)."""
+    """The whole network. `torque_ports`: port → node (torque in, motion out; a driven node yields to no torque). `motion_ports`: port → driven node (motion in, torque out)."""
 
     nodes: tuple[Inertia | Driven, ...]
     springs: tuple[Spring, ...] = ()
@@ -96,7 +96,6 @@ def _node_problems(network: Network) -> list[str]:
     used += [*network.torque_ports.items(), *network.motion_ports.items()]
     problems = [f"{part}: there is no node {name!r}; known: {', '.join(sorted(known))}" for part, name in used if name not in known]
     driven = {node.name for node in network.nodes if isinstance(node, Driven)}
-    problems += [f"port {port}: node {name!r} is driven; a torque needs an inertia" for port, name in network.torque_ports.items() if name in driven]
     return problems + [f"port {port}: node {name!r} is an inertia; a motion needs a driven node"
                        for port, name in network.motion_ports.items() if name in known - driven]
 

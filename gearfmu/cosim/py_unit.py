@@ -3,17 +3,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from gearfmu.cosim.dynamics import Dynamics, Mode
-from gearfmu.cosim.events import Event, Margins, first_event, initial_mode, switch
+from gearfmu.cosim.events import Attempt, Event, first_event, initial_mode, switch
 from gearfmu.cosim.network import Network
 from gearfmu.errors import CouplingError
 
-MAX_EVENTS = 200  # within one step; more means the parts have no solution (or the step is absurdly long)
+MAX_EVENTS = 200  # within one micro-step; more means that the parts have no solution or the step is absurdly long
 
 
 @dataclass
@@ -21,7 +21,7 @@ class _State:
     """Everything that changes."""
 
     time: float
-    x: np.ndarray  # (states,)
+    x: np.ndarray  # (states,); replaced, never changed in place, so that states may share it
     mode: Mode
     torque: np.ndarray  # (n,) port torques, N·m, held over the step
     motion: np.ndarray  # (d, 3) φ, w, a of the driven nodes at the start of the step
@@ -30,15 +30,16 @@ class _State:
     events: tuple[Event, ...]
 
     def copy(self) -> _State:
-        return replace(self, x=self.x.copy(), torque=self.torque.copy(), motion=self.motion.copy(), tau_mean=self.tau_mean.copy())
+        return _State(self.time, self.x, self.mode, self.torque.copy(), self.motion.copy(), self.tau_mean.copy(), self.work, self.events)
 
 
 class Handle(NamedTuple):
-    """Resolved names: `outputs` for get, `inputs` = flat positions for set (None where a name is no input)."""
+    """Resolved names. `outputs`: positions for get; `inputs`: (kind, position) for set; None where a name is of the other kind only."""
 
     names: tuple[str, ...]
     outputs: np.ndarray | None
     inputs: tuple[tuple[str, int], ...] | None
+    special: np.ndarray  # places of outputs that are not linear in state and input
     buffer: np.ndarray
 
 
@@ -60,22 +61,24 @@ class PyUnit:
         self._torque_ports = {port: d.node[node] for port, node in network.torque_ports.items()}
         self._motion_ports = {port: d.driven.index(d.node[node]) for port, node in network.motion_ports.items()}
         self._sources = [(d.node[source.node], source.torque) for source in network.sources]
+        self._clutches = slice(d.n, d.n + d.n_clutches)
         self._hybrid = bool(d.n_clutches or d.gaps)
         self._outputs = self._name_outputs()
+        self._output_rows: dict[tuple[tuple[str, ...], Mode], np.ndarray] = {}
         self._z = np.zeros(d.states + 2 * d.inputs)
         self._state = self._start(0.0)
 
     # -- life -------------------------------------------------------------------------------------------------------------------------------------------
     def initialize(self, time: float) -> None:
         """Start at `time` from the initial angles and speeds of the nodes; what motion ports were given before replaces that of their nodes."""
-        given, torque = self._state.motion, self._state.torque
-        self._state = self._start(time)
-        self._state.torque[:] = torque
+        d, given = self.dynamics, self._state
+        self._state = state = self._start(time)
+        state.torque[:] = given.torque
         for k in self._motion_ports.values():
-            node = self.dynamics.driven[k]
-            self._state.motion[k] = given[k]
-            self._state.x[node], self._state.x[self.dynamics.n + node] = given[k, :2]
-        self._state.mode = initial_mode(self.dynamics, self._state.x, self._inputs(time, self._state.x), self._capacity(time, time)[0])
+            node = d.driven[k]
+            state.motion[k] = given.motion[k]
+            state.x[node], state.x[d.n + node] = given.motion[k, :2]
+        state.mode = initial_mode(d, state.x, self._inputs(time, state.x), self._capacity(time, time)[0])
 
     def save(self) -> _State:
         """A copy of everything that changes."""
@@ -99,9 +102,14 @@ class PyUnit:
         unknown = [name for name in names if name not in self._outputs and name not in inputs]
         if unknown:
             raise CouplingError(f"no variable {', '.join(unknown)}; inputs: {', '.join(sorted(inputs))}; outputs: {', '.join(sorted(self._outputs))}")
-        outputs = np.array([self._outputs[name] for name in names]) if all(name in self._outputs for name in names) else None
+        outputs = np.array([self._outputs[name] for name in names], dtype=int) if all(name in self._outputs for name in names) else None
         places = tuple(inputs[name] for name in names) if all(name in inputs for name in names) else None
-        return Handle(tuple(names), outputs, places, np.zeros(len(names)))
+        special = np.flatnonzero(outputs >= len(self.dynamics.output_names)) if outputs is not None else np.zeros(0, dtype=int)
+        return Handle(tuple(names), outputs, places, special, np.zeros(len(names)))
+
+    def output_names(self) -> tuple[str, ...]:
+        """All outputs, those of ports last."""
+        return tuple(self._outputs)
 
     def set(self, handle: Handle, values: Sequence[float]) -> None:
         """Inputs for the next step."""
@@ -115,78 +123,95 @@ class PyUnit:
         """Values (k,) at the current time, in the handle's buffer."""
         if handle.outputs is None:
             raise CouplingError(f"not all of {', '.join(handle.names)} are outputs")
-        state, m = self._state, self.dynamics.matrices(self._state.mode)
-        u = self._inputs(state.time, state.x)
-        linear = m.c @ state.x + m.d @ u
-        handle.buffer[:] = np.concatenate([linear, self._other_outputs(u)])[handle.outputs]
+        state, rows = self._state, self._rows(handle)
+        if rows.shape[1] > self.dynamics.states:
+            np.dot(rows, np.concatenate([state.x, self._inputs(state.time, state.x)]), out=handle.buffer)
+        else:
+            np.dot(rows, state.x, out=handle.buffer)
+        if len(handle.special):
+            first = len(self.dynamics.output_names)
+            handle.buffer[handle.special] = self._special_outputs()[handle.outputs[handle.special] - first]
         return handle.buffer
+
+    def _rows(self, handle: Handle) -> np.ndarray:
+        """Rows of the outputs on [x, u], or on x alone when no input reaches them, kept for each mode."""
+        key = (handle.names, self._state.mode)
+        if key not in self._output_rows:
+            m, states = self.dynamics.matrices(self._state.mode), self.dynamics.states
+            rows = np.zeros((len(handle.names), states + self.dynamics.inputs))
+            linear = np.setdiff1d(np.arange(len(handle.names)), handle.special)
+            rows[linear] = np.hstack([m.c, m.d])[handle.outputs[linear]]
+            self._output_rows[key] = rows if rows[:, states:].any() else np.ascontiguousarray(rows[:, :states])
+        return self._output_rows[key]
 
     # -- stepping ---------------------------------------------------------------------------------------------------------------------------------------
     def step(self, time: float, h: float) -> None:
         """From `time` to time + h."""
-        state = self._state
-        state.x[2 * self.dynamics.n :] = 0.0
-        self._start_motion(h)
+        state, d = self._state, self.dynamics
+        if d.n_driven:
+            self._start_motion(h)
         count = max(1, math.ceil(h / self.micro_step - 1e-9)) if self.micro_step else 1
         for k in range(count):
-            self._micro_step(time + h * k / count, h / count)
+            (self._hybrid_step if self._hybrid else self._smooth_step)(time + h * k / count, h / count)
         state.time = time + h
-        state.tau_mean[:] = state.x[2 * self.dynamics.n :] / h
-        self._end_motion(h)
+        if d.n_driven:
+            self._end_motion(h)
 
     def _start_motion(self, h: float) -> None:
         state, d = self._state, self.dynamics
+        state.x = state.x.copy()
+        state.x[2 * d.n :] = 0.0
         for k in self._motion_ports.values():
             phi, w, _ = state.motion[k]
             state.x[d.n + d.driven[k]] = w + (phi - state.x[d.driven[k]]) / h
 
     def _end_motion(self, h: float) -> None:
         state, d = self._state, self.dynamics
+        state.tau_mean[:] = state.x[2 * d.n :] / h
         for k in self._motion_ports.values():
             _, w, a = state.motion[k]
             state.x[d.n + d.driven[k]] = w + a * h
 
-    def _micro_step(self, time: float, h: float) -> None:
-        state, done = self._state, 0.0
-        full = h
+    def _smooth_step(self, time: float, h: float) -> None:
+        u0 = self._inputs(time, self._state.x)
+        self._advance(self._attempt(time, h, u0, u0.copy())[0])
+
+    def _hybrid_step(self, time: float, h: float) -> None:
+        state, d, done = self._state, self.dynamics, 0.0
         for _ in range(MAX_EVENTS):
-            t0, rest = time + done, full - done
-            x0, u0 = state.x, self._inputs(t0, state.x)
-            capacity = self._capacity(t0, time + full)
-            self._fill_clutches(u0, capacity[0])
-            x1, u1 = self._attempt(t0, rest, x0, u0, capacity[1], keep=done == 0.0)
-            found = first_event(self.dynamics, state.mode, Margins(x0, u0, x1, u1, *capacity, rest)) if self._hybrid else None
+            start, rest = time + done, h - done
+            capacity = self._capacity(start, time + h)
+            u0, u1 = self._inputs(start, state.x, capacity[0]), self._inputs(start, state.x, capacity[1])
+            x1, u1 = self._attempt(start, rest, u0, u1, keep=done == 0.0)
+            found = first_event(d, state.mode, Attempt(state.x, u0, x1, u1, *capacity, rest))
+            self._advance(x1 if found is None else found.x)
             if found is None:
-                self._advance(x1)
                 return
-            self._advance(found.x)
-            state.mode = switch(self.dynamics, state.mode, found, state.x)
-            state.events += (Event(t0 + found.fraction * rest, found.part, found.what(state.mode)),)
+            state.x = state.x.copy()
+            state.mode = switch(d, state.mode, found, state.x)
+            state.events += (Event(start + found.fraction * rest, found.part, found.what(state.mode)),)
             done += found.fraction * rest
-            if done >= full:
+            if done >= h:
                 return
         raise CouplingError(f"more than {MAX_EVENTS} stick–slip or backlash events between {time} and {time + h} s; choose a shorter micro_step")
 
-    def _attempt(self, time: float, h: float, x0: np.ndarray, u0: np.ndarray, capacity: np.ndarray, keep: bool) -> tuple[np.ndarray, np.ndarray]:
-        d, z = self.dynamics, self._z
-        s = (d.transition if keep else d.transition_once)(self._state.mode, h)
-        z[: d.states], z[d.states : d.states + d.inputs] = x0, u0
-        u1 = u0.copy()
-        self._fill_clutches(u1, capacity)
-        z[d.states + d.inputs :] = u1
-        x1 = s @ z
+    def _attempt(self, time: float, h: float, u0: np.ndarray, u1: np.ndarray, keep: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """State at the end of a step in the present mode, and the input there with the sources at that state."""
+        d, z, state = self.dynamics, self._z, self._state
+        s = (d.transition if keep else d.transition_once)(state.mode, h)
+        z[: d.states], z[d.states : d.states + d.inputs], z[d.states + d.inputs :] = state.x, u0, u1
+        x1 = s.dot(z)
         if self._sources:
-            u1[: d.n] = self._node_torques(time + h, x1)
+            self._node_torques(u1, time + h, x1)
             z[d.states + d.inputs :] = u1
-            x1 = s @ z
+            x1 = s.dot(z)
         return x1, u1
 
     def _advance(self, x1: np.ndarray) -> None:
         state, d = self._state, self.dynamics
         for k in self._motion_ports.values():
             impulse, node = 2 * d.n + k, d.driven[k]
-            mean_speed = 0.5 * (state.x[d.n + node] + x1[d.n + node])
-            state.work -= (x1[impulse] - state.x[impulse]) * mean_speed
+            state.work -= (x1[impulse] - state.x[impulse]) * 0.5 * (state.x[d.n + node] + x1[d.n + node])
         state.x = x1
 
     # -- inputs and outputs -----------------------------------------------------------------------------------------------------------------------------
@@ -199,58 +224,53 @@ class PyUnit:
         state.mode = initial_mode(d, x, self._inputs(time, x), self._capacity(time, time)[0])
         return state
 
-    def _node_torques(self, time: float, x: np.ndarray) -> np.ndarray:
-        torque, n = self._state.torque.copy(), self.dynamics.n
+    def _node_torques(self, u: np.ndarray, time: float, x: np.ndarray) -> None:
+        """Port torques and sources into the first n places of u."""
+        n = self.dynamics.n
+        u[:n] = self._state.torque
         for node, function in self._sources:
-            torque[node] += function(time, x[node], x[n + node])
-        return torque
+            u[node] += function(time, float(x[node]), float(x[n + node]))
 
-    def _inputs(self, time: float, x: np.ndarray) -> np.ndarray:
+    def _inputs(self, time: float, x: np.ndarray, capacity: np.ndarray | None = None) -> np.ndarray:
         d = self.dynamics
         u = np.zeros(d.inputs)
-        u[: d.n] = self._node_torques(time, x)
-        u[d.n + d.n_clutches : -1] = self._state.motion[:, 2]
         u[-1] = 1.0
+        self._node_torques(u, time, x)
+        if d.n_driven:
+            u[self._clutches.stop : -1] = self._state.motion[:, 2]
         if d.n_clutches:
-            self._fill_clutches(u, self._capacity(time, time)[0])
+            u[self._clutches] = self._state.mode[0] * (self._capacity(time, time)[0] if capacity is None else capacity)
         return u
 
     def _capacity(self, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray]:
         ends = [clutch.capacity.ends(t0, t1) for clutch in self.network.clutches]
         return np.array([max(e[0], 0.0) for e in ends]), np.array([max(e[1], 0.0) for e in ends])
 
-    def _fill_clutches(self, u: np.ndarray, capacity: np.ndarray) -> None:
-        n = self.dynamics.n
-        u[n : n + self.dynamics.n_clutches] = np.array(self._state.mode[0]) * capacity
-
-    def _other_outputs(self, u: np.ndarray) -> np.ndarray:
-        state, d, n = self._state, self.dynamics, self.dynamics.n
-        sources = [function(state.time, state.x[node], state.x[n + node]) for node, function in self._sources]
+    def _special_outputs(self) -> np.ndarray:
+        state, n = self._state, self.dynamics.n
+        sources = [function(state.time, float(state.x[node]), float(state.x[n + node])) for node, function in self._sources]
         locked = [float(sign == 0) for sign in state.mode[0]]
         return np.array([*state.tau_mean, *locked, *sources, state.work, self.energy()])
 
     def energy(self) -> float:
         """Kinetic energy of the inertias and potential energy of the springs, J."""
-        state, d = self._state, self.dynamics
-        w = state.x[d.n : 2 * d.n]
-        energy = sum(0.5 * w[k] ** 2 / m for k, m in enumerate(d.inverse_inertia) if m > 0)
+        x, d = self._state.x, self.dynamics
+        energy = sum(0.5 * x[d.n + k] ** 2 / m for k, m in enumerate(d.inverse_inertia) if m > 0)
         for row, spring in zip(d.extension, self.network.springs, strict=True):
-            s = float(row @ state.x[: d.n])
+            s = float(row @ x[: d.n])
             stretched = s if s > 0 or not spring.backlash else min(s + spring.backlash, 0.0)
             energy += 0.5 * spring.k * stretched**2
-        return energy
+        return float(energy)
 
     def _name_outputs(self) -> dict[str, int]:
         d, network = self.dynamics, self.network
         names = dict(d.output_names)
-        driven = [network.nodes[k].name for k in d.driven]
-        other = [f"{name}.tau_mean" for name in driven] + [f"{clutch.name}.locked" for clutch in network.clutches]
+        other = [f"{network.nodes[k].name}.tau_mean" for k in d.driven] + [f"{clutch.name}.locked" for clutch in network.clutches]
         other += [f"{source.name}.tau" for source in network.sources] + ["energy.work", "energy.stored"]
         first = len(names)
         names |= {name: first + k for k, name in enumerate(other)}
-        aliases = {}
         for port, node in network.torque_ports.items():
-            aliases |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("phi", "w", "a")}
+            names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("phi", "w", "a")}
         for port, node in network.motion_ports.items():
-            aliases |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("tau", "tau_mean")}
-        return names | aliases
+            names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("tau", "tau_mean")}
+        return names

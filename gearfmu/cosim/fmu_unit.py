@@ -1,0 +1,215 @@
+"""FmuUnit: an FMI 2.0 co-simulation FMU as a unit, through fmpy's low-level interface with buffers taken once."""
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import calloc, extract, free, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    byref,
+    fmi2Boolean,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+    fmi2Component,
+    fmi2Discard,
+    fmi2Integer,
+    fmi2LastSuccessfulTime,
+    fmi2Real,
+    fmi2True,
+    fmi2ValueReference,
+    fmi2Warning,
+)
+from fmpy.logging import addLoggerProxy
+
+from gearfmu.errors import CouplingError, FmuError, SimulationError
+
+KINDS = {"Real": ("Real", fmi2Real), "Integer": ("Integer", fmi2Integer), "Enumeration": ("Integer", fmi2Integer), "Boolean": ("Boolean", fmi2Boolean)}
+MESSAGES_KEPT = 200
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Variables of one FMI type: one call gets or sets them all."""
+
+    call: str  # Real, Integer or Boolean
+    references: Any  # ctypes array of value references
+    values: Any  # ctypes array that the FMU reads or fills
+    view: np.ndarray  # the same memory
+    places: np.ndarray  # positions in the handle's buffer
+
+
+@dataclass(frozen=True)
+class FmuHandle:
+    """Resolved variables and their buffers."""
+
+    groups: tuple[_Group, ...]
+    buffer: np.ndarray
+
+
+class FmuUnit:
+    """Unit of an FMU.
+
+    path : the .fmu; parameters : start values by name, numbers, booleans or the items of an enumeration; folder : where to unpack (a temporary one if None).
+    Raises FmuError when the FMU cannot be loaded, knows no such variable or refuses a call; SimulationError when it discards a step.
+    `close` (or the end of a with block) frees the instance.
+    """
+
+    def __init__(self, path: str | Path, parameters: Mapping[str, float | bool | str] | None = None, folder: str | Path | None = None) -> None:
+        self.path = Path(path)
+        self.messages: list[str] = []
+        self._own_folder = None if folder else tempfile.mkdtemp(prefix="gearfmu-")
+        try:
+            self._load(str(folder or self._own_folder))
+            self.instantiate(parameters or {})
+        except FMICallException as error:
+            self._remove_folder()
+            raise FmuError(f"{self.path}: {error} {self._last_message()}") from error
+        except Exception as error:
+            self._remove_folder()
+            raise error if isinstance(error, FmuError) else FmuError(f"{self.path}: cannot be loaded: {error}") from error
+
+    def _load(self, folder: str) -> None:
+        self.description = read_model_description(str(self.path), validate=False)
+        if self.description.coSimulation is None or not self.description.fmiVersion.startswith("2"):
+            raise FmuError(f"{self.path}: not an FMI 2.0 co-simulation FMU (it is FMI {self.description.fmiVersion})")
+        extract(str(self.path), folder)
+        self.variables = {variable.name: variable for variable in self.description.modelVariables}
+        self._fmu = FMU2Slave(guid=self.description.guid, unzipDirectory=folder, modelIdentifier=self.description.coSimulation.modelIdentifier,
+                              instanceName=self.description.modelName)
+        self._callbacks = fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        addLoggerProxy(byref(self._callbacks))
+
+    def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self.messages.append(message.decode("utf-8", "replace"))
+        del self.messages[:-MESSAGES_KEPT]
+
+    # -- life -------------------------------------------------------------------------------------------------------------------------------------------
+    def instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
+        """A fresh instance with these start values."""
+        self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+        self._component = fmi2Component(self._fmu.component)
+        dll = self._fmu.dll
+        self._step = dll.fmi2DoStep
+        self._getters = {"Real": dll.fmi2GetReal, "Integer": dll.fmi2GetInteger, "Boolean": dll.fmi2GetBoolean}
+        self._setters = {"Real": dll.fmi2SetReal, "Integer": dll.fmi2SetInteger, "Boolean": dll.fmi2SetBoolean}
+        if parameters:
+            self.set(self.resolve(list(parameters)), [self._number(name, value) for name, value in parameters.items()])
+
+    def initialize(self, time: float) -> None:
+        """Enter and leave initialisation mode at `time`, with the inputs set so far. Raises FmuError with the FMU's own message."""
+        try:
+            self._fmu.setupExperiment(startTime=time)
+            self._fmu.enterInitializationMode()
+            self._fmu.exitInitializationMode()
+        except FMICallException as error:
+            raise FmuError(f"{self.path}: {error} {self._last_message()}") from error
+
+    def close(self) -> None:
+        """Free the instance and the unpacked files; a second call does nothing."""
+        if self._fmu.component is not None:
+            self._fmu.freeInstance()
+            self._fmu.component = None
+        self._remove_folder()
+
+    def __enter__(self) -> FmuUnit:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # -- variables --------------------------------------------------------------------------------------------------------------------------------------
+    def resolve(self, names: Sequence[str]) -> FmuHandle:
+        """Handle of variables; raises CouplingError naming those that the FMU does not have."""
+        unknown = [name for name in names if name not in self.variables]
+        if unknown:
+            raise CouplingError(f"{self.path}: no variable {', '.join(unknown)}; it has {', '.join(sorted(self.variables))}")
+        groups = []
+        for call, kind in {kind: None for kind in KINDS.values()}:
+            places = [k for k, name in enumerate(names) if KINDS.get(self.variables[name].type) == (call, kind)]
+            if places:
+                values = (kind * len(places))()
+                references = (fmi2ValueReference * len(places))(*[self.variables[names[k]].valueReference for k in places])
+                groups.append(_Group(call, references, values, np.frombuffer(values, dtype=np.dtype(kind)), np.array(places)))
+        return FmuHandle(tuple(groups), np.zeros(len(names)))
+
+    def set(self, handle: FmuHandle, values: Sequence[float]) -> None:
+        """Set variables, one call a type. Raises FmuError when the FMU refuses a value."""
+        handle.buffer[:] = values
+        for group in handle.groups:
+            group.view[:] = handle.buffer[group.places]
+            if self._setters[group.call](self._component, group.references, len(group.places), group.values) > fmi2Warning:
+                raise FmuError(f"{self.path}: fmi2Set{group.call} refused. {self._last_message()}")
+
+    def get(self, handle: FmuHandle) -> np.ndarray:
+        """Values (k,) in the handle's buffer, one call a type."""
+        for group in handle.groups:
+            if self._getters[group.call](self._component, group.references, len(group.places), group.values) > fmi2Warning:
+                raise FmuError(f"{self.path}: fmi2Get{group.call} refused. {self._last_message()}")
+            handle.buffer[group.places] = group.view
+        return handle.buffer
+
+    def step(self, time: float, h: float) -> None:
+        """fmi2DoStep. Raises SimulationError with outcome and last successful time on discard, FmuError on error."""
+        status = self._step(self._component, fmi2Real(time), fmi2Real(h), fmi2True)
+        if status <= fmi2Warning:
+            return
+        if status == fmi2Discard:
+            reached = fmi2Real(time)
+            self._fmu.dll.fmi2GetRealStatus(self._component, fmi2LastSuccessfulTime, byref(reached))
+            message = self._last_message()
+            raise SimulationError(f"{self.path}: {message}", outcome_of(message), reached.value)
+        raise FmuError(f"{self.path}: fmi2DoStep({time:g}, {h:g}) refused. {self._last_message()}")
+
+    # -- state ------------------------------------------------------------------------------------------------------------------------------------------
+    def save(self) -> bytes:
+        """The FMU's state as bytes. Raises FmuError when it cannot be saved."""
+        if not (self.description.coSimulation.canGetAndSetFMUstate and self.description.coSimulation.canSerializeFMUstate):
+            raise FmuError(f"{self.path}: this FMU cannot save its state; use a master without rollback")
+        state = self._fmu.getFMUstate()
+        try:
+            return self._fmu.serializeFMUstate(state)
+        finally:
+            self._fmu.freeFMUstate(state)
+
+    def restore(self, state: bytes) -> None:
+        """Back to a saved state."""
+        own = self._fmu.deSerializeFMUstate(state)
+        try:
+            self._fmu.setFMUstate(own)
+        finally:
+            self._fmu.freeFMUstate(own)
+
+    # -- small helpers ----------------------------------------------------------------------------------------------------------------------------------
+    def _number(self, name: str, value: float | bool | str) -> float:
+        if not isinstance(value, str):
+            return float(value)
+        declared = getattr(self.variables.get(name), "declaredType", None)
+        items = {item.name: int(item.value) for item in (declared.items if declared and declared.items else [])}
+        if value not in items:
+            raise FmuError(f"{self.path}: {name} = {value!r}: use one of {', '.join(items) or 'the numbers of its range'}")
+        return float(items[value])
+
+    def _last_message(self) -> str:
+        return self.messages[-1] if self.messages else "The FMU gave no message."
+
+    def _remove_folder(self) -> None:
+        if self._own_folder:
+            shutil.rmtree(self._own_folder, ignore_errors=True)
+
+
+def outcome_of(message: str) -> str:
+    """Name of an outcome from the kernel's text: the words after the last time, up to a colon ("diverged", "energy balance broken")."""
+    text = message.split(" s: ", 1)[-1]
+    return text.split(":")[0].strip()

@@ -1,0 +1,143 @@
+"""SceneSpec: a stage in a drivetrain, what happens to it, for how long, and how the two are coupled."""
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, read_toml, validate
+from gearfmu.spec.drivetrain import PassengerCar, TestRig
+
+SHIPPED = Path(__file__).parent.parent / "scenes"
+Level = Literal["rigid", "fast", "standard", "full", "paper"]
+Integrator = Literal["dg4", "mix4", "em", "rk45"]
+Seconds = Annotated[float, Quantity("s", at_least=0)]
+Capacity = Annotated[float, Quantity("N*m", at_least=0)]
+
+
+class StageChoice(Spec):
+    """Which stage, and how it is computed. h = 0: the step that suits model and level."""
+
+    name: Annotated[Text, Field(description='a path or the name of a shipped stage, e.g. "fzg_c/stage_relief"')]
+    level: Level = "standard"
+    integrator: Integrator = "dg4"
+    slices: Annotated[Count, Field(ge=1, le=10)] = 5
+    h: Seconds = 0.0
+
+
+class CouplingChoice(Spec):
+    """Master and communication step; micro_step: largest step of the drivetrain between evaluations of its torques, 0 for the communication step."""
+
+    step: Annotated[float, Quantity("s", above=0), Field(description="communication step")]
+    master: Literal["gs_mean", "jacobi"] = "gs_mean"
+    micro_step: Seconds = 0.0
+
+
+class ClutchSpec(Spec):
+    """Capacity over time: straight lines through (time, torque), constant outside; the same time twice is a jump."""
+
+    capacity: Annotated[tuple[tuple[Seconds, Capacity], ...], Field(min_length=1)]
+    peak: Annotated[float, Quantity(at_least=1)] = 1.0
+
+
+class StartSpec(Spec):
+    """Speeds at the start; slip: engine faster than the pinion by this."""
+
+    pinion_speed: Annotated[float, Quantity("rad/s")]
+    slip: Annotated[float, Quantity("rad/s")] = 0.0
+
+
+class SceneSpec(Spec):
+    """A scene. Exactly one of `passenger_car` and `test_rig`; the car needs a `clutch`.
+
+    record : names of stage outputs and drivetrain variables, "*" and "?" as in file names.
+    """
+
+    name: Name
+    description: Text
+    duration: Annotated[float, Quantity("s", above=0)]
+    settle: Seconds = 0.0
+    stage: StageChoice
+    coupling: CouplingChoice
+    start: StartSpec
+    clutch: ClutchSpec | None = None
+    passenger_car: PassengerCar | None = None
+    test_rig: TestRig | None = None
+    record: tuple[Text, ...] = ("*",)
+
+    @property
+    def hash(self) -> str:
+        """SHA-256, hex, over all values in SI; the text of the file does not matter."""
+        return hashlib.sha256(json.dumps(self.model_dump(), sort_keys=True).encode()).hexdigest()
+
+    @property
+    def steps(self) -> int:
+        """Number of communication steps."""
+        return round(self.duration / self.coupling.step)
+
+
+def shipped_scenes() -> list[str]:
+    """Names of the scenes that come with the package."""
+    return sorted(path.stem for path in SHIPPED.glob("*.toml"))
+
+
+def load_scene(path_or_name: str | Path) -> SceneSpec:
+    """The scene in a TOML file, or the shipped one of that name. SpecError with everything that is wrong."""
+    path = scene_path(path_or_name)
+    scene, problems = validate(SceneSpec, read_toml(path), str(path))
+    if scene is not None:
+        problems = list(_problems(scene, str(path)))
+    if scene is None or problems:
+        raise SpecError(problems)
+    return scene
+
+
+def scene_path(path_or_name: str | Path) -> Path:
+    """File of a scene. SpecError when there is none."""
+    given, shipped = Path(path_or_name), SHIPPED / f"{path_or_name}.toml"
+    if given.is_file():
+        return given
+    if str(path_or_name) in shipped_scenes():
+        return shipped
+    raise SpecError([Problem(str(path_or_name), "", "", f"no such file and no shipped scene; shipped are {', '.join(shipped_scenes())}")])
+
+
+def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
+    """What no single field shows."""
+    chosen = [key for key in ("passenger_car", "test_rig") if getattr(scene, key) is not None]
+    if len(chosen) != 1:
+        yield Problem(file, "", "", f"give exactly one of [passenger_car] and [test_rig], found {' and '.join(chosen) or 'none'}")
+    if scene.passenger_car is not None and scene.clutch is None:
+        yield Problem(file, "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity")
+    if scene.passenger_car is None and scene.clutch is not None:
+        yield Problem(file, "clutch", "", "only the passenger car has a clutch: remove this table")
+    if scene.passenger_car is None and scene.start.slip:
+        yield Problem(file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it")
+    if scene.clutch is not None:
+        yield from _clutch_problems(scene, scene.clutch, file)
+    yield from _time_problems(scene, file)
+
+
+def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterator[Problem]:
+    times = [time for time, _ in clutch.capacity]
+    if any(b < a for a, b in zip(times, times[1:], strict=False)):
+        yield Problem(file, "clutch.capacity", "", "times must not decrease: sort the points by time")
+    if clutch.peak != 1.0 and scene.passenger_car is not None and scene.passenger_car.chain_in_fmu:
+        yield Problem(file, "clutch.peak", f"{clutch.peak:g}", "the clutch inside the FMU has no peak: remove it, or set passenger_car.chain_in_fmu = false")
+
+
+def _time_problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
+    step, duration = scene.coupling.step, scene.duration
+    if scene.settle >= duration:
+        yield Problem(file, "settle", f"{scene.settle:g} s", f"must be shorter than the duration, {duration:g} s")
+    if step > duration:
+        yield Problem(file, "coupling.step", f"{step:g} s", f"must not exceed the duration, {duration:g} s")
+    elif abs(scene.steps * step - duration) > 1e-9 * duration:
+        yield Problem(file, "coupling.step", f"{step:g} s", f"the duration, {duration:g} s, must be a whole number of steps: use {duration / scene.steps:.6g} s")
+    if scene.coupling.micro_step > step:
+        yield Problem(file, "coupling.micro_step", f"{scene.coupling.micro_step:g} s", f"must not exceed the communication step, {step:g} s")
