@@ -44,13 +44,19 @@ def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None
     if not contacts or force == 0:
         return None
     moved = [_displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)]
-    largest = max(float(np.linalg.norm(u, axis=1).max()) for u in moved)
-    scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / largest)
-    shapes = [_shape(bodies[g].display, moved[g], angles[g], (pair.a if g else 0.0), scale) for g in (0, 1)]
+    scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
+    placed = [_placed(bodies[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
+    world = [u @ _rotation(angle).T for u, angle in zip(moved, angles, strict=True)]
+    approach = _approach(pair, contacts, sg, placed, world)
+    drawn = [points + scale * u for points, u in zip(placed, world, strict=True)]
+    drawn[0] = drawn[0] @ _rotation(sg * scale * approach / pair.gears[0].r_b).T
+    shapes = [_shape(bodies[g].display, drawn[g], moved[g]) for g in (0, 1)]
     caption = (f"At t = {trace.time[sample]:.5f} s, mesh force {force / 1e3:.2f} kN on the {'drive' if sg > 0 else 'coast'} flanks, "
-               f"{len(contacts)} tooth pair{'s' if len(contacts) > 1 else ''} in contact. Elastic displacement, enlarged {scale:g} times: that force applied "
+               f"{len(contacts)} tooth pair{'s' if len(contacts) > 1 else ''} in contact. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times: that force applied "
                "statically and split evenly over the pairs in contact; rigid motion and local flattening are left out.")  # fmt: skip
-    return Plot("deformed_pair", "The deformed pair at the largest mesh force", caption, draw(shapes), _columns(shapes, moved, spec))
+    pitch_point = np.array([pair.r_w[0], 0, 0])
+    image = draw(shapes, pitch_point, 3.2 * pair.gears[0].m, "elastic displacement in µm")
+    return Plot("deformed_pair", "The deformed pair at the largest mesh force", caption, image, _columns(shapes, moved, spec))
 
 
 def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
@@ -125,9 +131,23 @@ def _rotation(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
-def _shape(display: Any, moved: np.ndarray, angle: float, x: float, scale: float) -> Shape:
-    points = (np.asarray(display.points, dtype=float) + scale * moved) @ _rotation(angle).T + np.array([x, 0, 0])
-    return Shape(points, np.asarray(display.quads, dtype=int), 1e6 * np.linalg.norm(moved, axis=1))
+def _placed(points: np.ndarray, angle: float, x: float) -> np.ndarray:
+    return np.asarray(points, dtype=float) @ _rotation(angle).T + np.array([x, 0, 0])
+
+
+def _approach(pair: PairGeometry, contacts: Sequence[Contact], sg: int, placed: Sequence[np.ndarray], moved: Sequence[np.ndarray]) -> float:
+    """How far (m) the flanks recede from each other along the line of action, mean over the pairs in contact."""
+    t = _action_angle(pair, sg)
+    normal = sg * np.array([-math.sin(t), math.cos(t), 0])
+    tangent_point = pair.gears[0].r_b * np.array([math.cos(t), math.sin(t), 0])
+    spots = np.array([tangent_point + contact.rolls[0] * normal for contact in contacts])
+    spots[:, 2] = max(float(points[:, 2].max()) for points in placed)
+    nearest = [cKDTree(points).query(spots)[1] for points in placed]
+    return float(np.mean((moved[1][nearest[1]] - moved[0][nearest[0]]) @ normal))
+
+
+def _shape(display: Any, drawn: np.ndarray, moved: np.ndarray) -> Shape:
+    return Shape(drawn, np.asarray(display.quads, dtype=int), 1e6 * np.linalg.norm(moved, axis=1))
 
 
 def _round_scale(scale: float) -> float:

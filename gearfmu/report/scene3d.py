@@ -1,4 +1,4 @@
-"""Surfaces seen from an oblique direction: parallel projection, painter's order, colour by value."""
+"""Surfaces seen in parallel projection: painter's order, colour by value, light from above left."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
 
 from gearfmu.report.style import WIDTH, png, styled
 
-ELEVATION, AZIMUTH = np.radians(24.0), np.radians(-18.0)
-LIGHT = np.array([-0.35, 0.55, 0.76])
+ELEVATION, AZIMUTH = np.radians(17.0), np.radians(-13.0)
+LIGHT = np.array([-0.4, 0.6, 0.7]) / np.linalg.norm([-0.4, 0.6, 0.7])
+STEEL = LinearSegmentedColormap.from_list("steel", ["#d6dce3", "#a3bfd8", "#4f88b8", "#e2a63e", "#bb3a26"])
 
 
 @dataclass(frozen=True)
@@ -25,34 +28,39 @@ class Shape:
     value: np.ndarray
 
 
-def draw(shapes: Sequence[Shape], label: str = "elastic displacement in µm") -> str:
-    """The shapes in one picture, as an <img> element."""
-    view = _view()
+def draw(shapes: Sequence[Shape], centre: np.ndarray, radius: float, label: str) -> str:
+    """The shapes obliquely as a whole, and beside it along the axis within `radius` (m) of `centre` (3,); an <img> element."""
+    norm = Normalize(0, max(float(shape.value.max()) for shape in shapes))
+    with styled():
+        figure = Figure(figsize=(WIDTH, 0.4 * WIDTH), layout="constrained")
+        whole, detail = figure.subplots(1, 2, width_ratios=(1.55, 1))
+        _paint(whole, shapes, _view(), norm, 0.15)
+        _paint(detail, shapes, np.eye(3), norm, 0.35)
+        detail.set(xlim=(centre[0] - radius, centre[0] + radius), ylim=(centre[1] - radius, centre[1] + radius))
+        figure.colorbar(ScalarMappable(norm, STEEL), ax=[whole, detail], label=label, shrink=0.7, aspect=26, pad=0.01)
+        return png(figure)
+
+
+def _paint(axis: Axes, shapes: Sequence[Shape], view: np.ndarray, norm: Normalize, line: float) -> None:
     corners = np.vstack([shape.points[shape.quads] for shape in shapes]) @ view.T
     values = np.concatenate([shape.value[shape.quads].mean(axis=1) for shape in shapes])
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    facing = normal[:, 2] > 0
-    order = np.argsort(corners[facing][:, :, 2].mean(axis=1))
-    with styled():
-        return _painted(corners[facing][order][:, :, :2] * 1e3, values[facing][order], normal[facing][order], label)
-
-
-def _painted(polygons: np.ndarray, values: np.ndarray, normals: np.ndarray, label: str) -> str:
-    low, high = polygons.reshape(-1, 2).min(axis=0), polygons.reshape(-1, 2).max(axis=0)
-    height = WIDTH * 0.9 * (high[1] - low[1]) / (high[0] - low[0])
-    figure = matplotlib.figure.Figure(figsize=(WIDTH, height), layout="constrained")
-    axis = figure.add_subplot()
-    norm = Normalize(0, float(values.max()))
-    colours = matplotlib.colormaps["cividis"](norm(values))
-    colours[:, :3] *= (0.55 + 0.45 * np.clip(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1))[:, None]
+    facing = np.flatnonzero(normal[:, 2] > 1e-6)
+    order = facing[np.argsort(corners[facing, :, 2].mean(axis=1))]
+    colours = _shaded(STEEL, norm(values[order]), normal[order] @ view)
     edges = colours.copy()
-    edges[:, :3] *= 0.8
-    axis.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors=edges, linewidths=0.25))
-    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    edges[:, :3] *= 0.82
+    polygons = corners[order][:, :, :2]
+    axis.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors=edges, linewidths=line))
+    axis.set(xlim=(polygons[..., 0].min(), polygons[..., 0].max()), ylim=(polygons[..., 1].min(), polygons[..., 1].max()), aspect="equal")
     axis.axis("off")
-    figure.colorbar(ScalarMappable(norm, "cividis"), ax=axis, label=label, shrink=0.6, aspect=30, pad=0.01)
-    return png(figure)
+
+
+def _shaded(colormap: Colormap, values: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    colours = matplotlib.colormaps.get_cmap(colormap)(values)
+    colours[:, :3] *= (0.62 + 0.38 * np.clip(normals @ LIGHT, 0, 1))[:, None] / (0.62 + 0.38 * LIGHT[2])
+    return np.clip(colours, 0, 1)
 
 
 def _view() -> np.ndarray:
