@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with an input: where it stands, what stands there, why that cannot be and what to write instead."""
+    """One thing that is wrong with an input: where it stands, what stands there, why that cannot be and what to write
+    instead.
+    """
 
     file: str
     field: str

@@ -1,4 +1,6 @@
-"""Text such as "600 N*m" to SI floats. Only the TOML border and the command line call this; everything behind them is SI."""
+"""Text such as "600 N*m" to SI floats. Only the TOML border and the command line call this; everything behind them is
+SI.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,9 @@ _NEWTON_METRE = re.compile(r"\b([kM]?)Nm\b")
 def to_si(text: object, unit: str) -> float:
     """The SI value of `text` ("0.1 mm"), which must have the dimension of the SI unit `unit` ("m").
 
-    Angles count: "50 Hz" is no angular speed and "N*m" no torsional stiffness ("N*m/rad"). The result is rounded to 15 significant
-    digits, so that "82.46 mm" and "0.08246 m" are the same number. An empty `unit` means a plain number.
-    Raises UnitError with the remedy.
+    Angles count: "50 Hz" is no angular speed and "N*m" no torsional stiffness ("N*m/rad"). The result is rounded to
+    15 significant digits, so that "82.46 mm" and "0.08246 m" are the same number. An empty `unit` means a plain
+    number. Raises UnitError with the remedy.
     """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
         raise UnitError(f'expected a quantity such as "1 {unit}"')

@@ -11,9 +11,10 @@ import numpy as np
 class FlankGrid:
     """One flank of tooth 0 between root form and tip form point, as element faces.
 
-    quads: (Q, 8) node indices, VTK_QUADRATIC_QUAD, normal by the right-hand rule out of the tooth; roll: (Q, 8) analytic roll s (m) of these
-    nodes; z: (Q, 8) their face-width coordinate (m). Rows run along the flank (outer) and across the width (inner): shape = (along, across).
-    All elements have the same length along the involute and their mid nodes halve it: s² is linear in the element's natural coordinate.
+    quads: (Q, 8) node indices, VTK_QUADRATIC_QUAD, normal by the right-hand rule out of the tooth; roll: (Q, 8)
+    analytic roll s (m) of these nodes; z: (Q, 8) their face-width coordinate (m). Rows run along the flank (outer)
+    and across the width (inner): shape = (along, across). All elements have the same length along the involute and
+    their mid nodes halve it: s² is linear in the element's natural coordinate.
     """
 
     quads: np.ndarray
@@ -30,9 +31,10 @@ class FlankGrid:
 class FeMesh:
     """Quadratic hexahedra.
 
-    nodes: (N, 3) m. elements: (E, 20) node indices, VTK_QUADRATIC_HEXAHEDRON. sets: named node indices ("bore"). teeth: number of equal
-    sectors of the whole body (1: this is the whole body). cut_minus, cut_plus: (C,) node indices of the sector's faces at angle −π/z and
-    +π/z; cut_plus[i] is cut_minus[i] turned by 2π/z. flank: index 0 ↔ sg = +1, 1 ↔ sg = −1.
+    nodes: (N, 3) m. elements: (E, 20) node indices, VTK_QUADRATIC_HEXAHEDRON. sets: named node indices ("bore").
+    teeth: number of equal sectors of the whole body (1: this is the whole body). cut_minus, cut_plus: (C,) node
+    indices of the sector's faces at angle −π/z and +π/z; cut_plus[i] is cut_minus[i] turned by 2π/z. flank: index 0 ↔
+    sg = +1, 1 ↔ sg = −1.
     """
 
     nodes: np.ndarray
@@ -63,7 +65,10 @@ class FeMesh:
         return FeMesh(
             nodes=np.concatenate([rotated(self.nodes[owned], angle) for angle in angles]),
             elements=np.concatenate([numbers[self.elements] for numbers in index]),
-            sets={name: np.unique(np.concatenate([numbers[nodes] for numbers in index])) for name, nodes in self.sets.items()},
+            sets={
+                name: np.unique(np.concatenate([numbers[nodes] for numbers in index]))
+                for name, nodes in self.sets.items()
+            },
             flank={side: grid.renumbered(index[0]) for side, grid in self.flank.items()},
         )
 

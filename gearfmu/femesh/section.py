@@ -1,10 +1,11 @@
 """Plane mesh of one tooth with half a space on either side, in three blocks of eight-node quadrilaterals per half.
 
-    tooth: surface = flank, core = middle of the tooth        rows run from the root form point F up to the tip
-    root:  surface = trochoid and root land, core = an arc    rows run from F to the middle of the space
+    tooth: surface = flank, core = middle of the tooth; rows run from the root form point F up to the tip
+    root:  surface = trochoid and root land, core = an arc; rows run from F to the middle of the space
     rim:   from that arc down to the bore
-Tooth, root and rim meet in one point A on the middle of the tooth. Blocks are transfinite interpolations of exact boundary curves on a lattice
-that has the mid nodes too; the other half is the mirror image.
+
+Tooth, root and rim meet in one point A on the middle of the tooth. Blocks are transfinite interpolations of exact
+boundary curves on a lattice that has the mid nodes too; the other half is the mirror image.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ _CORE_SLOPE = 0.577  # A lies this times the half-thickness at F below F: three 
 
 @dataclass(frozen=True)
 class Section:
-    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore, cut_plus, cut_minus: node indices (cuts paired).
+    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore, cut_plus, cut_minus: node indices (cuts
+    paired).
 
-    flank: for sg = +1 and −1 (2, F, 3) node indices of its edges (start, end, middle) from form to tip form point. flank_roll: (F, 3) m.
+    flank: for sg = +1 and −1 (2, F, 3) node indices of its edges (start, end, middle) from form to tip form point.
+    flank_roll: (F, 3) m.
     """
 
     nodes: np.ndarray
@@ -41,25 +44,27 @@ class Section:
 
 def build_section(gear: GearGeometry, mesh: MeshSpec) -> Section:
     """The section of `gear` with the counts of `mesh`. MeshError when the rim leaves no room for the root block."""
-    roll = flank_rolls(gear, mesh.count("flank"))
+    elements = mesh.scaled(mesh.flank, 2)
+    roll = flank_rolls(gear, elements)
     tooth, root, rim = _blocks(gear, mesh, roll)
     upper = np.concatenate([_quads(block) for block in (tooth, root, rim)])
     points = np.concatenate([upper, _mirrored(upper)])
     nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
     find = _Finder(nodes)
-    along = 2 * mesh.count("flank") + 1
-    flank_line, cut = tooth[0, :along], np.concatenate([root[:, -1], rim[1:, -1]])
+    flank_line, cut = tooth[0, : 2 * elements + 1], np.concatenate([root[:, -1], rim[1:, -1]])
     return Section(
         nodes=nodes, quads=index.reshape(-1, 8),
         bore=find(np.concatenate([rim[-1], rim[-1, 1:] * [1, -1]])),
         cut_plus=find(cut), cut_minus=find(cut * [1, -1]),
         flank=np.stack([_edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
-        flank_roll=_edges(roll[:along]),
+        flank_roll=_edges(roll[: 2 * elements + 1]),
     )  # fmt: skip
 
 
 def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
-    """Rolls (m) of corner and mid nodes along the flank: equal arc lengths up to the tip form point, then one element to the tip circle."""
+    """Rolls (m) of corner and mid nodes along the flank: equal arc lengths up to the tip form point, then one element
+    to the tip circle.
+    """
     ends = involute.arc_length(np.array([gear.s_form, gear.s_tip, gear.s_a]), gear.r_b)
     length = np.linspace(ends[0], ends[1], 2 * elements + 1)
     if gear.s_a > gear.s_tip:
@@ -70,7 +75,9 @@ def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
 
 
 def graded(elements: int, growth: float) -> np.ndarray:
-    """(2·elements + 1,) parameters from 0 to 1 of corner and mid nodes; each element is `growth` times as long as the one before."""
+    """(2·elements + 1,) parameters from 0 to 1 of corner and mid nodes; each element is `growth` times as long as the
+    one before.
+    """
     sizes = growth ** np.arange(elements)
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
@@ -81,9 +88,11 @@ def graded(elements: int, growth: float) -> np.ndarray:
 
 
 def transfinite(low: np.ndarray, high: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Lattice (P, Q, 2) inside four curves: low, high (P, 2) at the ends of the second index, start, end (Q, 2) at those of the first.
+    """Lattice (P, Q, 2) inside four curves: low, high (P, 2) at the ends of the second index, start, end (Q, 2) at
+    those of the first.
 
-    Gordon and Hall's interpolation with the curves' own arc-length parameters, so that gradings of opposite sides need not agree.
+    Gordon and Hall's interpolation with the curves' own arc-length parameters, so that gradings of opposite sides
+    need not agree.
     """
     u0, u1, v0, v1 = (_parameter(curve) for curve in (low, high, start, end))
     du, dv = (u1 - u0)[:, None], (v1 - v0)[None, :]
@@ -102,9 +111,8 @@ def _parameter(curve: np.ndarray) -> np.ndarray:
 
 
 def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    across = graded(mesh.count("thickness"), mesh.thickness_grading)[:, None]
-    down = graded(mesh.count("rim"), mesh.rim_grading)[:, None]
-    share = graded(mesh.count("root"), 1.0)
+    across = graded(mesh.scaled(mesh.thickness), mesh.growth(mesh.thickness_grading))[:, None]
+    share = graded(mesh.scaled(mesh.root, 2), 1.0)
     flank, surface = gear.flank_point(roll), root_curve(gear, share)
     surface[0] = flank[0]
     space = np.array([math.cos(gear.half_pitch), math.sin(gear.half_pitch)])
@@ -118,14 +126,36 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
     neck[-1] = core[0]
     bore = gear.r_bore * np.stack([np.cos(share * gear.half_pitch), np.sin(share * gear.half_pitch)], axis=1)
     bore[-1] = gear.r_bore * space
+    down = _rim_parameters(gear.r_f - depth - gear.r_bore, depth, mesh)[:, None]
     tooth = transfinite(neck, tip, flank, middle)
     root = transfinite(neck, surface[-1] - across * depth * space, surface, core)
     under, below = core[0] + down * (bore[0] - core[0]), core[-1] + down * (bore[-1] - core[-1])
     return tooth, root, transfinite(under, below, core, bore)
 
 
+def _rim_parameters(height: float, depth: float, mesh: MeshSpec) -> np.ndarray:
+    """Grading down a rim of this height whose first element continues the last one of the root block, `depth` high."""
+    across = graded(mesh.thickness, mesh.thickness_grading)
+    first = depth * (across[-1] - across[-3])
+    wanted = math.log1p(height / first * (mesh.rim_grading - 1)) / math.log(mesh.rim_grading)
+    count = max(mesh.rim, math.ceil(wanted))
+    growth = mesh.rim_grading if wanted > mesh.rim else _fitting_growth(height / first, count)
+    return graded(mesh.scaled(count), mesh.growth(growth))
+
+
+def _fitting_growth(sum_of_series: float, terms: int) -> float:
+    """The growth q ≥ 1 with 1 + q + … + q^(terms−1) = sum_of_series; 1 when even that is too long. Bisection."""
+    low, high = 1.0, 5.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sum(middle**k for k in range(terms)) < sum_of_series else (low, middle)
+    return low
+
+
 def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
-    """Points (P, 2) on trochoid and root land at these shares of its length, from the form point to the middle of the space."""
+    """Points (P, 2) on trochoid and root land at these shares of its length, from the form point to the middle of the
+    space.
+    """
     rounding = gear.rounding
     tau = np.linspace(gear.alpha, math.pi / 2, 2001)
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rounding.point(tau), axis=0), axis=1))])
@@ -138,7 +168,9 @@ def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
 
 
 def _core_arc(gear: GearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, float]:
-    """Arc (P, 2) under the root from the middle of the tooth to that of the space, where it ends square at the returned depth."""
+    """Arc (P, 2) under the root from the middle of the tooth to that of the space, where it ends square at the
+    returned depth.
+    """
     rim = gear.r_f - gear.r_bore
     depth = min(_ROOT_DEPTH * gear.m, _RIM_SHARE * rim)
     middle = max(form[0] - _CORE_SLOPE * form[1], gear.r_f - _RIM_SHARE * rim)
@@ -153,7 +185,9 @@ def _quads(lattice: np.ndarray) -> np.ndarray:
     """Coordinates (E, 8, 2) of the counter-clockwise quadrilaterals of a lattice (2a+1, 2b+1, 2)."""
     rows, columns = lattice.shape[0] // 2, lattice.shape[1] // 2
     steps = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
-    quads = np.stack([lattice[i : i + 2 * rows - 1 : 2, j : j + 2 * columns - 1 : 2] for i, j in steps], axis=2).reshape(-1, 8, 2)
+    quads = np.stack(
+        [lattice[i : i + 2 * rows - 1 : 2, j : j + 2 * columns - 1 : 2] for i, j in steps], axis=2
+    ).reshape(-1, 8, 2)
     first, last = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
     clockwise = np.median(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]) < 0
     return quads[:, [0, 3, 2, 1, 7, 6, 5, 4]] if clockwise else quads

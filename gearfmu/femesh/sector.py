@@ -13,13 +13,14 @@ from gearfmu.spec.gear import MeshSpec
 
 
 def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """One sector of an external spur gear: tooth 0 on +x, half a space on either side, z ∈ [−b/2, b/2], `face_width` b in m.
+    """One sector of an external spur gear: tooth 0 on +x, half a space on either side, z ∈ [−b/2, b/2], `face_width`
+    b in m.
 
-    Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. The mesh is its own mirror image about z = 0 and about
-    y = 0. MeshError when the geometry leaves no valid element.
+    Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. The mesh is its own mirror
+    image about z = 0 and about y = 0. MeshError when the geometry leaves no valid element.
     """
     section = build_section(geometry, mesh)
-    numbers, nodes = _extruded(section, face_width, mesh.count("width"))
+    numbers, nodes = _extruded(section, face_width, mesh.scaled(mesh.width))
     result = FeMesh(
         nodes=nodes,
         elements=_hexahedra(section.quads, numbers),
@@ -30,12 +31,16 @@ def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> Fe
         flank={side: _flank_grid(section, side, numbers, nodes) for side in (0, 1)},
     )
     if not (worst := float(scaled_jacobian(result).min())) > 0:
-        raise MeshError(f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape or bore")
+        raise MeshError(
+            f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape or bore"
+        )
     return result
 
 
 def _extruded(section: Section, width: float, elements: int) -> tuple[np.ndarray, np.ndarray]:
-    """numbers (2·elements + 1, N2): node index at a level of a section's node, −1 where a mid level has none; nodes (N, 3)."""
+    """numbers (2·elements + 1, N2): node index at a level of a section's node, −1 where a mid level has none; nodes
+    (N, 3).
+    """
     levels = 2 * elements + 1
     exists = np.zeros((levels, len(section.nodes)), dtype=bool)
     exists[::2] = True
@@ -50,8 +55,11 @@ def _hexahedra(quads: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     layers = [
         np.concatenate(
             [
-                numbers[k][quads[:, :4]], numbers[k + 2][quads[:, :4]],
-                numbers[k][quads[:, 4:]], numbers[k + 2][quads[:, 4:]], numbers[k + 1][quads[:, :4]],
+                numbers[k][quads[:, :4]],
+                numbers[k + 2][quads[:, :4]],
+                numbers[k][quads[:, 4:]],
+                numbers[k + 2][quads[:, 4:]],
+                numbers[k + 1][quads[:, :4]],
             ],
             axis=1,
         )  # fmt: skip

@@ -15,8 +15,8 @@ from gearfmu.files import written_whole
 def write_vtu(mesh: FeMesh, path: str | os.PathLike[str]) -> None:
     """Write hexahedra and flank faces, whole or not at all, with
 
-    point data: `roll` (m, NaN off the flanks) and one 0/1 field per node set and cut; cell data: `scaled_jacobian` (NaN on faces) and
-    `flank` (0 solid, +1/−1 the flank side).
+    point data: `roll` (m, NaN off the flanks) and one 0/1 field per node set and cut; cell data: `scaled_jacobian`
+    (NaN on faces) and `flank` (0 solid, +1/−1 the flank side).
     """
     roll = np.full(len(mesh.nodes), np.nan)
     cells = [("hexahedron20", mesh.elements)]

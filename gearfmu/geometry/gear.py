@@ -19,8 +19,9 @@ _GAUSS = np.polynomial.legendre.leggauss(40)
 class GearGeometry:
     """An external spur gear in its body frame: tooth 0 centred on +x (ISO 21771:2007 symbols; lengths m, angles rad).
 
-    z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient. r_b, r, r_a: base, reference and tip radius.
-    r_bore: bore radius. tip_edge: radius of the tip edge rounding. h_fp, rho_fp: dedendum and tip rounding of the basic rack (m, not factors).
+    z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient. r_b, r, r_a: base, reference and tip
+    radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding. h_fp, rho_fp: dedendum and tip rounding of
+    the basic rack (m, not factors).
     """
 
     z: int
@@ -69,11 +70,15 @@ class GearGeometry:
     @property
     def rounding(self) -> RackRounding:
         """The rack's tip rounding that generates the root."""
+        height = self.h_fp - self.rho_fp
         return RackRounding(
-            r=self.r, alpha=self.alpha, centre_depth=self.h_fp - self.rho_fp - self.x * self.m, radius=self.rho_fp,
-            centre_offset=self.m * math.pi / 4 - (self.h_fp - self.rho_fp) * math.tan(self.alpha) - self.rho_fp / math.cos(self.alpha),
+            r=self.r,
+            alpha=self.alpha,
+            centre_depth=height - self.x * self.m,
+            centre_offset=self.m * math.pi / 4 - height * math.tan(self.alpha) - self.rho_fp / math.cos(self.alpha),
+            radius=self.rho_fp,
             half_pitch=self.half_pitch,
-        )  # fmt: skip
+        )
 
     @property
     def s_form(self) -> float:
@@ -118,7 +123,8 @@ class GearGeometry:
         return self.flank_point(self.s_tip, sg) - self.tip_edge * self.flank_normal(self.s_tip, sg)
 
     def profile(self, points: int = 32) -> np.ndarray:
-        """Outline (P, 2) in m of tooth 0, counter-clockwise from the middle of one space to the middle of the next, tip edges sharp.
+        """Outline (P, 2) in m of tooth 0, counter-clockwise from the middle of one space to the middle of the next,
+        tip edges sharp.
 
         `points` on either flank and trochoid, a quarter of that on root land and half the tip land.
         """
@@ -134,7 +140,9 @@ class GearGeometry:
         return np.concatenate([half * [1, -1], half[-2::-1]])
 
     def radius_moment(self, power: int) -> float:
-        """∫ r^power dθ over the outline of one sector (both sides), tip edges sharp; dθ along the outline from the middle of the tooth."""
+        """∫ r^power dθ over the outline of one sector (both sides), tip edges sharp; dθ along the outline from the
+        middle of the tooth.
+        """
         tip = self.tip_half_angle * self.r_a**power
         land = self.rounding.land_angle * self.r_f**power
         return 2 * (tip + land + self._flank_moment(power) + self._root_moment(power))
@@ -151,7 +159,11 @@ class GearGeometry:
         total = 0.0
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             tau = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
-            total += 0.5 * (high - low) * float(np.dot(_GAUSS[1], self.rounding.polar(tau)[0] ** power * self._root_slope(tau)))
+            total += (
+                0.5
+                * (high - low)
+                * float(np.dot(_GAUSS[1], self.rounding.polar(tau)[0] ** power * self._root_slope(tau)))
+            )
         return total
 
     def _root_slope(self, tau: np.ndarray) -> np.ndarray:

@@ -1,6 +1,8 @@
-"""The involute of a circle, in the roll s: length of the tangent from the base circle to the flank point (ISO 21771:2007, 4.3).
+"""The involute of a circle, in the roll s: length of the tangent from the base circle to the flank point (ISO
+21771:2007, 4.3).
 
-Flank side sg = +1 is the flank at the larger angle of a tooth centred on +x, sg = −1 its mirror image. All functions broadcast.
+Flank side sg = +1 is the flank at the larger angle of a tooth centred on +x, sg = −1 its mirror image. All functions
+broadcast.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ def inv(angle: ArrayLike) -> np.ndarray:
 
 
 def inverse_inv(value: float) -> float:
-    """The angle α in [0, π/2) with inv α = `value`; `value` ≥ 0 (ValueError otherwise). Newton on t − atan t, t = tan α."""
+    """The angle α in [0, π/2) with inv α = `value`; `value` ≥ 0 (ValueError otherwise). Newton on t − atan t, t = tan
+    α.
+    """
     if not 0.0 <= value < math.inf:
         raise ValueError(f"inv of no angle: {value}")
     t = (3.0 * value) ** (1 / 3) + value

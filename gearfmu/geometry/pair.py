@@ -12,10 +12,11 @@ from gearfmu.geometry.gear import GearGeometry
 
 @dataclass(frozen=True)
 class PairGeometry:
-    """Pinion and wheel at centre distance `a` (m). `backlash`: circumferential backlash j_wt (m) on the working pitch circles.
+    """Pinion and wheel at centre distance `a` (m). `backlash`: circumferential backlash j_wt (m) on the working pitch
+    circles.
 
-    Rolls along the path of contact are those of gear 0; the other gear's is `length` − s. Gears must reach each other's base circles' common
-    tangent: a > r_b1 + r_b2 (ValueError otherwise).
+    Rolls along the path of contact are those of gear 0; the other gear's is `length` − s. Gears must reach each
+    other's base circles' common tangent: a > r_b1 + r_b2 (ValueError otherwise).
     """
 
     gears: tuple[GearGeometry, GearGeometry]
@@ -60,7 +61,9 @@ class PairGeometry:
 
     @property
     def path(self) -> dict[str, float]:
-        """Rolls (m) of gear 0 at the path points: A, E ends (where tip edge roundings begin), B, D limits of single contact, C pitch point."""
+        """Rolls (m) of gear 0 at the path points: A, E ends (where tip edge roundings begin), B, D limits of single
+        contact, C pitch point.
+        """
         start, end = self.opposite(self.gears[1].s_tip), self.gears[0].s_tip
         pitch = self.gears[0].r_b * math.tan(self.alpha_wt)
         return {"A": start, "B": end - self.base_pitch, "C": pitch, "D": start + self.base_pitch, "E": end}
@@ -86,7 +89,9 @@ class PairGeometry:
 
     @property
     def nominal_backlash(self) -> float:
-        """Circumferential backlash (m) on the working pitch circle of the teeth as profile shift and centre distance give them (eq. 98)."""
+        """Circumferential backlash (m) on the working pitch circle of the teeth as profile shift and centre distance
+        give them (eq. 98).
+        """
         inv_w = float(involute.inv(self.alpha_wt))
         thickness = [2 * r_w * (gear.psi_b - inv_w) for r_w, gear in zip(self.r_w, self.gears, strict=True)]
         return 2 * math.pi * self.r_w[0] / self.gears[0].z - sum(thickness)
@@ -103,7 +108,8 @@ class PairGeometry:
 
     @property
     def wheel_phase(self) -> float:
-        """Angle (rad) of the wheel's body frame at which the drive flanks of the nominal teeth touch, tooth 0 of the pinion on +x.
+        """Angle (rad) of the wheel's body frame at which the drive flanks of the nominal teeth touch, tooth 0 of the
+        pinion on +x.
 
         φ_B = π − ψ_bB + inv(α_wt)(1 + i) − ψ_bA·i with i = r_bA/r_bB: the zero of the gap L − s_A − s_B.
         """
@@ -115,5 +121,7 @@ class PairGeometry:
     def zero_backlash_center_distance(self) -> float:
         """Centre distance (m) at which the nominal teeth would have no backlash."""
         first, second = self.gears
-        inv_w = float(involute.inv(first.alpha)) + 2 * (first.x + second.x) * math.tan(first.alpha) / (first.z + second.z)
+        inv_w = float(involute.inv(first.alpha)) + 2 * (first.x + second.x) * math.tan(first.alpha) / (
+            first.z + second.z
+        )
         return (first.r_b + second.r_b) / math.cos(involute.inverse_inv(max(inv_w, 0.0)))

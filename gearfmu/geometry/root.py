@@ -1,7 +1,9 @@
-"""The tooth root that a basic rack with a rounded tip generates: trochoid and root circle (ISO 53 basic rack; Litvin, *Gear Geometry*, ch. 6).
+"""The tooth root that a basic rack with a rounded tip generates: trochoid and root circle (ISO 53 basic rack; Litvin,
+*Gear Geometry*, ch. 6).
 
-The rounding of the rack's tip is run through by the angle τ of its normal: τ = α where it leaves the straight rack flank (the form point of the
-involute) and τ = π/2 at its bottom (the root circle). With this parameter the curve is smooth for any height of the rounding's centre.
+The rounding of the rack's tip is run through by the angle τ of its normal: τ = α where it leaves the straight rack
+flank (the form point of the involute) and τ = π/2 at its bottom (the root circle). With this parameter the curve is
+smooth for any height of the rounding's centre.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ from numpy.typing import ArrayLike
 class RackRounding:
     """Rounding of the rack's tip against the gear's reference circle.
 
-    r: reference radius; alpha: rack angle; centre_depth: of the rounding's centre below the pitch line; centre_offset: of that centre from
-    the middle of the tooth space; radius: of the rounding; all m. half_pitch: half the angle of a tooth and a space, π/z, rad.
+    r: reference radius; alpha: rack angle; centre_depth: of the rounding's centre below the pitch line;
+    centre_offset: of that centre from the middle of the tooth space; radius: of the rounding; all m. half_pitch: half
+    the angle of a tooth and a space, π/z, rad.
     """
 
     r: float

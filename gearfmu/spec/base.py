@@ -1,6 +1,7 @@
 """From TOML to frozen typed objects: quantities with units, and every problem of a file at once.
 
-A spec is a pydantic model whose fields are SI floats. In a file a field with a unit is text ("82.46 mm"); in Python it may also be the SI number.
+A spec is a pydantic model whose fields are SI floats. In a file a field with a unit is text ("82.46 mm"); in Python
+it may also be the SI number.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ SpecType = TypeVar("SpecType", bound=Spec)
 class Quantity:
     """Annotation of a float field: its SI unit, its bounds (SI) and words that may stand instead of a number.
 
-    `Annotated[float, Quantity("m", above=0)]` takes "82.46 mm" from a file and 0.08246 from Python. An empty unit means a plain number.
+    `Annotated[float, Quantity("m", above=0)]` takes "82.46 mm" from a file and 0.08246 from Python. An empty unit
+    means a plain number.
     """
 
     unit: str = ""
@@ -55,7 +57,12 @@ class Quantity:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         if not self.unit:
-            limits = {"exclusiveMinimum": self.above, "minimum": self.at_least, "exclusiveMaximum": self.below, "maximum": self.at_most}
+            limits = {
+                "exclusiveMinimum": self.above,
+                "minimum": self.at_least,
+                "exclusiveMaximum": self.below,
+                "maximum": self.at_most,
+            }
             return {"type": "number", **{key: value for key, value in limits.items() if value is not None}}
         number = {"type": "string", "pattern": _NUMBER_PATTERN, "unit": self.unit, "examples": [f"1 {self.unit}"]}
         return {"anyOf": [number, {"enum": list(self.words)}]} if self.words else number
@@ -89,7 +96,11 @@ class Quantity:
             (self.below, lambda limit: value < limit, "less than"),
             (self.at_most, lambda limit: value <= limit, "at most"),
         )
-        failed = [f"{words} {limit:g} {self.unit}".rstrip() for limit, holds, words in checks if limit is not None and not holds(limit)]
+        failed = [
+            f"{words} {limit:g} {self.unit}".rstrip()
+            for limit, holds, words in checks
+            if limit is not None and not holds(limit)
+        ]
         return f"must be {' and '.join(failed)}" if failed else ""
 
 
@@ -180,7 +191,9 @@ def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, A
 
 
 def inner_model(annotation: Any) -> type[BaseModel] | None:
-    """The spec class in an annotation such as `Spec`, `Spec | None`, `tuple[Spec, Spec]` or `dict[str, Spec]`; None without one."""
+    """The spec class in an annotation such as `Spec`, `Spec | None`, `tuple[Spec, Spec]` or `dict[str, Spec]`; None
+    without one.
+    """
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for part in get_args(annotation) if (found := inner_model(part))), None)

@@ -6,14 +6,12 @@ import hashlib
 import json
 from typing import Any
 
-from gearfmu.spec.gear import BodySpec, GearSpec
 from gearfmu.spec.stage import StageSpec
-
-_COUNTS = ("flank", "thickness", "root", "rim", "width")
 
 
 def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
-    """Everything that shapes the body of a gear, SI, and nothing else: backlash, tip relief, contact, ports, levels, names and bearings do not.
+    """Everything that shapes the body of a gear, SI, and nothing else: backlash, tip relief, contact, ports, levels,
+    names and bearings do not.
 
     The rack's addendum is left out too: the tip diameter says where the tooth ends.
     """
@@ -32,22 +30,14 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
         "rack": {"dedendum": gear.rack.dedendum, "fillet_radius": gear.rack.fillet_radius},
         "material": gear.material.model_dump(),
         "modal_damping": gear.modal_damping,
-        "body": _reduction(gear),
+        "body": gear.body.model_dump(),
     }
 
 
-def _reduction(gear: GearSpec) -> dict[str, Any]:
-    body: BodySpec = gear.body
-    counts = {name: body.mesh.count(name) for name in _COUNTS}
-    grading = {"thickness_grading": body.mesh.thickness_grading, "rim_grading": body.mesh.rim_grading}
-    return {
-        "strip_half_width": body.strip_half_width, "modes": body.modes, "roll_points": body.roll_points,
-        "width_functions": body.width_functions, "mesh": counts | grading,
-    }  # fmt: skip
-
-
 def body_hash(inputs: dict[str, Any]) -> str:
-    """SHA-256 (64 hex digits) of the inputs as JSON with sorted keys; floats by their shortest exact decimal form, −0 as 0."""
+    """SHA-256 (64 hex digits) of the inputs as JSON with sorted keys; floats by their shortest exact decimal form, −0
+    as 0.
+    """
     text = json.dumps(_plain(inputs), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -23,19 +23,33 @@ Found = Iterator[tuple[str, float | str, str]]
 
 
 def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torque_max: float | None) -> list[Problem]:
-    """Everything that is wrong with the geometry of pair and gears; without `torque_max` (N·m) the load strip is not judged."""
+    """Everything that is wrong with the geometry of pair and gears; without `torque_max` (N·m) the load strip is not
+    judged.
+    """
     shapes = [GearGeometry.of(gear, pair) for gear in gears]
-    found = [(f"gears.{gear.name}.{field}", value, remedy) for gear, shape in zip(gears, shapes, strict=True) for field, value, remedy in _gear(gear, shape)]
+    found = [
+        (f"gears.{gear.name}.{field}", value, remedy)
+        for gear, shape in zip(gears, shapes, strict=True)
+        for field, value, remedy in _gear(gear, shape)
+    ]
     sound = not found
     if pair.center_distance <= shapes[0].r_b + shapes[1].r_b:
         least = _mm(shapes[0].r_b + shapes[1].r_b)
-        found.append(("pair.center_distance", pair.center_distance, f"smaller than the sum of the base radii, {least}: check it against module and teeth"))
+        found.append(
+            (
+                "pair.center_distance",
+                pair.center_distance,
+                f"smaller than the sum of the base radii, {least}: check it against module and teeth",
+            )
+        )
     elif sound:
         geometry = PairGeometry((shapes[0], shapes[1]), pair.center_distance, pair.backlash)
         found += _pair(pair, gears, geometry)
         found += _reliefs(gears, geometry)
         found += _strips(gears, geometry, torque_max)
-    return [Problem(file, field, value if isinstance(value, str) else _mm(value), remedy) for field, value, remedy in found]
+    return [
+        Problem(file, field, value if isinstance(value, str) else _mm(value), remedy) for field, value, remedy in found
+    ]
 
 
 def _gear(gear: GearSpec, shape: GearGeometry) -> Found:
@@ -52,10 +66,22 @@ def _rack_problems(gear: GearSpec, shape: GearGeometry) -> list[tuple[str, float
     found: list[tuple[str, float | str, str]] = []
     largest = min((math.pi / 4 - gear.rack.dedendum * tan) * cos / (1 - sin), gear.rack.dedendum)
     if gear.rack.fillet_radius > largest:
-        found.append(("rack.fillet_radius", f"{gear.rack.fillet_radius:g}", f"does not fit the rack's tip: at most {_floor(largest):g} for this dedendum"))
+        found.append(
+            (
+                "rack.fillet_radius",
+                f"{gear.rack.fillet_radius:g}",
+                f"does not fit the rack's tip: at most {_floor(largest):g} for this dedendum",
+            )
+        )
     elif shape.s_form <= 0:
         least = (shape.h_fp - shape.rho_fp * (1 - sin)) / shape.m - shape.z * sin**2 / 2
-        found.append(("profile_shift", f"{gear.profile_shift:g}", f"the rack undercuts the flank: at least {_ceil(least):g}, or more teeth"))
+        found.append(
+            (
+                "profile_shift",
+                f"{gear.profile_shift:g}",
+                f"the rack undercuts the flank: at least {_ceil(least):g}, or more teeth",
+            )
+        )
     return found
 
 
@@ -63,36 +89,62 @@ def _rim_problems(gear: GearSpec, shape: GearGeometry) -> Found:
     least_rim = _RIM_PER_TOOTH_HEIGHT * (shape.r_a - shape.r_f)
     largest = 2 * (shape.r_f - least_rim)
     if gear.bore_diameter > largest:
-        yield "bore_diameter", gear.bore_diameter, f"leaves a rim thinner than half the tooth height: at most {_mm(_floor(largest))}"
+        yield (
+            "bore_diameter",
+            gear.bore_diameter,
+            f"leaves a rim thinner than half the tooth height: at most {_mm(_floor(largest))}",
+        )
 
 
 def _tip_problems(gear: GearSpec, shape: GearGeometry) -> Found:
     rack_tip = shape.r + (gear.rack.addendum + gear.profile_shift) * shape.m
     form = involute.radius_at_roll(shape.s_form, shape.r_b)
     if shape.r_a > rack_tip * (1 + 1e-9):
-        yield "tip_diameter", gear.tip_diameter, f"larger than the basic rack makes, d + 2 m (x + addendum): at most {_mm(_floor(2 * rack_tip))}"
+        yield (
+            "tip_diameter",
+            gear.tip_diameter,
+            f"larger than the basic rack makes, d + 2 m (x + addendum): at most {_mm(_floor(2 * rack_tip))}",
+        )
     if shape.r_a - shape.tip_edge <= form:
-        yield "tip_diameter", gear.tip_diameter, f"no involute is left above the form circle: more than {_mm(2 * (form + shape.tip_edge))}"
+        yield (
+            "tip_diameter",
+            gear.tip_diameter,
+            f"no involute is left above the form circle: more than {_mm(2 * (form + shape.tip_edge))}",
+        )
     elif shape.tip_half_angle <= 0:
         largest = _root(lambda radius: float(shape.thickness_angle(radius)), form, shape.r_a)
-        yield "tip_diameter", gear.tip_diameter, f"the tooth is pointed (tip thickness ≤ 0): less than {_mm(_floor(2 * largest))}"
+        yield (
+            "tip_diameter",
+            gear.tip_diameter,
+            f"the tooth is pointed (tip thickness ≤ 0): less than {_mm(_floor(2 * largest))}",
+        )
     elif shape.tip_land_half_angle < 0:
-        yield "tip_edge_radius", gear.tip_edge_radius, f"the two roundings overlap on a tip of {_mm(2 * shape.r_a * shape.tip_half_angle)}: make it smaller"
+        yield (
+            "tip_edge_radius",
+            gear.tip_edge_radius,
+            f"the two roundings overlap on a tip of {_mm(2 * shape.r_a * shape.tip_half_angle)}: make it smaller",
+        )
 
 
 def _pair(pair: PairSpec, gears: Sequence[GearSpec], geometry: PairGeometry) -> Found:
     for index in (0, 1):
         yield from _interference(gears, geometry, index)
     if geometry.contact_ratio < 1:
-        remedy = f"the contact ratio is {geometry.contact_ratio:.3f}, below 1: larger tip diameters, smaller tip edges or a smaller centre distance"
+        remedy = (
+            f"the contact ratio is {geometry.contact_ratio:.3f}, below 1: larger tip diameters or smaller tip edges"
+        )
         yield "pair.center_distance", pair.center_distance, remedy
     allowance, module = pair.backlash - geometry.nominal_backlash, pair.normal_module
     facts = f"profile shifts and centre distance give j_wt = {_um(geometry.nominal_backlash)}"
     if allowance < -_LARGEST_THICKENING * module:
-        yield "pair.backlash", pair.backlash, f"{facts}, more than declared: declare that, or correct centre distance or profile shifts"
+        yield (
+            "pair.backlash",
+            pair.backlash,
+            f"{facts}, more than declared: declare that, or correct centre distance or profile shifts",
+        )
     elif allowance > _LARGEST_ALLOWANCE * module:
         fitting = _mm(geometry.zero_backlash_center_distance)
-        remedy = f"{facts} (none at {fitting}); thinning the teeth by {_um(allowance)} to the declared backlash is no tolerance: correct it"
+        remedy = f"{facts}, none at {fitting}; to thin the teeth by {_um(allowance)} is no tolerance: correct it"
         yield "pair.center_distance", pair.center_distance, remedy
 
 
@@ -102,10 +154,18 @@ def _interference(gears: Sequence[GearSpec], geometry: PairGeometry, index: int)
     name, other = gears[index].name, gears[1 - index].name
     field, value = f"gears.{name}.tip_diameter", gears[index].tip_diameter
     if geometry.a - tip.r_a - root.r_f <= 0:
-        yield field, value, f"the tip touches the root circle of {other}: less than {_mm(_floor(2 * (geometry.a - root.r_f)))}"
+        yield (
+            field,
+            value,
+            f"the tip touches the root circle of {other}: less than {_mm(_floor(2 * (geometry.a - root.r_f)))}",
+        )
     elif geometry.opposite(tip.s_a) < root.s_form:
         largest = 2 * float(involute.radius_at_roll(max(geometry.opposite(root.s_form), 0.0), tip.r_b))
-        yield field, value, f"the tip meets {other} below its form circle (interference): at most {_mm(_floor(largest))}, or more profile shift there"
+        yield (
+            field,
+            value,
+            f"interference: the tip meets {other} below its form circle: at most {_mm(_floor(largest))}",
+        )
 
 
 def _reliefs(gears: Sequence[GearSpec], geometry: PairGeometry) -> Found:
@@ -115,9 +175,17 @@ def _reliefs(gears: Sequence[GearSpec], geometry: PairGeometry) -> Found:
             continue
         field = f"gears.{gear.name}.tip_relief"
         if relief.amount > _LARGEST_RELIEF * shape.m:
-            yield f"{field}.amount", relief.amount, f"more than a tenth of the module: a tip relief is some micrometres, at most {_mm(_LARGEST_RELIEF * shape.m)}"
+            yield (
+                f"{field}.amount",
+                relief.amount,
+                f"more than a tenth of the module: at most {_mm(_LARGEST_RELIEF * shape.m)}, usual are some micrometres",
+            )
         if not isinstance(relief.start_roll, str) and not shape.s_form <= relief.start_roll < shape.s_a:
-            yield f"{field}.start_roll", relief.start_roll, f"outside the flank: from {_mm(shape.s_form)} to {_mm(shape.s_a)}"
+            yield (
+                f"{field}.start_roll",
+                relief.start_roll,
+                f"outside the flank: from {_mm(shape.s_form)} to {_mm(shape.s_a)}",
+            )
 
 
 def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float | None) -> Found:
@@ -127,13 +195,19 @@ def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float
         flank = float(involute.arc_length(shape.s_tip, shape.r_b) - involute.arc_length(shape.s_form, shape.r_b))
         field = f"gears.{gear.name}.body.strip_half_width"
         if width < least:
-            yield field, width, f"the contact at torque_max is wider than the strip allows: at least 1.5 Hertz half-widths, {_mm(_ceil(least, 3))}"
+            yield (
+                field,
+                width,
+                f"too narrow for the contact at torque_max: at least 1.5 Hertz half-widths, {_mm(_ceil(least, 3))}",
+            )
         elif 2 * width > flank:
             yield field, width, f"the strip is longer than the flank: at most {_mm(flank / 2)}"
 
 
 def largest_half_width(gears: Sequence[GearSpec], geometry: PairGeometry, torque: float) -> float:
-    """Largest Hertz half-width b (m) along the path of contact, one tooth pair carrying the pinion torque (N·m) over the common face width."""
+    """Largest Hertz half-width b (m) along the path of contact, one tooth pair carrying the pinion torque (N·m) over
+    the common face width.
+    """
     load = torque / geometry.gears[0].r_b / min(gear.face_width for gear in gears)
     materials = [gear.material for gear in gears]
     e_star = contact_modulus(tuple(m.youngs_modulus for m in materials), tuple(m.poisson_ratio for m in materials))
@@ -150,7 +224,9 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _floor(value: float, digits: int = 4) -> float:
-    """The next number of so many significant digits that is not above a positive `value` (below zero: a little under it)."""
+    """The next number of so many significant digits that is not above a positive `value` (below zero: a little under
+    it).
+    """
     step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
     return math.floor(value / step) * step
 

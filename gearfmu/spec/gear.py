@@ -29,7 +29,7 @@ class PairSpec(Spec):
         default=0.0, description="helix angle; only spur gears so far"
     )
     backlash: Size = Field(
-        description="circumferential backlash j_wt of the assembled pair on the working pitch circle; the contact law thins the teeth to it"
+        description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
     )
 
 
@@ -70,28 +70,50 @@ class TipRelief(Spec):
 class MeshSpec(Spec):
     """Element counts of the sector mesh (20-node hexahedra; half a tooth) and how they are graded."""
 
-    flank: Annotated[Count, Field(ge=2, le=200)] = Field(default=20, description="elements along the flank, equal in arc length")
+    flank: Annotated[Count, Field(ge=2, le=200)] = Field(
+        default=20, description="elements along the flank, equal in arc length"
+    )
     thickness: Annotated[Count, Field(ge=1, le=50)] = Field(default=6, description="elements across half the tooth")
-    root: Annotated[Count, Field(ge=2, le=100)] = Field(default=10, description="elements along root fillet and half the root land")
-    rim: Annotated[Count, Field(ge=1, le=100)] = Field(default=6, description="elements from root to bore")
+    root: Annotated[Count, Field(ge=2, le=100)] = Field(
+        default=10, description="elements along root fillet and half the root land"
+    )
+    rim: Annotated[Count, Field(ge=1, le=100)] = Field(
+        default=4,
+        description="elements from root to bore; more are taken where the rim is too high for the growth below",
+    )
     width: Annotated[Count, Field(ge=1, le=100)] = Field(default=10, description="elements across the face width")
     thickness_grading: Grading = Field(default=1.25, description="growth of elements from the surface inwards")
-    rim_grading: Grading = Field(default=1.35, description="growth of elements from the root to the bore")
-    scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(default=1.0, description="factor on all counts")
+    rim_grading: Annotated[float, Quantity(at_least=1.05, at_most=5)] = Field(
+        default=1.5, description="largest growth of elements from the root to the bore"
+    )
+    scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(
+        default=1.0, description="factor on all counts; the gradings keep their shape"
+    )
 
-    def count(self, name: str) -> int:
-        """The scaled count of the field `name`, never below what a valid mesh needs."""
-        least = {"flank": 2, "root": 2}.get(name, 1)
-        return max(least, round(self.scale * getattr(self, name)))
+    def scaled(self, count: int, least: int = 1) -> int:
+        """`count` times the scale, rounded."""
+        return max(least, round(self.scale * count))
+
+    def growth(self, grading: float) -> float:
+        """Growth per element at this scale: the elements of scale 2 halve those of scale 1 within the same geometric
+        series.
+        """
+        return float(grading ** (1 / self.scale))
 
 
 class BodySpec(Spec):
     """How the gear's body is meshed and reduced; with geometry and material it decides the reduced body."""
 
-    strip_half_width: Length = Field(description="half-width, in arc length, of the load strip on the flank; at least 1.5 Hertz half-widths")
+    strip_half_width: Length = Field(
+        description="half-width, in arc length, of the load strip on the flank; at least 1.5 Hertz half-widths"
+    )
     modes: Annotated[Count, Field(ge=1, le=2000)] = Field(default=200, description="number of elastic modes stored")
-    roll_points: Annotated[Count, Field(ge=4, le=200)] = Field(default=24, description="Chebyshev points along the flank")
-    width_functions: Annotated[Count, Field(ge=1, le=20)] = Field(default=6, description="Legendre functions across the face width")
+    roll_points: Annotated[Count, Field(ge=4, le=200)] = Field(
+        default=24, description="Chebyshev points along the flank"
+    )
+    width_functions: Annotated[Count, Field(ge=1, le=20)] = Field(
+        default=6, description="Legendre functions across the face width"
+    )
     mesh: MeshSpec = Field(default_factory=MeshSpec, description="element counts")
 
 

@@ -1,4 +1,4 @@
-"""Files that vary another file: `base = "stage.toml"` takes everything from there that this file does not say itself."""
+"""Files that vary another one: `base = "stage.toml"` takes from there what this file does not say itself."""
 
 from __future__ import annotations
 
@@ -37,7 +37,9 @@ class Layers:
 
 
 def read_layers(path: Path) -> Layers:
-    """The file at `path` and its bases (paths relative to the file that names them). SpecError when one is missing or they form a ring."""
+    """The file at `path` and its bases (paths relative to the file that names them). SpecError when one is missing or
+    they form a ring.
+    """
     files: list[tuple[Path, dict[str, Any]]] = []
     current = path
     while True:
@@ -47,12 +49,32 @@ def read_layers(path: Path) -> Layers:
         if base is None:
             return Layers(tuple(files))
         if not isinstance(base, str) or not base:
-            raise SpecError([Problem(str(current), "base", str(base), 'expected the path of a file, e.g. base = "stage.toml"')])
+            raise SpecError(
+                [Problem(str(current), "base", str(base), 'expected the path of a file, e.g. base = "stage.toml"')]
+            )
         following = current.parent / base
         if len(files) >= _DEPTH or any(following.resolve() == seen.resolve() for seen, _ in files):
-            raise SpecError([Problem(str(current), "base", base, f"the bases form a ring or are more than {_DEPTH}: name the file that says it all")])
+            raise SpecError(
+                [
+                    Problem(
+                        str(current),
+                        "base",
+                        base,
+                        f"the bases form a ring or are more than {_DEPTH}: name the file that says it all",
+                    )
+                ]
+            )
         if not following.is_file():
-            raise SpecError([Problem(str(current), "base", base, f"there is no file {following}: write the path relative to this file")])
+            raise SpecError(
+                [
+                    Problem(
+                        str(current),
+                        "base",
+                        base,
+                        f"there is no file {following}: write the path relative to this file",
+                    )
+                ]
+            )
         current = following
 
 

@@ -19,7 +19,8 @@ from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import StageSpec, load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
-_HEAD = """# Gear stage "{name}", made like "{like}". Lengths, torques … are text with a unit; a line that begins with "# name =" is a default.
+_HEAD = """# Gear stage "{name}", made like "{like}". Lengths, torques … are text with a unit.
+# A line such as "# slices = 5" shows a default.
 # Bodies (<gear>.h5) are made beside this file by `gearfmu reduce` and remade when anything that shapes them changes.
 """
 
@@ -27,8 +28,8 @@ _HEAD = """# Gear stage "{name}", made like "{like}". Lengths, torques … are t
 def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | os.PathLike[str] = ".") -> Path:
     """Write `folder`/`name`/stage.toml with the values of the stage `like` and return its path.
 
-    The file is written under a temporary name and appears whole; an existing one is never touched. SpecError when `name` is no name,
-    `like` is no valid stage, or the file exists.
+    The file is written under a temporary name and appears whole; an existing one is never touched. SpecError when
+    `name` is no name, `like` is no valid stage, or the file exists.
     """
     target = Path(folder) / name / "stage.toml"
     if not _NAME.match(name):
@@ -40,7 +41,9 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
     try:
         _write_new(target, text)
     except FileExistsError:
-        raise SpecError([Problem(str(target), "", "", "this file exists already: choose another name, or edit it")]) from None
+        raise SpecError(
+            [Problem(str(target), "", "", "this file exists already: choose another name, or edit it")]
+        ) from None
     return target
 
 
@@ -68,7 +71,9 @@ def _write_new(target: Path, text: str) -> None:
 
 def _table(kind: type[Spec], raw: dict[str, Any], place: tuple[str, ...]) -> Iterator[str]:
     """Lines of one table: its own fields first, then its sub-tables."""
-    fields = {key: field for key, field in kind.model_fields.items() if key != "source" and not (key == "name" and place)}
+    fields = {
+        key: field for key, field in kind.model_fields.items() if key != "source" and not (key == "name" and place)
+    }
     for key, field in fields.items():
         if inner_model(field.annotation) is None and (line := _line(key, field, raw)):
             yield line
@@ -77,7 +82,7 @@ def _table(kind: type[Spec], raw: dict[str, Any], place: tuple[str, ...]) -> Ite
         if inner is None:
             continue
         named = get_origin(field.annotation) in (tuple, dict)
-        for name, table in (raw.get(key, {}).items() if named else [(None, raw.get(key))]):
+        for name, table in raw.get(key, {}).items() if named else [(None, raw.get(key))]:
             yield from _sub_table(inner, table, (*place, key) if name is None else (*place, key, name), field)
 
 
@@ -85,7 +90,11 @@ def _sub_table(kind: Any, raw: dict[str, Any] | None, place: tuple[str, ...], fi
     header = f"[{'.'.join(place)}]"
     if raw is None and type(None) in get_args(field.annotation):
         yield f"\n# {header}  # {field.description}"
-        yield from (line if line.startswith("# ") else f"# {line}" for line in _table(kind, {}, place) if not line.startswith("\n"))
+        yield from (
+            line if line.startswith("# ") else f"# {line}"
+            for line in _table(kind, {}, place)
+            if not line.startswith("\n")
+        )
         return
     yield f"\n{header}  # {field.description}"
     yield from _table(kind, raw or {}, place)
@@ -96,7 +105,11 @@ def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
     unit = quantity.unit if quantity else ""
     text = f"{key} = {_toml(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
     meaning = field.description or ""
-    choices = [part for part in get_args(field.annotation) if isinstance(part, str)] if get_origin(field.annotation) is Literal else []
+    choices = (
+        [part for part in get_args(field.annotation) if isinstance(part, str)]
+        if get_origin(field.annotation) is Literal
+        else []
+    )
     if len(choices) > 1:
         meaning += f" ({' | '.join(choices)})"
     return f"{text:<42}  # {meaning}{f' [{unit}]' if unit else ''}"
