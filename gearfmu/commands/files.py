@@ -41,9 +41,10 @@ def _schema_text(kind: str) -> str:
         from gearfmu.commands.variables import variables_page
 
         return variables_page()
-    from gearfmu import spec
+    from gearfmu.spec.scene import SceneSpec
+    from gearfmu.spec.schema import file_schema, stage_schema
 
-    made = spec.stage_schema() if kind == "stage" else spec.scene_schema()
+    made = stage_schema() if kind == "stage" else file_schema(SceneSpec)
     return json.dumps(made, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -52,7 +53,7 @@ def facts_of(path: Path) -> dict[str, Any]:
     from gearfmu.errors import GearfmuError
 
     if not path.exists():
-        raise GearfmuError(f"{path}: no such file")
+        path = _shipped(path)
     readers = {".h5": _hdf5, ".toml": _toml, ".fmu": _fmu}
     reader = _toml if path.is_dir() else readers.get(path.suffix.lower())
     if reader is None:
@@ -60,29 +61,59 @@ def facts_of(path: Path) -> dict[str, Any]:
     return reader(path)
 
 
+def _shipped(name: Path) -> Path:
+    """File of a shipped stage or scene of that name; an error that names them when there is none."""
+    from gearfmu.errors import GearfmuError
+    from gearfmu.spec.library import library_roots, shipped_stages
+    from gearfmu.spec.scene import SHIPPED, shipped_scenes
+
+    stages, scenes = shipped_stages(), shipped_scenes()
+    if str(name) in scenes:
+        return SHIPPED / f"{name}.toml"
+    found = [path for root in library_roots() for path in (root / name / "stage.toml", root / f"{name}.toml") if path.is_file()]
+    if not found:
+        raise GearfmuError(f"{name}: no such file; shipped are {', '.join([*stages, *scenes])}")
+    return found[0]
+
+
 def _hdf5(path: Path) -> dict[str, Any]:
     import h5py
 
-    from gearfmu.body import inspect_file
     from gearfmu.stage.trace import FORMAT, Trace
 
     if h5py.is_hdf5(path):
         with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                return inspect_file(path)
+            kind = file.attrs.get("format")
+        if kind != FORMAT:
+            from gearfmu.body import inspect_file
+
+            return {"file": "body", **inspect_file(path)}
     trace = Trace.load(path)
     channels = {name: {"unit": c.unit, "min": float(c.values.min()), "max": float(c.values.max())} for name, c in trace.channels.items()}
     span = [float(trace.time[0]), float(trace.time[-1])]
-    return {"kind": "trace", "samples": trace.time.size, "time_s": span, "channels": channels, "meta": trace.meta}
+    return {"file": "trace", "samples": trace.time.size, "time_s": span, "channels": channels, "meta": trace.meta}
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    from gearfmu.spec import load_scene, load_stage
     from gearfmu.spec.base import read_toml
+    from gearfmu.spec.scene import load_scene
+    from gearfmu.spec.stage import load_stage
 
-    is_scene = path.is_file() and "stage" in read_toml(path)
-    spec = load_scene(path) if is_scene else load_stage(path)
-    return {"kind": "scene" if is_scene else "stage", **spec.model_dump(mode="json")}
+    if path.is_file() and "coupling" in read_toml(path):
+        return {"file": "scene", **load_scene(path).model_dump(mode="json")}
+    spec = load_stage(path)
+    return {"file": "stage", **spec.model_dump(mode="json"), "derived": _derived(spec)}
+
+
+def _derived(spec: Any) -> dict[str, Any]:
+    """What follows from the numbers of a stage (ISO 21771): working pressure angle, contact ratio, radii in m."""
+    import math
+
+    from gearfmu.geometry import PairGeometry
+
+    pair = PairGeometry.of(spec)
+    radii = {gear.name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a} for gear, shape in zip(spec.gears, pair.gears, strict=True)}
+    return {"working_pressure_angle_deg": math.degrees(pair.alpha_wt), "contact_ratio": pair.contact_ratio, "base_pitch": pair.base_pitch, **radii}
 
 
 def _fmu(path: Path) -> dict[str, Any]:
@@ -95,5 +126,5 @@ def _fmu(path: Path) -> dict[str, Any]:
     except Exception as error:  # fmpy lets errors of zipfile, lxml and its own through
         raise FmuError(f"{path}: not an FMU ({error}); 'gearfmu validate' says more") from error
     variables = {v.name: f"{v.causality}, {v.unit or '-'}: {v.description or ''}" for v in description.modelVariables}
-    return {"kind": "fmu", "model": description.modelName, "fmi": description.fmiVersion, "guid": description.guid,
+    return {"file": "fmu", "model": description.modelName, "fmi": description.fmiVersion, "guid": description.guid,
             "platforms": list(fmpy.supported_platforms(str(path))), "variables": variables}  # fmt: skip

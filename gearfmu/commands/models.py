@@ -1,19 +1,50 @@
-"""From a stage's name to its model: load, reduce what is missing, assemble."""
+"""From a stage's name to its bodies and its model: load, reduce what is missing, assemble."""
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+import click
+
 from gearfmu.commands.shared import progress_bar
 
 
-def model_of(stage: str, ports: Mapping[str, str] | None = None) -> Any:
-    """The StageModel of STAGE with the ports' kinds replaced by `ports` (shaft → kind); reduces bodies that are not up to date."""
-    from gearfmu.body import reduce_stage
-    from gearfmu.spec import load_stage
+def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> Any:
+    """The StageModel of STAGE, with other kinds of port where `port_kinds` (shaft → kind) says so."""
+    spec, bodies = bodies_of(stage)
     from gearfmu.stage import assemble
 
+    return assemble(with_ports(spec, port_kinds or {}), bodies)
+
+
+def bodies_of(stage: str) -> tuple[Any, list[Any]]:
+    """StageSpec and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first, with a progress bar."""
+    from gearfmu.spec.stage import load_stage
+
     spec = load_stage(stage)
+    from gearfmu.body import reduce_stage
+
     with progress_bar("reducing") as progress:
-        bodies = reduce_stage(spec, progress=progress)
-    return assemble(spec, bodies) if not ports else assemble(spec, bodies, ports=dict(ports))
+        return spec, reduce_stage(spec, progress=progress)
+
+
+def shipped_bodies(spec: Any) -> list[Any]:
+    """The bodies beside the stage file as they are; raises BodyError when one is missing or damaged."""
+    from gearfmu.body import load_body
+    from gearfmu.spec.library import model_folder
+
+    return [load_body(model_folder(spec) / f"{gear.name}.h5") for gear in spec.gears]
+
+
+def with_ports(spec: Any, kinds: Mapping[str, str]) -> Any:
+    """The StageSpec with the ports' kinds replaced; a usage error for a shaft it does not have or a spring without k and c."""
+    unknown = set(kinds) - set(spec.ports)
+    if unknown:
+        raise click.BadParameter(f"no shaft '{min(unknown)}'; the stage has {', '.join(spec.ports)}", param_hint="--port")
+    ports = dict(spec.ports)
+    for shaft, kind in kinds.items():
+        if kind == "spring" and ports[shaft].k is None:
+            raise click.BadParameter(f"{shaft}=spring needs k and c in [ports.{shaft}] of {spec.source}", param_hint="--port")
+        chain = ports[shaft].chain if kind == "spring" else None
+        ports[shaft] = ports[shaft].model_copy(update={"kind": kind, "chain": chain})
+    return spec.model_copy(update={"ports": ports})

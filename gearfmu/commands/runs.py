@@ -19,7 +19,7 @@ OUT = click.Path(path_type=Path, file_okay=False)
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
-    from gearfmu.spec import load_scene
+    from gearfmu.spec.scene import load_scene
 
     spec = load_scene(scene)
     return run_scene(spec, out or Path("out") / spec.name, unit=unit, fmu_path=fmu_path, verify=verify)
@@ -29,7 +29,7 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
 @click.option("--out", type=OUT, default=Path("out/demo"), show_default=True, help="Folder of the results.")
 def demo(out: Path) -> int:
     """Clutch closure on the shipped stage fzg_c through its exported FMU; ends with a report."""
-    from gearfmu.spec import load_scene
+    from gearfmu.spec.scene import load_scene
 
     return run_scene(load_scene("clutch_closure"), out, unit="fmu")
 
@@ -50,10 +50,12 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
     from gearfmu import cosim
+    from gearfmu.commands.models import bodies_of
 
+    bodies_of(scene.stage.name)
     with progress_bar(scene.name) as progress:
         trace = cosim.run(scene, out, progress=progress, **options)
-    return finish(trace, out, scene.stage)
+    return finish(trace, out, scene.stage.name)
 
 
 def finish(trace: Any, out: Path, stage: str | None) -> int:
@@ -61,29 +63,24 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
     trace.save(out / "trace.h5")
     page = write_report(trace, out, stage)
     meta = trace.meta
-    click.echo(f"{meta.get('outcome')}: {meta.get('simulated_s', 0):.4g} s simulated in {meta.get('cpu_s', 0):.3g} s CPU time "
-               f"({meta.get('realtime_factor', 0):.3g} per simulated second)")  # fmt: skip
+    click.echo(f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
+               f"({meta['realtime_factor']:.3g} per simulated second)")  # fmt: skip
     click.echo(page)
-    return 0 if meta.get("outcome") == "ok" else 1
+    return 0 if meta["outcome"] == "ok" else 1
 
 
 def write_report(trace: Any, out: Path, stage: str | None) -> Path:
-    """The report page of `trace` in `out`; with the stage's bodies, where they are there, for the deformed pair."""
+    """The report page of `trace` in `out`; with the deformed pair where the stage and its bodies can be read."""
     from gearfmu import report as room
-
-    return room.write(trace, trace.meta, out, **_stage_objects(stage))
-
-
-def _stage_objects(stage: str | None) -> dict[str, Any]:
-    from gearfmu.body import load_bodies
+    from gearfmu.commands.models import shipped_bodies
     from gearfmu.errors import GearfmuError
-    from gearfmu.spec import load_stage
+    from gearfmu.spec.stage import load_stage
 
     if not stage:
-        return {}
+        return room.write(trace, trace.meta, out)
     try:
         spec = load_stage(stage)
-        return {"spec": spec, "bodies": load_bodies(spec)}
+        return room.write(trace, trace.meta, out, spec, shipped_bodies(spec))
     except GearfmuError as error:
-        click.echo(f"gearfmu: the report has no picture of the deformed pair: {error}", err=True)
-        return {}
+        click.echo(f"gearfmu: the report goes without the deformed pair: {error}", err=True)
+        return room.write(trace, trace.meta, out)

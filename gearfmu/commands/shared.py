@@ -55,6 +55,8 @@ def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:
     """Print a nested name–value mapping, aligned; numbers with six digits."""
     width = max((len(str(key)) for key in pairs), default=0)
     for key, value in pairs.items():
+        if isinstance(value, (list, tuple)) and value and isinstance(value[0], Mapping):
+            value = {str(item.get("name", number)): item for number, item in enumerate(value)}
         if isinstance(value, Mapping):
             click.echo(f"{indent}{key}")
             echo_pairs(value, indent + "  ")

@@ -13,7 +13,7 @@ from gearfmu.commands.shared import echo_pairs, progress_bar
 @click.option("--like", default="fzg_c", show_default=True, metavar="STAGE", help="Shipped stage to start from.")
 def new(name: str, like: str) -> None:
     """Write NAME/stage.toml, every field commented, as a copy of a shipped stage. Never overwrites."""
-    from gearfmu.spec import new_stage
+    from gearfmu.spec.new import new_stage
 
     path = new_stage(name, like)
     click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}' and 'gearfmu export {path}'.")
@@ -29,16 +29,17 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> N
     """Mesh the gears of STAGE, print size and quality, write <gear>.vtu."""
     from gearfmu.femesh import gear_sector, mesh_report, write_vtu
     from gearfmu.geometry import GearGeometry
-    from gearfmu.spec import load_stage
+    from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
     for gear in _chosen(spec.gears, only):
         counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * scale})
-        sector = gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, gear.bore_diameter, counts)
+        geometry = GearGeometry.of(gear, spec.pair)
+        sector = gear_sector(geometry, gear.face_width, counts)
         path = out / f"{gear.name}.vtu"
         write_vtu(sector.full() if full else sector, path)
         click.echo(gear.name)
-        echo_pairs({**mesh_report(sector), "written": str(path)}, "  ")
+        echo_pairs({**mesh_report(sector, geometry.r_b, gear.body.strip_half_width), "written": str(path)}, "  ")
 
 
 @click.command()
@@ -48,7 +49,7 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> N
 def reduce(stage: str, out: Path | None, force: bool) -> None:
     """Reduce the gears of STAGE to <gear>.h5; a body whose input hash matches is left as it is."""
     from gearfmu.body import reduce_stage
-    from gearfmu.spec import load_stage
+    from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
     with progress_bar("reducing") as progress:

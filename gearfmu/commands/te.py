@@ -19,16 +19,15 @@ from gearfmu.commands.shared import Quantity
 @click.option("--out", type=click.Path(path_type=Path), default=Path("te.csv"), show_default=True, help="Table; the plot has the same name.")
 def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, out: Path) -> None:
     """Loaded transmission error of STAGE over one pitch, wheel held: te_um = 1e6·(r_b1 φ_1 + r_b2 φ_2)."""
-    from gearfmu.report.te import te_svg
-    from gearfmu.files import write_text
+    model = model_of(stage)
+    from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.trace import write_columns
 
-    model = model_of(stage)
     result = loaded_te(model, torques=list(torques), positions=positions, rigid_bearings=rigid_bearings)
     write_columns(out, te_columns(result))
-    picture = out.with_suffix(".svg")
-    write_text(picture, te_svg(result))
+    picture = out.with_suffix(".png")
+    write_plot(result, picture)
     for torque, row, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):
         click.echo(f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
                    f"mesh stiffness {1e-6 * stiffness.mean():.1f} N/µm")  # fmt: skip

@@ -90,19 +90,18 @@ def mesh_force_and_error(trace: Trace, window: tuple[float, float] | None = None
 
 def bearing_forces(trace: Trace) -> Plot | None:
     """Bearing forces x and y of every shaft over time; None without them."""
-    bearings = [shaft for shaft in shafts(trace) if f"bearing.{shaft}.fx" in trace]
+    bearings = [found for shaft in shafts(trace) if (found := [n for d in "xy" if (n := f"bearing.{shaft}.f{d}") in trace])]
     if not bearings:
         return None
     with styled():
         figure, axes = panels((1.7,) * len(bearings))
-        for axis, shaft in zip(axes, bearings, strict=True):
-            for direction in ("fx", "fy"):
-                name = f"bearing.{shaft}.{direction}"
+        for axis, found in zip(axes, bearings, strict=True):
+            for name in found:
                 axis.plot(trace.time, trace[name] * 1e-3, label=name, lw=0.8)
             _finish(axis, "force in kN")
         axes[-1].set_xlabel("time in s")
         picture = svg(figure, "bearing")
-    names = [f"bearing.{shaft}.{direction}" for shaft in bearings for direction in ("fx", "fy")]
+    names = [name for found in bearings for name in found]
     caption = "Force of the gear on its bearing; x points from pinion to wheel."
     return Plot("bearing", "Bearing forces", caption, picture, columns(trace, names))
 

@@ -80,6 +80,8 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
     step = metrics.sample_step(trace.time)
     segment = _segment(trace.time.size, windows=14)
     picture_data = metrics.spectrogram(trace[name], step, segment, max(segment // 16, 1))
+    if picture_data.time.size < 4:
+        raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
     values = metrics.level(picture_data.amplitude)
     top = float(np.ceil(values.max() / 5) * 5)
     with styled():

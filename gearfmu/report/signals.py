@@ -24,9 +24,9 @@ class Window:
 
 
 def shafts(trace: Trace) -> list[str]:
-    """Shaft names, in the trace's order, pinion first: all X with a channel "X.gear.w" or "bearing.X.fx"."""
+    """Shaft names, in the trace's order, pinion first: all X with a channel "X.gear.w" or "bearing.X.…"."""
     found = [name.removesuffix(GEAR_SPEED) for name in trace.channels if name.endswith(GEAR_SPEED)]
-    found += [name.split(".")[1] for name in trace.channels if name.startswith("bearing.") and name.endswith(".fx")]
+    found += [name.split(".")[1] for name in trace.channels if name.startswith("bearing.") and name.count(".") == 2]
     return list(dict.fromkeys(found))
 
 

@@ -19,7 +19,7 @@ RC = {
     "axes.linewidth": 0.7, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": GRID,
     "grid.linewidth": 0.7, "axes.axisbelow": True, "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK,
     "ytick.labelcolor": INK, "lines.linewidth": 1.1, "legend.frameon": False, "legend.fontsize": 8.8,
-    "legend.handlelength": 1.6, "svg.fonttype": "none", "axes.unicode_minus": True, "image.cmap": "magma",
+    "legend.handlelength": 1.6, "svg.fonttype": "none", "text.parse_math": False, "axes.unicode_minus": True, "image.cmap": "magma",
 }  # fmt: skip
 
 
@@ -36,17 +36,13 @@ def panels(heights: tuple[float, ...], share: bool = True) -> tuple[Figure, list
     return figure, list(axes)
 
 
-def standalone_svg(figure: Figure, name: str) -> str:
-    """`figure` as the text of an SVG file, the same bytes every time; `name` keeps its ids apart from other figures'."""
+def svg(figure: Figure, name: str) -> str:
+    """`figure` as an <svg> element of a page, the same bytes every time: takes the page's width and names no outside
+    address; `name` keeps its ids apart from other figures'."""
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
         FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
-
-
-def svg(figure: Figure, name: str) -> str:
-    """`figure` as an <svg> element of a page: takes the page's width and names no outside address."""
-    text = standalone_svg(figure, name)
+    text = buffer.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     return _without_unused_ids(_bare_head(text))
 

@@ -1,15 +1,17 @@
 """Picture of a loaded transmission error: one curve a torque (Harris map), and the mesh stiffness below."""
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-from gearfmu.report.style import panels, standalone_svg, styled
+from gearfmu.files import written_whole
+from gearfmu.report.style import panels, styled
 
 
-def te_svg(result: Any) -> str:
-    """SVG file text of a TeResult: te (T, P) m and stiffness (T, P) N/m over position (P,) in pitches."""
+def write_plot(result: Any, path: Path) -> None:
+    """Write a TeResult, te (T, P) m and stiffness (T, P) N/m over position (P,) in pitches, as PNG or what the suffix says."""
     with styled():
-        figure, (upper, lower) = panels((2.4, 1.7))
+        figure, (upper, lower) = panels((2.6, 1.9))
         for torque, error, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):
             upper.plot(result.position, 1e6 * error, label=f"{torque:.4g} N·m", marker=".", ms=2.5)
             lower.plot(result.position, 1e-6 * stiffness, marker=".", ms=2.5)
@@ -17,4 +19,5 @@ def te_svg(result: Any) -> str:
         upper.set_ylabel("transmission error in µm")
         lower.set_ylabel("mesh stiffness in N/µm")
         lower.set(xlabel="position in pitches", xlim=(0, 1))
-        return standalone_svg(figure, "te")
+        with written_whole(path) as temporary:
+            figure.savefig(temporary, dpi=150)

@@ -1,0 +1,197 @@
+"""The page: complete, self-contained, the same every time, and honest about what a trace does not hold."""
+from __future__ import annotations
+
+import csv
+import json
+import re
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu import report
+from gearfmu.report.results import key_results, strict
+from gearfmu.report.signals import lock_time, spans, window_of_interest
+from gearfmu.stage.trace import Channel, Trace
+
+STEP, SAMPLES = 1e-4, 3000
+ALL = ("torque", "speed", "mesh", "mesh_detail", "bearing", "spectrum", "orders", "spectrogram")
+
+
+def coupled_run() -> Trace:
+    """A clutch that closes at 0.1 s on a stage with 16 teeth; the teeth are apart for the first 10 ms."""
+    t = np.arange(SAMPLES) * STEP
+    speed = 150 + 50 * np.clip(t / 0.1, 0, 1)
+    phi = np.cumsum(speed) * STEP
+    locked = t >= 0.1
+    force = np.where(t < 0.01, 0.0, 3000 + 200 * np.sin(16 * phi) + 50 * np.sin(32 * phi))
+    channels = {
+        "pinion.clutch.capacity": Channel(250 * np.clip(t / 0.05, 0, 1), "N.m"),
+        "pinion.clutch.tau": Channel(np.full(SAMPLES, 120.0), "N.m"),
+        "pinion.clutch.slip": Channel(np.where(locked, 0, 200 - speed), "rad/s"),
+        "pinion.clutch.locked": Channel(locked, ""),
+        "pinion.gear.w": Channel(speed, "rad/s"), "wheel.gear.w": Channel(-speed / 1.5, "rad/s"),
+        "mesh.force": Channel(force, "N"), "mesh.te": Channel(force / 2e8, "m"),
+        "mesh.contact": Channel((force > 0).astype(int), ""), "mesh.impacts": Channel((force > 0).astype(int), ""),
+    }  # fmt: skip
+    for shaft, sign in (("pinion", 1), ("wheel", -1)):
+        channels[f"bearing.{shaft}.fx"] = Channel(sign * 0.38 * force, "N")
+        channels[f"bearing.{shaft}.fy"] = Channel(sign * 0.92 * force, "N")
+    return Trace(t, channels, {"scene": "closure", "stage": "pair", "teeth": {"pinion": 16, "wheel": 24}})
+
+
+SUMMARY = {"scene": "closure", "stage": "pair", "outcome": "ok", "level": "standard", "n_dyn": 56, "slices": 5, "h": 5e-6,
+           "H": 1e-4, "simulated_s": 0.3, "cpu_s": 0.06, "realtime_factor": 0.2, "coupling_error": 2e-4, "energy_residual": 1e-6,
+           "hashes": {"model": "ab" * 32}, "versions": {"gearfmu": "0.1.0"}}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    assert report.write(coupled_run(), SUMMARY, out) == out / "report.html"
+    return out
+
+
+class Links(HTMLParser):
+    """Collects every address and checks that tags nest."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.addresses: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.addresses += [value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "action", "data")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.addresses += [value or "" for name, value in attrs if name in ("src", "href", "xlink:href")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_page_is_well_formed_and_names_no_outside_address(folder: Path) -> None:
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page = Links()
+    page.feed(text)
+    assert page.open == []
+    assert "//" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", text), "an address or a comment with two slashes"
+    assert not re.search(r"@import|url\((?!#)", text)
+    outside = [a for a in page.addresses if not a.startswith(("#", "data:", "data/"))]
+    assert outside == []
+    assert all((folder / a).is_file() for a in page.addresses if a.startswith("data/"))
+
+
+def test_ids_are_unique_and_references_resolve(folder: Path) -> None:
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    ids = re.findall(r' id="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(ids)
+
+
+def test_every_plot_has_its_data(folder: Path) -> None:
+    assert sorted(p.stem for p in (folder / "data").glob("*.csv")) == sorted(ALL)
+    rows = list(csv.reader((folder / "data" / "mesh.csv").open(encoding="utf-8")))
+    assert rows[0] == ["time_[s]", "mesh.force_[N]", "mesh.te_[m]", "mesh.contact"] and len(rows) == SAMPLES + 1
+    assert [float(r[1]) for r in rows[1:]] == coupled_run()["mesh.force"].tolist()
+
+
+def test_spectrum_data_hold_the_mesh_order(folder: Path) -> None:
+    data = np.genfromtxt(folder / "data" / "spectrum.csv", delimiter=",", names=True, deletechars="")
+    names = data.dtype.names
+    peak = np.argmax(data[names[-2]])
+    assert names[-2].startswith("mesh.force") and data[names[0]][peak] == pytest.approx(16 * 200 / (2 * np.pi), abs=10)
+    assert data[names[-2]][peak] == pytest.approx(200 / np.sqrt(2), rel=0.16)
+
+
+def test_order_data_are_the_amplitudes(folder: Path) -> None:
+    data = np.genfromtxt(folder / "data" / "orders.csv", delimiter=",", names=True, deletechars="")
+    late = data["time_[s]"] > 0.15
+    assert np.allclose(data["mesh.force_order_1_rms_[N]"][late], 200 / np.sqrt(2), rtol=2e-3)
+    assert np.allclose(data["mesh.force_order_2_rms_[N]"][late], 50 / np.sqrt(2), rtol=2e-2)
+
+
+def test_summary_is_strict_json_with_results(folder: Path) -> None:
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))
+    assert {**SUMMARY, "results": found["results"]} == found
+    assert found["results"]["mesh_force_mean_N"] == pytest.approx(3000, rel=1e-3)
+    assert found["results"]["lock_time_s"] == pytest.approx(0.1)
+    assert found["results"]["contact_loss_percent"] == pytest.approx(100 / 30, rel=0.02)
+
+
+def test_same_trace_same_bytes(folder: Path, tmp_path: Path) -> None:
+    report.write(coupled_run(), SUMMARY, tmp_path)
+    assert (tmp_path / "report.html").read_bytes() == (folder / "report.html").read_bytes()
+
+
+@pytest.mark.parametrize("count", range(8))
+def test_any_subset_of_channels_makes_a_report(tmp_path: Path, count: int) -> None:
+    whole = coupled_run()
+    chosen = np.random.default_rng(count).permutation(list(whole.channels))[: 2 * count]
+    trace = Trace(whole.time, {name: whole.channels[name] for name in chosen}, {})
+    page = report.write(trace, {}, tmp_path).read_text(encoding="utf-8")
+    assert "not given" in page and page.endswith("</html>\n")
+
+
+@pytest.mark.parametrize("samples", [1, 2, 20, 70])
+def test_short_traces_make_a_report(tmp_path: Path, samples: int) -> None:
+    whole = coupled_run()
+    channels = {name: Channel(c.values[:samples], c.unit) for name, c in whole.channels.items()}
+    report.write(Trace(whole.time[:samples], channels, whole.meta), SUMMARY, tmp_path)
+    assert (tmp_path / "report.html").is_file()
+
+
+def test_uneven_sampling_is_said_and_the_rest_is_shown(tmp_path: Path) -> None:
+    whole = coupled_run()
+    t = whole.time + 2e-5 * np.sin(np.arange(SAMPLES))
+    page = report.write(Trace(t, whole.channels, whole.meta), SUMMARY, tmp_path).read_text(encoding="utf-8")
+    assert "not evenly spaced" in page and (tmp_path / "data" / "mesh.csv").is_file() and not (tmp_path / "data" / "spectrum.csv").exists()
+
+
+def test_named_failure_is_shown_as_such(tmp_path: Path) -> None:
+    page = report.write(coupled_run(), {**SUMMARY, "outcome": "GK_PENETRATION"}, tmp_path).read_text(encoding="utf-8")
+    assert '<span class="bad">GK_PENETRATION</span>' in page
+
+
+def test_text_from_outside_cannot_become_markup(tmp_path: Path) -> None:
+    nasty = "<script>alert(1)</script>"
+    trace = Trace(np.arange(3.0), {f"{nasty[:8]}.w": Channel(np.zeros(3), "rad/s", nasty)}, {})
+    page = report.write(trace, {"scene": nasty, "stage": nasty, "outcome": nasty, "hashes": {nasty: nasty}}, tmp_path).read_text(encoding="utf-8")
+    assert "<script" not in page
+
+
+def test_results_are_those_after_the_lock() -> None:
+    trace = coupled_run()
+    window = window_of_interest(trace)
+    assert (window.start, window.reason) == (pytest.approx(0.1), "after the clutch has locked")
+    assert key_results(trace)["mesh_force_rms_ac_N"] == pytest.approx(np.hypot(200, 50) / np.sqrt(2), rel=0.01)
+
+
+def test_a_clutch_that_slips_at_the_end_has_not_locked() -> None:
+    t = np.arange(5.0)
+    trace = Trace(t, {"x.clutch.locked": Channel(np.array([True, True, False, True, False]))}, {})
+    assert lock_time(trace) is None
+    assert spans(t, trace["x.clutch.locked"]) == [(0.0, 2.0), (3.0, 4.0)]
+
+
+def test_strict_json_has_no_nan() -> None:
+    assert strict({"a": np.float64("nan"), "b": [np.int32(3), np.inf], 4: np.array([1.5])}) == {"a": None, "b": [3, None], "4": [1.5]}
+
+
+@pytest.mark.full
+@pytest.mark.needs("chromium")
+def test_headless_chromium_draws_the_page(folder: Path, tmp_path: Path) -> None:
+    """The page as a browser shows it: of full length, not blank, with the accent colour of the plots on it."""
+    image = pytest.importorskip("matplotlib.image")
+    shot = tmp_path / "shot.png"
+    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+                    f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1100,4000", f"--screenshot={shot}",
+                    (folder / "report.html").as_uri()], check=True, capture_output=True, timeout=120)  # fmt: skip
+    pixels = image.imread(shot)[..., :3]
+    assert pixels.shape[:2] == (4000, 1100)
+    blue = np.all(np.abs(pixels - np.array([0x1F, 0x5A, 0x92]) / 255) < 0.08, axis=-1)
+    assert np.flatnonzero(blue.any(axis=1)).max() > 3000 and blue.sum() > 2000

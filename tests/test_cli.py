@@ -1,0 +1,162 @@
+"""The command line: exit codes, one clear message, nothing half-written; verbs that need no long work are run."""
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+
+from gearfmu import cli
+from gearfmu.commands import variables
+from gearfmu.stage.trace import Channel, Trace
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    code = cli.outcome([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def process(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "gearfmu.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=cwd, check=False)
+
+
+def test_help_names_every_verb_and_comes_at_once() -> None:
+    start = time.perf_counter()
+    done = process("--help")
+    elapsed = time.perf_counter() - start
+    assert done.returncode == 0 and all(f"\n  {verb} " in done.stdout for verb in cli.VERBS)
+    assert elapsed < 3, "help imports something heavy"
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = "import sys; from gearfmu.cli import outcome; outcome(['--help']); print(sorted(m for m in sys.modules if '.' not in m))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    loaded = done.stdout.splitlines()[-1]
+    assert not [name for name in ("numpy", "h5py", "matplotlib", "pydantic", "pint", "rich", "scipy") if f"'{name}'" in loaded]
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_loads_and_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    module, name = cli.VERBS[verb][0].split(":")
+    command = getattr(importlib.import_module(module), name)
+    assert isinstance(command, click.Command) and command.name == verb
+    code, out, _ = call(verb, "--help", capsys=capsys)
+    assert code == 0 and "Usage: gearfmu" in out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["nonsense"], ["new"], ["te", "fzg_c"], ["te", "fzg_c", "--torque", "302"], ["te", "fzg_c", "--torque", "302 mm"],
+     ["te", "fzg_c", "--torque", "300 N*m", "--positions", "1"], ["run", "clutch_closure", "--unit", "guess"],
+     ["export", "fzg_c", "--port", "pinion"], ["export", "fzg_c", "--port", "pinion=glue"], ["mesh", "fzg_c", "--gear", "sun"],
+     ["schema", "stage", "extra"], ["inspect"]],
+    ids=" ".join,
+)  # fmt: skip
+def test_wrong_usage_is_100(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = call(*arguments, capsys=capsys)
+    assert code == cli.USAGE_ERROR and err.strip()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["inspect", "no/such.h5"], "no such file"), (["inspect", "fzg_x"], "fzg_c"), (["new", "mine", "--like", "fzg_k"], "fzg_c"),
+     (["run", "clutch_closur"], "clutch_closure"), (["report", "no/such"], "no such file"), (["te", "fzg_k", "--torque", "1 N*m"], "fzg_c")],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)  # fmt: skip
+def test_errors_are_one_message_with_the_remedy(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call(*arguments, capsys=capsys)
+    assert code == 1 and words in err and "Traceback" not in err and out == ""
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_debug_shows_the_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = call("--debug", "inspect", "fzg_x", capsys=capsys)
+    assert code == 1 and "Traceback" in err
+
+
+def test_a_bad_stage_file_lists_every_problem(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (ROOT / "reduced_models" / "fzg_c" / "stage.toml").read_text(encoding="utf-8")
+    bad = text.replace('"600 N*m"', '"600"').replace("center_distance", "centre_distance")
+    (tmp_path / "stage.toml").write_text(bad, encoding="utf-8")
+    code, _, err = call("inspect", tmp_path / "stage.toml", capsys=capsys)
+    assert code == 1 and "torque_max" in err and "centre_distance" in err and "unit is missing" in err
+
+
+def test_new_stage_can_be_read_and_is_never_overwritten(tmp_path: Path) -> None:
+    assert process("new", "my_pair", cwd=tmp_path).returncode == 0
+    before = (tmp_path / "my_pair" / "stage.toml").read_bytes()
+    again = process("new", "my_pair", cwd=tmp_path)
+    assert again.returncode == 1 and "exists" in again.stderr
+    assert (tmp_path / "my_pair" / "stage.toml").read_bytes() == before
+    shown = process("inspect", "my_pair", "--json", cwd=tmp_path)
+    assert json.loads(shown.stdout)["derived"]["contact_ratio"] > 1
+
+
+def test_mesh_writes_what_meshio_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    meshio = pytest.importorskip("meshio")
+    code, out, _ = call("mesh", "fzg_c", "--gear", "pinion", "--scale", 0.4, "--out", tmp_path, capsys=capsys)
+    assert code == 0 and "scaled_jacobian_min" in out and "elements_per_strip" in out
+    assert meshio.read(tmp_path / "pinion.vtu").points.shape[1] == 3
+
+
+@pytest.mark.parametrize("kind", ["stage", "scene"])
+def test_schema_is_json_and_knows_the_fields(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("schema", kind, "--out", tmp_path / "s.json", capsys=capsys)[0] == 0
+    made = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))
+    assert {"stage": "gears", "scene": "coupling"}[kind] in made["properties"]
+
+
+def test_variables_page_in_docs_is_the_kernels_table(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call("schema", "variables", capsys=capsys)
+    assert code == 0
+    assert (ROOT / "docs" / "variables.md").read_text(encoding="utf-8") == out, "run: make docs"
+
+
+def test_every_row_of_the_table_is_read() -> None:
+    source = (ROOT / "gearfmu" / "kernel" / "src" / "gk_variables.inc").read_text(encoding="utf-8")
+    found = variables.rows()
+    assert len(found) == source.count('GK_REAL, GK_') + source.count('GK_INTEGER, GK_') + source.count('GK_BOOLEAN, GK_') + source.count('GK_ENUM, GK_')
+    assert all(row.description and row.exists in variables.WHEN for row in found)
+
+
+def small_trace(path: Path) -> Path:
+    t = np.arange(2000) * 1e-4
+    force = Channel(1000 + 100 * np.sin(2 * np.pi * 300 * t), "N", "normal force")
+    Trace(t, {"mesh.force": force}, {"scene": "small", "outcome": "ok"}).save(path)
+    return path
+
+
+def test_report_of_a_trace_without_a_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    small_trace(tmp_path / "trace.h5")
+    code, out, _ = call("report", tmp_path, capsys=capsys)
+    assert code == 0 and out.strip() == str(tmp_path / "report.html") and (tmp_path / "summary.json").is_file()
+
+
+def test_inspect_tells_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call("inspect", small_trace(tmp_path / "x.h5"), "--json", capsys=capsys)
+    found = json.loads(out)
+    assert code == 0 and found["file"] == "trace" and found["channels"]["mesh.force"]["unit"] == "N"
+
+
+def test_counting_verb_returns_the_count_at_most_99(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = tmp_path / "bad.fmu"
+    bad.write_bytes(b"no zip")
+    code, out, _ = call("validate", bad, capsys=capsys)
+    assert 1 <= code <= 99 and f"{code} problem" in out
+
+
+def test_version_is_the_packages() -> None:
+    assert process("--version").stdout.strip() == f"gearfmu, version {importlib.metadata.version('gearfmu')}"
