@@ -30,6 +30,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.logging import addLoggerProxy
 
+from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, FmuError, SimulationError
 
 KINDS = {"Real": ("Real", fmi2Real), "Integer": ("Integer", fmi2Integer), "Enumeration": ("Integer", fmi2Integer), "Boolean": ("Boolean", fmi2Boolean)}
@@ -130,6 +131,11 @@ class FmuUnit:
         self.close()
 
     # -- variables --------------------------------------------------------------------------------------------------------------------------------------
+    def outputs(self) -> dict[str, Variable]:
+        """The numeric outputs of the FMU, in its order."""
+        return {name: Variable(variable.unit or "", variable.description or "", variable.type != "Real")
+                for name, variable in self.variables.items() if variable.causality == "output" and variable.type in KINDS}
+
     def resolve(self, names: Sequence[str]) -> FmuHandle:
         """Handle of variables; raises CouplingError naming those that the FMU does not have."""
         unknown = [name for name in names if name not in self.variables]

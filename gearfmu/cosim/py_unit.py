@@ -11,6 +11,7 @@ import numpy as np
 from gearfmu.cosim.dynamics import Dynamics, Mode
 from gearfmu.cosim.events import Attempt, Event, first_event, initial_mode, switch
 from gearfmu.cosim.network import Network
+from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError
 
 MAX_EVENTS = 200  # within one micro-step; more means that the parts have no solution or the step is absurdly long
@@ -41,6 +42,20 @@ class Handle(NamedTuple):
     inputs: tuple[tuple[str, int], ...] | None
     special: np.ndarray  # places of outputs that are not linear in state and input
     buffer: np.ndarray
+
+
+KEYS = {
+    "phi": Variable("rad", "angle"), "w": Variable("rad/s", "speed"), "a": Variable("rad/s2", "acceleration"), "tau": Variable("N.m", "torque"),
+    "tau_mean": Variable("N.m", "mean torque of the step"), "extension": Variable("rad", "twist of the spring"), "slip": Variable("rad/s", "slip speed"),
+    "locked": Variable("", "true while the clutch sticks", True), "work": Variable("J", "work of the motion ports since the start"),
+    "stored": Variable("J", "kinetic and potential energy"),
+}  # fmt: skip
+
+
+def _variable(name: str) -> Variable:
+    part, key = name.rsplit(".", 1)
+    about = KEYS[key]
+    return about if part == "energy" else about._replace(description=f"{part}: {about.description}")
 
 
 class PyUnit:
@@ -107,9 +122,9 @@ class PyUnit:
         special = np.flatnonzero(outputs >= len(self.dynamics.output_names)) if outputs is not None else np.zeros(0, dtype=int)
         return Handle(tuple(names), outputs, places, special, np.zeros(len(names)))
 
-    def output_names(self) -> tuple[str, ...]:
-        """All outputs, those of ports last."""
-        return tuple(self._outputs)
+    def outputs(self) -> dict[str, Variable]:
+        """All outputs by name."""
+        return {name: _variable(name) for name in self._outputs}
 
     def set(self, handle: Handle, values: Sequence[float]) -> None:
         """Inputs for the next step."""

@@ -1,10 +1,18 @@
 """What a master knows of a unit: names resolved once, then set / step / get / save / restore."""
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+
+class Variable(NamedTuple):
+    """What a recorded variable is: unit as in the FMU ("N.m"), description, and whether it counts (integers and booleans)."""
+
+    unit: str
+    description: str
+    whole: bool = False
 
 
 class Unit(Protocol):
@@ -15,6 +23,7 @@ class Unit(Protocol):
     `step` raises SimulationError when the unit cannot go on.
     """
 
+    def outputs(self) -> Mapping[str, Variable]: ...
     def initialize(self, time: float) -> None: ...
     def resolve(self, names: Sequence[str]) -> Any: ...
     def set(self, handle: Any, values: Sequence[float]) -> None: ...

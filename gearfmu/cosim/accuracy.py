@@ -1,0 +1,53 @@
+"""What the coupling costs: Richardson's estimate of its error from a run with half the communication step."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.stage.trace import Trace
+
+AVERAGE_OVER = 10e-3  # s: in transient runs AC is the signal minus this moving average of the reference
+
+
+@dataclass(frozen=True)
+class Window:
+    """From when signals are compared, s; steady: AC is the signal minus its mean, else minus a 10 ms moving average."""
+
+    start: float
+    steady: bool
+
+
+def coupling_errors(coarse: Trace, fine: Trace, order: int, window: Window) -> dict[str, float]:
+    """Estimated error of `coarse` (communication step H) by signal: 2^p/(2^p − 1)·rms(y_H − y_{H/2}) over the rms of the AC part of y_{H/2}.
+
+    fine : the same scene with H/2. Only real-valued signals in both, and with an AC part; sampled at the common times.
+    """
+    keep = coarse.time >= window.start
+    index = np.arange(coarse.time.size)[keep] * 2
+    index = index[index < fine.time.size]
+    keep = np.flatnonzero(keep)[: index.size]
+    factor = 2.0**order / (2.0**order - 1.0)
+    found = {}
+    for name in coarse.channels:
+        if name in fine.channels and coarse[name].dtype == np.float64 and index.size > 1:
+            reference = fine[name][index]
+            ac = rms(alternating(reference, coarse.time[1] - coarse.time[0], window.steady))
+            if ac > 1e-9 * rms(reference):
+                found[name] = factor * rms(coarse[name][keep] - reference) / ac
+    return found
+
+
+def alternating(values: np.ndarray, interval: float, steady: bool) -> np.ndarray:
+    """AC part (n,) of samples `interval` s apart: minus the mean, or minus the centred 10 ms moving average (shorter at the ends)."""
+    if steady:
+        return values - values.mean()
+    width = max(1, round(AVERAGE_OVER / interval)) | 1
+    ones = np.ones(min(width, values.size | 1))
+    count = np.convolve(np.ones(values.size), ones, mode="same")[: values.size]
+    return values - np.convolve(values, ones, mode="same")[: values.size] / count
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0

@@ -1,0 +1,139 @@
+"""Dry clutches against closed forms: when they lock, when they break loose, what they transmit."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearfmu.cosim.friction import sticking_torques
+from gearfmu.cosim.network import Clutch, Inertia, Network, Source, Spring
+from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.signals import Constant, Ramp, Smooth
+
+J1, J2 = 0.2, 0.7
+
+
+def two_inertias(capacity, torque=lambda t, phi, w: 0.0, w1=0.0, w2=0.0, peak=1.0) -> PyUnit:
+    network = Network((Inertia("a", J1, w=w1), Inertia("b", J2, w=w2)), clutches=(Clutch("clutch", "a", "b", capacity, peak),),
+                      sources=(Source("drive", "a", torque),))
+    unit = PyUnit(network)
+    unit.initialize(0.0)
+    return unit
+
+
+def advance(unit: PyUnit, h: float, steps: int) -> None:
+    for n in range(steps):
+        unit.step(n * h, h)
+
+
+@pytest.mark.parametrize("slip", [52.0, -52.0])
+def test_constant_capacity_locks_at_the_closed_form_instant(slip):
+    """Lock after Δw / (T (1/J1 + 1/J2)), at the speed of conserved momentum; then T_stick = T_drive J2 / (J1 + J2)."""
+    capacity, drive = 40.0, 7.0
+    unit = two_inertias(Constant(capacity), lambda t, phi, w: drive, w1=slip)
+    sign = math.copysign(1.0, slip)
+    instant = abs(slip) / (capacity * (1 / J1 + 1 / J2) - sign * drive / J1)
+    advance(unit, 1e-2, 100)
+    assert [(event.part, event.what) for event in unit.events] == [("clutch", "lock")]
+    assert unit.events[0].time == pytest.approx(instant, abs=1e-13)
+    speed, slip_now, torque, locked = unit.get(unit.resolve(["a.w", "clutch.slip", "clutch.tau", "clutch.locked"]))
+    assert speed == pytest.approx((J1 * slip + drive * 1.0) / (J1 + J2), abs=1e-11)
+    assert abs(slip_now) < 1e-13 and locked == 1.0
+    assert torque == pytest.approx(drive * J2 / (J1 + J2), abs=1e-12)
+
+
+def test_capacity_ramp_locks_at_the_closed_form_instant():
+    """T = r t: slip Δw − r t²/2 (1/J1 + 1/J2)."""
+    rate = 900.0
+    unit = two_inertias(Ramp(((0.0, 0.0), (1.0, rate))), w1=30.0)
+    advance(unit, 3e-3, 200)
+    assert unit.events[0].time == pytest.approx(math.sqrt(2 * 30.0 / (rate * (1 / J1 + 1 / J2))), abs=1e-12)
+
+
+@pytest.mark.parametrize("peak", [1.0, 1.3])
+def test_breaks_loose_when_the_sticking_torque_exceeds_the_static_capacity(peak):
+    """Drive torque r t: sticks until r t J2/(J1+J2) = peak·T; afterwards J2 accelerates with T."""
+    rate, capacity = 200.0, 25.0
+    unit = two_inertias(Constant(capacity), lambda t, phi, w: rate * t, peak=peak)
+    advance(unit, 7e-3, 50)
+    instant = peak * capacity * (J1 + J2) / (J2 * rate)
+    assert [event.what for event in unit.events] == ["slip"]
+    assert unit.events[0].time == pytest.approx(instant, abs=1e-10)  # TORQUE_TOLERANCE over the rate of the torque
+    expected = 0.5 * rate * instant**2 / (J1 + J2) + capacity / J2 * (0.35 - instant)
+    assert unit.get(unit.resolve(["b.w"]))[0] == pytest.approx(expected, abs=1e-8)
+
+
+def test_sticks_through_a_reversal_of_torque_and_slips_both_ways():
+    """±60 N·m, 1 Hz, against 30 N·m: slips forward, sticks, slips backward, as often as the drive turns over."""
+    unit = two_inertias(Constant(30.0), lambda t, phi, w: 60.0 * math.sin(2 * math.pi * t))
+    advance(unit, 1e-3, 3000)
+    assert [event.what for event in unit.events] == ["slip", "lock"] * 5 + ["slip"]
+    loose = [event.time for event in unit.events[::2]]
+    assert loose[0] == pytest.approx(math.asin(30.0 * (J1 + J2) / J2 / 60.0) / (2 * math.pi), abs=1e-6)
+
+
+def test_without_capacity_the_sides_do_not_feel_each_other():
+    unit = two_inertias(Constant(0.0), lambda t, phi, w: 10.0 * math.cos(40 * t), w2=1.0)
+    advance(unit, 1e-3, 1000)
+    assert unit.get(unit.resolve(["b.w"]))[0] == 1.0
+
+
+def test_a_jump_of_capacity_between_steps_is_exact():
+    """Nothing before the jump, the closed form after it."""
+    unit = two_inertias(Ramp(((0.1, 0.0), (0.1, 20.0))), w1=10.0)
+    advance(unit, 1e-2, 100)
+    assert unit.events[0].time == pytest.approx(0.1 + 10.0 / (20.0 * (1 / J1 + 1 / J2)), abs=1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(speeds=st.lists(st.floats(-50, 50), min_size=4, max_size=4), capacities=st.lists(st.floats(0.0, 40.0), min_size=3, max_size=3),
+       stiffness=st.floats(10.0, 1e4))
+def test_energy_never_grows_and_momentum_stays(speeds, capacities, stiffness):
+    """Four inertias, three clutches and a spring around them, no torque from outside."""
+    names = ("a", "b", "c", "d")
+    network = Network(tuple(Inertia(name, 0.1 + 0.2 * k, w=w) for k, (name, w) in enumerate(zip(names, speeds, strict=True))),
+                      springs=(Spring("spring", {"a": 1.0, "d": -1.0}, stiffness),),
+                      clutches=tuple(Clutch(f"clutch{k}", names[k], names[k + 1], Constant(c)) for k, c in enumerate(capacities)))
+    unit = PyUnit(network)
+    unit.initialize(0.0)
+    handle = unit.resolve(["energy.stored", *(f"{name}.w" for name in names), *(f"clutch{k}.tau" for k in range(3))])
+    inertias = np.array([node.inertia for node in network.nodes])
+    energy, momentum, scale = unit.energy(), inertias @ speeds, 1.0 + np.abs(inertias * speeds).sum()
+    for n in range(40):
+        unit.step(n * 1e-3, 1e-3)
+        values = unit.get(handle)
+        assert values[0] <= energy * (1 + 1e-10) + 1e-12
+        assert abs(inertias @ values[1:5] - momentum) < 1e-10 * scale
+        assert np.all(np.abs(values[5:]) <= np.array(capacities) * (1 + 1e-9) + 1e-9)
+        energy = values[0]
+
+
+@settings(max_examples=100, deadline=None)
+@given(entries=st.lists(st.floats(-1, 1), min_size=16, max_size=16), wanted=st.lists(st.floats(-100, 100), min_size=4, max_size=4),
+       bound=st.lists(st.floats(0, 20), min_size=4, max_size=4))
+def test_sticking_torques_solve_the_complementarity_problem(entries, wanted, bound):
+    """Inside the bounds the slip acceleration is zero; at a bound it points the way of the torque."""
+    a = np.array(entries).reshape(4, 4)
+    delassus, wanted, bound = a @ a.T + 0.5 * np.eye(4), np.array(wanted), np.array(bound)
+    torque = sticking_torques(delassus, wanted, bound)
+    left = wanted - delassus @ torque
+    assert np.all(np.abs(torque) <= bound)
+    inside = np.abs(torque) < bound * (1 - 1e-12)
+    tolerance = 1e-9 * (1 + np.abs(wanted).max())
+    assert np.all(np.abs(left[inside]) < tolerance)
+    assert np.all(left[~inside] * np.sign(torque[~inside]) > -tolerance)
+
+
+def test_a_smooth_capacity_converges_with_second_order():
+    """Capacity is taken linear over a step."""
+    def final(h):
+        unit = two_inertias(Smooth(lambda t: 30.0 * (1 + math.sin(9 * t))), w1=400.0)
+        advance(unit, h, round(0.2 / h))
+        return unit.get(unit.resolve(["a.w"]))[0]
+
+    exact = 400.0 - 30.0 * (0.2 + (1 - math.cos(1.8)) / 9) / J1
+    errors = [abs(final(h) - exact) for h in (0.04, 0.02, 0.01)]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05) and errors[1] / errors[2] == pytest.approx(4.0, rel=0.05)
