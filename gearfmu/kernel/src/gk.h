@@ -80,6 +80,10 @@ GK_API gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk
 GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, double time, double H);
 GK_API double gk_time(const gk_data *data);
 
+/* Quasi-static loaded transmission error: torque on the pinion's bore, wheel's bore held at phi_wheel; by the contact routine of the step. After gk_prepare; `keep` continues from the last call.
+ * out[0] = te (m), then for each of *places tooth pairs {flank 0 drive 1 coast, tooth number of the pinion, force of each slice (N)}; at most 1 + 8·12 numbers. */
+GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque, int keep, double *out, int *places);
+
 /* state = the first gk_state_size bytes of gk_data */
 GK_API size_t gk_state_size(const gk_setup *setup);
 /* check bytes that come from outside (another process, a file) before they become a state */

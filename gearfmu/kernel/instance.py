@@ -1,0 +1,157 @@
+"""One running instance of a stage model in this process."""
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gearfmu.errors import ModelError, SimulationError
+from gearfmu.kernel.binding import CAUSALITIES, OUTCOMES, TYPES, VariableInfo, aligned, blank_message, load
+
+PLACES = 8
+SLICES = 10
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One row of the kernel's table of variables (src/gk_variables.inc)."""
+
+    reference: int
+    name: str
+    type: str
+    causality: str
+    unit: str
+    items: tuple[str, ...]
+    description: str
+    start: float
+    minimum: float
+    maximum: float
+
+
+@dataclass(frozen=True)
+class TeState:
+    """Quasi-static transmission at one position: te (m); forces (N) of the slices, keyed (flank 0 drive 1 coast, tooth number of the pinion)."""
+
+    te: float
+    forces: dict[tuple[int, int], tuple[float, ...]]
+
+
+class Kernel:
+    """A stage model with its own parameters, state and time.
+
+    blob: bytes of a StageModel. parameters: values of causality "parameter" by name. library: another build of the kernel.
+    ModelError: the blob or a parameter is refused, with the kernel's message.
+    """
+
+    def __init__(self, blob: bytes, parameters: Mapping[str, float] | None = None, library: Path | None = None):
+        self._lib = load(library)
+        self._blob_keep, self._blob = aligned(len(blob))
+        ctypes.memmove(self._blob, blob, len(blob))
+        self._model_keep, self._model = aligned(self._lib.gk_model_size())
+        message = blank_message()
+        if self._lib.gk_model_open(self._model, self._blob, len(blob), message):
+            raise ModelError(message.value.decode(errors="replace"))
+        self._setup_keep, self._setup = aligned(self._lib.gk_setup_size(self._model))
+        self._data_keep, self._data = aligned(self._lib.gk_data_size(self._model))
+        self._lib.gk_defaults(self._model, self._data)
+        self.variables = {v.name: v for v in self._read_variables()}
+        self.warning = ""
+        for name, value in (parameters or {}).items():
+            self.set(name, value)
+
+    @property
+    def name(self) -> str:
+        return self._lib.gk_model_name(self._model).decode()
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the blob, 64 hex digits."""
+        return self._lib.gk_model_hash(self._model).decode()
+
+    @property
+    def time(self) -> float:
+        """The last time (s) the state is good at."""
+        return self._lib.gk_time(self._data)
+
+    def _read_variables(self) -> list[Variable]:
+        found = []
+        for i in range(self._lib.gk_variable_count(self._model)):
+            info = VariableInfo()
+            self._lib.gk_variable(self._model, i, ctypes.byref(info))
+            items = tuple(info.items.decode().split("|")) if info.items else ()
+            found.append(Variable(info.reference, info.name.decode(), TYPES[info.type], CAUSALITIES[info.causality], info.unit.decode(), items,
+                                  info.description.decode(), info.start, info.minimum, info.maximum))
+        return found
+
+    def _reference(self, name: str) -> int:
+        variable = self.variables.get(name)
+        if variable is None:
+            raise ModelError(f"{self.name} has no variable {name!r}; it has {', '.join(self.variables)}")
+        return variable.reference
+
+    def set(self, name: str, value: float) -> None:
+        """Set an input or, before `initialize`, a parameter. ModelError when name or value is refused."""
+        outcome = self._lib.gk_set(self._model, self._data, self._reference(name), value)
+        if outcome:
+            variable = self.variables[name]
+            raise ModelError(f"{name} = {value!r}: {self._text(outcome)} (between {variable.minimum:g} and {variable.maximum:g} {variable.unit})")
+
+    def get(self, name: str) -> float:
+        """Value of any variable, SI."""
+        value = ctypes.c_double()
+        self._lib.gk_get(self._model, self._data, self._reference(name), ctypes.byref(value))
+        return value.value
+
+    def set_reference(self, reference: int, value: float) -> int:
+        """Fast road: outcome number of gk_set."""
+        return self._lib.gk_set(self._model, self._data, reference, value)
+
+    def get_reference(self, reference: int, out: ctypes.c_double) -> int:
+        """Fast road: outcome number of gk_get, the value in `out`."""
+        return self._lib.gk_get(self._model, self._data, reference, ctypes.byref(out))
+
+    def prepare(self) -> None:
+        """Fix level, effects and step. ModelError when the wished h is too large; `warning` holds what the kernel wants said."""
+        message = blank_message()
+        outcome = self._lib.gk_prepare(self._model, self._data, self._setup, message)
+        self.warning = message.value.decode(errors="replace")
+        if outcome:
+            raise ModelError(self.warning or self._text(outcome))
+
+    def initialize(self, time: float = 0.0) -> None:
+        """Prepare and start from static equilibrium. SimulationError(no_equilibrium) when there is none."""
+        self.prepare()
+        self._check(self._lib.gk_initialize(self._model, self._setup, self._data, time))
+
+    def step(self, time: float, h: float) -> None:
+        """One communication step from `time` over `h` (s). SimulationError with the named outcome; the state then stands at `self.time`."""
+        outcome = self._lib.gk_step(self._model, self._setup, self._data, time, h)
+        if outcome:
+            self._check(outcome)
+
+    def save(self) -> bytes:
+        """The state: a copy of its bytes."""
+        return ctypes.string_at(self._data, self._lib.gk_state_size(self._setup))
+
+    def restore(self, state: bytes) -> None:
+        """Take a state of this model and setup back. ModelError when the bytes cannot be one."""
+        if self._lib.gk_state_check(self._model, self._setup, state, len(state)):
+            raise ModelError("these bytes are not a state of this model at this level: save and restore with the same model and parameters")
+        ctypes.memmove(self._data, state, len(state))
+
+    def transmission(self, phi_wheel: float, torque: float, keep: bool = False) -> TeState:
+        """Quasi-static equilibrium with the wheel's bore held at phi_wheel (rad) and `torque` (N·m) on the pinion's bore; after `prepare`."""
+        out = (ctypes.c_double * (1 + PLACES * (2 + SLICES)))()
+        count = ctypes.c_int()
+        self._check(self._lib.gk_te(self._model, self._setup, self._data, phi_wheel, torque, int(keep), out, ctypes.byref(count)))
+        slices = int(self.get("slices"))
+        rows = [out[1 + i * (2 + slices): 1 + (i + 1) * (2 + slices)] for i in range(count.value)]
+        return TeState(out[0], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
+
+    def _text(self, outcome: int) -> str:
+        return self._lib.gk_outcome_text(outcome).decode()
+
+    def _check(self, outcome: int) -> None:
+        if outcome:
+            raise SimulationError(f"{self.name}: {self._text(outcome)} (last good time {self.time:.9g} s)", OUTCOMES[outcome], self.time)

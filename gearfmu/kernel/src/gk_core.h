@@ -1,0 +1,267 @@
+/* Inside of the kernel: what model, setup and data are made of. One reading direction:
+ *   gk_model.c  blob → gk_model          gk_setup.c  level, effects, h → gk_setup      gk_vars.c   variables by reference
+ *   gk_flank.c  where teeth may touch    gk_rows.c   displacement rows at those places gk_system.c the small system of a step
+ *   gk_law.c    local line contact       gk_solve.c  its solution                       gk_step.c   one step; gk_comm.c many; gk_static.c none */
+#ifndef GK_CORE_H
+#define GK_CORE_H
+#include <math.h>
+#include <string.h>
+#include "gk.h"
+#include "gk_blob.h"
+#include "gk_math.h"
+
+#ifdef GK_DOUBLE_MODES
+typedef double gk_real; /* test build: modal states and rows in double */
+#else
+typedef float gk_real;
+#endif
+
+#define GK_PI 3.14159265358979323846
+enum {
+    LANES = 16,       /* sums run in this many lanes, whatever the vector width */
+    MAX_PAIRS = 8,    /* tooth pairs looked at in one step, both flanks */
+    MAX_SLICES = 10,
+    MAX_FUNCTIONS = 6,
+    MAX_MODES = 8000,
+    OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual table */
+    MAX_CONTACTS = MAX_PAIRS * MAX_SLICES,
+    CACHE = 4         /* coefficient sets kept */
+};
+
+/* bilateral rows of the small system; they exist when `live` */
+/* what a row of the small system is: λ ≥ 0; any λ; given torque; velocity-level friction */
+typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
+enum { BEARING_0X, BEARING_0Y, BEARING_1X, BEARING_1Y, PORT_0, PORT_1, SHAFT_0, SHAFT_1, CLUTCH_0, CLUTCH_1, LINKS };
+/* rigid coordinates */
+enum { XA, YA, PHIA, XB, YB, PHIB, INERTIA_0, INERTIA_1, DISC_0, DISC_1, RIGID };
+enum { BORE_X, BORE_Y, BORE_RZ, BORE_ROWS };
+enum { MAX_ROWS = MAX_CONTACTS + LINKS, MAX_BASIS = MAX_PAIRS * MAX_FUNCTIONS + BORE_ROWS };
+
+enum {
+#define GK_VAR(S, ID, ...) V_##S##_##ID,
+#include "gk_variables.inc"
+#undef GK_VAR
+    GK_VARS
+};
+/* the same variable of shaft s: the blocks of both shafts have one layout */
+#define GK_OF_SHAFT(ID, s) (V_0_##ID + (s) * (V_1_PHI_IN - V_0_PHI_IN))
+
+typedef enum { PORT_SPRING, PORT_TORQUE, PORT_FIXED } gk_port_kind;
+typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER } gk_level;
+typedef enum { DG4, MIX4, EM, RK45 } gk_integrator;
+typedef enum { KIND_PAIR, KIND_FLAT } gk_kind;
+
+/* ---- constant: read from the blob -------------------------------------------------------------------------------------------------------------- */
+typedef struct gk_gear {
+    double teeth, r_b, s_form, s_tip, psi_b, phase;       /* phase: attitude of tooth 0 when phi = 0 */
+    double mass, inertia, width, local, strip;            /* local = 2 (1 − ν²)/(π E); strip half-width w */
+    double relief, relief_start;                          /* δ(s) = relief (s − relief_start)²₊ */
+    double edge, corner_radius, corner_angle;             /* tip edge: arc radius, polar position of its centre */
+    double bearing_k, bearing_c;
+    int z, modes, rolls, functions;
+    const double *omega, *zeta, *rows, *bore, *c_ff, *c_fb, *c_bb;
+    const int32_t *diameter, *part;
+} gk_gear;
+
+typedef struct gk_port {
+    gk_port_kind kind;
+    int chain;
+    double k, c, inertia, disc, shaft_k, shaft_c;
+} gk_port;
+
+struct gk_model {
+    gk_blob blob;
+    const char *name;
+    char shaft[2][24];
+    gk_kind kind;
+    gk_gear gear[2];
+    gk_port port[2];
+    double distance, backlash, nominal_backlash, damping, /* backlash j_wt of the pair; of the teeth as their numbers give them */
+         torque_max, speed_max, cut[2], h_max, overlap_max;
+    int degree[MAX_FUNCTIONS];    /* Legendre degrees of the width functions */
+    int slices, coast_shift; /* wheel tooth of the pinion's tooth k: −k on the drive flank, coast_shift − k on the coast flank */
+};
+
+/* ---- chosen: level, effects, step ----------------------------------------------------------------------------------------------------------------- */
+typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | second parts], padded with zeros */
+    int n, pairs, count;
+    double *omega, *zeta; /* (n) */
+    gk_real *omega2;
+    gk_real *rows;        /* (2 flanks, rolls, functions, n) tooth 0 */
+    gk_real *bore;        /* (3, n) */
+    gk_real *cosine, *sine; /* (z, pairs) */
+    gk_real *c_ff;        /* (2, 2, OFFSETS, rolls, rolls, block) residual */
+    double *c_fb;         /* (2, rolls, functions, 3) */
+    double c_bb[9];
+    int block; /* functions² padded to 4 */
+} gk_modal;
+
+typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
+    gk_real *a11, *a12, *a21, *a22, *bq, *bv, *kappa, *inverse_s2;
+    int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
+} gk_flow;
+
+typedef struct gk_coefficients {
+    double h, gamma, rigid_mobility, rigid_kappa; /* mobility h²/4 */
+    gk_flow flow[2];
+    uint64_t age;
+} gk_coefficients;
+
+typedef struct gk_effects {
+    int residual, hertz, coast, damping, relief, corner, bearings, modal_damping;
+} gk_effects;
+
+typedef struct gk_work gk_work;
+
+struct gk_setup {
+    uint64_t magic;
+    gk_level level;
+    gk_integrator integrator;
+    gk_effects on;
+    int slices, functions;
+    double h, gamma, allowance, damping, slice_width[2]; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal */
+    double slice_row[2][MAX_SLICES][MAX_FUNCTIONS]; /* slice ← width functions, per gear */
+    double inverse_mass[RIGID];
+    int link[LINKS];             /* live bilateral rows */
+    int given_torque[2];         /* the port's row carries a given torque */
+    double link_c[LINKS];        /* compliance 1/k */
+    double link_d[LINKS];        /* dashpot */
+    gk_modal modal[2];
+    gk_work *work; /* scratch and coefficient cache: neither model nor state */
+    size_t state_size;
+};
+
+/* ---- changing ---------------------------------------------------------------------------------------------------------------------------------------- */
+typedef struct gk_key { int32_t flank, tooth; } gk_key; /* flank 0 drive, 1 coast; tooth: unwrapped tooth number of the pinion */
+
+typedef struct gk_memory { /* what a tooth pair remembers from the last step */
+    gk_key key;
+    double force[MAX_SLICES], gap[MAX_SLICES]; /* λ0, s0 */
+} gk_memory;
+
+typedef struct gk_motion { double phi, w, a; } gk_motion;
+
+typedef struct gk_ledger { double work, dissipated, baseline; } gk_ledger;
+
+struct gk_data {
+    uint64_t magic;
+    int32_t phase, pairs, locked[2];
+    double value[GK_VARS];
+    double x[RIGID], v[RIGID], f[RIGID];
+    double link[LINKS];          /* λ0 of the bilateral rows (clutch: the constant torque of the last step) */
+    double time_base, step_H, time_last; /* time = time_base + count·H */
+    int64_t count;
+    gk_motion input[2], blend[2]; /* outer ends at the start of the communication step; jump that is blended away */
+    double hold[2];              /* angle a port is referred to */
+    double v_bore[2], balance_h;
+    double angle[2];             /* bore angle at a torque port, massless part included */
+    double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
+    gk_ledger ledger;
+    int64_t steps, rounds, trouble, impacts;
+    int32_t status, apart;
+    double open_time;
+    gk_memory memory[MAX_PAIRS];
+    gk_real modal[];             /* per gear: q (n), v (n), f (n) */
+};
+
+#define GK_SETUP_MAGIC 0x50555445534b47ULL
+#define GK_DATA_MAGIC 0x41544144534b47ULL
+enum { PHASE_NEW = 1, PHASE_RUNNING, PHASE_FAILED };
+
+/* ---- scratch of one step ----------------------------------------------------------------------------------------------------------------------------- */
+typedef struct gk_place { /* one tooth pair on one flank at the predicted position */
+    gk_key key;
+    double gap, gradient[6];          /* ∂gap/∂(xA, yA, φA, xB, yB, φB) */
+    double roll[2], curvature;        /* roll on each gear, 1/ρA + 1/ρB */
+    int tooth[2], number[2], flank;   /* tooth of each gear: wrapped to 0 … z−1, and as counted */
+    int index[2];                     /* first of four grid rolls */
+    double weight[2][4];
+    int memory;                       /* its entry in gk_data.memory, −1 if new */
+} gk_place;
+
+typedef struct gk_local { double c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high; } gk_local;
+
+typedef struct gk_system { /* unknown forces of one step: contacts, then links */
+    int contacts, n, slices;
+    gk_row_kind kind[MAX_ROWS];
+    int link_of[MAX_ROWS];            /* −1 for contacts */
+    int place_of[MAX_CONTACTS];
+    double g[MAX_ROWS], g0[MAX_ROWS], force0[MAX_ROWS];
+    double force[MAX_ROWS], eta[MAX_ROWS], z[MAX_ROWS];
+    double damping[MAX_ROWS];         /* 2c/h of the row's dashpot */
+    double bound[MAX_ROWS];           /* clutch: |z| ≤ bound */
+    gk_local local[MAX_CONTACTS];
+    unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
+    signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
+    double rigid[MAX_ROWS][RIGID];
+    double *D, *C;                    /* (n, n) row-major: what forces do to gaps in the step; massless compliance C′ without the local law */
+    double *J, *rhs;                  /* factorised tangent of the active set */
+    double direction[MAX_ROWS], alpha; /* η = α·direction + dashpot */
+    int pivot[MAX_ROWS], rank, map[MAX_ROWS];
+    int rounds, limit_reached, curved;
+} gk_system;
+
+struct gk_work {
+    gk_coefficients cache[CACHE], at_rest;    /* at_rest: everything elastic is compliance (gk_static.c) */
+    uint64_t clock;
+    gk_place place[MAX_PAIRS];
+    int places;
+    gk_real *qp[2], *vp[2], *force[2], *zero[2], *scaled; /* predicted modal state; modal force of the rows; zeros; row times coefficient */
+    const gk_real *y[2];                      /* displacement that the rows read: qp, or zero at rest */
+    gk_real *basis[2];                        /* (MAX_BASIS, n): rows of places × functions, then bore rows in inertial axes */
+    double frame[RIGID], speed[RIGID];        /* predicted */
+    double moved[RIGID];
+    double outer[2], outer_before[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
+    double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS];
+    gk_system system;
+    double matrix[4 * MAX_ROWS * MAX_ROWS];
+};
+
+/* gk_vars.c */
+gk_effects gk_effects_of(const gk_data *data);
+/* gk_flow.c */
+const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma);
+/* gk_flank.c */
+int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *frame, double reach, gk_place *place);
+/* gk_rows.c */
+void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work);
+/* gk_system.c */
+void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work);
+int gk_system_basis(const gk_model *model, const gk_setup *setup, const gk_work *work, int row, int g, int *first, const double **c);
+/* gk_law.c */
+void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);
+double gk_law_approach(const gk_local *law, double force, double *slope);
+double gk_law_energy(const gk_local *law, double force);
+/* gk_solve.c */
+void gk_solve_contacts(gk_system *s);
+void gk_solve_energy(gk_system *s);
+double gk_solve_end_gap(const gk_system *s, int row);
+double gk_solve_massless(const gk_system *s, int row);
+double gk_solve_stored(const gk_system *s, const double *force);
+/* gk_limit.c */
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
+gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);
+/* gk_step.c */
+gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
+void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);
+void gk_step_remember(const gk_setup *setup, gk_data *data);
+void gk_step_scatter(const gk_model *model, const gk_setup *setup, int g, const double *x, gk_real *out);
+double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
+/* gk_static.c */
+typedef struct gk_boundary { gk_port_kind kind; double torque, phi, k; } gk_boundary;
+gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data *data, const gk_boundary boundary[2], int keep);
+
+static inline double gk_clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+static inline int gk_finite(double x) { return x - x == 0.0; }
+
+/* Σ a_k b_k in fixed lanes: the same bits at every vector width; n is a multiple of LANES */
+static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
+{
+    gk_real lane[LANES] = {0};
+    for (int k = 0; k < n; k += LANES)
+        for (int l = 0; l < LANES; l++) lane[l] += a[k + l] * b[k + l];
+    for (int half = LANES / 2; half > 0; half /= 2)
+        for (int l = 0; l < half; l++) lane[l] += lane[l + half];
+    return lane[0];
+}
+#endif

@@ -1,0 +1,47 @@
+/* Displacement rows of the dynamic modes at the places of contact and at the bore, in body-fixed lanes.
+ * A place's row is the tooth-0 table at its roll (four grid rolls), turned to its tooth: (a, b) → (a cos θ − b sin θ, a sin θ + b cos θ), θ = 2πνj/z. */
+#include "gk_core.h"
+
+static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, gk_real *out)
+{
+    const gk_modal *modal = &setup->modal[g];
+    const int n = modal->n, P = modal->pairs, functions = setup->functions;
+    const gk_real *table = modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * functions * n;
+    const gk_real w0 = (gk_real)p->weight[g][0], w1 = (gk_real)p->weight[g][1], w2 = (gk_real)p->weight[g][2], w3 = (gk_real)p->weight[g][3];
+    const gk_real *c = modal->cosine + (size_t)p->tooth[g] * P, *s = modal->sine + (size_t)p->tooth[g] * P;
+    const size_t next = (size_t)functions * n;
+    for (int a = 0; a < functions; a++, table += n, out += n) {
+        const gk_real *t0 = table, *t1 = t0 + next, *t2 = t1 + next, *t3 = t2 + next;
+        for (int k = 0; k < P; k++) {
+            gk_real first = (w0 * t0[k] + w1 * t1[k]) + (w2 * t2[k] + w3 * t3[k]);
+            gk_real second = (w0 * t0[P + k] + w1 * t1[P + k]) + (w2 * t2[P + k] + w3 * t3[P + k]);
+            out[k] = first * c[k] - second * s[k];
+            out[P + k] = first * s[k] + second * c[k];
+        }
+    }
+}
+
+static void bore_rows(const gk_modal *modal, double attitude, gk_real *out)
+{
+    double sine, cosine;
+    gk_sincos(attitude, &sine, &cosine);
+    const gk_real c = (gk_real)cosine, s = (gk_real)sine, *x = modal->bore, *y = x + modal->n, *rz = y + modal->n;
+    const int n = modal->n;
+    for (int k = 0; k < n; k++) {
+        out[k] = c * x[k] - s * y[k];
+        out[n + k] = s * x[k] + c * y[k];
+        out[2 * n + k] = rz[k];
+    }
+}
+
+/* fills work->basis of both gears for the places found: places × functions rows, then the three bore rows in inertial axes */
+void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work)
+{
+    for (int g = 0; g < 2; g++) {
+        const gk_modal *modal = &setup->modal[g];
+        if (!modal->n) continue;
+        size_t row = (size_t)setup->functions * modal->n;
+        for (int p = 0; p < work->places; p++) place_rows(setup, &model->gear[g], g, &work->place[p], work->basis[g] + p * row);
+        bore_rows(modal, frame[g ? PHIB : PHIA] + model->gear[g].phase, work->basis[g] + work->places * row);
+    }
+}

@@ -1,0 +1,313 @@
+/* Level, effects, slices and step → gk_setup: which modes are dynamic, their tables in lanes, and the static residual of all others. */
+#include <stdio.h>
+#include "gk_core.h"
+
+/* memory is handed out twice with the same code: first counting (base NULL), then for real */
+typedef struct bump { char *base; size_t used; } bump;
+
+static void *take(bump *b, size_t bytes)
+{
+    void *p = b->base ? b->base + b->used : NULL;
+    b->used += (bytes + 63) / 64 * 64;
+    return p;
+}
+
+static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
+
+/* number of lanes a half needs: one a pair, one a single mode */
+static int lanes_of(const gk_gear *gear, int modes)
+{
+    int lanes = 0;
+    for (int k = 0; k < modes; k++) lanes += gear->part[k] != 2;
+    return lanes;
+}
+
+static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g, int modes)
+{
+    const gk_gear *gear = &model->gear[g];
+    gk_modal *m = &setup->modal[g];
+    size_t n, R = (size_t)gear->rolls, A = (size_t)gear->functions;
+    m->count = modes;
+    m->pairs = padded(lanes_of(gear, modes));
+    m->n = 2 * m->pairs;
+    m->block = (gear->functions * gear->functions + 3) / 4 * 4;
+    n = (size_t)m->n;
+    m->omega = take(b, n * sizeof(double));
+    m->zeta = take(b, n * sizeof(double));
+    m->omega2 = take(b, n * sizeof(gk_real));
+    m->rows = take(b, 2 * R * A * n * sizeof(gk_real));
+    m->bore = take(b, BORE_ROWS * n * sizeof(gk_real));
+    m->cosine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
+    m->sine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
+    m->c_ff = take(b, 4 * OFFSETS * R * R * (size_t)m->block * sizeof(gk_real));
+    m->c_fb = take(b, 2 * R * A * 3 * sizeof(double));
+}
+
+static void lay_out_flow(bump *b, const gk_setup *setup, gk_coefficients *k)
+{
+    for (int g = 0; g < 2; g++) {
+        size_t bytes = (size_t)setup->modal[g].n * sizeof(gk_real);
+        gk_real **array[8] = {&k->flow[g].a11, &k->flow[g].a12, &k->flow[g].a21, &k->flow[g].a22, &k->flow[g].bq, &k->flow[g].bv, &k->flow[g].kappa, &k->flow[g].inverse_s2};
+        for (int i = 0; i < 8; i++) *array[i] = take(b, bytes);
+    }
+}
+
+/* everything after the setup itself; returns the bytes used */
+static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const int modes[2])
+{
+    bump b = {base, 0};
+    gk_work scratch, *work = take(&b, sizeof(gk_work));
+    if (!work) work = &scratch;
+    setup->work = work;
+    int widest = 0;
+    for (int g = 0; g < 2; g++) {
+        lay_out_gear(&b, model, setup, g, modes[g]);
+        size_t n = (size_t)setup->modal[g].n;
+        work->qp[g] = take(&b, n * sizeof(gk_real));
+        work->vp[g] = take(&b, n * sizeof(gk_real));
+        work->force[g] = take(&b, n * sizeof(gk_real));
+        work->zero[g] = take(&b, n * sizeof(gk_real));
+        work->basis[g] = take(&b, (size_t)(MAX_PAIRS * model->gear[g].functions + BORE_ROWS) * n * sizeof(gk_real));
+        if (setup->modal[g].n > widest) widest = setup->modal[g].n;
+    }
+    work->scaled = take(&b, (size_t)widest * sizeof(gk_real));
+    for (int i = 0; i < CACHE; i++) lay_out_flow(&b, setup, &work->cache[i]);
+    lay_out_flow(&b, setup, &work->at_rest);
+    return b.used;
+}
+
+static const int *all_modes(const gk_model *model, int modes[2])
+{
+    modes[0] = model->gear[0].modes, modes[1] = model->gear[1].modes;
+    return modes;
+}
+
+size_t gk_setup_size(const gk_model *model)
+{
+    gk_setup probe;
+    int modes[2];
+    memset(&probe, 0, sizeof probe);
+    return 128 + sizeof(gk_setup) + lay_out(model, &probe, NULL, all_modes(model, modes));
+}
+
+size_t gk_data_size(const gk_model *model)
+{
+    size_t n = 0;
+    for (int g = 0; g < 2; g++) n += 2 * (size_t)padded(lanes_of(&model->gear[g], model->gear[g].modes));
+    return sizeof(gk_data) + 3 * n * sizeof(gk_real);
+}
+
+size_t gk_state_size(const gk_setup *setup) { return setup->state_size; }
+
+/* number of modes below the wished cut, moved to the widest relative gap within 15 %: never inside a cluster, never inside a pair */
+static int modes_below(const gk_gear *gear, double cut_hz)
+{
+    double cut = 2.0 * GK_PI * cut_hz, widest = 0.0;
+    int best = 0;
+    while (best < gear->modes && gear->omega[best] < cut) best++;
+    if (best == gear->modes) return best;
+    for (int k = 1; k < gear->modes; k++) {
+        if (gear->part[k] == 2 || gear->omega[k] < 0.85 * cut || gear->omega[k - 1] > 1.15 * cut) continue;
+        double gap = gear->omega[k] / gear->omega[k - 1] - 1.0;
+        if (gap > widest) widest = gap, best = k;
+    }
+    if (best < gear->modes && gear->part[best] == 2) best++;
+    return best;
+}
+
+static int modes_at_level(const gk_model *model, gk_level level, int g)
+{
+    const gk_gear *gear = &model->gear[g];
+    switch (level) {
+    case LEVEL_RIGID: return 0;
+    case LEVEL_FAST: return modes_below(gear, model->cut[0]);
+    case LEVEL_STANDARD: return modes_below(gear, model->cut[1]);
+    default: return gear->modes;
+    }
+}
+
+/* dynamic modes into lanes */
+static void fill_modes(const gk_gear *gear, gk_modal *m)
+{
+    const int P = m->pairs, n = m->n, R = gear->rolls, A = gear->functions;
+    memset(m->omega, 0, (size_t)n * sizeof(double));
+    memset(m->zeta, 0, (size_t)n * sizeof(double));
+    memset(m->omega2, 0, (size_t)n * sizeof(gk_real));
+    memset(m->rows, 0, 2 * (size_t)R * A * n * sizeof(gk_real));
+    memset(m->bore, 0, (size_t)BORE_ROWS * n * sizeof(gk_real));
+    memset(m->cosine, 0, (size_t)gear->z * P * sizeof(gk_real));
+    memset(m->sine, 0, (size_t)gear->z * P * sizeof(gk_real));
+    int lane = -1;
+    for (int k = 0; k < m->count; k++) {
+        if (gear->part[k] != 2) lane++;
+        const int at = gear->part[k] == 2 ? P + lane : lane;
+        m->omega[at] = gear->omega[k];
+        m->zeta[at] = gear->zeta[k];
+        for (int i = 0; i < 2 * R * A; i++) m->rows[(size_t)i * n + at] = (gk_real)gear->rows[(size_t)i * gear->modes + k];
+        for (int i = 0; i < BORE_ROWS; i++) m->bore[i * n + at] = (gk_real)gear->bore[(size_t)i * gear->modes + k];
+        m->omega2[at] = (gk_real)(gear->omega[k] * gear->omega[k]);
+        if (gear->part[k] == 2) continue;
+        for (int j = 0; j < gear->z; j++) {
+            double sine, cosine;
+            gk_sincos(2.0 * GK_PI * (double)((int64_t)gear->diameter[k] * j % gear->z) / gear->z, &sine, &cosine);
+            m->cosine[(size_t)j * P + lane] = (gk_real)cosine;
+            m->sine[(size_t)j * P + lane] = gear->part[k] == 0 ? 0 : (gk_real)sine;
+        }
+    }
+}
+
+/* row on tooth `offset` divided by ω², in the modes' own order, so that a dot product with a tooth-0 row gives Σ N Nᵀ/ω² over the dynamic modes */
+static void turned_row(const gk_gear *gear, int modes, const double *row, int offset, double *out)
+{
+    for (int k = 0; k < modes; k++) {
+        double sine, cosine, flexibility = 1.0 / (gear->omega[k] * gear->omega[k]);
+        int64_t step = (int64_t)gear->diameter[k] * offset % gear->z;
+        gk_sincos(2.0 * GK_PI * (double)step / gear->z, &sine, &cosine);
+        if (gear->part[k] == 1) {
+            out[k] = (row[k] * cosine - row[k + 1] * sine) * flexibility;
+            out[k + 1] = (row[k] * sine + row[k + 1] * cosine) * flexibility;
+            k++;
+        } else {
+            out[k] = row[k] * cosine * flexibility;
+        }
+    }
+}
+
+static double dot(const double *a, const double *b, int n)
+{
+    double lane[4] = {0, 0, 0, 0};
+    int k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
+    for (; k < n; k++) lane[0] += a[k] * b[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+
+/* residual flank–flank: C_static − Σ N Nᵀ/ω² on the grid points */
+static void fill_flank_residual(const gk_gear *gear, gk_modal *m, double *row)
+{
+    const size_t R = (size_t)gear->rolls, A = (size_t)gear->functions, points = R * A, N = (size_t)gear->modes;
+    memset(m->c_ff, 0, 4 * OFFSETS * R * R * (size_t)m->block * sizeof(gk_real));
+    for (int to = 0; to < 2; to++)
+        for (int o = 0; o < OFFSETS; o++)
+            for (size_t j = 0; j < points; j++) {
+                turned_row(gear, m->count, gear->rows + ((size_t)to * points + j) * N, o - 3, row);
+                for (int from = 0; from < 2; from++)
+                    for (size_t i = 0; i < points; i++) {
+                        const size_t cell = (((size_t)(from * 2 + to) * OFFSETS + (size_t)o) * R + i / A) * R + j / A, ab = i % A * A + j % A;
+                        m->c_ff[cell * (size_t)m->block + ab] =
+                            (gk_real)(gear->c_ff[cell * A * A + ab] - dot(gear->rows + ((size_t)from * points + i) * N, row, m->count));
+                    }
+            }
+}
+
+static void fill_bore_residual(const gk_gear *gear, gk_modal *m, double *row)
+{
+    const size_t points = 2 * (size_t)gear->rolls * (size_t)gear->functions, N = (size_t)gear->modes;
+    for (int c = 0; c < BORE_ROWS; c++) {
+        turned_row(gear, m->count, gear->bore + (size_t)c * N, 0, row);
+        for (size_t i = 0; i < points; i++) m->c_fb[3 * i + (size_t)c] = gear->c_fb[3 * i + (size_t)c] - dot(gear->rows + i * N, row, m->count);
+        for (int d = 0; d < BORE_ROWS; d++) m->c_bb[3 * d + c] = gear->c_bb[3 * d + c] - dot(gear->bore + (size_t)d * N, row, m->count);
+    }
+}
+
+/* slice ← width functions: (2a + 1) × mean of P_a over the slice; slices share the common face width */
+static double legendre_integral(int degree, double x)
+{ /* ∫ P_a = (P_{a+1} − P_{a−1})/(2a + 1) */
+    double before = 1.0, now = x, minus = 0.0;
+    if (degree == 0) return x;
+    for (int k = 1; k <= degree; k++) {
+        double next = ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0);
+        minus = before, before = now, now = next;
+    }
+    return (now - minus) / (2.0 * degree + 1.0);
+}
+
+static void fill_slices(const gk_model *model, gk_setup *setup)
+{
+    const double width = fmin(model->gear[0].width, model->gear[1].width);
+    for (int g = 0; g < 2; g++) {
+        setup->slice_width[g] = width / setup->slices;
+        double edge = width / model->gear[g].width;
+        for (int s = 0; s < setup->slices; s++)
+            for (int a = 0; a < setup->functions; a++) {
+                double from = edge * (2.0 * s / setup->slices - 1.0), to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
+                int d = model->degree[a];
+                setup->slice_row[g][s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+            }
+    }
+}
+
+static void fill_links(const gk_model *model, gk_setup *setup)
+{
+    for (int g = 0; g < 2; g++) {
+        const gk_gear *gear = &model->gear[g];
+        const gk_port *port = &model->port[g];
+        const int bearing = model->kind == KIND_PAIR && setup->on.bearings;
+        for (int i = BEARING_0X + 2 * g; i <= BEARING_0Y + 2 * g; i++) setup->link[i] = bearing, setup->link_c[i] = 1.0 / gear->bearing_k, setup->link_d[i] = gear->bearing_c;
+        setup->inverse_mass[3 * g] = bearing || model->kind == KIND_FLAT ? 1.0 / gear->mass : 0.0;
+        setup->inverse_mass[3 * g + 1] = bearing ? 1.0 / gear->mass : 0.0;
+        setup->inverse_mass[3 * g + 2] = model->kind == KIND_PAIR ? 1.0 / gear->inertia : 0.0;
+        setup->link[PORT_0 + g] = model->kind == KIND_PAIR;
+        setup->link_c[PORT_0 + g] = port->kind != PORT_TORQUE ? 1.0 / port->k : 0.0;
+        setup->link_d[PORT_0 + g] = port->kind != PORT_TORQUE ? port->c : 0.0;
+        setup->given_torque[g] = port->kind == PORT_TORQUE;
+        setup->link[SHAFT_0 + g] = setup->link[CLUTCH_0 + g] = port->chain;
+        setup->link_c[SHAFT_0 + g] = port->chain ? 1.0 / port->shaft_k : 0.0;
+        setup->link_d[SHAFT_0 + g] = port->shaft_c;
+        setup->link_c[CLUTCH_0 + g] = setup->link_d[CLUTCH_0 + g] = 0.0;
+        setup->inverse_mass[INERTIA_0 + g] = port->chain ? 1.0 / port->inertia : 0.0;
+        setup->inverse_mass[DISC_0 + g] = port->chain ? 1.0 / port->disc : 0.0;
+    }
+}
+
+/* the coefficients with which everything elastic is compliance: no motion of modes in a "step", κ = −1/ω² puts them back into C′ */
+static void fill_at_rest(gk_setup *setup)
+{
+    gk_coefficients *k = &setup->work->at_rest;
+    k->h = 1.0, k->gamma = 0.0, k->rigid_kappa = 0.0, k->rigid_mobility = 0.0;
+    for (int g = 0; g < 2; g++) {
+        const gk_modal *m = &setup->modal[g];
+        memset(setup->work->zero[g], 0, (size_t)m->n * sizeof(gk_real));
+        memset(k->flow[g].bq, 0, (size_t)m->n * sizeof(gk_real));
+        for (int i = 0; i < m->n; i++) k->flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
+        k->flow[g].exact = m->pairs;
+    }
+}
+
+gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+{
+    message[0] = 0;
+    if (data->magic != GK_DATA_MAGIC) {
+        snprintf(message, GK_MESSAGE, "gk_prepare before gk_defaults");
+        return GK_BAD_CALL;
+    }
+    memset(setup, 0, sizeof *setup);
+    setup->level = (gk_level)(int)data->value[V_M_LEVEL];
+    setup->integrator = (gk_integrator)(int)data->value[V_M_INTEGRATOR];
+    setup->on = gk_effects_of(data);
+    if (setup->level == LEVEL_PAPER) setup->on.residual = 0;
+    setup->slices = (int)data->value[V_M_SLICES];
+    setup->functions = model->gear[0].functions;
+    setup->allowance = model->kind == KIND_PAIR ? (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance : 0.0;
+    setup->damping = data->value[V_M_DAMPING];
+    int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
+    uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
+    lay_out(model, setup, (char *)base, modes);
+    gk_work *work = setup->work;
+    work->clock = 0;
+    for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;
+    setup->state_size = sizeof(gk_data);
+    for (int g = 0; g < 2; g++) {
+        fill_modes(&model->gear[g], &setup->modal[g]);
+        if (setup->on.residual) fill_flank_residual(&model->gear[g], &setup->modal[g], work->matrix);
+        if (setup->on.residual) fill_bore_residual(&model->gear[g], &setup->modal[g], work->matrix);
+        setup->state_size += 3 * (size_t)setup->modal[g].n * sizeof(gk_real);
+    }
+    fill_slices(model, setup);
+    fill_links(model, setup);
+    fill_at_rest(setup);
+    gk_outcome outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);
+    if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
+    return outcome;
+}

@@ -1,0 +1,306 @@
+/* The complementarity problem of a step and the one scalar that keeps its energy (docs/theory: the step; discrete gradient after Gonzalez 1996).
+ *
+ *   closed contact, bilateral row, sticking clutch:   g + D z + C′λ + δ(λ) = 0,   z = λ + η;   open contact: λ = 0 and g + D z + C′λ ≥ 0;   slipping clutch: z = ±bound.
+ *   η = α·direction + dashpot; the dashpot on the massless path of a row that is closed at both ends is −K (g₁ − g₀), K = 2c/h, limited to |λ₀ + λ₁| (no pull),
+ *   and with g₁ = −(C′λ + δ) it is linear in λ:  K (C′λ + δ + g₀).
+ * Active-set Newton: tangent J = D (I + K C″) + C″, C″ = C′ + diag δ′, of the active rows, LU with partial pivoting; chord steps; all violated rows flip at once, after four rounds
+ * without progress only the last one (block principal pivoting, Júdice & Pires 1994). */
+#include "gk_core.h"
+
+enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, ENERGY_LIMIT = 12 };
+
+static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
+static int is_clutch(const gk_system *s, int i) { return s->kind[i] == ROW_CLUTCH; }
+
+static double massless(const gk_system *s, int i, double *slope)
+{ /* (C′λ)ᵢ + δ(λᵢ) */
+    const double *row = s->C + (size_t)i * s->n;
+    double sum = 0.0, d = 0.0;
+    for (int j = 0; j < s->n; j++) sum += row[j] * s->force[j];
+    if (is_contact(s, i)) sum += gk_law_approach(&s->local[i], s->force[i], &d);
+    *slope = d;
+    return sum;
+}
+
+/* z of every row from λ, α and the dashpots; `path` = C′λ + δ of the active rows */
+static void total_force(gk_system *s, const double *path)
+{
+    for (int i = 0; i < s->n; i++) {
+        s->eta[i] = s->alpha * s->direction[i];
+        if (s->active[i] && s->clip[i] != 2)
+            s->eta[i] += s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (path[i] + s->g0[i]);
+        if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
+        else if (s->active[i]) s->z[i] = s->force[i];
+    }
+}
+
+double gk_solve_massless(const gk_system *s, int i)
+{
+    double slope;
+    return massless(s, i, &slope);
+}
+
+double gk_solve_end_gap(const gk_system *s, int i)
+{ /* g₁ = g + D z */
+    const double *row = s->D + (size_t)i * s->n;
+    double sum = s->g[i];
+    for (int j = 0; j < s->n; j++) sum += row[j] * s->z[j];
+    return sum;
+}
+
+/* J of the active rows at the present λ, factorised */
+static void factorise(gk_system *s)
+{
+    const int n = s->n;
+    double slope[MAX_ROWS], *J = s->J;
+    s->rank = 0;
+    for (int i = 0; i < n; i++) {
+        slope[i] = 0.0;
+        if (is_contact(s, i)) gk_law_approach(&s->local[i], s->force[i], &slope[i]);
+        if (s->active[i]) s->map[s->rank++] = i;
+    }
+    const int m = s->rank;
+    for (int a = 0; a < m; a++) {
+        const int i = s->map[a];
+        const double *d = s->D + (size_t)i * n, *c = s->C + (size_t)i * n;
+        double *row = J + (size_t)a * m;
+        for (int b = 0; b < m; b++) {
+            const int j = s->map[b];
+            row[b] = d[j] + c[j] + (i == j ? slope[i] : 0.0);
+            if (s->clip[j] && s->clip[j] != 2) row[b] += s->clip[j] * d[j];
+        }
+        for (int e = 0; e < m; e++) { /* dashpots: D K C″ */
+            const int k = s->map[e];
+            if (s->damping[k] == 0.0 || s->clip[k]) continue;
+            const double weight = d[k] * s->damping[k], *ck = s->C + (size_t)k * n;
+            for (int b = 0; b < m; b++) row[b] += weight * ck[s->map[b]];
+            row[e] += weight * slope[k];
+        }
+    }
+    for (int k = 0; k < m; k++) {
+        int best = k;
+        for (int a = k + 1; a < m; a++)
+            if (fabs(J[(size_t)a * m + k]) > fabs(J[(size_t)best * m + k])) best = a;
+        s->pivot[k] = best;
+        if (best != k)
+            for (int b = 0; b < m; b++) {
+                double t = J[(size_t)k * m + b];
+                J[(size_t)k * m + b] = J[(size_t)best * m + b];
+                J[(size_t)best * m + b] = t;
+            }
+        const double inverse = 1.0 / J[(size_t)k * m + k];
+        for (int a = k + 1; a < m; a++) {
+            double *row = J + (size_t)a * m;
+            const double f = row[k] *= inverse;
+            if (f != 0.0)
+                for (int b = k + 1; b < m; b++) row[b] -= f * J[(size_t)k * m + b];
+        }
+    }
+    s->rounds++;
+}
+
+static void back_solve(const gk_system *s, double *x)
+{
+    const int m = s->rank;
+    const double *J = s->J;
+    for (int k = 0; k < m; k++) {
+        double t = x[s->pivot[k]];
+        x[s->pivot[k]] = x[k];
+        x[k] = t;
+    }
+    for (int a = 1; a < m; a++)
+        for (int b = 0; b < a; b++) x[a] -= J[(size_t)a * m + b] * x[b];
+    for (int a = m - 1; a >= 0; a--) {
+        for (int b = a + 1; b < m; b++) x[a] -= J[(size_t)a * m + b] * x[b];
+        x[a] /= J[(size_t)a * m + a];
+    }
+}
+
+/* λ of the active rows for the present set: chord iteration, tangent renewed when it is slow */
+static void newton(gk_system *s)
+{
+    double path[MAX_ROWS] = {0}, x[MAX_ROWS], slope, last = INFINITY;
+    factorise(s);
+    for (int round = 0; round < CHORD_LIMIT; round++) {
+        for (int a = 0; a < s->rank; a++) path[s->map[a]] = massless(s, s->map[a], &slope);
+        total_force(s, path);
+        for (int a = 0; a < s->rank; a++) x[a] = -(gk_solve_end_gap(s, s->map[a]) + path[s->map[a]]);
+        back_solve(s, x);
+        double change = 0.0, size = 0.0;
+        for (int a = 0; a < s->rank; a++) {
+            s->force[s->map[a]] += x[a];
+            change = fmax(change, fabs(x[a]));
+            size = fmax(size, fabs(s->force[s->map[a]]));
+        }
+        if (!(change > 1e-11 * size)) break;
+        if (change > 0.2 * last) factorise(s);
+        last = change;
+    }
+    for (int a = 0; a < s->rank; a++) path[s->map[a]] = massless(s, s->map[a], &slope);
+    total_force(s, path);
+}
+
+/* one row's verdict: does it contradict its status? */
+static int violated(gk_system *s, int i)
+{
+    if (is_contact(s, i)) {
+        if (s->active[i]) return s->force[i] < 0.0;
+        double slope;
+        return gk_solve_end_gap(s, i) + massless(s, i, &slope) < 0.0;
+    }
+    if (!is_clutch(s, i)) return 0;
+    if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
+    return s->bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0; /* friction must oppose slip */
+}
+
+static void flip(gk_system *s, int i)
+{
+    s->active[i] = !s->active[i];
+    if (is_clutch(s, i)) {
+        if (!s->active[i]) s->z[i] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
+        s->force[i] = 0.0;
+    } else if (!s->active[i]) {
+        s->force[i] = 0.0;
+    }
+}
+
+/* dashpots: act where closed at both ends; limited so that they never pull */
+static int limit_dashpots(gk_system *s)
+{
+    int changed = 0;
+    for (int i = 0; i < s->contacts; i++) {
+        signed char clip = 2;
+        if (s->active[i] && s->force0[i] > 0.0 && s->damping[i] > 0.0) {
+            double slope, free = s->damping[i] * (massless(s, i, &slope) + s->g0[i]), limit = s->force0[i] + s->force[i];
+            clip = free > limit ? 1 : free < -limit ? -1 : 0;
+        }
+        changed |= clip != s->clip[i];
+        s->clip[i] = clip;
+    }
+    return changed;
+}
+
+/* λ and z for the present α; starts from the present active set */
+void gk_solve_contacts(gk_system *s)
+{
+    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = 3;
+    for (int round = 0; round < ROUND_LIMIT; round++) {
+        newton(s);
+        int count = 0, last = -1;
+        for (int i = 0; i < s->n; i++)
+            if (violated(s, i)) count++, last = i;
+        if (!count) {
+            if (dashpot_rounds-- > 0 && limit_dashpots(s)) continue;
+            return;
+        }
+        if (count < fewest) fewest = count, patience = 4;
+        else patience--;
+        if (patience < 0) flip(s, last);
+        else {
+            unsigned char wrong[MAX_ROWS];
+            for (int i = 0; i < s->n; i++) wrong[i] = (unsigned char)violated(s, i);
+            for (int i = 0; i < s->n; i++)
+                if (wrong[i]) flip(s, i);
+        }
+        for (int i = 0; i < s->contacts; i++) /* a contact that opened has no dashpot */
+            if (!s->active[i]) s->clip[i] = 2;
+    }
+    s->limit_reached = 1;
+}
+
+/* stored energy of the massless part: ½ λᵀC′λ + Σ Φ(λ) */
+double gk_solve_stored(const gk_system *s, const double *force)
+{
+    double sum = 0.0;
+    for (int i = 0; i < s->n; i++) {
+        const double *row = s->C + (size_t)i * s->n;
+        double c = 0.0;
+        for (int j = 0; j < s->n; j++) c += row[j] * force[j];
+        sum += 0.5 * force[i] * c;
+        if (is_contact(s, i)) sum += gk_law_energy(&s->local[i], force[i]);
+    }
+    return sum;
+}
+
+typedef struct balance { double defect, c1, c2, scale; } balance;
+
+/* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀) and its expansion in α along the solved direction p = dλ/dα */
+static balance energy_balance(const gk_system *s, double U0, const double *p, const double *w)
+{
+    balance b = {-U0, 0.0, 0.0, fabs(U0)};
+    b.defect += gk_solve_stored(s, s->force);
+    for (int i = 0; i < s->n; i++) {
+        if (is_clutch(s, i)) continue;
+        const double *d = s->D + (size_t)i * s->n, *c = s->C + (size_t)i * s->n;
+        double Dw = 0.0, Cp = 0.0, slope = 0.0;
+        for (int j = 0; j < s->n; j++) Dw += d[j] * w[j], Cp += c[j] * p[j];
+        if (is_contact(s, i) && p[i] != 0.0) gk_law_approach(&s->local[i], s->force[i], &slope);
+        Cp += slope * p[i];
+        /* what a given torque does to the massless part is work from outside: it counts with its massless displacement alone */
+        const int given = s->kind[i] == ROW_TORQUE;
+        if (given) Dw = -Cp;
+        double change = (given ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i], sum = s->force0[i] + s->force[i] + s->alpha * s->direction[i], dw = p[i] + s->direction[i];
+        b.defect += 0.5 * sum * change;
+        b.c1 += s->force[i] * Cp + 0.5 * dw * change + 0.5 * sum * Dw;
+        b.c2 += 0.5 * p[i] * Cp + 0.5 * dw * Dw;
+        b.scale += 0.5 * (c[i] + slope) * s->force[i] * s->force[i];
+    }
+    return b;
+}
+
+/* p = dλ/dα on the active rows, w = dz/dα everywhere */
+static void sensitivity(const gk_system *s, double *p, double *w)
+{
+    double x[MAX_ROWS], path[MAX_ROWS];
+    memset(p, 0, (size_t)s->n * sizeof *p);
+    for (int a = 0; a < s->rank; a++) {
+        const double *d = s->D + (size_t)s->map[a] * s->n;
+        x[a] = 0.0;
+        for (int j = 0; j < s->n; j++) x[a] -= d[j] * s->direction[j];
+    }
+    back_solve(s, x);
+    for (int a = 0; a < s->rank; a++) p[s->map[a]] = x[a];
+    for (int i = 0; i < s->n; i++) {
+        w[i] = p[i] + s->direction[i];
+        if (!s->active[i] || s->clip[i] == 2) continue;
+        if (s->clip[i]) {
+            w[i] += s->clip[i] * p[i];
+            continue;
+        }
+        double slope = 0.0;
+        path[i] = 0.0;
+        for (int j = 0; j < s->n; j++) path[i] += s->C[(size_t)i * s->n + j] * p[j];
+        if (is_contact(s, i)) gk_law_approach(&s->local[i], s->force[i], &slope);
+        w[i] += s->damping[i] * (path[i] + slope * p[i]);
+    }
+}
+
+/* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the massless part's energy change equal its work. */
+void gk_solve_energy(gk_system *s)
+{
+    double p[MAX_ROWS] = {0}, w[MAX_ROWS] = {0};
+    s->alpha = 0.0;
+    memset(s->direction, 0, (size_t)s->n * sizeof *s->direction);
+    gk_solve_contacts(s);
+    int changed = s->curved;
+    for (int i = 0; i < s->contacts; i++) changed |= (s->force0[i] > 0.0) != (s->force[i] > 0.0);
+    if (!changed) return;
+    double U0 = gk_solve_stored(s, s->force0);
+    balance b = energy_balance(s, U0, p, w);
+    if (!(fabs(b.defect) > 1e-9 * b.scale)) return;
+    for (int i = 0; i < s->n; i++)
+        if (s->kind[i] != ROW_TORQUE && !is_clutch(s, i) && (s->force0[i] != 0.0 || s->force[i] != 0.0)) s->direction[i] = gk_solve_end_gap(s, i) - s->g0[i];
+    for (int round = 0; round < ENERGY_LIMIT; round++) {
+        sensitivity(s, p, w);
+        b = energy_balance(s, U0, p, w);
+        if (!(fabs(b.defect) > 1e-9 * b.scale)) return;
+        double root = sqrt(fmax(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)), divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
+        if (!(fabs(divisor) > 0.0)) break;
+        double a = -2.0 * b.defect / divisor;
+        s->alpha += a;
+        for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
+        gk_solve_contacts(s);
+        s->rounds++;
+    }
+    s->limit_reached = 1;
+}

@@ -1,0 +1,155 @@
+/* Static equilibrium by the same contact routine as the step: proximal points. Every rigid coordinate may move by mobility × force (an implicit "step" of a viscous body), everything elastic is
+ * compliance; repeated until nothing moves. The mobility is large against all compliances, so a few rounds suffice; each round is a monotone complementarity problem. */
+#include "gk_core.h"
+
+static const double MOBILITY = 1e-4; /* s²: divided by the mass of a coordinate, m/N */
+static const double SEE = 3e-3;      /* m: look this far for flanks */
+enum { REST_ROUNDS = 200 };
+
+static int grounded(const gk_boundary *b) { return b->kind != PORT_TORQUE; }
+
+/* where to begin: the grounded side decides, the other follows without load */
+static void begin(const gk_model *model, gk_data *data, const gk_boundary b[2])
+{
+    const double ratio = model->gear[0].r_b / model->gear[1].r_b;
+    memset(data->x, 0, sizeof data->x);
+    if (model->kind == KIND_FLAT) return;
+    data->x[PHIA] = grounded(&b[0]) ? b[0].phi : grounded(&b[1]) ? -b[1].phi / ratio : 0.0;
+    data->x[PHIB] = -data->x[PHIA] * ratio;
+    for (int g = 0; g < 2; g++) {
+        data->x[INERTIA_0 + g] = b[g].phi;
+        data->x[DISC_0 + g] = data->x[3 * g + 2];
+    }
+}
+
+/* when nothing holds the rotation of the train: the inertial forces of its uniform acceleration */
+static void free_rotation(const gk_model *model, const gk_setup *setup, const gk_boundary b[2], const double *torque, double *inertial)
+{
+    const double turn[2] = {1.0, -model->gear[0].r_b / model->gear[1].r_b};
+    double net = 0.0, inertia = 0.0;
+    memset(inertial, 0, RIGID * sizeof *inertial);
+    if (model->kind == KIND_FLAT) return;
+    for (int g = 0; g < 2; g++)
+        if (grounded(&b[g]) && !(model->port[g].chain && !setup->link[CLUTCH_0 + g])) return;
+    for (int g = 0; g < 2; g++) {
+        const int disc = DISC_0 + g;
+        net += turn[g] * ((model->port[g].chain ? 0.0 : b[g].torque) + torque[disc]);
+        inertia += turn[g] * turn[g] * (model->gear[g].inertia + (model->port[g].chain ? model->port[g].disc : 0.0));
+    }
+    for (int g = 0; g < 2; g++) {
+        inertial[3 * g + 2] = -turn[g] * model->gear[g].inertia * net / inertia;
+        if (model->port[g].chain) inertial[DISC_0 + g] = -turn[g] * model->port[g].disc * net / inertia;
+    }
+}
+
+static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, const double *given)
+{
+    gk_work *work = rest->work;
+    gk_system *s = &work->system;
+    double moved = 0.0;
+    for (int d = 0; d < RIGID; d++) {
+        work->frame[d] = data->x[d] + work->at_rest.rigid_mobility * rest->inverse_mass[d] * given[d];
+        work->speed[d] = 2.0 * work->frame[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
+    }
+    work->y[0] = work->zero[0], work->y[1] = work->zero[1];
+    work->places = gk_flank_find(model, rest, work->frame, SEE, work->place);
+    if (work->places < 0) return work->places = 0, NAN;
+    for (int p = 0; p < work->places; p++) {
+        work->place[p].memory = -1;
+        for (int m = 0; m < data->pairs; m++)
+            if (data->memory[m].key.flank == work->place[p].key.flank && data->memory[m].key.tooth == work->place[p].key.tooth) work->place[p].memory = m;
+    }
+    gk_rows_form(model, rest, work->frame, work);
+    gk_system_form(model, rest, data, &work->at_rest, work);
+    gk_step_recall(rest, data, s);
+    s->alpha = 0.0;
+    memset(s->direction, 0, sizeof s->direction);
+    gk_solve_contacts(s);
+    for (int d = 0; d < RIGID; d++) {
+        double z = 0.0;
+        for (int i = 0; i < s->n; i++) z += s->rigid[i][d] * s->z[i];
+        const double x = work->frame[d] + work->at_rest.rigid_mobility * rest->inverse_mass[d] * z;
+        const double arm = d == XA || d == YA || d == XB || d == YB ? 1.0 : d == PHIB || d == INERTIA_1 || d == DISC_1 ? model->gear[1].r_b : model->gear[0].r_b;
+        moved = fmax(moved, fabs(x - data->x[d]) * arm);
+        if (!gk_finite(x)) return NAN;
+        data->x[d] = x;
+    }
+    gk_step_remember(rest, data);
+    return s->limit_reached ? fmax(moved, 1.0) : moved;
+}
+
+/* modes take the static share of the forces that hold the equilibrium */
+static void spread(const gk_model *model, const gk_setup *setup, gk_data *data)
+{
+    const gk_system *s = &setup->work->system;
+    gk_real *q = data->modal;
+    for (int g = 0; g < 2; g++) {
+        const int n = setup->modal[g].n;
+        if (n) gk_step_scatter(model, setup, g, s->force, q + 2 * n);
+        for (int i = 0; i < n; i++) {
+            q[i] = setup->modal[g].omega2[i] > 0 ? q[2 * n + i] / setup->modal[g].omega2[i] : 0;
+            q[n + i] = 0;
+        }
+        q += 3 * n;
+    }
+    for (int d = 0; d < RIGID; d++) {
+        data->f[d] = 0.0;
+        for (int i = 0; i < s->n; i++)
+            if (s->kind[i] != ROW_CLUTCH) data->f[d] += s->rigid[i][d] * s->force[i];
+    }
+}
+
+/* Equilibrium under the given boundary: for each shaft a spring of stiffness k at angle phi, a held angle (PORT_FIXED, k = ∞: the bore is held) or a torque.
+ * `keep`: start from data->x instead of from the unloaded mesh. */
+gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data *data, const gk_boundary b[2], int keep)
+{
+    gk_setup rest = *setup;
+    gk_work *work = setup->work;
+    double given[RIGID] = {0}, inertial[RIGID];
+    rest.on.damping = 0;
+    work->at_rest.rigid_mobility = MOBILITY;
+    for (int g = 0; g < 2; g++) {
+        rest.given_torque[g] = !grounded(&b[g]);
+        rest.link_c[PORT_0 + g] = b[g].kind == PORT_SPRING ? 1.0 / b[g].k : 0.0;
+        work->outer[g] = b[g].phi;
+        work->torque[g] = b[g].torque;
+        if (model->port[g].chain && !data->locked[g]) { /* slips at the start: a given friction torque */
+            const double slip = data->v[INERTIA_0 + g] - data->v[DISC_0 + g], friction = data->value[GK_OF_SHAFT(CAPACITY, g)] * (slip > 0.0 ? 1.0 : slip < 0.0 ? -1.0 : 0.0);
+            rest.link[CLUTCH_0 + g] = 0;
+            given[INERTIA_0 + g] = -friction;
+            given[DISC_0 + g] = friction;
+        }
+        for (int i = 0; i < LINKS; i++) rest.link_d[i] = 0.0;
+    }
+    if (!keep) begin(model, data, b);
+    if (!keep) data->pairs = 0;
+    free_rotation(model, &rest, b, given, inertial);
+    for (int d = 0; d < RIGID; d++) given[d] += inertial[d];
+    double moved = INFINITY;
+    int rounds = 0;
+    while (rounds++ < REST_ROUNDS && moved > 1e-14) moved = relax(model, &rest, data, given);
+    if (!(moved <= 1e-11)) return GK_NO_EQUILIBRIUM;
+    spread(model, &rest, data);
+    return GK_OK;
+}
+
+/* Quasi-static transmission: torque on the pinion's bore, the wheel's bore held at phi_wheel. out: te (m), then for every place {flank, tooth of the pinion, force of each slice};
+ * room for 1 + MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
+gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque, int keep, double *out, int *places)
+{
+    const gk_boundary b[2] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_wheel, 0.0}};
+    gk_outcome outcome = gk_static_solve(model, setup, data, b, keep);
+    if (outcome) return outcome;
+    const gk_system *s = &setup->work->system;
+    double phi_pinion = 0.0;
+    for (int i = s->contacts; i < s->n; i++)
+        if (s->link_of[i] == PORT_0) phi_pinion = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+    *out++ = model->gear[0].r_b * phi_pinion + model->gear[1].r_b * phi_wheel;
+    *places = setup->work->places;
+    for (int p = 0; p < *places; p++, out += 2 + s->slices) {
+        out[0] = setup->work->place[p].key.flank;
+        out[1] = setup->work->place[p].key.tooth;
+        for (int i = 0; i < s->slices; i++) out[2 + i] = s->force[p * s->slices + i];
+    }
+    return GK_OK;
+}

@@ -1,0 +1,62 @@
+"""Reduced body → the tables of one gear in the model blob: rows and compliances on an even grid of rolls, for the width functions that the stage can excite."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator
+
+ROLLS = 32
+MOST_FUNCTIONS = 6
+OFFSETS = range(-3, 4)
+BORE = (0, 1, 5)
+
+
+def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS) -> np.ndarray:
+    """(rolls, R) weights from values at the body's Chebyshev points `roll` (R,) to an even grid on [s_form, s_tip] (barycentric interpolation).
+
+    Applied to both sides of a compliance it stays positive semidefinite.
+    """
+    grid = np.linspace(s_form, s_tip, rolls)
+    return BarycentricInterpolator(roll, np.eye(roll.size))(grid)
+
+
+def symmetric_functions(count: int) -> np.ndarray:
+    """Degrees of the Legendre functions that a load symmetric about mid-width can excite, at most MOST_FUNCTIONS.
+
+    A spur pair without lead modification loads its slices symmetrically: odd functions and antisymmetric modes stay at rest exactly.
+    """
+    return np.arange(0, count, 2)[:MOST_FUNCTIONS]
+
+
+def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
+    """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay together."""
+    rows = np.abs(body.flank_rows[:, :, degrees, :]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
+    seen = (rows > 1e-9) & (body.parity > 0)
+    second = np.flatnonzero(body.part == 2)
+    seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
+    return np.flatnonzero(seen)
+
+
+def body_sections(index: int, body: Any, s_form: float, s_tip: float, degrees: np.ndarray) -> Mapping[str, np.ndarray]:
+    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/gk_model.c)."""
+    to_grid = resampling(body.roll, s_form, s_tip)
+    modes = excited_modes(body, degrees)
+    rows = np.einsum("ir,fran->fian", to_grid, body.flank_rows[:, :, degrees][..., modes])
+    static = body.static_ff[..., degrees, :][..., degrees]
+    static = np.stack([static[:, :, offset % body.teeth] for offset in OFFSETS], axis=2)
+    static = np.einsum("ir,fgmrsab,js->fgmijab", to_grid, static, to_grid, optimize=True)
+    flank_bore = np.einsum("ir,frak->fiak", to_grid, body.static_fb[:, :, degrees][..., BORE])
+    return {
+        f"size{index}": np.array([modes.size, ROLLS, degrees.size], np.int32),
+        f"omega{index}": 2 * np.pi * body.frequency[modes],
+        f"zeta{index}": body.damping_ratio[modes],
+        f"diameter{index}": body.nodal_diameter[modes].astype(np.int32),
+        f"part{index}": body.part[modes].astype(np.int32),
+        f"rows{index}": rows,
+        f"bore{index}": body.bore_rows[np.ix_(BORE, modes)],
+        f"c_ff{index}": static,
+        f"c_fb{index}": flank_bore,
+        f"c_bb{index}": body.static_bb[np.ix_(BORE, BORE)],
+    }
