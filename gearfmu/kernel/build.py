@@ -4,7 +4,7 @@ One source list, one set of flags (docs/architecture.md, Kernel): contraction of
 no fast-math, so that gcc, clang and zig, Linux and Windows give the same bits. `-Bsymbolic` and hidden visibility keep
 a second FMU in the same process from running the first one's kernel.
 
-    python -m gearfmu.kernel.build [--platform win64] [--sanitize]
+    python -m gearfmu.kernel [--platform win64] [--sanitize]
 
 This file is also loaded by setup.py before anything is installed: it imports the standard library and gearfmu.errors.
 """
@@ -30,7 +30,7 @@ SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
 ZIG_TARGET = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
 FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden",
          "-Wall", "-Wextra", "-Werror")
-REBUILD = "python -m gearfmu.kernel.build"
+REBUILD = "python -m gearfmu.kernel"
 CROSS = 'pip install "gearfmu[cross]"'
 
 

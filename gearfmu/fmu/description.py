@@ -1,0 +1,134 @@
+"""modelDescription.xml of FMI 2.0, generated from the kernel's own table of variables."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+from gearfmu.fmu.units import DISPLAY, base_exponents
+from gearfmu.kernel import Variable
+
+DEFAULT_STEP = 1e-4
+DEFAULT_STOP = 0.1
+LOG_CATEGORIES = {
+    "logEvents": "life of the instance: made, initialised",
+    "logStatusWarning": "the solver works outside of its usual range, e.g. a fallback scheme in use",
+    "logStatusDiscard": "a step that stopped early: last good time and reason",
+    "logStatusError": "refused calls: what, where, why",
+    "logAll": "all of these",
+}
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What modelDescription.xml says about the FMU as a whole.
+
+    identifier: modelIdentifier, a C name; guid: hash of the model, checked by the binary; native: the binary needs
+    nothing else on the importing machine (else Python with pythonfmu's binary)."""
+
+    name: str
+    identifier: str
+    guid: str
+    version: str
+    description: str = ""
+    native: bool = True
+
+
+def model_description(identity: Identity, variables: Sequence[Variable]) -> bytes:
+    """The XML document (UTF-8) for these variables, in their order; raises FmuError for a unit without definition."""
+    root = ET.Element("fmiModelDescription", {
+        "fmiVersion": "2.0", "modelName": identity.name, "guid": identity.guid, "description": identity.description,
+        "version": identity.version, "license": "BSD-3-Clause", "generationTool": f"gearfmu {identity.version}",
+        "variableNamingConvention": "structured", "numberOfEventIndicators": "0"})
+    ET.SubElement(root, "CoSimulation", _capabilities(identity))
+    _add_units(root, variables)
+    _add_enumerations(root, variables)
+    categories = ET.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", {"name": name, "description": text})
+    ET.SubElement(root, "DefaultExperiment",
+                  {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)})
+    listed = ET.SubElement(root, "ModelVariables")
+    for variable in variables:
+        _add_variable(listed, variable)
+    _add_structure(root, variables)
+    ET.indent(root)
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+
+
+def enumeration_type(variable: Variable) -> str:
+    """Name of the type definition of an enumeration variable."""
+    return variable.name.replace(".", "_") + "_type"
+
+
+def _capabilities(identity: Identity) -> dict[str, str]:
+    """Only what is real: input interpolation, output derivatives and directional derivatives are not offered."""
+    able = {"canHandleVariableCommunicationStepSize": True, "canGetAndSetFMUstate": True, "canSerializeFMUstate": True,
+            "needsExecutionTool": not identity.native, "canNotUseMemoryManagementFunctions": not identity.native,
+            "canBeInstantiatedOnlyOncePerProcess": False, "canInterpolateInputs": False,
+            "canRunAsynchronuously": False, "providesDirectionalDerivative": False}
+    return {"modelIdentifier": identity.identifier, **{name: str(value).lower() for name, value in able.items()},
+            "maxOutputDerivativeOrder": "0"}
+
+
+def _add_units(root: ET.Element, variables: Sequence[Variable]) -> None:
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for unit in sorted({v.unit for v in variables if v.unit}):
+        node = ET.SubElement(definitions, "Unit", {"name": unit})
+        ET.SubElement(node, "BaseUnit", {base: str(power) for base, power in base_exponents(unit).items()})
+        for name, factor in DISPLAY.get(unit, ()):
+            ET.SubElement(node, "DisplayUnit", {"name": name, "factor": repr(factor)})
+
+
+def _add_enumerations(root: ET.Element, variables: Sequence[Variable]) -> None:
+    enumerations = [v for v in variables if v.type == "Enumeration"]
+    if not enumerations:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for variable in enumerations:
+        simple = ET.SubElement(definitions, "SimpleType", {"name": enumeration_type(variable)})
+        node = ET.SubElement(simple, "Enumeration")
+        for value, item in enumerate(variable.items):
+            ET.SubElement(node, "Item", {"name": item, "value": str(value)})
+
+
+def _add_variable(listed: ET.Element, variable: Variable) -> None:
+    output = variable.causality == "output"
+    attributes = {"name": variable.name, "valueReference": str(variable.reference),
+                  "description": variable.description, "causality": variable.causality,
+                  "variability": _variability(variable)}
+    if variable.causality != "input":
+        attributes["initial"] = "calculated" if output else "exact"
+    node = ET.SubElement(listed, "ScalarVariable", attributes)
+    detail = {"declaredType": enumeration_type(variable)} if variable.type == "Enumeration" else {}
+    if variable.type == "Real":
+        detail["unit"] = variable.unit
+    if not output and variable.type != "Boolean":
+        detail.update(min=value_text(variable, variable.minimum), max=value_text(variable, variable.maximum))
+    if not output:
+        detail["start"] = value_text(variable, variable.start)
+    ET.SubElement(node, variable.type, detail)
+
+
+def _variability(variable: Variable) -> str:
+    if variable.causality == "parameter":
+        return "fixed"
+    return "continuous" if variable.type == "Real" else "discrete"
+
+
+def value_text(variable: Variable, value: float) -> str:
+    """A value of this variable as XML writes it: the shortest text that gives the same double, or a whole number."""
+    if variable.type == "Boolean":
+        return "true" if value else "false"
+    return repr(float(value)) if variable.type == "Real" else str(int(value))
+
+
+def _add_structure(root: ET.Element, variables: Sequence[Variable]) -> None:
+    """Outputs follow the inputs only through a step: no direct dependencies. Initial outputs depend on everything."""
+    structure = ET.SubElement(root, "ModelStructure")
+    indices = [str(k) for k, v in enumerate(variables, start=1) if v.causality == "output"]
+    outputs = ET.SubElement(structure, "Outputs")
+    initial = ET.SubElement(structure, "InitialUnknowns")
+    for index in indices:
+        ET.SubElement(outputs, "Unknown", {"index": index, "dependencies": ""})
+        ET.SubElement(initial, "Unknown", {"index": index})

@@ -1,0 +1,121 @@
+"""An FMU file from a stage model: XML from the kernel's table, the model blob, and a byte copy of the kernel library."""
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Protocol
+
+from gearfmu.errors import FmuError
+from gearfmu.files import written_whole
+from gearfmu.fmu.description import Identity, model_description
+from gearfmu.fmu.documentation import licences, page
+from gearfmu.fmu.terminals import terminals_and_icons
+from gearfmu.kernel import Kernel
+from gearfmu.kernel.build import host_platform, library_path
+
+MODEL_FILE = "resources/model.gkb"
+RUNTIMES = ("native", "python")
+LONGEST_NAME = 40
+
+
+class Model(Protocol):
+    """What export needs of a stage model (gearfmu.stage.StageModel): its name, its bytes and their hash."""
+
+    name: str
+    blob: bytes
+    hash: str
+
+
+def export(model: Model, path: str | Path, runtime: str = "native", platforms: Sequence[str] = ("host",)) -> Path:
+    """Write `model` as an FMI 2.0 co-simulation FMU and return its path.
+
+    runtime: "native" (the kernel library is the FMU's binary; no Python on the importing machine) or "python" (pythonfmu's
+    binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64".
+    The same model gives the same bytes; the file appears whole or not at all.
+    Raises FmuError for unknown options and BuildError when a platform's library is missing or stale."""
+    if runtime not in RUNTIMES:
+        raise FmuError(f"runtime = {runtime!r}: use {' or '.join(RUNTIMES)}")
+    names = list(dict.fromkeys(host_platform() if p == "host" else p for p in platforms))
+    if not names:
+        raise FmuError('platforms is empty: name at least one, e.g. "host"')
+    libraries = {name: library_path("host" if name == host_platform() else name) for name in names}
+    files = (_native_files if runtime == "native" else _python_files)(model, libraries)
+    return write_archive(path, files)
+
+
+def write_archive(path: str | Path, files: Mapping[str, bytes]) -> Path:
+    """A zip file with these members in this order, without times or other traces of the machine; returns its path."""
+    target = Path(path)
+    with written_whole(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            member = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            member.compress_type = zipfile.ZIP_DEFLATED
+            member.create_system = 3
+            member.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(member, content)
+    return target
+
+
+def content_identifier(name: str, contents: Sequence[bytes]) -> str:
+    """modelIdentifier: the stage's name as a C name, and twelve hex digits over all that decides what the FMU does.
+
+    Two FMUs with different contents never share a file or module name within one process."""
+    digest = hashlib.sha256()
+    for content in contents:
+        digest.update(hashlib.sha256(content).digest())
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)[:LONGEST_NAME] or "stage"
+    return f"{'_' if plain[0].isdigit() else ''}{plain}_{digest.hexdigest()[:12]}"
+
+
+def _native_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, bytes]:
+    binaries = {name: path.read_bytes() for name, path in libraries.items()}
+    identifier = content_identifier(model.name, [model.blob, *binaries.values()])
+    files = _common_files(model, identifier, native=True)
+    for name, content in binaries.items():
+        files[f"binaries/{name}/{identifier}{libraries[name].suffix}"] = content
+    return files
+
+
+def _python_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, bytes]:
+    """pythonfmu's binary loads resources/<slavemodule>.py; the module's name carries the content hash, else two FMUs in
+    one process would share the first one's module."""
+    frame = _pythonfmu_folder()
+    slave = Path(__file__).with_name("slave.py").read_text(encoding="utf-8")
+    binaries = {name: path.read_bytes() for name, path in libraries.items()}
+    identifier = content_identifier(model.name, [model.blob, slave.encode(), *binaries.values()])
+    files = _common_files(model, identifier, native=False)
+    for name, library in libraries.items():
+        binary = next(iter((frame / "resources" / "binaries" / name).glob(f"*{library.suffix}")), None)
+        if binary is None:
+            raise FmuError(f"pythonfmu has no binary for {name}: export with runtime native")
+        files[f"binaries/{name}/{identifier}{library.suffix}"] = binary.read_bytes()
+        files[f"resources/{identifier}_kernel{library.suffix}"] = binaries[name]
+    slave = slave.replace("@MODEL_HASH@", model.hash).replace("@LIBRARY@", f"{identifier}_kernel")
+    files[f"resources/{identifier}.py"] = slave.encode()
+    files["resources/slavemodule.txt"] = identifier.encode()
+    for source in sorted(frame.glob("*.py")):
+        files[f"resources/pythonfmu/{source.name}"] = source.read_bytes()
+    return files
+
+
+def _common_files(model: Model, identifier: str, native: bool) -> dict[str, bytes]:
+    variables = list(Kernel(model.blob).variables.values())
+    identity = Identity(model.name, identifier, model.hash, metadata.version("gearfmu"),
+                        getattr(getattr(model, "spec", None), "description", ""), native)
+    return {"modelDescription.xml": model_description(identity, variables),
+            "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(variables),
+            "documentation/index.html": page(identity, variables).encode(),
+            **{f"documentation/licenses/{name}": text.encode() for name, text in licences(native).items()},
+            MODEL_FILE: model.blob}
+
+
+def _pythonfmu_folder() -> Path:
+    spec = importlib.util.find_spec("pythonfmu")
+    if spec is None or spec.origin is None:
+        raise FmuError("runtime python needs the package pythonfmu: pip install pythonfmu")
+    return Path(spec.origin).parent

@@ -1,0 +1,147 @@
+"""Everything that can be found wrong with an FMU: what fmpy checks, and what only shows when the file is opened and called."""
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import fmpy
+from fmpy.model_description import ModelDescription
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+from gearfmu.errors import FmuError, Problem
+from gearfmu.fmu.probes import CHECKS
+from gearfmu.fmu.symbols import exported_symbols
+from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
+
+TIMEOUT = 300
+EXPORT_AGAIN = "export the FMU again"
+
+
+def validate(path: str | Path) -> list[Problem]:
+    """All problems of the FMU at `path`; an empty list when there are none.
+
+    Checks the XML against schema and rules (fmpy), units, start values, terminals, exported symbols, and, when there is a
+    binary for this machine, its answers to wrong and right calls in a process of its own.
+    Raises FmuError when the file cannot be read as an FMU at all."""
+    file = Path(path)
+    with tempfile.TemporaryDirectory(prefix="gearfmu-validate-") as work:
+        folder = Path(work) / "fmu"
+        description = _open(file, folder)
+        found = [("modelDescription.xml", text, EXPORT_AGAIN) for text in validate_fmu(str(file))]
+        for check in (_units, _terminals, _binaries):
+            found += check(folder, description)
+        if (folder / "binaries" / host_platform()).is_dir():
+            found += _answers(folder)
+        return [Problem(str(file), field, value, remedy) for field, value, remedy in found]
+
+
+def _open(file: Path, folder: Path) -> ModelDescription:
+    try:
+        fmpy.extract(str(file), str(folder))
+        description = fmpy.read_model_description(str(folder), validate=False)
+    except Exception as error:  # fmpy and what it calls raise many kinds
+        raise FmuError(f"{file}: cannot be read as an FMU: {error}") from error
+    if description.coSimulation is None or not description.fmiVersion.startswith("2."):
+        raise FmuError(f"{file}: not an FMI 2.0 co-simulation FMU (FMI {description.fmiVersion})")
+    return description
+
+
+def _units(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
+    with_base = {unit.name for unit in description.unitDefinitions if unit.baseUnit is not None}
+    for variable in description.modelVariables:
+        if variable.type == "Real" and variable.unit not in with_base:
+            yield variable.name, f"unit {variable.unit}", "declare a unit with its SI base units in UnitDefinitions"
+
+
+def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
+    """fmpy does not look at this file; its FMI 3.0 schema does."""
+    file = folder / "terminalsAndIcons" / "terminalsAndIcons.xml"
+    if not file.is_file():
+        return
+    schema = etree.XMLSchema(etree.parse(str(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd")))
+    try:
+        tree = etree.parse(str(file))
+    except etree.XMLSyntaxError as error:
+        yield file.name, str(error), EXPORT_AGAIN
+        return
+    for error in () if schema.validate(tree) else schema.error_log:
+        yield f"{file.name}:{error.line}", error.message, EXPORT_AGAIN
+    known = {variable.name for variable in description.modelVariables}
+    for member in tree.iter("TerminalMemberVariable"):
+        if member.get("variableName") not in known:
+            yield f"{file.name}: {member.get('variableName')}", "is no variable of the FMU", EXPORT_AGAIN
+
+
+def _binaries(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
+    simulation = description.coSimulation
+    places = [place for place in sorted((folder / "binaries").glob("*")) if place.name in SUFFIX]
+    if not places:
+        yield "binaries", "no binary for a platform known here", f"export for {', '.join(SUFFIX)}"
+    for place in places:
+        library = place / (simulation.modelIdentifier + SUFFIX[place.name])
+        if not library.is_file():
+            yield f"binaries/{place.name}", f"{library.name} is missing", "the file must be named by the modelIdentifier"
+        elif place.name != "darwin64":
+            yield from _symbols(library, exact=not simulation.needsExecutionTool)
+
+
+def _symbols(library: Path, exact: bool) -> Iterator[tuple[str, str, str]]:
+    """All co-simulation functions of FMI 2; a native FMU of ours exports nothing else but the gk_ functions."""
+    exported, wanted = exported_symbols(library), fmi_functions()
+    for name in sorted(wanted - exported):
+        yield library.name, f"{name} is not exported", "importers look up every function of FMI 2"
+    ours = any(name.startswith("gk_") for name in exported)
+    for name in sorted(n for n in exported - wanted if not n.startswith("gk_")) if exact and ours else ():
+        yield library.name, f"{name} is exported", "hide it: another FMU in the process could take it for its own"
+
+
+def fmi_functions() -> set[str]:
+    """Names of the functions that a co-simulation FMU exports, from the FMI 2 header."""
+    text = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8", errors="replace")
+    exchange, simulation = "Functions for FMI2 for Model Exchange", "Functions for FMI2 for Co-Simulation"
+    declared = text.rindex("Common Functions")
+    names = set()
+    for part in (text[declared:text.rindex(exchange)], text[text.rindex(simulation):]):
+        names |= {line.split()[2].rstrip(";") for line in part.splitlines() if line.strip().startswith("FMI2_Export")}
+    return names
+
+
+def _answers(folder: Path) -> Iterator[tuple[str, str, str]]:
+    """Findings of the probes; after a crash the remaining ones go on in a new process."""
+    left = list(CHECKS)
+    while left:
+        text, ending = _probe(folder, left)
+        begun = None
+        for line in text.splitlines():
+            try:
+                report = json.loads(line)
+            except ValueError:
+                continue  # something the FMU printed itself
+            if not isinstance(report, dict):
+                continue
+            begun = report.get("begin", begun)
+            if report.get("end") in left:
+                left.remove(report["end"])
+                yield from (tuple(finding) for finding in report["found"])
+        if begun is None:
+            raise FmuError(f"the probes could not be started: {ending}")
+        if begun in left:
+            left.remove(begun)
+            yield begun, ending, f"the FMU brings its process down; run `python -m gearfmu.fmu FOLDER {begun}` to see it"
+
+
+def _probe(folder: Path, checks: list[str]) -> tuple[str, str]:
+    """Output of a probe process and how it ended."""
+    command = [sys.executable, "-m", "gearfmu.fmu", str(folder), *checks]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT, env={**os.environ})
+    except subprocess.TimeoutExpired as late:
+        output = late.stdout.decode("utf-8", "replace") if isinstance(late.stdout, bytes) else late.stdout or ""
+        return output, f"no answer within {TIMEOUT} s"
+    return done.stdout, f"ended with code {done.returncode} {done.stderr.strip()[-300:]}"
