@@ -59,14 +59,16 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
 
 
 def finish(trace: Any, out: Path, stage: str | None) -> int:
-    """Write trace.h5 and the report into `out` and print the outcome and the price; 0 for the outcome "ok", else 1."""
+    """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end, else 1."""
+    from gearfmu.report.page import REACHED_THE_END
+
     trace.save(out / "trace.h5")
     page = write_report(trace, out, stage)
     meta = trace.meta
     click.echo(f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
                f"({meta['realtime_factor']:.3g} per simulated second)")  # fmt: skip
     click.echo(page)
-    return 0 if meta["outcome"] == "ok" else 1
+    return 0 if meta["outcome"] in REACHED_THE_END else 1
 
 
 def write_report(trace: Any, out: Path, stage: str | None) -> Path:

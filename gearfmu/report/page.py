@@ -38,6 +38,9 @@ details summary{cursor:pointer;font-weight:600}
 """
 
 
+REACHED_THE_END = ("completed", "ok")
+
+
 def page(title: str, body: Sequence[str]) -> str:
     """The whole document around the given parts."""
     return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
@@ -46,7 +49,7 @@ def page(title: str, body: Sequence[str]) -> str:
 
 def head(title: str, outcome: str, subtitle: str) -> str:
     """Title with the outcome as a badge."""
-    kind = "ok" if outcome == "ok" else "bad"
+    kind = "ok" if outcome in REACHED_THE_END else "bad"
     return f'<header><h1>{escape(title)}<span class="{kind}">{escape(outcome)}</span></h1><p>{escape(subtitle)}</p></header>'
 
 

@@ -11,7 +11,7 @@ from gearfmu.report.signals import LOCKED, lock_time, shafts, spans
 from gearfmu.report.style import COAST, INK, MUTED, OPEN, panels, styled, svg
 from gearfmu.stage.trace import Trace, heading
 
-TORQUES = (".clutch.capacity", ".clutch.tau", ".shaft.tau", ".tau")
+CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
 RPM = 30 / np.pi
 
 
@@ -27,27 +27,25 @@ class Plot:
 
 
 def torque_and_slip(trace: Trace) -> Plot | None:
-    """Torques of the drivetrain, and below them the slip of every clutch with its lock-up; None without torques."""
-    torques = [name for suffix in TORQUES for name in trace.channels if name.endswith(suffix)]
-    torques = [name for name in dict.fromkeys(torques) if not _twin(trace, name)]
+    """Torques around the clutch, the other torques, and the slip of every clutch with its lock-up; None without torques."""
+    clutch = [name for suffix in CLUTCH_TORQUES for name in trace.channels if name.endswith(suffix)]
+    others = [name for name in trace.channels if name.endswith(".tau") and name not in clutch and not _twin(trace, name)]
     slips = [name for name in trace.channels if name.endswith(".slip")]
-    if not torques:
+    rows = [(names, label) for names, label in ((clutch, "torque in N·m"), (others, "torque in N·m"), (slips, "slip in rad/s")) if names]
+    if not clutch and not others:
         return None
     with styled():
-        figure, axes = panels((2.5, 1.3) if slips else (2.5,))
-        for name in torques:
-            capacity = name.endswith(".capacity")
-            axes[0].plot(trace.time, trace[name], label=name, **(_DASHED if capacity else {}))
-        _finish(axes[0], "torque in N·m")
-        for name in slips:
-            axes[1].plot(trace.time, trace[name], label=name)
-            _finish(axes[1], "slip in rad/s")
+        figure, axes = panels(tuple(1.3 if names is slips else 2.0 for names, _ in rows))
+        for axis, (names, label) in zip(axes, rows, strict=True):
+            for name in names:
+                axis.plot(trace.time, trace[name], label=name, **(_DASHED if name.endswith(".capacity") else {}))
+            _finish(axis, label)
         _mark_lock(trace, axes)
         axes[-1].set_xlabel("time in s")
         picture = svg(figure, "torque")
     locked = lock_time(trace)
     caption = "" if locked is None else f"The clutch stays locked from {locked:.4f} s on."
-    return Plot("torque", "Torque and slip", caption, picture, columns(trace, torques + slips))
+    return Plot("torque", "Torque and slip", caption, picture, columns(trace, clutch + others + slips))
 
 
 def speeds(trace: Trace) -> Plot | None:
