@@ -21,9 +21,9 @@ SPECIAL, EXEMPLARY, OR CONSEQUENTIAL DAMAGES ARISING IN ANY WAY OUT OF THE USE O
 """
 
 NOTES = """
-<p>An elastic gear stage with its own solver (FMI 2.0 co-simulation). All angles and torques are about +z, so an external
-pair counter-rotates. The torque <code>tau</code> of a spring or fixed port is exerted on the outside; of a torque port it
-acts on the stage.</p>
+<p>An elastic gear stage with its own solver (FMI 2.0 co-simulation). All angles and torques are about +z, so an
+external pair counter-rotates. The torque <code>tau</code> of a spring or fixed port is exerted on the outside; that of
+a torque port acts on the stage.</p>
 <ul>
 <li>Inputs <code>.phi</code>, <code>.w</code>, <code>.a</code> of a spring port are held and extrapolated within a step:
 connect all three where the other side has them.</li>
@@ -33,7 +33,8 @@ connect all three where the other side has them.</li>
 </ul>
 """
 
-STYLE = "body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}td,th{padding:.1em .8em;text-align:left}"
+STYLE = ("body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
+         "td,th{padding:.1em .8em;text-align:left}")
 
 
 def page(identity: Identity, variables: Sequence[Variable]) -> str:
@@ -67,5 +68,5 @@ def _licence_of(package: str) -> str:
     files = metadata.files(package) or []
     found = next((f for f in files if f.name.upper().startswith("LICENSE") and ".dist-info" in str(f)), None)
     if found is None:
-        raise FmuError(f"the installation of {package} has no licence file, which an FMU must carry: reinstall {package}")
+        raise FmuError(f"the installation of {package} has lost its licence, which an FMU must carry: reinstall it")
     return found.read_text(encoding="utf-8")

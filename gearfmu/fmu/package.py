@@ -1,4 +1,4 @@
-"""An FMU file from a stage model: XML from the kernel's table, the model blob, and a byte copy of the kernel library."""
+"""An FMU file from a stage model: XML from the kernel's table, the model blob, a byte copy of the kernel library."""
 from __future__ import annotations
 
 import hashlib
@@ -34,8 +34,8 @@ class Model(Protocol):
 def export(model: Model, path: str | Path, runtime: str = "native", platforms: Sequence[str] = ("host",)) -> Path:
     """Write `model` as an FMI 2.0 co-simulation FMU and return its path.
 
-    runtime: "native" (the kernel library is the FMU's binary; no Python on the importing machine) or "python" (pythonfmu's
-    binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64".
+    runtime: "native" (the kernel library is the FMU's binary; no Python on the importing machine) or "python"
+    (pythonfmu's binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64".
     The same model gives the same bytes; the file appears whole or not at all.
     Raises FmuError for unknown options and BuildError when a platform's library is missing or stale."""
     if runtime not in RUNTIMES:

@@ -100,22 +100,24 @@ def _refused(subject: Subject, mode: str, calls: dict[str, tuple[Any, ...]]) -> 
 
 
 def wrong_order(folder: str) -> Findings:
-    """Calls that the state machine of FMI 2.0 (4.2.4) does not allow are refused, and the run goes on as if nothing happened."""
+    """Calls that FMI 2.0 (4.2.4) does not allow in a mode are refused; the run goes on as if nothing happened."""
     subject = Subject(folder)
     if not subject.native:
         return
     expected = _plain_run(folder)
     outputs, inputs = subject.references("output", "Real")[:1], subject.references("input", "Real")[:1]
     step = {"doStep": (0.0, subject.step_size)}
-    yield from _refused(subject, "instantiated mode", {"exitInitializationMode": (), **step, "getReal": (outputs,), "terminate": ()})
+    setup = {"setupExperiment": (), "enterInitializationMode": ()}
+    yield from _refused(subject, "instantiated mode",
+                        {"exitInitializationMode": (), **step, "getReal": (outputs,), "terminate": ()})
     subject.fmu.setupExperiment(startTime=0.0)
     subject.fmu.enterInitializationMode()
-    yield from _refused(subject, "initialization mode", {"setupExperiment": (), "enterInitializationMode": (), **step, "terminate": ()})
+    yield from _refused(subject, "initialization mode", {**setup, **step, "terminate": ()})
     subject.excite()
     subject.fmu.exitInitializationMode()
     fixed = subject.references("parameter", "Real")[:1]
-    yield from _refused(subject, "step mode", {"setupExperiment": (), "enterInitializationMode": (), "exitInitializationMode": (),
-                                               "setReal": (fixed, [1e-6] * len(fixed))} if fixed else {})
+    yield from _refused(subject, "step mode", {**setup, "exitInitializationMode": ()})
+    yield from _refused(subject, "step mode, of a fixed parameter", {"setReal": (fixed, [1e-6])} if fixed else {})
     if subject.run() != expected:
         yield "refused calls", "the outputs differ afterwards", "a refused call must change nothing"
     subject.fmu.terminate()
@@ -137,8 +139,9 @@ def bad_values(folder: str) -> Findings:
     if not subject.native:
         return
     truth = subject.references("parameter", "Boolean")[:1]
-    yield from _refused(subject, "step mode", {"getReal": ([UNKNOWN],), "getInteger": ([UNKNOWN],), "setBoolean": ([UNKNOWN], [True])})
-    yield from _refused(subject, "step mode (of a Boolean)", {"getReal": (truth,)} if truth else {})
+    yield from _refused(subject, "step mode, of an unknown reference",
+                        {"getReal": ([UNKNOWN],), "getInteger": ([UNKNOWN],), "setBoolean": ([UNKNOWN], [True])})
+    yield from _refused(subject, "step mode, of a Boolean", {"getReal": (truth,)} if truth else {})
     if subject.run() != expected:
         yield "refused values", "the outputs differ afterwards", "a refused call must change nothing"
     subject.close()
@@ -175,7 +178,7 @@ def start_values(folder: str) -> Findings:
 
 
 def saved_state(folder: str) -> Findings:
-    """A restored state goes on with the same bits: in the same instance, from bytes in another one; damaged bytes are refused."""
+    """A restored state goes on with the same bits, here and, from its bytes, elsewhere; damaged bytes are refused."""
     subject = Subject(folder).initialized()
     if not subject.description.coSimulation.canGetAndSetFMUstate:
         return
@@ -197,7 +200,8 @@ def saved_state(folder: str) -> Findings:
 def _serialized(folder: str, image: bytes, time: int, expected: bytes, native: bool) -> Findings:
     other = Subject(folder)
     if native:
-        for damaged in (b"", image[:-1], bytes([image[0] ^ 1]) + image[1:], image[:-9] + bytes([image[-9] ^ 1]) + image[-8:]):
+        flipped = [image[:k] + bytes([image[k] ^ 1]) + image[k + 1:] for k in (0, len(image) // 2, len(image) - 1)]
+        for damaged in (b"", image[:-1], image + b"\0", *flipped):
             yield from _refused(other, "instantiated mode, of damaged bytes", {"deSerializeFMUstate": (damaged,)})
     else:
         other.initialized()
@@ -205,7 +209,7 @@ def _serialized(folder: str, image: bytes, time: int, expected: bytes, native: b
     other.fmu.setFMUstate(state)
     other.time = time
     if other.run() != expected:
-        yield "fmi2DeSerializeFMUstate", "the outputs differ", "a state from bytes must give the same bits in another instance"
+        yield "fmi2DeSerializeFMUstate", "the outputs differ", "its bytes must give the same run elsewhere"
     other.fmu.freeFMUstate(state)
     other.close()
 
@@ -216,7 +220,7 @@ def instances(folder: str) -> Findings:
     first, second = Subject(folder).initialized(), Subject(folder).initialized()
     in_turn = [(first.run(1), second.run(1)) for _ in range(STEPS)]
     if any(b"".join(bits) != expected for bits in zip(*in_turn)):
-        yield "two instances", "the outputs differ from those of one alone", "instances must not share anything that changes"
+        yield "two instances", "the outputs differ from those of one alone", "instances must share nothing that changes"
     first.fmu.reset()
     first.time = 0
     if first.initialized().run() != expected:
@@ -237,7 +241,7 @@ def clocks(folder: str) -> Findings:
         bits += subject.outputs()
         time = after
     if bits != expected:
-        yield "fmi2DoStep", "n·H and accumulated times differ", "take a step within the rounding of the time as the last one"
+        yield "fmi2DoStep", "n·H and accumulated times differ", "take steps equal up to rounding as equal"
     subject.close()
 
 

@@ -31,7 +31,7 @@ def load_library(resources):
 
 
 class GearStage(Fmi2Slave):
-    """One instance. What pythonfmu cannot report from a setter (it would be fatal) is logged and makes the next step fail."""
+    """One instance. A setter cannot report an error (it would be fatal): it is logged and makes the next step fail."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -51,8 +51,8 @@ class GearStage(Fmi2Slave):
 
     def setup_experiment(self, start_time, stop_time=None, tolerance=None):
         stop = ctypes.c_double(stop_time or 0.0)
-        self._demand("fmi2SetupExperiment", 0, ctypes.c_double(0), ctypes.c_double(start_time), int(stop_time is not None),
-                     stop)
+        self._demand("fmi2SetupExperiment", 0, ctypes.c_double(0), ctypes.c_double(start_time),
+                     int(stop_time is not None), stop)
 
     def enter_initialization_mode(self):
         self._demand("fmi2EnterInitializationMode")

@@ -1,6 +1,7 @@
 """Names that a shared library exports, read from the file itself: ELF (Linux) and PE (Windows), 64 bit, little-endian.
 
-Loading is not needed, so that a Windows binary can be checked on Linux. Sources: System V ABI, gABI chapters 4–5; Microsoft PE Format."""
+Nothing is loaded, so that a Windows binary can be checked on Linux.
+Sources: System V ABI (gABI), chapters 4 and 5; Microsoft PE Format."""
 from __future__ import annotations
 
 import struct
@@ -13,7 +14,7 @@ EXPORT_DIRECTORY = 0
 
 
 def exported_symbols(path: str | Path) -> set[str]:
-    """Names of the functions and objects that the library at `path` exports. Raises FmuError for any other kind of file."""
+    """Names of the functions and objects that the library at `path` exports; FmuError for any other kind of file."""
     data = Path(path).read_bytes()
     try:
         if data[:6] == b"\x7fELF\x02\x01":

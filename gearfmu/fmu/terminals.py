@@ -1,7 +1,7 @@
-"""terminalsAndIcons/terminalsAndIcons.xml (FMI 3.0, 2.4.9; allowed in FMI 2.0 since 2.0.4): one terminal for each shaft.
+"""terminalsAndIcons/terminalsAndIcons.xml (FMI 3.0, 2.4.9; in FMI 2.0 since 2.0.4): one terminal for each shaft.
 
 The members carry the names of a rotational flange: `phi` and `tau` as in Modelica.Mechanics.Rotational.Interfaces, plus
-the speed, the acceleration and the mean torque that a good coupling uses. Which of them are inputs follows from the port."""
+the speed, the acceleration and the mean torque that a good coupling uses. Which are inputs follows from the port."""
 from __future__ import annotations
 
 from collections.abc import Sequence

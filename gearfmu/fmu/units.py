@@ -1,4 +1,4 @@
-"""Units of the kernel's variables as FMI 2 unit definitions: exponents of the SI base units and the display units engineers expect."""
+"""Units of the kernel's variables as FMI 2 units: exponents of the SI base units, and the usual display units."""
 from __future__ import annotations
 
 import math

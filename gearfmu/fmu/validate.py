@@ -1,8 +1,7 @@
-"""Everything that can be found wrong with an FMU: what fmpy checks, and what only shows when the file is opened and called."""
+"""All that can be found wrong with an FMU: what fmpy checks, and what only shows when it is opened and called."""
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,13 +20,14 @@ from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
 
 TIMEOUT = 300
 EXPORT_AGAIN = "export the FMU again"
+TERMINALS_SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
 
 
 def validate(path: str | Path) -> list[Problem]:
     """All problems of the FMU at `path`; an empty list when there are none.
 
-    Checks the XML against schema and rules (fmpy), units, start values, terminals, exported symbols, and, when there is a
-    binary for this machine, its answers to wrong and right calls in a process of its own.
+    Checks the XML against schema and rules (fmpy), units, start values, terminals, exported symbols and, when there is
+    a binary for this machine, its answers to right and wrong calls in a process of its own.
     Raises FmuError when the file cannot be read as an FMU at all."""
     file = Path(path)
     with tempfile.TemporaryDirectory(prefix="gearfmu-validate-") as work:
@@ -64,7 +64,7 @@ def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[st
     file = folder / "terminalsAndIcons" / "terminalsAndIcons.xml"
     if not file.is_file():
         return
-    schema = etree.XMLSchema(etree.parse(str(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd")))
+    schema = etree.XMLSchema(etree.parse(str(TERMINALS_SCHEMA)))
     try:
         tree = etree.parse(str(file))
     except etree.XMLSyntaxError as error:
@@ -86,7 +86,7 @@ def _binaries(folder: Path, description: ModelDescription) -> Iterator[tuple[str
     for place in places:
         library = place / (simulation.modelIdentifier + SUFFIX[place.name])
         if not library.is_file():
-            yield f"binaries/{place.name}", f"{library.name} is missing", "the file must be named by the modelIdentifier"
+            yield f"binaries/{place.name}", f"{library.name} is missing", "name the file by the modelIdentifier"
         elif place.name != "darwin64":
             yield from _symbols(library, exact=not simulation.needsExecutionTool)
 
@@ -133,14 +133,14 @@ def _answers(folder: Path) -> Iterator[tuple[str, str, str]]:
             raise FmuError(f"the probes could not be started: {ending}")
         if begun in left:
             left.remove(begun)
-            yield begun, ending, f"the FMU brings its process down; run `python -m gearfmu.fmu FOLDER {begun}` to see it"
+            yield begun, ending, f"it brings its process down: `python -m gearfmu.fmu FOLDER {begun}` shows it"
 
 
 def _probe(folder: Path, checks: list[str]) -> tuple[str, str]:
     """Output of a probe process and how it ended."""
     command = [sys.executable, "-m", "gearfmu.fmu", str(folder), *checks]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT, env={**os.environ})
+        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT)
     except subprocess.TimeoutExpired as late:
         output = late.stdout.decode("utf-8", "replace") if isinstance(late.stdout, bytes) else late.stdout or ""
         return output, f"no answer within {TIMEOUT} s"
