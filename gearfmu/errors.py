@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong with an input: where it stands, what stands there, why that cannot be and what to write
-    instead.
-    """
+    """One thing that is wrong with an input: where, what stands there, why that cannot be and what to write."""
 
     file: str
     field: str

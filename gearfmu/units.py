@@ -1,6 +1,4 @@
-"""Text such as "600 N*m" to SI floats. Only the TOML border and the command line call this; everything behind them is
-SI.
-"""
+"""Text such as "600 N*m" to SI floats. Only the TOML border and the command line call this; all behind it is SI."""
 
 from __future__ import annotations
 

@@ -26,8 +26,9 @@ _CORE_SLOPE = 0.577  # A lies this times the half-thickness at F below F: three 
 
 @dataclass(frozen=True)
 class Section:
-    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore, cut_plus, cut_minus: node indices (cuts
-    paired).
+    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore, cut_plus, cut_minus: node indices.
+
+    cut_plus[i] is cut_minus[i] turned by 2π/z.
 
     flank: for sg = +1 and −1 (2, F, 3) node indices of its edges (start, end, middle) from form to tip form point.
     flank_roll: (F, 3) m.
@@ -62,9 +63,7 @@ def build_section(gear: GearGeometry, mesh: MeshSpec) -> Section:
 
 
 def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
-    """Rolls (m) of corner and mid nodes along the flank: equal arc lengths up to the tip form point, then one element
-    to the tip circle.
-    """
+    """Rolls (m) of the flank's nodes: equal arc lengths to the tip form point, then one element to the tip circle."""
     ends = involute.arc_length(np.array([gear.s_form, gear.s_tip, gear.s_a]), gear.r_b)
     length = np.linspace(ends[0], ends[1], 2 * elements + 1)
     if gear.s_a > gear.s_tip:
@@ -75,9 +74,7 @@ def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
 
 
 def graded(elements: int, growth: float) -> np.ndarray:
-    """(2·elements + 1,) parameters from 0 to 1 of corner and mid nodes; each element is `growth` times as long as the
-    one before.
-    """
+    """Parameters (2·elements + 1,) from 0 to 1 of corner and mid nodes; elements grow by the factor `growth`."""
     sizes = growth ** np.arange(elements)
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
@@ -88,8 +85,7 @@ def graded(elements: int, growth: float) -> np.ndarray:
 
 
 def transfinite(low: np.ndarray, high: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Lattice (P, Q, 2) inside four curves: low, high (P, 2) at the ends of the second index, start, end (Q, 2) at
-    those of the first.
+    """Lattice (P, Q, 2) between the curves low, high (P, 2), first and last of the second index, and start, end (Q, 2).
 
     Gordon and Hall's interpolation with the curves' own arc-length parameters, so that gradings of opposite sides
     need not agree.
@@ -153,9 +149,7 @@ def _fitting_growth(sum_of_series: float, terms: int) -> float:
 
 
 def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
-    """Points (P, 2) on trochoid and root land at these shares of its length, from the form point to the middle of the
-    space.
-    """
+    """Points (P, 2) from the form point over trochoid and root land to mid space, at shares of the way."""
     rounding = gear.rounding
     tau = np.linspace(gear.alpha, math.pi / 2, 2001)
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rounding.point(tau), axis=0), axis=1))])
@@ -168,9 +162,7 @@ def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
 
 
 def _core_arc(gear: GearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, float]:
-    """Arc (P, 2) under the root from the middle of the tooth to that of the space, where it ends square at the
-    returned depth.
-    """
+    """Arc (P, 2) under the root from mid tooth to mid space, square to the cut there, and its depth there (m)."""
     rim = gear.r_f - gear.r_bore
     depth = min(_ROOT_DEPTH * gear.m, _RIM_SHARE * rim)
     middle = max(form[0] - _CORE_SLOPE * form[1], gear.r_f - _RIM_SHARE * rim)

@@ -13,8 +13,7 @@ from gearfmu.spec.gear import MeshSpec
 
 
 def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """One sector of an external spur gear: tooth 0 on +x, half a space on either side, z ∈ [−b/2, b/2], `face_width`
-    b in m.
+    """One sector of an external spur gear: tooth 0 on +x, half a space on either side, `face_width` b (m) about z = 0.
 
     Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. The mesh is its own mirror
     image about z = 0 and about y = 0. MeshError when the geometry leaves no valid element.
@@ -38,9 +37,7 @@ def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> Fe
 
 
 def _extruded(section: Section, width: float, elements: int) -> tuple[np.ndarray, np.ndarray]:
-    """numbers (2·elements + 1, N2): node index at a level of a section's node, −1 where a mid level has none; nodes
-    (N, 3).
-    """
+    """Node index (levels, N2) of a section's node at a level, −1 where a mid level has none; node positions (N, 3)."""
     levels = 2 * elements + 1
     exists = np.zeros((levels, len(section.nodes)), dtype=bool)
     exists[::2] = True

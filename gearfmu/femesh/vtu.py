@@ -13,9 +13,9 @@ from gearfmu.files import written_whole
 
 
 def write_vtu(mesh: FeMesh, path: str | os.PathLike[str]) -> None:
-    """Write hexahedra and flank faces, whole or not at all, with
+    """Write hexahedra and flank faces, whole or not at all.
 
-    point data: `roll` (m, NaN off the flanks) and one 0/1 field per node set and cut; cell data: `scaled_jacobian`
+    Point data: `roll` (m, NaN off the flanks) and one 0/1 field per node set and cut. Cell data: `scaled_jacobian`
     (NaN on faces) and `flank` (0 solid, +1/−1 the flank side).
     """
     roll = np.full(len(mesh.nodes), np.nan)

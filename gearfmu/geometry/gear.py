@@ -17,7 +17,7 @@ _GAUSS = np.polynomial.legendre.leggauss(40)
 
 @dataclass(frozen=True)
 class GearGeometry:
-    """An external spur gear in its body frame: tooth 0 centred on +x (ISO 21771:2007 symbols; lengths m, angles rad).
+    """An external spur gear in its body frame: tooth 0 centred on +x (ISO 21771 symbols; lengths m, angles rad).
 
     z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient. r_b, r, r_a: base, reference and tip
     radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding. h_fp, rho_fp: dedendum and tip rounding of
@@ -54,7 +54,7 @@ class GearGeometry:
 
     @property
     def r_f(self) -> float:
-        """Root radius r − h_fP + x m (ISO 21771:2007, eq. 24)."""
+        """Root radius r − h_fP + x m (ISO 21771)."""
         return self.r - self.h_fp + self.x * self.m
 
     @property
@@ -64,7 +64,7 @@ class GearGeometry:
 
     @property
     def psi_b(self) -> float:
-        """Half tooth-thickness angle at the base circle: ψ + inv α (ISO 21771:2007, eqs. 33 and 39)."""
+        """Half tooth-thickness angle at the base circle: ψ + inv α (ISO 21771)."""
         return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha))
 
     @property
@@ -123,8 +123,7 @@ class GearGeometry:
         return self.flank_point(self.s_tip, sg) - self.tip_edge * self.flank_normal(self.s_tip, sg)
 
     def profile(self, points: int = 32) -> np.ndarray:
-        """Outline (P, 2) in m of tooth 0, counter-clockwise from the middle of one space to the middle of the next,
-        tip edges sharp.
+        """Outline (P, 2) in m of tooth 0, counter-clockwise from mid space to mid space, tip edges sharp.
 
         `points` on either flank and trochoid, a quarter of that on root land and half the tip land.
         """
@@ -140,9 +139,7 @@ class GearGeometry:
         return np.concatenate([half * [1, -1], half[-2::-1]])
 
     def radius_moment(self, power: int) -> float:
-        """∫ r^power dθ over the outline of one sector (both sides), tip edges sharp; dθ along the outline from the
-        middle of the tooth.
-        """
+        """∫ r^power dθ along the outline of one sector from space to space, tip edges sharp (m^power)."""
         tip = self.tip_half_angle * self.r_a**power
         land = self.rounding.land_angle * self.r_f**power
         return 2 * (tip + land + self._flank_moment(power) + self._root_moment(power))

@@ -11,8 +11,7 @@ def contact_modulus(modulus: tuple[float, float], poisson: tuple[float, float]) 
 
 
 def half_width(load: float, radius: float, e_star: float) -> float:
-    """Half width b (m) of the contact of cylinders: √(4 w ρ/(π E*)); load w in N/m, relative radius of curvature ρ in
-    m.
+    """Half width b (m) of the contact of cylinders, √(4 w ρ/(π E*)): load w in N/m, relative radius ρ in m.
 
     Johnson, *Contact Mechanics*, eq. 4.43.
     """
@@ -20,8 +19,6 @@ def half_width(load: float, radius: float, e_star: float) -> float:
 
 
 def largest_relative_radius(length: float, low: float, high: float) -> float:
-    """Largest s (L − s)/L for s in [low, high]: relative radius of curvature of two involutes along the path of
-    contact (m).
-    """
+    """Largest relative radius of curvature s (L − s)/L (m) of two involutes for rolls s in [low, high]."""
     roll = min(max(length / 2, low), high)
     return roll * (length - roll) / length

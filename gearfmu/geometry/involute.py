@@ -1,5 +1,4 @@
-"""The involute of a circle, in the roll s: length of the tangent from the base circle to the flank point (ISO
-21771:2007, 4.3).
+"""The involute of a circle over the roll s: length of its tangent from base circle to flank point (ISO 21771).
 
 Flank side sg = +1 is the flank at the larger angle of a tooth centred on +x, sg = −1 its mirror image. All functions
 broadcast.
@@ -16,7 +15,7 @@ _INV_SERIES = (1 / 3, 2 / 15, 17 / 315, 62 / 2835, 1382 / 155925, 21844 / 608107
 
 
 def inv(angle: ArrayLike) -> np.ndarray:
-    """Involute function tan α − α (ISO 21771:2007, eq. 4), accurate also for small angles."""
+    """Involute function tan α − α (ISO 21771), accurate also for small angles."""
     angle = np.asarray(angle, float)
     square = angle * angle
     series = np.zeros_like(square)
@@ -26,9 +25,7 @@ def inv(angle: ArrayLike) -> np.ndarray:
 
 
 def inverse_inv(value: float) -> float:
-    """The angle α in [0, π/2) with inv α = `value`; `value` ≥ 0 (ValueError otherwise). Newton on t − atan t, t = tan
-    α.
-    """
+    """The angle α in [0, π/2) with inv α = `value` ≥ 0 (ValueError otherwise). Newton on t − atan t, t = tan α."""
     if not 0.0 <= value < math.inf:
         raise ValueError(f"inv of no angle: {value}")
     t = (3.0 * value) ** (1 / 3) + value

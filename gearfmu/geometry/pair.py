@@ -1,4 +1,4 @@
-"""A pair of external spur gears at its working centre distance (ISO 21771:2007, clause 5)."""
+"""A pair of external spur gears at its working centre distance (ISO 21771)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from gearfmu.geometry.gear import GearGeometry
 
 @dataclass(frozen=True)
 class PairGeometry:
-    """Pinion and wheel at centre distance `a` (m). `backlash`: circumferential backlash j_wt (m) on the working pitch
-    circles.
+    """Pinion and wheel at centre distance `a` (m) with circumferential backlash j_wt (m) on the working pitch circles.
 
     Rolls along the path of contact are those of gear 0; the other gear's is `length` − s. Gears must reach each
     other's base circles' common tangent: a > r_b1 + r_b2 (ValueError otherwise).
@@ -35,7 +34,7 @@ class PairGeometry:
 
     @property
     def alpha_wt(self) -> float:
-        """Working pressure angle, rad (eq. 70)."""
+        """Working pressure angle, rad."""
         return math.atan2(self.length, self.gears[0].r_b + self.gears[1].r_b)
 
     @property
@@ -61,8 +60,9 @@ class PairGeometry:
 
     @property
     def path(self) -> dict[str, float]:
-        """Rolls (m) of gear 0 at the path points: A, E ends (where tip edge roundings begin), B, D limits of single
-        contact, C pitch point.
+        """Rolls (m) of gear 0 at the points of the path of contact.
+
+        A, E: ends, where the tip edge roundings begin; B, D: limits of single contact; C: pitch point.
         """
         start, end = self.opposite(self.gears[1].s_tip), self.gears[0].s_tip
         pitch = self.gears[0].r_b * math.tan(self.alpha_wt)
@@ -70,7 +70,7 @@ class PairGeometry:
 
     @property
     def contact_ratio(self) -> float:
-        """Transverse contact ratio of the usable flanks, up to where the tip edge roundings begin (eq. 91)."""
+        """Transverse contact ratio of the usable flanks, up to where the tip edge roundings begin."""
         path = self.path
         return (path["E"] - path["A"]) / self.base_pitch
 
@@ -89,9 +89,7 @@ class PairGeometry:
 
     @property
     def nominal_backlash(self) -> float:
-        """Circumferential backlash (m) on the working pitch circle of the teeth as profile shift and centre distance
-        give them (eq. 98).
-        """
+        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give."""
         inv_w = float(involute.inv(self.alpha_wt))
         thickness = [2 * r_w * (gear.psi_b - inv_w) for r_w, gear in zip(self.r_w, self.gears, strict=True)]
         return 2 * math.pi * self.r_w[0] / self.gears[0].z - sum(thickness)
@@ -108,8 +106,7 @@ class PairGeometry:
 
     @property
     def wheel_phase(self) -> float:
-        """Angle (rad) of the wheel's body frame at which the drive flanks of the nominal teeth touch, tooth 0 of the
-        pinion on +x.
+        """Angle (rad) of the wheel's frame at which the nominal drive flanks touch while the pinion's tooth 0 is on +x.
 
         φ_B = π − ψ_bB + inv(α_wt)(1 + i) − ψ_bA·i with i = r_bA/r_bB: the zero of the gap L − s_A − s_B.
         """

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class ReliefCurve:
-    """Relief δ(s) = amount·((s − start)/(s_a − start))² for s > start, else 0: quadratic in the roll (ISO 21771:2007,
-    7.5 tip relief C_a).
+    """Relief δ(s) = amount·((s − start)/(s_a − start))² for s > start, else 0 (tip relief C_a of ISO 21771).
 
     amount: m, normal to the involute, at the roll s_a of the tip circle. start, s_a: rolls, m; start < s_a.
     """

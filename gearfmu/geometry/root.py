@@ -1,5 +1,4 @@
-"""The tooth root that a basic rack with a rounded tip generates: trochoid and root circle (ISO 53 basic rack; Litvin,
-*Gear Geometry*, ch. 6).
+"""The tooth root that a basic rack (ISO 53) with a rounded tip generates: trochoid and root circle.
 
 The rounding of the rack's tip is run through by the angle τ of its normal: τ = α where it leaves the straight rack
 flank (the form point of the involute) and τ = π/2 at its bottom (the root circle). With this parameter the curve is

@@ -191,9 +191,7 @@ def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, A
 
 
 def inner_model(annotation: Any) -> type[BaseModel] | None:
-    """The spec class in an annotation such as `Spec`, `Spec | None`, `tuple[Spec, Spec]` or `dict[str, Spec]`; None
-    without one.
-    """
+    """The spec class in an annotation such as `Spec | None` or `dict[str, Spec]`; None without one."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next((found for part in get_args(annotation) if (found := inner_model(part))), None)

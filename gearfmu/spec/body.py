@@ -10,8 +10,9 @@ from gearfmu.spec.stage import StageSpec
 
 
 def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
-    """Everything that shapes the body of a gear, SI, and nothing else: backlash, tip relief, contact, ports, levels,
-    names and bearings do not.
+    """Everything that shapes the body of a gear, in SI, and nothing else.
+
+    Backlash, tip relief, contact, ports, levels, names and bearings do not.
 
     The rack's addendum is left out too: the tip diameter says where the tooth ends.
     """
@@ -35,9 +36,7 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
 
 
 def body_hash(inputs: dict[str, Any]) -> str:
-    """SHA-256 (64 hex digits) of the inputs as JSON with sorted keys; floats by their shortest exact decimal form, −0
-    as 0.
-    """
+    """SHA-256 (64 hex digits) of the inputs as JSON: sorted keys, floats in their shortest exact form, −0 as 0."""
     text = json.dumps(_plain(inputs), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

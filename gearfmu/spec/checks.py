@@ -1,6 +1,6 @@
 """Can these gears be made, run together and carry the torque? Every problem names a field and what to write there.
 
-Formulas: ISO 21771:2007; undercut and interference by form rolls. Nothing here stops at the first problem.
+Formulas: ISO 21771; undercut and interference by form rolls. Nothing here stops at the first problem.
 """
 
 from __future__ import annotations
@@ -17,15 +17,13 @@ STRIP_PER_HERTZ = 1.5  # the local law needs w > 1.12 b; at 1.5 b its tangent st
 _LARGEST_ALLOWANCE = 0.1  # of the module: more is a wrong centre distance or profile shift
 _LARGEST_THICKENING = 0.005  # of the module
 _LARGEST_RELIEF = 0.1  # of the module
-_RIM_PER_TOOTH_HEIGHT = 0.5  # ISO 6336-3:2019, 7.3: thinner rims are outside the rules for gears
+_RIM_PER_TOOTH_HEIGHT = 0.5  # thinner rims are outside the rim thickness factor of ISO 6336-3
 
 Found = Iterator[tuple[str, float | str, str]]
 
 
 def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torque_max: float | None) -> list[Problem]:
-    """Everything that is wrong with the geometry of pair and gears; without `torque_max` (N·m) the load strip is not
-    judged.
-    """
+    """Everything that is wrong with pair and gears; without `torque_max` (N·m) the load strip is not judged."""
     shapes = [GearGeometry.of(gear, pair) for gear in gears]
     found = [
         (f"gears.{gear.name}.{field}", value, remedy)
@@ -178,7 +176,7 @@ def _reliefs(gears: Sequence[GearSpec], geometry: PairGeometry) -> Found:
             yield (
                 f"{field}.amount",
                 relief.amount,
-                f"more than a tenth of the module: at most {_mm(_LARGEST_RELIEF * shape.m)}, usual are some micrometres",
+                f"more than a tenth of the module: at most {_mm(_LARGEST_RELIEF * shape.m)}",
             )
         if not isinstance(relief.start_roll, str) and not shape.s_form <= relief.start_roll < shape.s_a:
             yield (
@@ -205,8 +203,9 @@ def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float
 
 
 def largest_half_width(gears: Sequence[GearSpec], geometry: PairGeometry, torque: float) -> float:
-    """Largest Hertz half-width b (m) along the path of contact, one tooth pair carrying the pinion torque (N·m) over
-    the common face width.
+    """Largest Hertz half-width b (m) along the path of contact.
+
+    One tooth pair carries the whole pinion torque (N·m) over the common face width.
     """
     load = torque / geometry.gears[0].r_b / min(gear.face_width for gear in gears)
     materials = [gear.material for gear in gears]
@@ -224,9 +223,7 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _floor(value: float, digits: int = 4) -> float:
-    """The next number of so many significant digits that is not above a positive `value` (below zero: a little under
-    it).
-    """
+    """The largest number of so many significant digits that is not above `value`."""
     step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
     return math.floor(value / step) * step
 

@@ -95,9 +95,7 @@ class MeshSpec(Spec):
         return max(least, round(self.scale * count))
 
     def growth(self, grading: float) -> float:
-        """Growth per element at this scale: the elements of scale 2 halve those of scale 1 within the same geometric
-        series.
-        """
+        """Growth per element at this scale: scale 2 divides the elements of scale 1 within the same series."""
         return float(grading ** (1 / self.scale))
 
 

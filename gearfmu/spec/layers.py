@@ -37,9 +37,7 @@ class Layers:
 
 
 def read_layers(path: Path) -> Layers:
-    """The file at `path` and its bases (paths relative to the file that names them). SpecError when one is missing or
-    they form a ring.
-    """
+    """The file at `path` and its bases, paths relative to the naming file; SpecError: one is missing, or a ring."""
     files: list[tuple[Path, dict[str, Any]]] = []
     current = path
     while True:

@@ -28,8 +28,7 @@ def shipped_stages() -> list[str]:
 
 
 def find_stage(name: str | os.PathLike[str]) -> Path:
-    """The stage file meant by a path, by a folder with a stage.toml or by a shipped name. A path goes before a
-    shipped name.
+    """The stage file meant by a path, a folder with a stage.toml or a shipped name; a path goes before a shipped name.
 
     SpecError names the nearest shipped stages when there is none.
     """

@@ -1,0 +1,100 @@
+"""Gear geometry: FZG type C numbers, the root as envelope of the rack, cross-section against polygons."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from fzg import ALPHA, MODULE, PINION, WHEEL, gear
+
+
+def polygon_moments(points: np.ndarray) -> tuple[float, float]:
+    """Area and polar moment about the origin of a polygon (closed through the origin)."""
+    x, y = np.vstack([points, [0, 0]]).T
+    x1, y1 = np.roll(x, -1), np.roll(y, -1)
+    cross = x * y1 - x1 * y
+    polar = cross * (x * x + x * x1 + x1 * x1 + y * y + y * y1 + y1 * y1)
+    return float(cross.sum() / 2), float(polar.sum() / 12)
+
+
+def test_fzg_diameters_by_hand() -> None:
+    assert 2 * PINION.r == pytest.approx(72e-3)
+    assert 2 * PINION.r_b == pytest.approx(67.65787e-3, abs=1e-8)  # 72 cos 20°
+    assert 2 * PINION.r_f == pytest.approx((72 - 11.25 + 2 * 0.1817 * 4.5) * 1e-3, abs=1e-12)
+    assert 2 * WHEEL.r_f == pytest.approx((108 - 11.25 + 2 * 0.1715 * 4.5) * 1e-3, abs=1e-12)
+    # tooth thickness on the reference circle m (π/2 + 2 x tan α): 7.663784 mm
+    assert 2 * PINION.thickness_angle(PINION.r) * PINION.r == pytest.approx(7.663784e-3, abs=1e-8)
+
+
+def test_half_thickness_angle_at_base_in_50_digits() -> None:
+    with mpmath.workdps(50):
+        alpha = mpmath.mpf(20) * mpmath.pi / 180
+        exact = (mpmath.pi / 2 + 2 * mpmath.mpf("0.1817") * mpmath.tan(alpha)) / 16 + mpmath.tan(alpha) - alpha
+    assert PINION.psi_b == pytest.approx(float(exact), rel=1e-14)
+
+
+@pytest.mark.parametrize("shape", [PINION, WHEEL, gear(80, -0.3, 369e-3, 100e-3), gear(12, 0.95, 70e-3, 20e-3)])
+class TestRoot:
+    def test_meets_the_involute_with_a_common_tangent(self, shape) -> None:
+        tau = shape.alpha + np.array([0.0, 1e-7])
+        start, after = shape.rounding.point(tau)
+        assert start == pytest.approx(shape.flank_point(shape.s_form), abs=1e-15)
+        step = (after - start) / np.linalg.norm(after - start)
+        assert abs(step @ shape.flank_normal(shape.s_form)) < 1e-4
+
+    def test_ends_on_the_root_circle_square_to_it(self, shape) -> None:
+        radius, angle = shape.rounding.polar(np.array([math.pi / 2 - 1e-6, math.pi / 2]))
+        assert radius[1] == pytest.approx(shape.r_f, rel=1e-14)
+        assert angle[1] == pytest.approx(shape.half_pitch - shape.rounding.land_angle, abs=1e-14)
+        assert radius[0] - radius[1] < 1e-10
+
+    def test_is_the_envelope_of_the_rolling_rack_rounding(self, shape) -> None:
+        """No position of the rack's rounding cuts the curve, and one touches each of its points."""
+        rack = shape.rounding
+        turn = np.linspace(-0.5, 0.5, 400_001)
+        # the rounding's centre seen from the gear, which has turned by `turn` while rolling along the rack
+        across, up = rack.centre_offset - rack.r * turn, rack.r - rack.centre_depth
+        angle = shape.half_pitch - (np.arctan2(across, up) + turn)
+        centres = np.hypot(across, up)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        for point in rack.point(np.linspace(shape.alpha, math.pi / 2, 9)):
+            assert np.linalg.norm(centres - point, axis=1).min() == pytest.approx(rack.radius, rel=2e-6)
+
+
+@pytest.mark.parametrize("shape", [PINION, WHEEL, gear(80, -0.3, 369e-3, 100e-3)])
+def test_cross_section_against_polygons(shape) -> None:
+    """The outline's polygon converges to the closed integrals with the second order of chords."""
+    errors = []
+    for points in (200, 400):
+        area, polar = polygon_moments(shape.profile(points))
+        area -= shape.half_pitch * shape.r_bore**2
+        polar -= 0.5 * shape.half_pitch * shape.r_bore**4
+        errors.append((abs(area / shape.sector_area - 1), abs(polar / shape.sector_polar_moment - 1)))
+    assert max(errors[1]) < 1e-6
+    rates = np.log2(np.array(errors[0]) / np.array(errors[1]))
+    assert rates == pytest.approx(2, abs=0.15)
+
+
+def test_tip_edge_rounding_touches_flank_and_tip_circle() -> None:
+    for sg in (1, -1):
+        centre = PINION.tip_edge_centre(sg)
+        assert np.linalg.norm(centre) + PINION.tip_edge == pytest.approx(PINION.r_a, rel=1e-14)
+        touch = centre + PINION.tip_edge * PINION.flank_normal(PINION.s_tip, sg)
+        assert touch == pytest.approx(PINION.flank_point(PINION.s_tip, sg), abs=1e-16)
+        assert sg * math.atan2(centre[1], centre[0]) == pytest.approx(PINION.tip_land_half_angle, abs=1e-14)
+
+
+def test_undercut_limit_is_the_textbook_one() -> None:
+    """Sharp rack (no rounding beyond the straight flank): x_min = h_f − z sin²α/2 with the straight dedendum."""
+    straight = 1.25 - 0.38 * (1 - math.sin(ALPHA))
+    limit = straight - 16 * math.sin(ALPHA) ** 2 / 2
+    assert gear(16, limit, 82e-3, 30e-3).s_form == pytest.approx(0, abs=1e-15)
+    assert gear(16, limit - 0.01, 82e-3, 30e-3).s_form < 0 < gear(16, limit + 0.01, 82e-3, 30e-3).s_form
+
+
+def test_lengths_scale_with_the_module() -> None:
+    big = gear(16, 0.1817, 2 * 82.46e-3, 60e-3, 2 * MODULE)
+    assert big.s_form == pytest.approx(2 * PINION.s_form)
+    assert big.psi_b == PINION.psi_b
+    assert (big.s_a, big.r_f) == pytest.approx((2 * PINION.s_a, 2 * PINION.r_f))

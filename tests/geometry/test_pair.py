@@ -1,0 +1,134 @@
+"""Pair geometry: FZG type C numbers, and contact of the real outlines."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import mpmath
+import numpy as np
+import pytest
+from fzg import PAIR, PINION, WHEEL, gear
+
+from gearfmu.geometry import PairGeometry, ReliefCurve, hertz, involute
+
+LOOSE = PairGeometry((PINION, WHEEL), 91.7e-3, 3e-4)
+OTHER = PairGeometry((gear(21, 0.3, 106e-3, 30e-3), gear(34, -0.1, 160e-3, 40e-3)), 124.8e-3, 1e-4)
+
+
+def test_fzg_type_c_in_50_digits() -> None:
+    with mpmath.workdps(50):
+        m, a, z, alpha = mpmath.mpf("4.5"), mpmath.mpf("91.5"), (16, 24), mpmath.mpf(20) * mpmath.pi / 180
+        r_b = [m * k / 2 * mpmath.cos(alpha) for k in z]
+        alpha_wt = mpmath.acos(sum(r_b) / a)
+        length = a * mpmath.sin(alpha_wt)
+        rolls = [mpmath.sqrt((mpmath.mpf(d) / 2) ** 2 - r**2) for d, r in zip(("82.46", "118.36"), r_b, strict=True)]
+        ratio = (sum(rolls) - length) / (mpmath.pi * m * mpmath.cos(alpha))
+        inv = [mpmath.tan(angle) - angle for angle in (alpha, alpha_wt)]
+        shifts = mpmath.mpf("0.1817") + mpmath.mpf("0.1715")
+        thickness = 2 * shifts * m * mpmath.tan(alpha) + (z[0] + z[1]) * m * inv[0]
+        backlash = ((z[0] + z[1]) * m * inv[1] - thickness) * mpmath.cos(alpha) / mpmath.cos(alpha_wt)
+    assert math.degrees(PAIR.alpha_wt) == pytest.approx(float(alpha_wt * 180 / mpmath.pi), rel=1e-14)
+    assert PAIR.length == pytest.approx(float(length) / 1e3, rel=1e-13)
+    assert PAIR.tip_circle_contact_ratio == pytest.approx(float(ratio), rel=1e-12)
+    assert PAIR.nominal_backlash == pytest.approx(float(backlash) / 1e3, abs=1e-16)
+
+
+def test_fzg_type_c_as_published() -> None:
+    assert PAIR.tip_circle_contact_ratio == pytest.approx(1.44, abs=0.005)
+    assert PAIR.nominal_backlash == pytest.approx(-0.07e-6, abs=0.01e-6)
+    assert PAIR.zero_backlash_center_distance == pytest.approx(91.5e-3, abs=0.1e-6)
+    assert PAIR.r_w == pytest.approx((36.6e-3, 54.9e-3))
+    assert PAIR.contact_ratio == pytest.approx(1.412, abs=5e-4)
+
+
+def test_path_of_contact_is_in_order_and_both_gears_agree() -> None:
+    for pair in (PAIR, OTHER):
+        path = pair.path
+        assert list(path.values()) == sorted(path.values())
+        assert path["E"] - path["B"] == pytest.approx(pair.base_pitch, rel=1e-14)
+        assert pair.outer_single_contact(0) == path["D"]
+        assert pair.outer_single_contact(1) == pytest.approx(pair.opposite(path["B"]), rel=1e-13)
+        assert pair.inner_single_contact(1) == pytest.approx(pair.opposite(path["D"]), rel=1e-13)
+        # at the pitch point both radii add up to the centre distance
+        radii = [
+            involute.radius_at_roll(roll, shape.r_b)
+            for roll, shape in zip((path["C"], pair.opposite(path["C"])), pair.gears, strict=True)
+        ]
+        assert sum(radii) == pytest.approx(pair.a, rel=1e-14)
+
+
+def clearance(pair: PairGeometry, sg: int, turn: float) -> float:
+    """Smallest gap (m, along the line of action) between flank sg of any pinion tooth and the wheel, by search.
+
+    The pinion is turned by `turn`, the wheel accordingly from its phase; nothing of the gap formula is used.
+    """
+    pinion, wheel = pair.gears
+    smallest = math.inf
+    phase = pair.wheel_phase - turn * pinion.z / wheel.z
+    for tooth in range(-3, 4):
+        points = pinion.flank_point(np.linspace(pinion.s_form, pinion.s_tip, 20_001), sg)
+        c, s = math.cos(turn + 2 * tooth * pinion.half_pitch), math.sin(turn + 2 * tooth * pinion.half_pitch)
+        points = points @ np.array([[c, s], [-s, c]]) - [pair.a, 0]
+        radius = np.linalg.norm(points, axis=1)
+        inside = (radius < involute.radius_at_roll(wheel.s_tip, wheel.r_b)) & (radius > wheel.r_b)
+        if not inside.any():
+            continue
+        angle = np.arctan2(points[inside, 1], points[inside, 0]) - phase
+        pitch = 2 * wheel.half_pitch
+        angle = angle - pitch * np.round(angle / pitch)
+        facing = sg * angle > 0
+        gap = (sg * angle - wheel.thickness_angle(radius[inside]))[facing] * wheel.r_b
+        smallest = min(smallest, gap.min(initial=math.inf))
+    return smallest
+
+
+@pytest.mark.parametrize("pair", [PAIR, LOOSE, OTHER])
+@pytest.mark.parametrize("turn", [0.0, 0.05, -0.11, 0.2])
+def test_outlines_touch_at_the_wheel_phase_and_leave_the_backlash(pair: PairGeometry, turn: float) -> None:
+    assert clearance(pair, 1, turn) == pytest.approx(0, abs=1e-9)
+    coast = pair.nominal_backlash * math.cos(pair.alpha_wt)
+    assert clearance(pair, -1, turn) == pytest.approx(coast, abs=1e-9)
+
+
+def test_nominal_backlash_grows_with_the_centre_distance() -> None:
+    """dj_wt/da = 2 tan α_wt at constant rotation ratio (working pitch circle grows too: below 1 %)."""
+    step = 1e-6
+    wide = replace(PAIR, a=PAIR.a + step)
+    assert (wide.nominal_backlash - PAIR.nominal_backlash) / step == pytest.approx(2 * math.tan(PAIR.alpha_wt), rel=0.01)
+    assert replace(PAIR, a=LOOSE.zero_backlash_center_distance).nominal_backlash == pytest.approx(0, abs=1e-15)
+
+
+def test_backlash_angles_and_normal_backlash() -> None:
+    free = PAIR.backlash_angles
+    assert free[0] * PINION.r_b == pytest.approx(PAIR.normal_backlash, rel=1e-14)
+    assert free[1] * WHEEL.r_b == pytest.approx(PAIR.normal_backlash, rel=1e-14)
+
+
+def test_a_centre_distance_below_the_base_circles_is_refused() -> None:
+    with pytest.raises(ValueError, match="base radii"):
+        PairGeometry((PINION, WHEEL), PINION.r_b + WHEEL.r_b, 0.0)
+
+
+def test_relief_is_smooth_and_reaches_its_amount_at_the_tip() -> None:
+    curve = ReliefCurve(15e-6, PAIR.outer_single_contact(0), PINION.s_a)
+    assert curve.depth(PINION.s_a) == pytest.approx(15e-6, rel=1e-15)
+    assert (curve.depth(curve.start), curve.slope(curve.start), curve.depth(1e-3)) == (0, 0, 0)
+    roll = np.linspace(curve.start - 1e-3, PINION.s_a, 50)
+    step = 1e-8
+    slope = (curve.depth(roll + step) - curve.depth(roll - step)) / (2 * step)
+    assert curve.slope(roll) == pytest.approx(slope, abs=2e-9)
+
+
+def test_hertz_half_width_is_consistent_with_its_peak_pressure() -> None:
+    """Johnson 4.45: p0 = E* b/(2R), and the load is ∫ p = π b p0/2."""
+    e_star = hertz.contact_modulus((206e9, 70e9), (0.3, 0.33))
+    b = hertz.half_width(3e5, 9e-3, e_star)
+    assert math.pi * b / 2 * e_star * b / (2 * 9e-3) == pytest.approx(3e5)
+    assert hertz.contact_modulus((206e9, 206e9), (0.3, 0.3)) == pytest.approx(206e9 / 1.82)
+
+
+def test_largest_relative_radius_lies_mid_path_or_at_its_end() -> None:
+    assert hertz.largest_relative_radius(2.0, 0.1, 1.9) == 0.5
+    assert hertz.largest_relative_radius(2.0, 0.1, 0.8) == pytest.approx(0.8 * 1.2 / 2)
+    assert hertz.largest_relative_radius(2.0, 1.5, 1.9) == pytest.approx(1.5 * 0.5 / 2)
