@@ -176,7 +176,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
         for (int g = 0; g < 2; g++)
             if (!setup->given_torque[g]) data->value[GK_OF_SHAFT(TAU_MEAN, g)] = data->value[GK_OF_SHAFT(TAU, g)];
     data->value[V_M_FORCE_MEAN] = data->value[V_M_MESH_FORCE];
-    data->value[V_M_FORCE_MAX] = fmax(data->value[V_M_FORCE_DRIVE], data->value[V_M_FORCE_COAST]);
+    data->value[V_M_FORCE_MAX] = gk_max(data->value[V_M_FORCE_DRIVE], data->value[V_M_FORCE_COAST]);
     data->apart = data->value[V_M_CONTACT] == 0.0;
     return GK_OK;
 }
@@ -232,7 +232,7 @@ static void count_step(const gk_setup *setup, gk_data *data, double h, tally *t)
         }
     }
     t->force += (side[0] - side[1]) * h;
-    t->highest = fmax(t->highest, fmax(side[0], side[1]));
+    t->highest = gk_max(t->highest, gk_max(side[0], side[1]));
     if (touches) {
         data->impacts += data->apart;
         data->apart = 0;
@@ -263,9 +263,9 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     if (outcome) return outcome;
     gk_work *work = setup->work;
     span c = {gk_time(data), data->step_H, {{0, 0, 0}, {0, 0, 0}}};
-    const double count = ceil(c.H / setup->h * (1.0 - 1e-12));
+    const double count = c.H / setup->h * (1.0 - 1e-12);
     if (!(count < 1e9)) return GK_BAD_STEP;
-    const int64_t steps = count < 1.0 ? 1 : (int64_t)count;
+    const int64_t steps = 1 + (int64_t)count; /* ceil, guarded against rounding of H / h */
     const double h = c.H / (double)steps;
     for (int g = 0; g < 2; g++) {
         const gk_motion next = motion_in(data, g), was = data->input[g];

@@ -252,6 +252,14 @@ typedef struct gk_boundary { gk_port_kind kind; double torque, phi, k; } gk_boun
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data *data, const gk_boundary boundary[2], int keep);
 
 static inline double gk_clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+/* the C library stays out (only sqrt and memory functions come from the compiler): NaN on the right goes through */
+static inline double gk_max(double x, double y) { return x > y ? x : y; }
+static inline double gk_min(double x, double y) { return x < y ? x : y; }
+static inline double gk_floor(double x)
+{ /* |x| < 2^62 */
+    double whole = (double)(int64_t)x;
+    return whole > x ? whole - 1.0 : whole;
+}
 static inline int gk_finite(double x) { return x - x == 0.0; }
 
 /* Σ a_k b_k in fixed lanes: the same bits at every vector width; n is a multiple of LANES */

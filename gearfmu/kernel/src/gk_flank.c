@@ -55,7 +55,7 @@ static void add_roll(gk_place *p, const line *l, const gk_gear *gear, int which,
 static void flank_contact(const gk_model *model, const gk_setup *setup, const line *l, double g, gk_place *p)
 {
     p->gap = g;
-    p->curvature = 1.0 / fmax(p->roll[0], 1e-4) + 1.0 / fmax(p->roll[1], 1e-4);
+    p->curvature = 1.0 / gk_max(p->roll[0], 1e-4) + 1.0 / gk_max(p->roll[1], 1e-4);
     const double gradient[6] = {-l->nx, -l->ny, -l->sg * model->gear[0].r_b, l->nx, l->ny, -l->sg * model->gear[1].r_b};
     memcpy(p->gradient, gradient, sizeof gradient);
     for (int i = 0; i < 2; i++) {
@@ -110,7 +110,7 @@ static int corner_contact(const gk_model *model, const gk_setup *setup, const do
     p->roll[o] = s;
     double blend = gk_clamp(over / tip->strip, 0.0, 1.0); /* the contact patch leaves the flank over about the strip's half-width */
     blend = blend * blend * (3.0 - 2.0 * blend);
-    p->curvature = (1.0 - blend) / tip->s_tip + blend / tip->edge + 1.0 / fmax(s, 1e-4);
+    p->curvature = (1.0 - blend) / tip->s_tip + blend / tip->edge + 1.0 / gk_max(s, 1e-4);
     return 1;
 }
 
@@ -153,7 +153,7 @@ static int side(const gk_model *model, const gk_setup *setup, const double *fram
     double from = sg > 0 ? (first - s_a) / p_b : (s_a - last) / p_b, to = sg > 0 ? (last - s_a) / p_b : (s_a - first) / p_b;
     if (!(from > -1e8 && to < 1e8)) return -1;
     int found = 0;
-    for (int k = (int)floor(from) + 1; k <= (int)floor(to) && found < room; k++) {
+    for (int k = (int)gk_floor(from) + 1; k <= (int)gk_floor(to) && found < room; k++) {
         gk_place *p = &place[found];
         p->key.flank = p->flank = flank;
         p->key.tooth = k;

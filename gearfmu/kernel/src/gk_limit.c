@@ -39,7 +39,7 @@ static double largest(const double *L, const double *K, int n)
             y[i] /= L[i * n + i];
         }
         value = 0.0;
-        for (int i = 0; i < n; i++) value = fmax(value, fabs(y[i]));
+        for (int i = 0; i < n; i++) value = gk_max(value, fabs(y[i]));
         if (!(value > 0.0)) return 0.0;
         for (int i = 0; i < n; i++) x[i] = y[i] / value;
     }
@@ -88,7 +88,7 @@ double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, doubl
     double worst = 0.0;
     gk_data empty;
     memset(&empty, 0, sizeof empty);
-    for (int i = 0; i < (model->kind == KIND_FLAT ? 1 : POSITIONS); i++) worst = fmax(worst, mu_at(model, setup, &empty, h, gamma, (double)i / POSITIONS));
+    for (int i = 0; i < (model->kind == KIND_FLAT ? 1 : POSITIONS); i++) worst = gk_max(worst, mu_at(model, setup, &empty, h, gamma, (double)i / POSITIONS));
     return worst;
 }
 
@@ -110,11 +110,11 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
     static const double ladder[] = {0.5e-6, 1e-6, 1.5e-6, 2e-6, 2.5e-6, 3e-6, 4e-6, 5e-6, 6e-6, 7.5e-6, 10e-6, 12.5e-6, 15e-6, 20e-6};
     const double period = 2.0 * GK_PI / (model->speed_max * model->gear[0].teeth);
     const int variational = setup->integrator == DG4;
-    double limit = fmin(model->h_max, period / 40.0), h = wished;
+    double limit = gk_min(model->h_max, period / 40.0), h = wished;
     if (!(wished > 0.0)) {
-        h = fmin(ladder[0], limit);
+        h = gk_min(ladder[0], limit);
         for (int i = 0; i < (int)(sizeof ladder / sizeof *ladder); i++) {
-            double next = fmin(ladder[i], limit);
+            double next = gk_min(ladder[i], limit);
             if (variational && gk_limit_mu(model, setup, next, 1.0) > MU) break;
             h = next;
             if (ladder[i] >= limit) break;

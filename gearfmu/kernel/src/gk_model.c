@@ -38,7 +38,7 @@ static int between(double x, double low, double high) { return x >= low && x <= 
 
 static int plausible_gear(const gk_gear *g)
 {
-    return between(g->teeth, 1, 1000) && g->teeth == floor(g->teeth) && between(g->r_b, 1e-4, 10) && between(g->s_form, 0, 10) && g->s_tip > g->s_form + 1e-6 &&
+    return between(g->teeth, 1, 1000) && g->teeth == gk_floor(g->teeth) && between(g->r_b, 1e-4, 10) && between(g->s_form, 0, 10) && g->s_tip > g->s_form + 1e-6 &&
            between(g->s_tip, 0, 20) && between(g->psi_b, 0, 4) && between(g->phase, -10, 10) && between(g->mass, 1e-9, 1e7) && between(g->inertia, 1e-12, 1e7) &&
            between(g->width, 1e-6, 10) && between(g->local, 1e-20, 1) && between(g->strip, 1e-6, 0.1) && between(g->relief, 0, 1e4) && between(g->relief_start, -1, 20) &&
            between(g->edge, 1e-6, 0.1) && between(g->corner_radius, 1e-4, 20) && between(g->corner_angle, -10, 10) && between(g->bearing_k, 1, 1e15) &&

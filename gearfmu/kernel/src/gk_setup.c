@@ -225,7 +225,7 @@ static double legendre_integral(int degree, double x)
 
 static void fill_slices(const gk_model *model, gk_setup *setup)
 {
-    const double width = fmin(model->gear[0].width, model->gear[1].width);
+    const double width = gk_min(model->gear[0].width, model->gear[1].width);
     for (int g = 0; g < 2; g++) {
         setup->slice_width[g] = width / setup->slices;
         double edge = width / model->gear[g].width;

@@ -129,8 +129,8 @@ static void newton(gk_system *s)
         double change = 0.0, size = 0.0;
         for (int a = 0; a < s->rank; a++) {
             s->force[s->map[a]] += x[a];
-            change = fmax(change, fabs(x[a]));
-            size = fmax(size, fabs(s->force[s->map[a]]));
+            change = gk_max(change, fabs(x[a]));
+            size = gk_max(size, fabs(s->force[s->map[a]]));
         }
         if (!(change > 1e-11 * size)) break;
         if (change > 0.2 * last) factorise(s);
@@ -294,7 +294,7 @@ void gk_solve_energy(gk_system *s)
         sensitivity(s, p, w);
         b = energy_balance(s, U0, p, w);
         if (!(fabs(b.defect) > 1e-9 * b.scale)) return;
-        double root = sqrt(fmax(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)), divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
+        double root = sqrt(gk_max(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)), divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
         if (!(fabs(divisor) > 0.0)) break;
         double a = -2.0 * b.defect / divisor;
         s->alpha += a;

@@ -70,12 +70,12 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
         for (int i = 0; i < s->n; i++) z += s->rigid[i][d] * s->z[i];
         const double x = work->frame[d] + work->at_rest.rigid_mobility * rest->inverse_mass[d] * z;
         const double arm = d == XA || d == YA || d == XB || d == YB ? 1.0 : d == PHIB || d == INERTIA_1 || d == DISC_1 ? model->gear[1].r_b : model->gear[0].r_b;
-        moved = fmax(moved, fabs(x - data->x[d]) * arm);
+        moved = gk_max(moved, fabs(x - data->x[d]) * arm);
         if (!gk_finite(x)) return NAN;
         data->x[d] = x;
     }
     gk_step_remember(rest, data);
-    return s->limit_reached ? fmax(moved, 1.0) : moved;
+    return s->limit_reached ? gk_max(moved, 1.0) : moved;
 }
 
 /* modes take the static share of the forces that hold the equilibrium */

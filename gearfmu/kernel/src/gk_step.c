@@ -189,7 +189,7 @@ void gk_step_remember(const gk_setup *setup, gk_data *data)
         gk_memory *m = &data->memory[s->place_of[i]];
         m->force[i % s->slices] = s->force[i];
         m->gap[i % s->slices] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-        deepest = fmax(deepest, -work->place[s->place_of[i]].gap);
+        deepest = gk_max(deepest, -work->place[s->place_of[i]].gap);
     }
     data->reach = 20e-6 + 1.5 * deepest;
 }

@@ -151,7 +151,7 @@ static void project(const gk_model *model, const gk_setup *setup, const gk_work 
 static void list_contacts(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work)
 {
     gk_system *s = &work->system;
-    const double width = fmin(setup->slice_width[0], setup->slice_width[1]);
+    const double width = gk_min(setup->slice_width[0], setup->slice_width[1]);
     for (int p = 0; p < work->places; p++)
         for (int i = 0; i < s->slices; i++, s->n++) {
             const gk_place *place = &work->place[p];
