@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import click
@@ -151,11 +152,30 @@ def test_inspect_tells_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert code == 0 and found["file"] == "trace" and found["channels"]["mesh.force"]["unit"] == "N"
 
 
-def test_counting_verb_returns_the_count_at_most_99(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    bad = tmp_path / "bad.fmu"
-    bad.write_bytes(b"no zip")
-    code, out, _ = call("validate", bad, capsys=capsys)
-    assert 1 <= code <= 99 and f"{code} problem" in out
+POOR_FMU = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="poor" guid="{{0}}">
+<CoSimulation modelIdentifier="poor"/>
+<ModelVariables>{variables}</ModelVariables>
+<ModelStructure/>
+</fmiModelDescription>"""
+POOR_VARIABLE = '<ScalarVariable name="x{0}" valueReference="{0}" causality="output"><Real unit="N"/></ScalarVariable>'
+
+
+@pytest.mark.parametrize("count", [1, 150])
+def test_validate_returns_the_count_at_most_99(tmp_path: Path, capsys: pytest.CaptureFixture[str], count: int) -> None:
+    """Outputs without unit definition and outside ModelStructure: at least one problem each."""
+    variables = "".join(POOR_VARIABLE.format(i) for i in range(count))
+    with zipfile.ZipFile(tmp_path / "poor.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", POOR_FMU.format(variables=variables))
+    code, out, _ = call("validate", tmp_path / "poor.fmu", capsys=capsys)
+    found = int(out.strip().splitlines()[-1].split(": ")[1].split()[0])
+    assert found >= count and code == min(found, 99) and len(out.strip().splitlines()) >= found
+
+
+def test_validate_of_what_is_no_fmu_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.fmu").write_bytes(b"no zip")
+    code, _, err = call("validate", tmp_path / "bad.fmu", capsys=capsys)
+    assert code == 1 and "bad.fmu" in err
 
 
 def test_version_is_the_packages() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.shared import INTEGRATORS, LEVELS, Quantity, progress_bar
+from gearfmu.commands.shared import Quantity, progress_bar
 
 OUT = click.Path(path_type=Path, file_okay=False)
 
@@ -23,6 +23,26 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
 
     spec = load_scene(scene)
     return run_scene(spec, out or Path("out") / spec.name, unit=unit, fmu_path=fmu_path, verify=verify)
+
+
+@click.command()
+@click.argument("stage")
+@click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the pinion, "302 N*m".')
+@click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the pinion, "2000 rpm".')
+@click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
+@click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.")
+@click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
+def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:
+    """Run STAGE alone: both shafts' outer ends turn at constant speed, wound up by the torque."""
+    from gearfmu.commands.models import model_of
+    from gearfmu.commands.standalone import parameters, steady_run
+
+    model = model_of(stage)
+    with progress_bar(model.name) as progress:
+        trace = steady_run(model, drive, parameters(model, settings), progress)
+    trace.meta["stage"] = stage
+    return finish(trace, out or Path("out") / model.name, stage)
 
 
 @click.command()

@@ -8,8 +8,6 @@ from typing import Any
 
 import click
 
-LEVELS = ("rigid", "fast", "standard", "full", "paper")
-INTEGRATORS = ("dg4", "mix4", "em", "rk45")
 Progress = Callable[..., None]
 
 

@@ -1,0 +1,48 @@
+"""The standalone solver behind the verb simulate: settings of the kernel, a run at constant speed and load."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import click
+
+from gearfmu.commands.shared import Progress
+
+
+def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
+    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for a name or value the model does not know."""
+    known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
+    found = {}
+    for text in settings:
+        name, _, value = text.partition("=")
+        if name not in known:
+            raise click.BadParameter(f"'{name}' is no parameter; there are {', '.join(known)}", param_hint="--set")
+        found[name] = _number(known[name], value)
+    return found
+
+
+def steady_run(model: Any, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None) -> Any:
+    """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s."""
+    from gearfmu.stage import Steady, simulate
+
+    soft = [name for name, port in model.spec.ports.items() if port.kind != "spring" or port.chain is not None]
+    if soft:
+        raise click.UsageError(f"'simulate' turns spring ports without a chain; {', '.join(soft)} of {model.spec.source} is another: use 'run' with a scene")
+    inputs = Steady(model, drive["speed"], drive["torque"])
+    trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
+    exchanged = abs(trace["energy.work"]).max() + trace["energy.stored"].max()
+    trace.meta.update(energy_residual=float(trace["energy.residual"][-1] / exchanged), H=drive["step"], scene="constant speed and load",
+                      teeth={gear.name: gear.teeth for gear in model.spec.gears}, torque=drive["torque"], speed=drive["speed"])  # fmt: skip
+    return trace
+
+
+def _number(variable: Any, text: str) -> float:
+    """Value of an enumeration by its item, of a boolean by true or false, else a number in SI."""
+    words = {"true": 1.0, "false": 0.0} if variable.type == "Boolean" else {item: float(i) for i, item in enumerate(variable.items)}
+    if text in words:
+        return words[text]
+    try:
+        return float(text)
+    except ValueError:
+        expected = " | ".join(words) or f"a number in {variable.unit or 'plain form'}"
+        raise click.BadParameter(f"{variable.name}={text}: expected {expected}", param_hint="--set") from None
