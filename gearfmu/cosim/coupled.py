@@ -11,7 +11,7 @@ from gearfmu.cosim.recorder import Recorder
 from gearfmu.errors import CouplingError, FmuError, SimulationError
 from gearfmu.stage.trace import Trace
 
-COMPLETED = "completed"
+OK = "ok"
 Progress = Callable[[float], None]
 
 
@@ -49,7 +49,7 @@ class Result:
 def run_coupled(cut: Cut, plan: Plan) -> Result:
     """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good communication point."""
     with_recorder = _Run(cut, plan)
-    outcome, message, started = COMPLETED, "", clock.process_time()
+    outcome, message, started = OK, "", clock.process_time()
     try:
         with_recorder.go()
     except SimulationError as error:

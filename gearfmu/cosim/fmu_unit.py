@@ -32,6 +32,7 @@ from fmpy.logging import addLoggerProxy
 
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, FmuError, SimulationError
+from gearfmu.kernel.binding import OUTCOMES, load
 
 KINDS = {"Real": ("Real", fmi2Real), "Integer": ("Integer", fmi2Integer), "Enumeration": ("Integer", fmi2Integer), "Boolean": ("Boolean", fmi2Boolean)}
 MESSAGES_KEPT = 200
@@ -216,6 +217,6 @@ class FmuUnit:
 
 
 def outcome_of(message: str) -> str:
-    """Name of an outcome from the kernel's text: the words after the last time, up to a colon ("diverged", "energy balance broken")."""
-    text = message.split(" s: ", 1)[-1]
-    return text.split(":")[0].strip()
+    """The kernel's name of the outcome whose text the message ends with ("diverged", "penetration", "energy"); "discarded" for another FMU's words."""
+    texts = {name: load().gk_outcome_text(number).decode() for number, name in enumerate(OUTCOMES)}
+    return next((name for name, text in texts.items() if message.rstrip().endswith(text)), "discarded")

@@ -66,7 +66,7 @@ class PassengerCar(Spec):
 
 
 class TestRig(Spec):
-    """Back-to-back rig: a drive with torque control on the pinion's shaft, a shaft of constant speed on the wheel.
+    """A rig: a drive with torque control on the pinion's shaft, a shaft of constant speed on the wheel.
 
     The drive's controller adds `speed_droop` times the deviation from the nominal speed. It damps the drive against the shafts and leaves the gears alone,
     so that the mean torque is reached within the settling time.

@@ -1,0 +1,132 @@
+"""The passenger car: its table, its masses and frequencies, firing orders, and that the cut does not move the physics."""
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from gearfmu.cosim.drivetrain import Shafts, build, capacity, engine_torque, road_load, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.network import Driven, Inertia, Network, Source
+from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.table import page
+from gearfmu.spec.drivetrain import PassengerCar, TestRig, table
+from gearfmu.spec.scene import SceneSpec, load_scene
+
+SHAFTS = Shafts("pinion", "wheel", 1.5)
+CAR = PassengerCar()
+
+
+def closure(**changes) -> SceneSpec:
+    scene = load_scene("clutch_closure")
+    return scene.model_copy(update={"passenger_car": CAR.model_copy(update=changes)})
+
+
+def test_docs_show_the_table():
+    assert (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8") == page(), "run: python -m gearfmu.cosim.table > docs/drivetrain.md"
+
+
+def test_every_value_has_unit_meaning_and_source():
+    for kind in (PassengerCar, TestRig):
+        for row in table(kind):
+            assert row.meaning and row.source and (row.unit or row.name in ("final_drive_ratio", "rolling_resistance")), row
+
+
+@pytest.mark.parametrize(("name", "diameter", "length", "count"), [
+    ("input_shaft_stiffness", 0.028, 0.2, 1), ("output_shaft_stiffness", 0.030, 0.25, 1), ("half_shaft_stiffness", 0.025, 0.6, 2)])
+def test_shafts_that_are_called_computed_are(name, diameter, length, count):
+    """Solid steel: k = G π d⁴ / (32 l); G = 79.3 GPa; the table rounds to three digits."""
+    assert getattr(CAR, name) == pytest.approx(count * 79.3e9 * math.pi * diameter**4 / (32 * length), rel=5e-3)
+
+
+def test_dual_mass_flywheel_frequency_is_what_the_table_says():
+    j1, j2 = CAR.crank_inertia + CAR.dmf_primary_inertia, CAR.secondary_inertia
+    omega = math.sqrt(CAR.dmf_stiffness * (1 / j1 + 1 / j2))
+    assert omega / (2 * math.pi) == pytest.approx(18.0, abs=0.5)
+    assert CAR.dmf_damping * omega / (2 * CAR.dmf_stiffness) == pytest.approx(0.10, abs=0.005)
+
+
+def test_firing_orders_are_2_4_and_6_and_nothing_else():
+    """Spectrum over whole revolutions."""
+    torque, n = engine_torque(CAR), 720
+    samples = np.array([torque(0.0, phi, 150.0) for phi in 2 * np.pi * np.arange(4 * n) / n])
+    amplitude = np.abs(np.fft.rfft(samples)) / samples.size * 2
+    orders = {k / 4: a for k, a in enumerate(amplitude) if a > 1e-9}
+    assert orders == pytest.approx({0.0: 2 * CAR.engine_torque, 2.0: CAR.order_2, 4.0: CAR.order_4, 6.0: CAR.order_6})
+
+
+def test_firing_orders_reach_the_crankshaft_as_speed_ripple():
+    """Free engine at 2000 rpm: ripple of order k is A_k / (J k Ω), seen in the spectrum of a run."""
+    omega, inertia, revolutions = 2000 * 2 * math.pi / 60, 0.16, 20
+    car = CAR.model_copy(update={"engine_torque": 0.0, "order_2": 5.0, "order_4": 3.0, "order_6": 1.0})
+    unit = PyUnit(Network((Inertia("engine", inertia, w=omega),), sources=(Source("combustion", "engine", engine_torque(car)),)))
+    unit.initialize(0.0)
+    h, speeds = 2 * math.pi / omega / 240, []
+    for n in range(240 * revolutions):
+        unit.step(n * h, h)
+        speeds.append(unit.get(unit.resolve(["engine.w"]))[0])
+    amplitude = np.abs(np.fft.rfft(speeds)) / len(speeds) * 2
+    for order, torque in ((2, 5.0), (4, 3.0), (6, 1.0)):
+        assert amplitude[order * revolutions] == pytest.approx(torque / (inertia * order * omega), rel=5e-3)
+
+
+def test_road_load_opposes_the_motion_and_vanishes_at_rest():
+    load = road_load(CAR)
+    assert load(0, 0, 0.0) == 0.0 and load(0, 0, 50.0) == -load(0, 0, -50.0) < 0.0
+    lever, v = CAR.road_wheel_radius / CAR.final_drive_ratio, 30.0
+    force = CAR.rolling_resistance * CAR.vehicle_mass * CAR.gravity + 0.5 * CAR.air_density * CAR.drag_area * v**2
+    assert load(0, 0, v / lever) == pytest.approx(-force * lever, rel=1e-12)
+
+
+def test_kinetic_energy_is_that_of_the_moving_vehicle():
+    """Referred inertias hold the energy of mass and four road wheels at the vehicle's speed, besides final drive and engine."""
+    scene = closure()
+    unit = PyUnit(build(scene, SHAFTS))
+    wheel_w = scene.start.pinion_speed / SHAFTS.ratio
+    road_w = wheel_w / CAR.final_drive_ratio
+    v, engine_w = road_w * CAR.road_wheel_radius, scene.start.pinion_speed + scene.start.slip
+    expected = 0.5 * CAR.vehicle_mass * v**2 + 4 * 0.5 * CAR.road_wheel_inertia * road_w**2 + 0.5 * CAR.final_drive_inertia * wheel_w**2
+    assert unit.energy() == pytest.approx(expected + 0.5 * (CAR.crank_inertia + CAR.dmf_primary_inertia) * engine_w**2, rel=1e-12)
+
+
+def test_vehicle_side_frequencies():
+    """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to slip."""
+    network = build(closure(tyre_slip_stiffness=1e-6, half_shaft_damping=0.0), SHAFTS)
+    unit = PyUnit(network)
+    mass = np.diag([node.inertia for node in network.nodes])
+    rows = unit.dynamics.extension
+    values = eigh(rows.T @ np.diag([spring.k for spring in network.springs]) @ rows, mass, eigvals_only=True)
+    referred = 1 / CAR.final_drive_ratio**2
+    k, j1, j2 = CAR.half_shaft_stiffness * referred, CAR.final_drive_inertia, 2 * CAR.road_wheel_inertia * referred
+    assert math.sqrt(values[-1]) == pytest.approx(math.sqrt(k * (1 / j1 + 1 / j2)), rel=1e-9)
+
+
+def test_ports_and_drivetrain_hold_every_inertia_and_spring_once():
+    """Chain inside or outside the FMU: the same sum of inertias, the same stiffnesses."""
+    inside, outside = closure(), closure(chain_in_fmu=False)
+    ports_in, ports_out = stage_ports(inside, SHAFTS), stage_ports(outside, SHAFTS)
+    chain = ports_in["pinion"].chain
+    total_in = sum(node.inertia for node in build(inside, SHAFTS).nodes) + chain.inertia + chain.disc_inertia
+    assert total_in == pytest.approx(sum(node.inertia for node in build(outside, SHAFTS).nodes), rel=1e-14)
+    springs_out = [spring.k for spring in build(outside, SHAFTS).springs] + [port.k for port in ports_out.values()]
+    springs_in = [spring.k for spring in build(inside, SHAFTS).springs] + [port.k for port in ports_in.values()] + [chain.shaft_k]
+    assert sorted(springs_in) == pytest.approx(sorted(springs_out))
+    assert stage_signals(outside, SHAFTS) == () and stage_start(outside, SHAFTS) == {}
+
+
+def test_capacity_of_the_closure():
+    ramp = capacity(load_scene("clutch_closure"))
+    assert ramp.ends(0.0, 0.025) == (0.0, 125.0) and ramp.ends(0.05, 1.0) == (250.0, 250.0)
+
+
+def test_rig_holds_speed_and_starts_twisted():
+    """The brake is a driven node; the drive's torque balances at nominal speed."""
+    scene = load_scene("pair_loaded")
+    network = build(scene, SHAFTS)
+    drive, brake = network.nodes
+    assert isinstance(brake, Driven) and brake.w == pytest.approx(-drive.w / 1.5)
+    rig = scene.test_rig
+    assert drive.phi == pytest.approx(rig.torque * (1 / rig.pinion_shaft_stiffness + 2.25 / rig.wheel_shaft_stiffness))
+    assert network.sources[0].torque(0.0, 0.0, 0.0) - rig.speed_droop * drive.w == pytest.approx(rig.torque)
