@@ -1,0 +1,98 @@
+"""Any pair is either refused with a reason or gives valid meshes: z 12–80, profile shifts, module, face width, bore."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import event, given, settings
+from hypothesis import strategies as st
+
+from gearfmu.errors import Problem
+from gearfmu.femesh import gear_sector, scaled_jacobian, volume
+from gearfmu.geometry import GearGeometry, involute
+from gearfmu.spec.checks import geometry_problems
+from gearfmu.spec.gear import Bearing, BodySpec, GearSpec, Material, MeshSpec, PairSpec
+
+STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density=7850)
+
+
+def pair_of(teeth, shifts, module, widths, bores, widening) -> tuple[PairSpec, list[GearSpec]]:
+    """A pair of the standard rack at the centre distance without backlash plus `widening` modules; bores in root radii."""
+    alpha = math.radians(20)
+    inv_w = float(involute.inv(alpha)) + 2 * sum(shifts) * math.tan(alpha) / sum(teeth)
+    cos_w = math.cos(involute.inverse_inv(max(inv_w, 1e-6)))
+    distance = module * (sum(teeth) / 2 * math.cos(alpha) / cos_w + widening)
+    shortening = max(0.0, sum(shifts) + sum(teeth) / 2 + widening - distance / module)
+    gears = []
+    for index in (0, 1):
+        root = module * (teeth[index] - 2.5 + 2 * shifts[index])
+        gears.append(
+            GearSpec(
+                name=("pinion", "wheel")[index],
+                teeth=teeth[index],
+                profile_shift=shifts[index],
+                tip_diameter=module * (teeth[index] + 2 * shifts[index] + 2 - 2 * shortening),
+                face_width=widths[index] * module,
+                bore_diameter=bores[index] * root,
+                tip_edge_radius=0.04 * module,
+                material=STEEL,
+                bearing=Bearing(stiffness=3e8),
+                body=BodySpec(strip_half_width=0.1 * module),
+            )
+        )
+    backlash = (2 * math.tan(alpha) * max(widening, 0) + 0.02) * module
+    pair = PairSpec(center_distance=distance, normal_module=module, pressure_angle=alpha, backlash=backlash)
+    return pair, gears
+
+
+def check_meshes(pair: PairSpec, gears: list[GearSpec], scale: float) -> None:
+    for gear in gears:
+        shape = GearGeometry.of(gear, pair)
+        mesh = gear_sector(shape, gear.face_width, MeshSpec(scale=scale))
+        assert scaled_jacobian(mesh).min() > 0.35
+        assert volume(mesh) == pytest.approx(shape.sector_area * gear.face_width, rel=5e-4)
+        angle = 2 * math.pi / gear.teeth
+        turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+        gap = np.abs(mesh.nodes[mesh.cut_minus] @ turn.T - mesh.nodes[mesh.cut_plus]).max()
+        assert gap <= 1e-12 * shape.r_a
+
+
+def check_reasons(problems: list[Problem], gears: list[GearSpec]) -> None:
+    for problem in problems:
+        assert problem.field.split(".")[0] in ("gears", "pair")
+        assert problem.value and len(problem.remedy) > 20
+
+
+both = lambda values: st.tuples(values, values)  # noqa: E731
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    teeth=both(st.integers(12, 80)),
+    shifts=both(st.floats(-0.5, 0.9)),
+    module=st.floats(0.5e-3, 20e-3),
+    widths=both(st.floats(1, 20)),
+    bores=both(st.floats(0.05, 0.98)),
+    widening=st.floats(-0.1, 0.2),
+)
+def test_valid_mesh_or_a_reason(teeth, shifts, module, widths, bores, widening) -> None:
+    pair, gears = pair_of(teeth, shifts, module, widths, bores, widening)
+    problems = geometry_problems("stage.toml", pair, gears, None)
+    event("refused" if problems else "meshed")
+    check_reasons(problems, gears)
+    if not problems:
+        check_meshes(pair, gears, 0.3)
+
+
+def test_ordinary_pairs_are_not_refused() -> None:
+    """A grid of everyday gears must pass: the checks may not refuse everything."""
+    refused = []
+    for small in (18, 25, 40):
+        for large in (20, 45, 80):
+            for shifts in ((0.0, 0.0), (0.3, -0.1), (0.5, 0.4)):
+                pair, gears = pair_of((small, large), shifts, 3e-3, (8, 8), (0.4, 0.6), 0.0)
+                refused += geometry_problems("stage.toml", pair, gears, None)
+                check_meshes(pair, gears, 0.3)
+    assert not refused

@@ -1,0 +1,201 @@
+"""The sector mesh of the shipped gears: exact flanks, paired cuts, volume, symmetry, joining."""
+
+from __future__ import annotations
+
+import math
+
+import meshio
+import numpy as np
+import pytest
+
+from gearfmu.errors import MeshError
+from gearfmu.femesh import FeMesh, gear_sector, mesh_report, scaled_jacobian, volume, write_vtu
+from gearfmu.femesh.section import graded, transfinite
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.gear import MeshSpec
+from gearfmu.spec.stage import load_stage
+
+STAGE = load_stage("fzg_c")
+SHAPES = [GearGeometry.of(gear, STAGE.pair) for gear in STAGE.gears]
+WIDTH = STAGE.gears[0].face_width
+COARSE = MeshSpec(scale=0.4)
+
+
+@pytest.fixture(scope="module", params=[0, 1], ids=["pinion", "wheel"])
+def case(request: pytest.FixtureRequest) -> tuple[GearGeometry, FeMesh]:
+    shape = SHAPES[request.param]
+    return shape, gear_sector(shape, WIDTH, COARSE)
+
+
+def rows(points: np.ndarray) -> set[tuple[float, ...]]:
+    return {tuple(row) for row in np.round(points * 1e9).astype(int).tolist()}
+
+
+def test_flank_nodes_lie_on_the_involute_with_their_roll(case: tuple[GearGeometry, FeMesh]) -> None:
+    shape, mesh = case
+    for side, sg in ((0, 1), (1, -1)):
+        grid = mesh.flank[side]
+        points = mesh.nodes[grid.quads]
+        assert np.abs(points[..., :2] - shape.flank_point(grid.roll, sg)).max() < 1e-15
+        assert np.array_equal(points[..., 2], grid.z)
+        assert (grid.roll.min(), grid.roll.max()) == (shape.s_form, shape.s_tip)
+        assert (grid.z.min(), grid.z.max()) == pytest.approx((-WIDTH / 2, WIDTH / 2))
+        assert grid.quads.shape == (grid.shape[0] * grid.shape[1], 8)
+
+
+def test_flank_faces_look_out_of_the_tooth_and_are_faces_of_elements(case: tuple[GearGeometry, FeMesh]) -> None:
+    shape, mesh = case
+    elements = [set(element) for element in mesh.elements.tolist()]
+    for side, sg in ((0, 1), (1, -1)):
+        grid = mesh.flank[side]
+        corners = mesh.nodes[grid.quads[:, :4]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
+        outward = shape.flank_normal(grid.roll.mean(axis=1), sg)
+        assert (normal[:, :2] * outward).sum(axis=1) == pytest.approx(np.linalg.norm(normal, axis=1), rel=0.02)
+        for quad in grid.quads[:: grid.shape[1]].tolist():
+            assert sum(set(quad) <= element for element in elements) == 1
+        # mid nodes (4 … 7) lie between the corners they belong to
+        middle = 0.5 * (mesh.nodes[grid.quads[:, :4]] + mesh.nodes[grid.quads[:, [1, 2, 3, 0]]])
+        assert np.abs(mesh.nodes[grid.quads[:, 4:]] - middle).max() < 0.1 * np.linalg.norm(corners[:, 2] - corners[:, 0])
+
+
+def test_flank_elements_are_equal_in_arc_length_and_halved_by_their_mid_nodes(case: tuple[GearGeometry, FeMesh]) -> None:
+    _, mesh = case
+    grid = mesh.flank[0]
+    arc = grid.roll**2
+    length = np.ptp(arc[:, :4], axis=1)
+    assert length == pytest.approx(length[0], rel=1e-10)
+    assert arc[:, 4:].sum(axis=1) == pytest.approx(arc[:, :4].sum(axis=1), rel=1e-12)
+
+
+def test_cuts_are_paired_by_the_rotation(case: tuple[GearGeometry, FeMesh]) -> None:
+    shape, mesh = case
+    angle = 2 * math.pi / shape.z
+    turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+    assert np.abs(mesh.nodes[mesh.cut_minus] @ turn.T - mesh.nodes[mesh.cut_plus]).max() < 1e-15
+    on_cut = np.abs(np.arctan2(mesh.nodes[:, 1], mesh.nodes[:, 0]) - shape.half_pitch) < 1e-9
+    assert set(np.flatnonzero(on_cut)) == set(mesh.cut_plus)
+    assert len(set(mesh.cut_plus)) == len(mesh.cut_plus) == len(mesh.cut_minus)
+
+
+def test_bore_set_is_every_node_on_the_bore(case: tuple[GearGeometry, FeMesh]) -> None:
+    shape, mesh = case
+    radius = np.linalg.norm(mesh.nodes[:, :2], axis=1)
+    assert set(np.flatnonzero(radius < shape.r_bore * (1 + 1e-9))) == set(mesh.sets["bore"])
+    assert radius[mesh.sets["bore"]] == pytest.approx(shape.r_bore, rel=1e-14)
+
+
+def test_mesh_is_its_own_mirror_image(case: tuple[GearGeometry, FeMesh]) -> None:
+    _, mesh = case
+    for mirror in ([1, 1, -1], [1, -1, 1]):
+        assert rows(mesh.nodes) == rows(mesh.nodes * mirror)
+        centres = mesh.nodes[mesh.elements].mean(axis=1)
+        assert rows(centres) == rows(centres * mirror)
+
+
+def test_no_two_nodes_coincide_and_all_are_used(case: tuple[GearGeometry, FeMesh]) -> None:
+    _, mesh = case
+    assert len(rows(mesh.nodes)) == len(mesh.nodes)
+    assert np.array_equal(np.unique(mesh.elements), np.arange(len(mesh.nodes)))
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=["pinion", "wheel"])
+def test_volume_converges_to_the_section_with_high_order(shape: GearGeometry) -> None:
+    """Curved quadratic edges leave fourth order at least."""
+    exact = shape.sector_area * WIDTH
+    errors = [
+        abs(volume(gear_sector(shape, WIDTH, MeshSpec(scale=scale, width=1))) / exact - 1) for scale in (0.5, 1, 2)
+    ]
+    assert errors[1] < 2e-6
+    assert math.log2(errors[0] / errors[2]) / 2 > 3
+
+
+def test_quality_of_the_shipped_meshes() -> None:
+    for shape, gear in zip(SHAPES, STAGE.gears, strict=True):
+        mesh = gear_sector(shape, gear.face_width, gear.body.mesh)
+        facts = mesh_report(mesh, shape.r_b, gear.body.strip_half_width)
+        assert facts["scaled_jacobian_min"] > 0.6
+        assert facts["elements_per_strip"] > 2
+        assert facts["nodes"] < 35_000
+        assert facts["dof"] == mesh.nodes.size
+
+
+def test_scale_divides_every_element_along_the_same_lines() -> None:
+    """The corners of a coarse mesh are corners of the mesh of twice the scale (section and rim gradings nest)."""
+    coarse, fine = (gear_sector(SHAPES[0], WIDTH, MeshSpec(scale=scale, width=1)) for scale in (1, 2))
+    surface = [np.unique(mesh.flank[0].quads[:, :4]) for mesh in (coarse, fine)]
+    assert rows(coarse.nodes[surface[0]]) <= rows(fine.nodes[surface[1]])
+    cuts = [rows(mesh.nodes[mesh.cut_plus][np.isin(mesh.cut_plus, mesh.elements[:, :8])]) for mesh in (coarse, fine)]
+    assert cuts[0] <= cuts[1]
+
+
+def test_full_body_joins_all_sectors(case: tuple[GearGeometry, FeMesh]) -> None:
+    shape, mesh = case
+    full = mesh.full()
+    assert len(full.nodes) == shape.z * (len(mesh.nodes) - len(mesh.cut_plus)) == len(rows(full.nodes))
+    assert volume(full) == pytest.approx(shape.z * volume(mesh), rel=1e-13)
+    assert (full.teeth, len(full.cut_plus), full.full()) == (1, 0, full)
+    assert np.linalg.norm(full.nodes[full.sets["bore"], :2], axis=1) == pytest.approx(shape.r_bore, rel=1e-13)
+    for sector in (0, 1, shape.z - 1):
+        angle = 2 * math.pi * sector / shape.z
+        turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+        there = full.nodes[mesh.sector_nodes(sector)]
+        assert np.abs(there[:, :2] - mesh.nodes[:, :2] @ turn.T).max() < 1e-15
+        assert np.array_equal(there[:, 2], mesh.nodes[:, 2])
+    assert np.array_equal(full.nodes[full.flank[1].quads], mesh.nodes[mesh.flank[1].quads])
+
+
+def test_scaled_jacobian_of_a_sheared_brick_is_the_sine_of_its_angle() -> None:
+    corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    nodes = np.concatenate([corner, [(corner[i] + corner[j]) / 2 for i, j in edges]])
+    for degrees in (90, 60, 30):
+        angle = math.radians(degrees)
+        sheared = nodes @ np.array([[3, 0, 0], [2 * math.cos(angle), 2 * math.sin(angle), 0], [0, 0, 0.1]])
+        mesh = FeMesh(sheared, np.arange(20)[None], {})
+        assert scaled_jacobian(mesh)[0] == pytest.approx(math.sin(angle), rel=1e-13)
+        assert volume(mesh) == pytest.approx(0.6 * math.sin(angle), rel=1e-13)
+    folded = nodes.copy()
+    folded[6] = [0.2, 0.2, 0.2]
+    assert scaled_jacobian(FeMesh(folded, np.arange(20)[None], {}))[0] < 0
+
+
+def test_volume_is_exact_for_quadratic_maps() -> None:
+    """A quarter of a ring meshed with one element: the mid nodes' parabola, integrated in closed form."""
+    bulge = 0.2
+    nodes = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    mids = np.array([(nodes[i] + nodes[j]) / 2 for i, j in edges])
+    mids[[2, 6], 1] += bulge  # the far side bulges as a parabola of height 0.2: 2/3 of the rectangle
+    mesh = FeMesh(np.concatenate([nodes, mids]), np.arange(20)[None], {})
+    assert volume(mesh) == pytest.approx(1 + 2 / 3 * bulge, rel=1e-13)
+
+
+def test_graded_and_transfinite() -> None:
+    corners = graded(4, 2.0)[::2]
+    assert np.diff(corners)[1:] / np.diff(corners)[:-1] == pytest.approx(2)
+    assert graded(4, 2.0)[1::2] == pytest.approx(0.5 * (corners[1:] + corners[:-1]))
+    u, v = np.linspace(0, 1, 5)[:, None], np.linspace(0, 1, 7)[:, None] ** 2
+    low, high = u * [2, 0], u * [2, 0] + [0, 3]
+    start, end = v * [0, 3], v * [0, 3] + [2, 0]
+    lattice = transfinite(low, high, start, end)
+    assert lattice == pytest.approx(np.stack(np.broadcast_arrays(2 * u, 3 * v.T), axis=-1))
+
+
+def test_a_bore_that_leaves_no_rim_is_refused() -> None:
+    shape = SHAPES[0]
+    wide = GearGeometry(**{**vars(shape), "r_bore": shape.r_f * 1.001})
+    with pytest.raises(MeshError, match="bore smaller"):
+        gear_sector(wide, WIDTH, COARSE)
+
+
+def test_vtu_comes_back_as_written(tmp_path, case: tuple[GearGeometry, FeMesh]) -> None:
+    _, mesh = case
+    write_vtu(mesh, tmp_path / "body.vtu")
+    back = meshio.read(tmp_path / "body.vtu")
+    assert np.array_equal(back.points, mesh.nodes)
+    assert np.array_equal(back.cells[0].data, mesh.elements)
+    assert np.array_equal(np.flatnonzero(back.point_data["bore"]), np.sort(mesh.sets["bore"]))
+    assert np.array_equal(back.point_data["roll"][mesh.flank[0].quads], mesh.flank[0].roll)
+    assert back.cell_data["scaled_jacobian"][0] == pytest.approx(scaled_jacobian(mesh))
+    assert [path.name for path in tmp_path.iterdir()] == ["body.vtu"]
