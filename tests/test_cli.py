@@ -149,7 +149,7 @@ def test_report_of_a_trace_without_a_stage(tmp_path: Path, capsys: pytest.Captur
 def test_inspect_tells_a_trace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = call("inspect", small_trace(tmp_path / "x.h5"), "--json", capsys=capsys)
     found = json.loads(out)
-    assert code == 0 and found["file"] == "trace" and found["channels"]["mesh.force"]["unit"] == "N"
+    assert code == 0 and found["kind"] == "trace" and found["channels"]["mesh.force"]["unit"] == "N"
 
 
 POOR_FMU = """<?xml version="1.0" encoding="UTF-8"?>

@@ -87,11 +87,11 @@ def _hdf5(path: Path) -> dict[str, Any]:
         if kind != FORMAT:
             from gearfmu.body import inspect_file
 
-            return {"file": "body", **inspect_file(path)}
+            return inspect_file(path)
     trace = Trace.load(path)
     channels = {name: {"unit": c.unit, "min": float(c.values.min()), "max": float(c.values.max())} for name, c in trace.channels.items()}
     span = [float(trace.time[0]), float(trace.time[-1])]
-    return {"file": "trace", "samples": trace.time.size, "time_s": span, "channels": channels, "meta": trace.meta}
+    return {"file": str(path), "kind": "trace", "samples": trace.time.size, "time_s": span, "channels": channels, "meta": trace.meta}
 
 
 def _toml(path: Path) -> dict[str, Any]:
@@ -100,9 +100,9 @@ def _toml(path: Path) -> dict[str, Any]:
     from gearfmu.spec.stage import load_stage
 
     if path.is_file() and "coupling" in read_toml(path):
-        return {"file": "scene", **load_scene(path).model_dump(mode="json")}
+        return {"file": str(path), "kind": "scene", **load_scene(path).model_dump(mode="json")}
     spec = load_stage(path)
-    return {"file": "stage", **spec.model_dump(mode="json"), "derived": _derived(spec)}
+    return {"file": str(path), "kind": "stage", **spec.model_dump(mode="json", exclude={"kind"}), "derived": _derived(spec)}
 
 
 def _derived(spec: Any) -> dict[str, Any]:
@@ -126,5 +126,5 @@ def _fmu(path: Path) -> dict[str, Any]:
     except Exception as error:  # fmpy lets errors of zipfile, lxml and its own through
         raise FmuError(f"{path}: not an FMU ({error}); 'gearfmu validate' says more") from error
     variables = {v.name: f"{v.causality}, {v.unit or '-'}: {v.description or ''}" for v in description.modelVariables}
-    return {"file": "fmu", "model": description.modelName, "fmi": description.fmiVersion, "guid": description.guid,
+    return {"file": str(path), "kind": "fmu", "model": description.modelName, "fmi": description.fmiVersion, "guid": description.guid,
             "platforms": list(fmpy.supported_platforms(str(path))), "variables": variables}  # fmt: skip

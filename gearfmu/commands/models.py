@@ -1,12 +1,12 @@
 """From a stage's name to its bodies and its model: load, reduce what is missing, assemble."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
 
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.shared import Progress, progress_bar
 
 
 def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> Any:
@@ -25,15 +25,12 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
     from gearfmu.body import reduce_stage
 
     with progress_bar("reducing") as progress:
-        return spec, reduce_stage(spec, progress=progress)
+        return spec, reduce_stage(spec, progress=by_text(progress))
 
 
-def shipped_bodies(spec: Any) -> list[Any]:
-    """The bodies beside the stage file as they are; raises BodyError when one is missing or damaged."""
-    from gearfmu.body import load_body
-    from gearfmu.spec.library import model_folder
-
-    return [load_body(model_folder(spec) / f"{gear.name}.h5") for gear in spec.gears]
+def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
+    """The progress function of reduce_stage, called with (what is being done, share done)."""
+    return None if progress is None else lambda text, share: progress(share, text)
 
 
 def with_ports(spec: Any, kinds: Mapping[str, str]) -> Any:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from gearfmu.commands.models import by_text
 from gearfmu.commands.shared import echo_pairs, progress_bar
 
 
@@ -53,10 +54,10 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
 
     spec = load_stage(stage)
     with progress_bar("reducing") as progress:
-        bodies = reduce_stage(spec, out_dir=out, force=force, progress=progress)
+        bodies = reduce_stage(spec, out_dir=out, force=force, progress=by_text(progress))
     for body in bodies:
-        top = body.frequency[-1] / 1e3
-        click.echo(f"{body.name}: {body.frequency.size} modes to {top:.0f} kHz, mass {body.mass:.4g} kg, input {body.input_hash[:12]}")
+        click.echo(f"{body.name}: {body.modes} modes to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, "
+                   f"frequency response within {body.frf.max_error:.1e} to {body.frf.band[1] / 1e3:.0f} kHz, input {body.input_hash[:12]}")  # fmt: skip
 
 
 def _chosen(gears: tuple, only: str | None) -> list:

@@ -166,9 +166,9 @@ def _accuracy(summary: Mapping[str, Any], bodies: Sequence[Any] | None) -> list[
 
 
 def _frf_words(body: Any) -> str:
-    worst = int(np.argmax(body.frf.error))
-    return (f"Body {body.name}: largest relative error of the reduced frequency response {body.frf.error[worst]:.2e} "
-            f"at {body.frf.frequency[worst]:.0f} Hz, band {body.frf.band[0]:g} to {body.frf.band[1]:g} Hz.")  # fmt: skip
+    frf = body.frf
+    return (f"Body {body.name}: frequency response of the modes below {frf.cut / 1e3:g} kHz with their static residual against the finite elements: "
+            f"largest relative error {frf.max_error:.1e} from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be trusted up to {frf.trusted_to / 1e3:.3g} kHz.")  # fmt: skip
 
 
 def _provenance(summary: Mapping[str, Any]) -> dict[str, str]:
