@@ -25,7 +25,7 @@ else:
     import tomli as tomllib
 
 FROM_FILE = {"from_file": True}
-_NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*\S+.*$"
+_NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*$"
 
 
 class Spec(BaseModel):

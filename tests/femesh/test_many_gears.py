@@ -19,7 +19,9 @@ STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3, density=7850)
 
 
 def pair_of(teeth, shifts, module, widths, bores, widening) -> tuple[PairSpec, list[GearSpec]]:
-    """A pair of the standard rack at the centre distance without backlash plus `widening` modules; bores in root radii."""
+    """A pair of the standard rack at the centre distance without backlash plus `widening` modules; bores in root
+    radii.
+    """
     alpha = math.radians(20)
     inv_w = float(involute.inv(alpha)) + 2 * sum(shifts) * math.tan(alpha) / sum(teeth)
     cos_w = math.cos(involute.inverse_inv(max(inv_w, 1e-6)))

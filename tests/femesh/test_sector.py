@@ -56,10 +56,14 @@ def test_flank_faces_look_out_of_the_tooth_and_are_faces_of_elements(case: tuple
             assert sum(set(quad) <= element for element in elements) == 1
         # mid nodes (4 … 7) lie between the corners they belong to
         middle = 0.5 * (mesh.nodes[grid.quads[:, :4]] + mesh.nodes[grid.quads[:, [1, 2, 3, 0]]])
-        assert np.abs(mesh.nodes[grid.quads[:, 4:]] - middle).max() < 0.1 * np.linalg.norm(corners[:, 2] - corners[:, 0])
+        assert np.abs(mesh.nodes[grid.quads[:, 4:]] - middle).max() < 0.1 * np.linalg.norm(
+            corners[:, 2] - corners[:, 0]
+        )
 
 
-def test_flank_elements_are_equal_in_arc_length_and_halved_by_their_mid_nodes(case: tuple[GearGeometry, FeMesh]) -> None:
+def test_flank_elements_are_equal_in_arc_length_and_halved_by_their_mid_nodes(
+    case: tuple[GearGeometry, FeMesh],
+) -> None:
     _, mesh = case
     grid = mesh.flank[0]
     arc = grid.roll**2

@@ -95,7 +95,9 @@ def test_nominal_backlash_grows_with_the_centre_distance() -> None:
     """dj_wt/da = 2 tan α_wt at constant rotation ratio (working pitch circle grows too: below 1 %)."""
     step = 1e-6
     wide = replace(PAIR, a=PAIR.a + step)
-    assert (wide.nominal_backlash - PAIR.nominal_backlash) / step == pytest.approx(2 * math.tan(PAIR.alpha_wt), rel=0.01)
+    assert (wide.nominal_backlash - PAIR.nominal_backlash) / step == pytest.approx(
+        2 * math.tan(PAIR.alpha_wt), rel=0.01
+    )
     assert replace(PAIR, a=LOOSE.zero_backlash_center_distance).nominal_backlash == pytest.approx(0, abs=1e-15)
 
 

@@ -1,0 +1,104 @@
+"""The fingerprint of a body: what changes it, and what must not."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.stage import StageSpec, load_stage
+
+STAGE = load_stage("fzg_c")
+
+
+def with_field(field: str, value: Any, stage: StageSpec = STAGE) -> StageSpec:
+    """The stage with one field replaced ("gears.0.teeth")."""
+    parts: list[Any] = [int(part) if part.isdigit() else part for part in field.split(".")]
+
+    def put(owner: Any, rest: list[Any]) -> Any:
+        if not rest:
+            return value
+        key = rest[0]
+        if isinstance(owner, tuple):
+            return tuple(put(item, rest[1:]) if k == key else item for k, item in enumerate(owner))
+        if isinstance(owner, dict):
+            return owner | {key: put(owner[key], rest[1:])}
+        assert key in type(owner).model_fields
+        return owner.model_copy(update={key: put(getattr(owner, key), rest[1:])})
+
+    return put(stage, parts)
+
+
+def fingerprint(stage: StageSpec, index: int = 0) -> str:
+    return body_hash(body_inputs(stage, index))
+
+
+SHAPING = [
+    ("gears.0.teeth", 17),
+    ("gears.0.profile_shift", 0.2),
+    ("gears.0.tip_diameter", 82e-3),
+    ("gears.0.face_width", 15e-3),
+    ("gears.0.bore_diameter", 31e-3),
+    ("gears.0.tip_edge_radius", 0.1e-3),
+    ("gears.0.rack.dedendum", 1.3),
+    ("gears.0.rack.fillet_radius", 0.3),
+    ("gears.0.material.youngs_modulus", 207e9),
+    ("gears.0.material.density", 7800.0),
+    ("gears.0.material.poisson_ratio", 0.29),
+    ("gears.0.modal_damping", 0.02),
+    ("gears.0.body.strip_half_width", 0.6e-3),
+    ("gears.0.body.modes", 100),
+    ("gears.0.body.roll_points", 20),
+    ("gears.0.body.width_functions", 5),
+    ("gears.0.body.mesh.scale", 2.0),
+    ("gears.0.body.mesh.rim", 9),
+    ("pair.normal_module", 4.4e-3),
+    ("pair.pressure_angle", 0.4),
+]
+OTHERS = [
+    ("name", "x"),
+    ("description", "x"),
+    ("torque_max", 1.0),
+    ("speed_max", 1.0),
+    ("pair.backlash", 0.0),
+    ("pair.center_distance", 92e-3),
+    ("gears.0.name", "x"),
+    ("gears.0.rack.addendum", 1.1),
+    ("gears.1.teeth", 25),
+    ("gears.0.bearing.stiffness", 1e8),
+    ("contact.slices", 1),
+    ("contact.damping", 0.0),
+    ("ports.pinion.k", 1.0),
+    ("levels.fast_cut", 1e3),
+]
+
+
+@pytest.mark.parametrize(("field", "value"), SHAPING)
+def test_what_shapes_the_body_changes_its_hash(field: str, value: Any) -> None:
+    assert fingerprint(with_field(field, value)) != fingerprint(STAGE)
+
+
+@pytest.mark.parametrize(("field", "value"), OTHERS)
+def test_what_belongs_to_the_stage_does_not(field: str, value: Any) -> None:
+    assert fingerprint(with_field(field, value)) == fingerprint(STAGE)
+
+
+def test_every_field_of_a_gear_is_in_one_of_the_two_lists() -> None:
+    """A new field must be put into one of them, or it would silently not count."""
+    named = {field.split(".")[2] for field, _ in SHAPING + OTHERS if field.startswith("gears.0")}
+    assert named | {"tip_relief"} == set(type(STAGE.gears[0]).model_fields)
+
+
+def test_tip_relief_shares_the_bodies() -> None:
+    relieved = load_stage("fzg_c/stage_relief")
+    assert [fingerprint(relieved, k) for k in (0, 1)] == [fingerprint(STAGE, k) for k in (0, 1)]
+    assert fingerprint(STAGE, 0) != fingerprint(STAGE, 1)
+
+
+def test_hash_is_of_the_values_not_of_their_spelling() -> None:
+    inputs = body_inputs(STAGE, 0)
+    assert body_hash(json.loads(json.dumps(inputs))) == body_hash(dict(reversed(inputs.items())))
+    assert body_hash(inputs | {"profile_shift": -0.0}) == body_hash(inputs | {"profile_shift": 0.0})
+    assert body_hash({"a": 0.1}) == "9e3d5635fc1c09ff15c19f1089a0bfe03fbd8329cca722f9a2227060ac77dcaa"  # {"a":0.1}

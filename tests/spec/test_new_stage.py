@@ -1,0 +1,119 @@
+"""New stage files and the JSON schema."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from gearfmu.errors import SpecError
+from gearfmu.spec.base import read_toml
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.new import new_stage
+from gearfmu.spec.schema import stage_schema
+from gearfmu.spec.stage import load_stage
+
+
+@pytest.mark.parametrize("like", ["fzg_c", "fzg_c/stage_relief"])
+def test_a_new_stage_is_the_old_one_under_its_name(tmp_path: Path, like: str) -> None:
+    path = new_stage("mine", like, tmp_path)
+    assert path == tmp_path / "mine" / "stage.toml"
+    made, old = load_stage(path), load_stage(like)
+    assert made.name == "mine"
+    assert made.model_copy(update={"name": old.name, "source": old.source}) == old
+    assert [entry.name for entry in path.parent.iterdir()] == ["stage.toml"]
+
+
+def test_every_field_has_a_comment_and_every_default_is_shown(tmp_path: Path) -> None:
+    text = new_stage("mine", "fzg_c", tmp_path).read_text(encoding="utf-8")
+    fields = [line for line in text.splitlines() if " = " in line and not line.startswith("# A line")]
+    assert all(re.search(r"= .*  # \S", line) for line in fields)
+    assert any(line.startswith("backlash = ") and line.endswith("[m]") for line in fields)
+    assert any(line.startswith("# width_functions = 6") for line in fields)
+    assert any(line.startswith("# helix_angle = ") for line in fields)
+
+
+def test_shown_defaults_are_the_defaults(tmp_path: Path) -> None:
+    path = new_stage("mine", "fzg_c/stage_relief", tmp_path)
+    before = load_stage(path)
+    text = re.sub(r"^# (\w+ = [^…]*?)$", r"\1", path.read_text(encoding="utf-8"), flags=re.M)
+    assert "\nhelix_angle = " in text and "\nscale = " in text
+    path.write_text(text, encoding="utf-8")
+    assert load_stage(path) == before
+
+
+def test_an_existing_file_is_never_touched(tmp_path: Path) -> None:
+    path = new_stage("mine", "fzg_c", tmp_path)
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(SpecError, match="exists already"):
+        new_stage("mine", "fzg_c", tmp_path)
+    assert path.read_text(encoding="utf-8") == "mine"
+    assert os.listdir(path.parent) == ["stage.toml"]
+
+
+@pytest.mark.parametrize("name", ["", "A", "../x", "a/b", "1a", "a" * 41])
+def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SpecError, match="small letters"):
+        new_stage(name, "fzg_c", tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def resolve(schema: dict, part: dict) -> dict:
+    while "$ref" in part:
+        part = {key: value for key, value in part.items() if key != "$ref"} | schema["$defs"][
+            part["$ref"].split("/")[-1]
+        ]
+    return part
+
+
+def fits(schema: dict, part: dict, value: object) -> bool:
+    """A small judge of the JSON schema words that our schema uses."""
+    part = resolve(schema, part)
+    if "anyOf" in part:
+        return any(fits(schema, choice, value) for choice in part["anyOf"])
+    if "enum" in part or "const" in part:
+        return value in part.get("enum", [part.get("const")])
+    kinds = {"object": dict, "string": str, "integer": int, "number": (int, float)}
+    if not isinstance(value, kinds[part["type"]]):
+        return False
+    if part["type"] == "string":
+        return re.search(part.get("pattern", ""), value) is not None
+    if part["type"] != "object":
+        return part.get("minimum", value) <= value <= part.get("maximum", value)
+    properties, other = part.get("properties", {}), part.get("additionalProperties", False)
+    known = all(key in properties or isinstance(other, dict) for key in value)
+    return (
+        known
+        and set(part.get("required", [])) <= set(value)
+        and all(fits(schema, properties.get(key, other), item) for key, item in value.items())
+    )
+
+
+def test_schema_accepts_the_shipped_files_and_refuses_slips() -> None:
+    schema = json.loads(json.dumps(stage_schema()))
+    raw = read_toml(find_stage("fzg_c"))
+    assert fits(schema, schema, raw)
+    assert set(schema["else"]["required"]) <= set(raw)
+    assert fits(schema, schema, read_toml(find_stage("fzg_c/stage_relief")) | {"gears": raw["gears"]})
+    for slip in ({"torque_max": 600}, {"torque_max": "600"}, {"torqe": "1 N*m"}, {"levels": {"fast_cut": 5}}):
+        assert not fits(schema, schema, raw | slip)
+
+
+def test_schema_shows_units_meanings_and_defaults_as_in_a_file() -> None:
+    schema = stage_schema()
+    assert "source" not in schema["properties"]
+    gear = schema["$defs"]["GearSpec"]
+    assert gear["properties"]["tip_edge_radius"]["default"] == "0.0002 m"
+    assert gear["properties"]["face_width"]["unit"] == "m"
+    assert "name" not in gear["properties"]
+    assert '"null"' not in json.dumps(schema)
+    missing = [
+        f"{kind}.{name}"
+        for kind, part in schema["$defs"].items()
+        for name, field in part["properties"].items()
+        if not field.get("description")
+    ]
+    assert not missing

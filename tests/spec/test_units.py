@@ -1,0 +1,91 @@
+"""Quantities with units: what is read, and what is refused with which remedy."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gearfmu.errors import UnitError
+from gearfmu.units import to_si
+
+READ = [
+    ("600 N*m", "N*m", 600),
+    ("600 N·m", "N*m", 600),
+    ("600 Nm", "N*m", 600),
+    ("0.6 kNm", "N*m", 600),
+    ("600 N.m", "N*m", 600),
+    ("6000 rpm", "rad/s", 6000 * math.pi / 30),
+    ("20 deg", "rad", math.pi / 9),
+    ("20°", "rad", math.pi / 9),
+    ("0.1 mm", "m", 1e-4),
+    ("15 µm", "m", 15e-6),
+    ("15 μm", "m", 15e-6),  # Greek mu, not the micro sign
+    ("15um", "m", 15e-6),
+    ("120 kHz", "Hz", 120e3),
+    ("206 GPa", "Pa", 206e9),
+    ("206e3 N/mm^2", "Pa", 206e9),
+    ("27.6e3 N*s/m^2", "N*s/m^2", 27.6e3),
+    ("27.6 N·s/(m·mm)", "N*s/m^2", 27.6e3),
+    ("20 N*m/deg", "N*m/rad", 20 * 180 / math.pi),
+    ("7.85 g/cm^3", "kg/m^3", 7850),
+    ("7850 kg/m³", "kg/m^3", 7850),
+    ("-.5e-3 m", "m", -5e-4),
+    ("3", "", 3),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "value"), READ)
+def test_reads(text: str, unit: str, value: float) -> None:
+    assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+REFUSED = [
+    ("600", "N*m", "unit is missing"),
+    (600, "N*m", 'write "600 N*m"'),
+    (0.1, "m", "unit is missing"),
+    ("600 N", "N*m", "another kind"),
+    ("50 Hz", "rad/s", "another kind"),
+    ("314 rad/s", "Hz", "another kind"),
+    ("20 N*m", "N*m/rad", "another kind"),
+    ("3 furlongz", "m", "unknown unit"),
+    ("3 mm; import os", "m", "is no unit"),
+    ("three mm", "m", "not a number"),
+    ("", "m", "not a number"),
+    ("nan m", "m", "not a number"),
+    ("1e999 m", "m", "not finite"),
+    ("1 mm**99999", "m", "another kind"),
+    (True, "m", "expected a quantity"),
+    (None, "m", "expected a quantity"),
+    (["1 mm"], "m", "expected a quantity"),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "remedy"), REFUSED)
+def test_refuses_with_a_remedy(text: object, unit: str, remedy: str) -> None:
+    with pytest.raises(UnitError, match=remedy.replace("*", r"\*")):
+        to_si(text, unit)
+
+
+@given(st.floats(1e-6, 1e6))
+def test_the_same_length_in_other_units_is_the_same_number(metres: float) -> None:
+    value = float(f"{metres:.9g}")
+    texts = [f"{value!r} m", f"{value * 1e3:.9g} mm", f"{value * 1e2:.9g} cm", f"{value * 1e6:.9g} µm"]
+    assert len({to_si(text, "m") for text in texts}) == 1
+
+
+@given(st.text(max_size=30))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    try:
+        assert math.isfinite(to_si(text, "m"))
+    except UnitError as error:
+        assert len(str(error)) > 10
+
+
+def test_the_unit_library_is_loaded_only_when_a_unit_needs_it() -> None:
+    code = "import sys; from gearfmu.units import to_si; to_si('3 m', 'm'); sys.exit('pint' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
