@@ -115,8 +115,12 @@ static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data,
 /* stored energy and what the balance does not close; a new h is a new invariant: the balance goes on from there */
 static void balance(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
 {
-    const gk_coefficients *k = gk_flow_for(setup, h, setup->gamma);
+    const gk_coefficients *k = setup->integrator == RK45 ? &setup->work->explicit_rows : gk_flow_for(setup, h, setup->gamma);
     double *v = data->value, stored = gk_step_energy(model, setup, data, k);
+    if (setup->integrator == RK45) { /* keeps no account of works: no balance */
+        v[V_M_ENERGY] = stored;
+        return;
+    }
     if (data->balance_h != h) {
         data->ledger.baseline = stored - data->ledger.work + data->ledger.dissipated - v[V_M_RESIDUAL];
         data->balance_h = h;
@@ -199,8 +203,8 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
     gk_work *work = setup->work;
     const double before[2] = {work->outer[0], work->outer[1]};
     ports_at(data, work, c, model, tau + h);
-    gk_outcome outcome = gk_step_once(model, setup, data, h, setup->gamma);
-    if (outcome == GK_OK) return outcome;
+    gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : gk_step_once(model, setup, data, h, setup->gamma);
+    if (outcome == GK_OK || setup->integrator == RK45) return outcome;
     data->trouble++;
     work->outer[0] = before[0], work->outer[1] = before[1];
     if (depth < HALVINGS) {

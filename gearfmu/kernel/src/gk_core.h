@@ -97,12 +97,15 @@ typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | 
 } gk_modal;
 
 typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
-    gk_real *a11, *a12, *a21, *a22, *bq, *bv, *kappa, *inverse_s2;
+    gk_real *a11, *a12, *a21, *a22, *b0q, *b0v, *bq, *bv; /* flow; response to the force at the start and at the end of the step */
+    gk_real *mobility, *read_q, *read_v;                  /* what a force at the end does to a gap; the gap reads read_q q + read_v v */
+    gk_real *kappa, *inverse_s2;
     int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
 } gk_flow;
 
 typedef struct gk_coefficients {
-    double h, gamma, rigid_mobility, rigid_kappa; /* mobility h²/4 */
+    double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
+    int curved_read; /* mix4: the gap reads more than q */
     gk_flow flow[2];
     uint64_t age;
 } gk_coefficients;
@@ -153,7 +156,7 @@ struct gk_data {
     int64_t count;
     gk_motion input[2], blend[2]; /* outer ends at the start of the communication step; jump that is blended away */
     double hold[2];              /* angle a port is referred to */
-    double v_bore[2], balance_h;
+    double v_bore[2], balance_h, rk_h;
     double angle[2];             /* bore angle at a torque port, massless part included */
     double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
     gk_ledger ledger;
@@ -202,23 +205,29 @@ typedef struct gk_system { /* unknown forces of one step: contacts, then links *
 } gk_system;
 
 struct gk_work {
-    gk_coefficients cache[CACHE], at_rest;    /* at_rest: everything elastic is compliance (gk_static.c) */
+    gk_coefficients cache[CACHE];
+    gk_coefficients at_rest, explicit_rows;   /* everything elastic is compliance (gk_static.c); forces move nothing at once (gk_rk45.c) */
     uint64_t clock;
     gk_place place[MAX_PAIRS];
     int places;
     gk_real *qp[2], *vp[2], *force[2], *zero[2], *scaled; /* predicted modal state; modal force of the rows; zeros; row times coefficient */
-    const gk_real *y[2];                      /* displacement that the rows read: qp, or zero at rest */
+    gk_real *reading[2];                      /* read_q q + read_v v where that is not q */
+    const gk_real *y[2];                      /* displacement that the rows read: qp, reading, or zero at rest */
+    gk_real *stage[2][7], *trial[2];          /* rk45: derivatives (v, a) and trial state (q, v) */
+    double stage_rigid[7][2 * RIGID], trial_rigid[2 * RIGID];
     gk_real *basis[2];                        /* (MAX_BASIS, n): rows of places × functions, then bore rows in inertial axes */
     double frame[RIGID], speed[RIGID];        /* predicted */
     double moved[RIGID];
-    double outer[2], outer_before[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
-    double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS];
+    double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
+    double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     double matrix[4 * MAX_ROWS * MAX_ROWS];
 };
 
 /* gk_vars.c */
 gk_effects gk_effects_of(const gk_data *data);
+/* gk_rk45.c */
+gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data *data, double h);
 /* gk_flow.c */
 const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma);
 /* gk_flank.c */
@@ -227,6 +236,7 @@ int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *fr
 void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work);
 /* gk_system.c */
 void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work);
+void gk_system_rates(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_real *const modal_speed[2], const double *speed, double *rate);
 int gk_system_basis(const gk_model *model, const gk_setup *setup, const gk_work *work, int row, int g, int *first, const double **c);
 /* gk_law.c */
 void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);
@@ -234,6 +244,7 @@ double gk_law_approach(const gk_local *law, double force, double *slope);
 double gk_law_energy(const gk_local *law, double force);
 /* gk_solve.c */
 void gk_solve_contacts(gk_system *s);
+void gk_solve_plain(gk_system *s);
 void gk_solve_energy(gk_system *s);
 double gk_solve_end_gap(const gk_system *s, int row);
 double gk_solve_massless(const gk_system *s, int row);

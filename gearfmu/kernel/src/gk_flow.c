@@ -7,45 +7,77 @@
 
 static const double EXPONENTIAL_BELOW = 1.2;
 
-typedef struct oscillator { double a11, a12, a21, a22, bq, bv, kappa, inverse_s2; } oscillator;
+typedef struct oscillator { double a11, a12, a21, a22, b0q, b0v, bq, bv, mobility, read_q, read_v, kappa, inverse_s2; } oscillator;
+
+static oscillator free_flow(double omega, double zeta, double h)
+{
+    double damped = omega * sqrt(1.0 - zeta * zeta), sine, cosine;
+    gk_sincos(damped * h, &sine, &cosine);
+    double e = gk_exp(-zeta * omega * h), ratio = zeta * omega / damped;
+    oscillator o = {e * (cosine + ratio * sine), e * sine / damped, -e * omega * omega / damped * sine, e * (cosine - ratio * sine), 0, 0, 0, 0, 0, 1.0, 0, 0, 1.0};
+    return o;
+}
 
 static oscillator exponential(double omega, double zeta, double h, double gamma)
 {
-    double decay = zeta * omega, damped = omega * sqrt(1.0 - zeta * zeta), sine, cosine, plain, unused;
-    gk_sincos(damped * h, &sine, &cosine);
+    oscillator o = free_flow(omega, zeta, h);
+    double plain, unused, omega2 = omega * omega;
     gk_sincos(omega * h, &plain, &unused);
-    double e = gk_exp(-decay * h), ratio = decay / damped, sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
-    oscillator o = {e * (cosine + ratio * sine), e * sine / damped, -e * omega * omega / damped * sine, e * (cosine - ratio * sine), 0, 0, 0, sigma};
-    o.bq = 0.5 * (1.0 - o.a11) / (omega * omega * sigma);
-    o.bv = 0.5 * o.a12 / sigma;
-    o.kappa = (1.0 / sigma - 1.0) / (omega * omega);
+    double sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
+    o.bq = o.b0q = o.mobility = 0.5 * (1.0 - o.a11) / (omega2 * sigma);
+    o.bv = o.b0v = 0.5 * o.a12 / sigma;
+    o.kappa = (1.0 / sigma - 1.0) / omega2;
+    o.inverse_s2 = sigma;
     return o;
 }
 
 static oscillator trapezoidal(double omega, double zeta, double h)
 {
-    double c = zeta * omega * h, k = 0.25 * omega * omega * h * h, d = 1.0 + c + k;
-    oscillator o = {(1.0 + c - k) / d, h / d, -omega * omega * h / d, (1.0 - c - k) / d, 0.25 * h * h / d, 0.5 * h / d, 0.0, 1.0};
+    double c = zeta * omega * h, k = 0.25 * omega * omega * h * h, d = 1.0 + c + k, bq = 0.25 * h * h / d, bv = 0.5 * h / d;
+    oscillator o = {(1.0 + c - k) / d, h / d, -omega * omega * h / d, (1.0 - c - k) / d, bq, bv, bq, bv, bq, 1.0, 0, 0, 1.0};
     return o;
+}
+
+/* mix4: force linear in the step, gap at q − (h²/12) q̈ (the scheme before dg4, for comparison) */
+static oscillator linear_force(double omega, double zeta, double h)
+{
+    oscillator o = free_flow(omega, zeta, h);
+    double omega2 = omega * omega, twelfth = h * h / 12.0, loss = 2.0 * zeta * omega;
+    double q0 = -loss / (h * omega2 * omega2), v0 = 1.0 / (h * omega2); /* particular solution of the ramp at its start */
+    o.bq = q0 + 1.0 / omega2 - o.a11 * q0 - o.a12 * v0;
+    o.bv = v0 - o.a21 * q0 - o.a22 * v0;
+    o.b0q = (1.0 - o.a11) / omega2 - o.bq;
+    o.b0v = o.a12 - o.bv;
+    o.read_q = 1.0 + omega2 * twelfth;
+    o.read_v = loss * twelfth;
+    o.mobility = o.read_q * o.bq + o.read_v * o.bv - twelfth;
+    return o;
+}
+
+static void store(gk_flow *f, int i, const oscillator *o)
+{
+    f->a11[i] = (gk_real)o->a11, f->a12[i] = (gk_real)o->a12, f->a21[i] = (gk_real)o->a21, f->a22[i] = (gk_real)o->a22;
+    f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
+    f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
+    f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
 }
 
 static void fill(const gk_setup *setup, gk_coefficients *k, int g)
 {
     const gk_modal *modal = &setup->modal[g];
-    gk_flow *flow = &k->flow[g];
     int exact = 0;
     for (int i = 0; i < modal->n; i++) {
         double omega = modal->omega[i], zeta = setup->on.modal_damping ? modal->zeta[i] : 0.0;
-        oscillator o = {0, 0, 0, 0, 0, 0, 0, 0};
-        if (omega > 0.0) {
-            int exponential_mode = omega * k->h < EXPONENTIAL_BELOW;
-            o = exponential_mode ? exponential(omega, zeta, k->h, k->gamma) : trapezoidal(omega, zeta, k->h);
-            if (exponential_mode && i % modal->pairs + 1 > exact) exact = i % modal->pairs + 1;
+        oscillator o = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+        if (omega > 0.0 && omega * k->h >= EXPONENTIAL_BELOW) o = trapezoidal(omega, zeta, k->h);
+        else if (omega > 0.0 && setup->integrator == MIX4) o = linear_force(omega, zeta, k->h);
+        else if (omega > 0.0) {
+            o = exponential(omega, zeta, k->h, k->gamma);
+            if (i % modal->pairs + 1 > exact) exact = i % modal->pairs + 1;
         }
-        flow->a11[i] = (gk_real)o.a11, flow->a12[i] = (gk_real)o.a12, flow->a21[i] = (gk_real)o.a21, flow->a22[i] = (gk_real)o.a22;
-        flow->bq[i] = (gk_real)o.bq, flow->bv[i] = (gk_real)o.bv, flow->kappa[i] = (gk_real)o.kappa, flow->inverse_s2[i] = (gk_real)o.inverse_s2;
+        store(&k->flow[g], i, &o);
     }
-    flow->exact = (exact + LANES - 1) / LANES * LANES;
+    k->flow[g].exact = (exact + LANES - 1) / LANES * LANES;
 }
 
 /* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */
@@ -63,7 +95,10 @@ const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma
     }
     oldest->h = h;
     oldest->gamma = gamma;
-    oldest->rigid_mobility = 0.25 * h * h;
+    oldest->curved_read = setup->integrator == MIX4;
+    oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
+    oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
+    oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
     oldest->rigid_kappa = gamma * h * h / 6.0;
     for (int g = 0; g < 2; g++) fill(setup, oldest, g);
     oldest->age = ++work->clock;

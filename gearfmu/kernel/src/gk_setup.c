@@ -47,8 +47,9 @@ static void lay_out_flow(bump *b, const gk_setup *setup, gk_coefficients *k)
 {
     for (int g = 0; g < 2; g++) {
         size_t bytes = (size_t)setup->modal[g].n * sizeof(gk_real);
-        gk_real **array[8] = {&k->flow[g].a11, &k->flow[g].a12, &k->flow[g].a21, &k->flow[g].a22, &k->flow[g].bq, &k->flow[g].bv, &k->flow[g].kappa, &k->flow[g].inverse_s2};
-        for (int i = 0; i < 8; i++) *array[i] = take(b, bytes);
+        gk_flow *f = &k->flow[g];
+        gk_real **array[] = {&f->a11, &f->a12, &f->a21, &f->a22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+        for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = take(b, bytes);
     }
 }
 
@@ -67,12 +68,16 @@ static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const 
         work->vp[g] = take(&b, n * sizeof(gk_real));
         work->force[g] = take(&b, n * sizeof(gk_real));
         work->zero[g] = take(&b, n * sizeof(gk_real));
+        work->reading[g] = take(&b, n * sizeof(gk_real));
+        for (int i = 0; i < 7; i++) work->stage[g][i] = take(&b, 2 * n * sizeof(gk_real));
+        work->trial[g] = take(&b, 2 * n * sizeof(gk_real));
         work->basis[g] = take(&b, (size_t)(MAX_PAIRS * model->gear[g].functions + BORE_ROWS) * n * sizeof(gk_real));
         if (setup->modal[g].n > widest) widest = setup->modal[g].n;
     }
     work->scaled = take(&b, (size_t)widest * sizeof(gk_real));
     for (int i = 0; i < CACHE; i++) lay_out_flow(&b, setup, &work->cache[i]);
     lay_out_flow(&b, setup, &work->at_rest);
+    lay_out_flow(&b, setup, &work->explicit_rows);
     return b.used;
 }
 
@@ -261,17 +266,23 @@ static void fill_links(const gk_model *model, gk_setup *setup)
     }
 }
 
-/* the coefficients with which everything elastic is compliance: no motion of modes in a "step", κ = −1/ω² puts them back into C′ */
-static void fill_at_rest(gk_setup *setup)
+/* coefficients of systems in which no time passes: at rest κ = −1/ω² puts the dynamic modes into C′ too; for explicit integration C′ is the massless part alone */
+static void fill_timeless(gk_setup *setup)
 {
-    gk_coefficients *k = &setup->work->at_rest;
-    k->h = 1.0, k->gamma = 0.0, k->rigid_kappa = 0.0, k->rigid_mobility = 0.0;
-    for (int g = 0; g < 2; g++) {
-        const gk_modal *m = &setup->modal[g];
-        memset(setup->work->zero[g], 0, (size_t)m->n * sizeof(gk_real));
-        memset(k->flow[g].bq, 0, (size_t)m->n * sizeof(gk_real));
-        for (int i = 0; i < m->n; i++) k->flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
-        k->flow[g].exact = m->pairs;
+    gk_coefficients *both[2] = {&setup->work->at_rest, &setup->work->explicit_rows};
+    for (int c = 0; c < 2; c++) {
+        gk_coefficients *k = both[c];
+        k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = k->rigid_b0 = k->rigid_bq = 0.0, k->curved_read = 0;
+        for (int g = 0; g < 2; g++) {
+            const gk_modal *m = &setup->modal[g];
+            memset(setup->work->zero[g], 0, (size_t)m->n * sizeof(gk_real));
+            memset(k->flow[g].mobility, 0, (size_t)m->n * sizeof(gk_real));
+            for (int i = 0; i < m->n; i++) {
+                k->flow[g].kappa[i] = c == 0 && m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
+                k->flow[g].inverse_s2[i] = 1;
+            }
+            k->flow[g].exact = c == 0 ? m->pairs : 0;
+        }
     }
 }
 
@@ -289,6 +300,10 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     if (setup->level == LEVEL_PAPER) setup->on.residual = 0;
     setup->slices = (int)data->value[V_M_SLICES];
     setup->functions = model->gear[0].functions;
+    if (setup->integrator == RK45 && (model->port[0].chain || model->port[1].chain)) {
+        snprintf(message, GK_MESSAGE, "integrator rk45 knows no clutch: use dg4, or export the stage without the chain");
+        return GK_BAD_VALUE;
+    }
     setup->allowance = model->kind == KIND_PAIR ? (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance : 0.0;
     setup->damping = data->value[V_M_DAMPING];
     int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
@@ -306,7 +321,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     }
     fill_slices(model, setup);
     fill_links(model, setup);
-    fill_at_rest(setup);
+    fill_timeless(setup);
     gk_outcome outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
     return outcome;

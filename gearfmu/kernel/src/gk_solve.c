@@ -275,13 +275,19 @@ static void sensitivity(const gk_system *s, double *p, double *w)
     }
 }
 
+/* Contacts alone, without the scalar: η is the dashpots' */
+void gk_solve_plain(gk_system *s)
+{
+    s->alpha = 0.0;
+    memset(s->direction, 0, (size_t)s->n * sizeof *s->direction);
+    gk_solve_contacts(s);
+}
+
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the massless part's energy change equal its work. */
 void gk_solve_energy(gk_system *s)
 {
     double p[MAX_ROWS] = {0}, w[MAX_ROWS] = {0};
-    s->alpha = 0.0;
-    memset(s->direction, 0, (size_t)s->n * sizeof *s->direction);
-    gk_solve_contacts(s);
+    gk_solve_plain(s);
     int changed = s->curved;
     for (int i = 0; i < s->contacts; i++) changed |= (s->force0[i] > 0.0) != (s->force[i] > 0.0);
     if (!changed) return;

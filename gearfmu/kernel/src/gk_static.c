@@ -62,9 +62,7 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
     gk_rows_form(model, rest, work->frame, work);
     gk_system_form(model, rest, data, &work->at_rest, work);
     gk_step_recall(rest, data, s);
-    s->alpha = 0.0;
-    memset(s->direction, 0, sizeof s->direction);
-    gk_solve_contacts(s);
+    gk_solve_plain(s);
     for (int d = 0; d < RIGID; d++) {
         double z = 0.0;
         for (int i = 0; i < s->n; i++) z += s->rigid[i][d] * s->z[i];

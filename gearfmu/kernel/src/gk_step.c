@@ -14,15 +14,19 @@ static void predict(const gk_setup *setup, const gk_data *data, const gk_coeffic
         const gk_real *v = q + n, *f = v + n;
         const gk_flow *w = &k->flow[g];
         for (int i = 0; i < n; i++) {
-            work->qp[g][i] = w->a11[i] * q[i] + w->a12[i] * v[i] + w->bq[i] * f[i];
-            work->vp[g][i] = w->a21[i] * q[i] + w->a22[i] * v[i] + w->bv[i] * f[i];
+            work->qp[g][i] = w->a11[i] * q[i] + w->a12[i] * v[i] + w->b0q[i] * f[i];
+            work->vp[g][i] = w->a21[i] * q[i] + w->a22[i] * v[i] + w->b0v[i] * f[i];
         }
         work->y[g] = work->qp[g];
+        if (k->curved_read) {
+            for (int i = 0; i < n; i++) work->reading[g][i] = w->read_q[i] * work->qp[g][i] + w->read_v[i] * work->vp[g][i];
+            work->y[g] = work->reading[g];
+        }
         q += 3 * n;
     }
     for (int d = 0; d < RIGID; d++) {
         const double acceleration = data->f[d] * setup->inverse_mass[d];
-        work->frame[d] = data->x[d] + k->h * data->v[d] + k->rigid_mobility * acceleration;
+        work->frame[d] = data->x[d] + k->h * data->v[d] + k->rigid_b0 * acceleration;
         work->speed[d] = data->v[d] + 0.5 * k->h * acceleration;
     }
 }
@@ -140,7 +144,7 @@ static void correct(const gk_model *model, const gk_setup *setup, gk_data *data,
             if (s->kind[i] != ROW_CLUTCH) force += s->rigid[i][d] * s->force[i];
         }
         const double before = data->x[d];
-        data->x[d] = work->frame[d] + k->rigid_mobility * setup->inverse_mass[d] * z;
+        data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
         data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_mass[d] * z;
         data->f[d] = force;
         work->moved[d] = data->x[d] - before;
@@ -210,7 +214,8 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_rows_form(model, setup, work->frame, work);
     gk_system_form(model, setup, data, k, work);
     gk_step_recall(setup, data, s);
-    gk_solve_energy(s);
+    if (setup->integrator == MIX4) gk_solve_plain(s);
+    else gk_solve_energy(s);
     if (!all_finite(s)) return GK_DIVERGED;
     correct(model, setup, data, k);
     account(setup, data);

@@ -18,7 +18,7 @@ static int bore_row(const gk_model *model, int link, int g)
     }
 }
 
-static void link_gradient(const gk_model *model, int link, const gk_work *work, int places_rows[2], double *rigid)
+static void link_gradient(const gk_model *model, int link, const gk_work *work, int bore, double *rigid)
 {
     int g = link == BEARING_1X || link == BEARING_1Y || link == PORT_1 || link == SHAFT_1 || link == CLUTCH_1;
     int phi = g ? PHIB : PHIA;
@@ -26,11 +26,11 @@ static void link_gradient(const gk_model *model, int link, const gk_work *work, 
     switch (link) {
     case BEARING_0X: case BEARING_1X:
         rigid[3 * g] = 1.0;
-        rigid[phi] = -work->read[g][places_rows[g] + BORE_Y]; /* the elastic bore displacement turns with the frame */
+        rigid[phi] = -work->read[g][bore + BORE_Y]; /* the elastic bore displacement turns with the frame */
         break;
     case BEARING_0Y: case BEARING_1Y:
         rigid[3 * g + 1] = 1.0;
-        rigid[phi] = work->read[g][places_rows[g] + BORE_X];
+        rigid[phi] = work->read[g][bore + BORE_X];
         break;
     case PORT_0: case PORT_1: rigid[model->port[g].chain ? INERTIA_0 + g : phi] = 1.0; break;
     case SHAFT_0: case SHAFT_1: rigid[phi] = 1.0, rigid[DISC_0 + g] = -1.0; break;
@@ -38,11 +38,11 @@ static void link_gradient(const gk_model *model, int link, const gk_work *work, 
     }
 }
 
-/* displacement read by every basis row, B·y */
-static void gather(const gk_setup *setup, gk_work *work, int g, int rows)
+/* what every basis row reads of y, B·y */
+static void gather(const gk_setup *setup, const gk_work *work, int g, int rows, const gk_real *y, double *read)
 {
     const int n = setup->modal[g].n;
-    for (int i = 0; i < rows; i++) work->read[g][i] = n ? gk_dot(work->basis[g] + (size_t)i * n, work->y[g], n) : 0.0;
+    for (int i = 0; i < rows; i++) read[i] = n ? gk_dot(work->basis[g] + (size_t)i * n, y, n) : 0.0;
 }
 
 /* B diag(w) Bᵀ over `lanes` of both halves, added to out with factor */
@@ -185,38 +185,64 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
     }
 }
 
-/* gaps at the predicted frames: undeformed gap minus outward elastic displacement; springs measure relative to their outer ends */
-static void gaps(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work)
+/* elastic part of row i from what the basis rows read, in the row's own sense */
+static double elastic(const gk_model *model, const gk_setup *setup, const gk_work *work, int i, double (*const read)[MAX_BASIS])
+{
+    double sum = 0.0;
+    for (int g = 0; g < 2; g++) {
+        const double *c;
+        int first, count = gk_system_basis(model, setup, work, i, g, &first, &c);
+        for (int a = 0; a < count; a++) sum += c[a] * read[g][first + a];
+    }
+    return work->system.kind[i] == ROW_CONTACT ? -sum : sum;
+}
+
+/* rigid part of a link's displacement: its gradient times the coordinates, but not the turning part of the bearing rows, which is a derivative and no displacement */
+static double rigid_part(const gk_system *s, int i, const double *x)
+{
+    double sum = 0.0;
+    for (int d = 0; d < RIGID; d++)
+        if (s->link_of[i] > BEARING_1Y || (d != PHIA && d != PHIB)) sum += s->rigid[i][d] * x[d];
+    return sum;
+}
+
+/* gaps at the predicted frames: undeformed gap minus outward elastic displacement; springs measure relative to their outer ends; clutches read half a step of slip */
+static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work *work)
 {
     gk_system *s = &work->system;
-    (void)data;
+    const int bore = work->places * setup->functions;
     for (int i = 0; i < s->n; i++) {
-        double elastic = 0.0;
-        for (int g = 0; g < 2; g++) {
-            const double *c;
-            int first, count = gk_system_basis(model, setup, work, i, g, &first, &c);
-            for (int a = 0; a < count; a++) elastic += c[a] * work->read[g][first + a];
-        }
-        if (i < s->contacts) {
-            s->g[i] = work->place[s->place_of[i]].gap - elastic;
-            memcpy(s->rigid[i], work->place[s->place_of[i]].gradient, 6 * sizeof(double));
+        s->g[i] = elastic(model, setup, work, i, work->read);
+        const int port = s->link_of[i] - PORT_0;
+        switch (s->kind[i]) {
+        case ROW_CONTACT: {
+            const gk_place *p = &work->place[s->place_of[i]];
+            s->g[i] += p->gap;
+            memcpy(s->rigid[i], p->gradient, sizeof p->gradient);
             memset(s->rigid[i] + 6, 0, (RIGID - 6) * sizeof(double));
-            continue;
+            break;
         }
-        int link = s->link_of[i], places_rows[2] = {work->places * setup->functions, work->places * setup->functions};
-        link_gradient(model, link, work, places_rows, s->rigid[i]);
-        const double *x = link >= CLUTCH_0 ? work->speed : work->frame;
-        double scale = link >= CLUTCH_0 ? 0.5 * h : 1.0;
-        s->g[i] = elastic;
-        switch (link) { /* not rigid·x: the turning part of the bearing rows is a derivative, not a displacement */
-        case BEARING_0X: s->g[i] += x[XA]; break;
-        case BEARING_0Y: s->g[i] += x[YA]; break;
-        case BEARING_1X: s->g[i] += x[XB]; break;
-        case BEARING_1Y: s->g[i] += x[YB]; break;
+        case ROW_CLUTCH:
+            link_gradient(model, s->link_of[i], work, bore, s->rigid[i]);
+            s->g[i] += 0.5 * h * rigid_part(s, i, work->speed);
+            break;
         default:
-            for (int d = 0; d < RIGID; d++) s->g[i] += scale * s->rigid[i][d] * x[d];
-            if ((link == PORT_0 || link == PORT_1) && s->kind[i] == ROW_SPRING) s->g[i] -= work->outer[link - PORT_0];
+            link_gradient(model, s->link_of[i], work, bore, s->rigid[i]);
+            s->g[i] += rigid_part(s, i, work->frame) - (s->kind[i] == ROW_SPRING && port >= 0 && port < 2 ? work->outer[port] : 0.0);
         }
+    }
+}
+
+/* d/dt of the gaps that the rows read, for given modal and rigid speeds, at the system formed last */
+void gk_system_rates(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_real *const modal_speed[2], const double *speed, double *rate)
+{
+    const gk_system *s = &work->system;
+    for (int g = 0; g < 2; g++) gather(setup, work, g, work->places * setup->functions + BORE_ROWS, modal_speed[g], work->read_rate[g]);
+    for (int i = 0; i < s->n; i++) {
+        const int port = s->link_of[i] - PORT_0;
+        rate[i] = elastic(model, setup, work, i, work->read_rate);
+        for (int d = 0; d < RIGID; d++) rate[i] += s->rigid[i][d] * speed[d];
+        if (s->kind[i] == ROW_SPRING && port >= 0 && port < 2) rate[i] -= work->outer_speed[port];
     }
 }
 
@@ -233,16 +259,16 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     memset(s->D, 0, 2 * (size_t)n * n * sizeof(double));
     for (int g = 0; g < 2; g++) {
         double *d = work->gram_d[g], *c = work->gram_c[g];
-        gather(setup, work, g, rows);
+        gather(setup, work, g, rows, work->y[g], work->read[g]);
         memset(d, 0, (size_t)rows * rows * sizeof *d);
         memset(c, 0, (size_t)rows * rows * sizeof *c);
         if (setup->on.residual) residual(model, setup, work->frame, work, g, rows, c);
-        gram(setup, work, g, rows, k->flow[g].bq, setup->modal[g].pairs, 1.0, d);
+        gram(setup, work, g, rows, k->flow[g].mobility, setup->modal[g].pairs, 1.0, d);
         gram(setup, work, g, rows, k->flow[g].kappa, k->flow[g].exact, -1.0, c);
         project(model, setup, work, g, rows, d, s->D);
         project(model, setup, work, g, rows, c, s->C);
     }
-    gaps(model, setup, data, k->h, work);
+    gaps(model, setup, k->h, work);
     for (int i = 0; i < n; i++) {
         for (int j = i; j < n; j++) {
             double sum = 0.0;
