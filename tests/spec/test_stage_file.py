@@ -322,7 +322,8 @@ FIELDS = [
     "pair.center_distance", "pair.normal_module", "pair.pressure_angle", "pair.backlash", "gears.pinion.teeth",
     "gears.wheel.profile_shift", "gears.wheel.tip_diameter", "gears.pinion.bore_diameter", "gears.wheel.face_width",
     "gears.pinion.rack.dedendum", "gears.pinion.rack.fillet_radius", "gears.pinion.tip_edge_radius", "torque_max",
-    "gears", "ports", "levels", "contact", "gears.pinion", "gears.pinion.tip_relief", "gears.wheel.body.strip_half_width",
+    "gears", "ports", "levels", "contact", "gears.pinion", "gears.pinion.tip_relief",
+    "gears.wheel.body.strip_half_width",
 ]  # fmt: skip
 
 
