@@ -66,9 +66,13 @@ def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
 
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
     """Torque of a four-stroke four-cylinder engine, N·m, over the crank angle: mean and orders 2, 4, 6 (cosines, all at their maximum at angle zero)."""
-    orders = ((2, car.order_2), (4, car.order_4), (6, car.order_6))
-    mean, cos = car.engine_torque, math.cos
-    return lambda time, phi, w: mean + sum(amplitude * cos(order * phi) for order, amplitude in orders)
+    mean, second, fourth, sixth, cos = car.engine_torque, car.order_2, car.order_4, car.order_6, math.cos
+
+    def torque(time: float, phi: float, w: float) -> float:
+        c = cos(2.0 * phi)
+        return mean + second * c + fourth * (2.0 * c * c - 1.0) + sixth * c * (4.0 * c * c - 3.0)
+
+    return torque
 
 
 def road_load(car: PassengerCar) -> Callable[[float, float, float], float]:

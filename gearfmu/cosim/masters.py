@@ -40,6 +40,7 @@ class _Exchange:
         self.stage_tau: Any = cut.stage.resolve([f"{shaft}.tau" for shaft in cut.shafts])
         self.stage_mean: Any = cut.stage.resolve([f"{shaft}.tau_mean" for shaft in cut.shafts])
         self.drive_motion: Any = cut.drive.resolve(motion)
+        self.drive_phi_w: Any = cut.drive.resolve([f"{shaft}.{key}" for key in ("phi", "w") for shaft in cut.shafts])
         self.drive_phi: Any = cut.drive.resolve([f"{shaft}.phi" for shaft in cut.shafts])
         self.drive_tau: Any = cut.drive.resolve([f"{shaft}.tau" for shaft in cut.shafts])
 
@@ -55,13 +56,12 @@ class _Exchange:
         self.set_signals(lambda first, _: first, time, time)
         cut.stage.initialize(time)
 
-    def step_drive(self, tau: np.ndarray, time: float, h: float) -> None:
-        """Step the drivetrain under torques that are held, and count their work."""
+    def step_drive(self, tau: np.ndarray, phi: np.ndarray, time: float, h: float) -> None:
+        """Step the drivetrain from the angles phi under torques that are held, and count their work."""
         drive = self.cut.drive
-        before = drive.get(self.drive_phi).copy()
         drive.set(self.drive_tau, tau)
         drive.step(time, h)
-        work = tau * (drive.get(self.drive_phi) - before)
+        work = tau * (drive.get(self.drive_phi) - phi)
         self.work += float(work.sum())
         self.throughput += float(np.abs(work).sum())
 
@@ -73,7 +73,7 @@ class GsMean:
 
     def __init__(self, cut: Cut) -> None:
         self.exchange = _Exchange(cut)
-        self._tau = np.zeros(len(cut.shafts))
+        self._tau, self._motion = np.zeros(len(cut.shafts)), np.zeros((3, len(cut.shafts)))
 
     def begin(self, time: float) -> None:
         """Initialise both units."""
@@ -84,20 +84,22 @@ class GsMean:
     def step(self, time: float, h: float) -> None:
         """One communication step of both units."""
         x, stage = self.exchange, self.exchange.cut.stage
-        stage.set(x.stage_motion, self._predict(time, h))
+        motion = self._predict(time, h)
+        stage.set(x.stage_motion, motion.T.ravel())
         x.set_signals(lambda first, last: 0.5 * (first + last), time, time + h)
         stage.step(time, h)
         self._tau[:] = stage.get(x.stage_mean)
-        x.step_drive(self._tau, time, h)
+        x.step_drive(self._tau, motion[0], time, h)
 
     def _predict(self, time: float, h: float) -> np.ndarray:
+        """(3, shafts) φ, w at the start of the step, and the constant acceleration that leads to the predicted angle."""
         x, drive = self.exchange, self.exchange.cut.drive
-        motion = drive.get(x.drive_motion).copy()
+        motion = self._motion
+        motion[:2].flat = drive.get(x.drive_phi_w)
         state = drive.save()
         drive.set(x.drive_tau, self._tau)
         drive.step(time, h)
-        end = drive.get(x.drive_phi)
-        motion[2::3] = 2.0 * (end - motion[0::3] - motion[1::3] * h) / h**2
+        motion[2] = 2.0 * (drive.get(x.drive_phi) - motion[0] - motion[1] * h) / h**2
         drive.restore(state)
         return motion
 
@@ -123,7 +125,7 @@ class Jacobi:
         cut.stage.set(x.stage_motion, motion)
         x.set_signals(lambda first, _: first, time, time + h)
         cut.stage.step(time, h)
-        x.step_drive(tau, time, h)
+        x.step_drive(tau, motion[0::3], time, h)
 
 
 Master = GsMean | Jacobi

@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -143,9 +144,8 @@ class PyUnit:
             np.dot(rows, np.concatenate([state.x, self._inputs(state.time, state.x)]), out=handle.buffer)
         else:
             np.dot(rows, state.x, out=handle.buffer)
-        if len(handle.special):
-            first = len(self.dynamics.output_names)
-            handle.buffer[handle.special] = self._special_outputs()[handle.outputs[handle.special] - first]
+        for place in handle.special:
+            handle.buffer[place] = self._special[handle.outputs[place]]()
         return handle.buffer
 
     def _rows(self, handle: Handle) -> np.ndarray:
@@ -261,12 +261,6 @@ class PyUnit:
         ends = [clutch.capacity.ends(t0, t1) for clutch in self.network.clutches]
         return np.array([max(e[0], 0.0) for e in ends]), np.array([max(e[1], 0.0) for e in ends])
 
-    def _special_outputs(self) -> np.ndarray:
-        state, n = self._state, self.dynamics.n
-        sources = [function(state.time, float(state.x[node]), float(state.x[n + node])) for node, function in self._sources]
-        locked = [float(sign == 0) for sign in state.mode[0]]
-        return np.array([*state.tau_mean, *locked, *sources, state.work, self.energy()])
-
     def energy(self) -> float:
         """Kinetic energy of the inertias and potential energy of the springs, J."""
         x, d = self._state.x, self.dynamics
@@ -277,13 +271,29 @@ class PyUnit:
             energy += 0.5 * spring.k * stretched**2
         return float(energy)
 
+    def _special_outputs(self) -> dict[str, Callable[[], float]]:
+        """Outputs that are not linear in state and input."""
+        network, d = self.network, self.dynamics
+        found = {f"{network.nodes[node].name}.tau_mean": partial(self._mean, k) for k, node in enumerate(d.driven)}
+        found |= {f"{clutch.name}.locked": partial(self._locked, k) for k, clutch in enumerate(network.clutches)}
+        found |= {f"{source.name}.tau": partial(self._source, d.node[source.node], source.torque) for source in network.sources}
+        return found | {"energy.work": lambda: self._state.work, "energy.stored": self.energy}
+
+    def _mean(self, k: int) -> float:
+        return float(self._state.tau_mean[k])
+
+    def _locked(self, k: int) -> float:
+        return float(self._state.mode[0][k] == 0)
+
+    def _source(self, node: int, torque: Callable[[float, float, float], float]) -> float:
+        return torque(self._state.time, float(self._state.x[node]), float(self._state.x[self.dynamics.n + node]))
+
     def _name_outputs(self) -> dict[str, int]:
-        d, network = self.dynamics, self.network
-        names = dict(d.output_names)
-        other = [f"{network.nodes[k].name}.tau_mean" for k in d.driven] + [f"{clutch.name}.locked" for clutch in network.clutches]
-        other += [f"{source.name}.tau" for source in network.sources] + ["energy.work", "energy.stored"]
+        """Position of every output: the linear ones, then the special ones, then the ports' names for some of both."""
+        network, names, special = self.network, dict(self.dynamics.output_names), self._special_outputs()
         first = len(names)
-        names |= {name: first + k for k, name in enumerate(other)}
+        names |= {name: first + k for k, name in enumerate(special)}
+        self._special = dict(enumerate(special.values(), start=first))
         for port, node in network.torque_ports.items():
             names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("phi", "w", "a")}
         for port, node in network.motion_ports.items():

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu import fmu
-from gearfmu.body import load_body
+from gearfmu.body import load_stage_bodies
 from gearfmu.cosim.accuracy import Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import Shafts, build, stage_ports, stage_signals, stage_start
@@ -24,7 +24,6 @@ from gearfmu.cosim.masters import Cut
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
-from gearfmu.spec.library import model_folder
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, assemble
@@ -73,7 +72,7 @@ def run(scene: SceneSpec | str, out_dir: str | Path | None = None, unit: str = "
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     spec = load_stage(scene.stage.name)
-    bodies = [load_body(model_folder(spec) / f"{gear.name}.h5") for gear in spec.gears]
+    bodies = load_stage_bodies(spec)
     return assemble(spec.model_copy(update={"ports": stage_ports(scene, shafts_of(spec))}), bodies)
 
 
