@@ -1,0 +1,66 @@
+"""The kernel compiled together with inner_probe.c: places of contact, local law and step limit of a prepared model."""
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from probes import FLAGS, HERE, source_folder
+
+from gearfmu.kernel import Kernel
+from gearfmu.kernel.build import fmi_headers
+
+RIGID = 10
+
+
+@dataclass(frozen=True)
+class Place:
+    """One tooth pair: flank 0 drive, 1 coast; gap m; gradient (6,) with respect to xA, yA, φA, xB, yB, φB; rolls m; 1/ρA + 1/ρB in 1/m."""
+
+    flank: int
+    tooth: int
+    gap: float
+    gradient: np.ndarray
+    roll: tuple[float, float]
+    curvature: float
+
+
+def compile_inner(out: Path) -> Path:
+    """Kernel and inner_probe.c in one library."""
+    files = [str(p) for p in sorted(source_folder().glob("*.c"))] + [str(HERE / "inner_probe.c")]
+    line = ["cc", *FLAGS, "-fPIC", "-shared", f"-I{source_folder()}", f"-I{fmi_headers()}", "-o", str(out), *files]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+class Inner:
+    """A prepared kernel whose inner functions can be called."""
+
+    def __init__(self, library: Path, blob: bytes, parameters: dict[str, float] | None = None) -> None:
+        self.kernel = Kernel(blob, parameters, library)
+        self.kernel.prepare()
+        self._lib = ctypes.CDLL(str(library))
+        self._lib.probe_mu.restype = ctypes.c_double
+
+    def _handles(self) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
+        return ctypes.c_void_p(self.kernel._model), ctypes.c_void_p(self.kernel._setup)
+
+    def places(self, frame: np.ndarray, reach: float = 1e-3) -> list[Place]:
+        """All places at frame (xA, yA, φA, xB, yB, φB) whose undeformed gap is below `reach`."""
+        full, out = (ctypes.c_double * RIGID)(*frame), (ctypes.c_double * (8 * 12))()
+        count = self._lib.probe_places(*self._handles(), full, ctypes.c_double(reach), out)
+        rows = [out[12 * i: 12 * i + 12] for i in range(count)]
+        return [Place(int(r[0]), int(r[1]), r[2], np.array(r[3:9]), (r[9], r[10]), r[11]) for r in rows]
+
+    def law(self, force: float, curvature: float) -> tuple[float, float, float]:
+        """Approach (m), slope (m/N) and energy (J) of one slice."""
+        out = (ctypes.c_double * 3)()
+        self._lib.probe_law(*self._handles(), ctypes.c_double(curvature), ctypes.c_double(force), out)
+        return tuple(out)
+
+    def mu(self, h: float, gamma: float = 1.0) -> float:
+        """μ′ at step h (s)."""
+        return self._lib.probe_mu(*self._handles(), ctypes.c_double(h), ctypes.c_double(gamma))

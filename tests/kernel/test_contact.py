@@ -1,0 +1,151 @@
+"""Line contact: gaps are zero where involutes touch, gradients are derivatives of the gaps, flanks go over into tip corners without a jump, the local law is Hertz's."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from inner import Inner, Place, compile_inner
+from small_model import BASE, PSI, TEETH, TIP, WORKING, pair_blob
+
+from gearfmu.stage.blob import read_blob, write_blob
+
+REFERENCE = json.loads((Path(__file__).parent.parent / "reference" / "hertz_line.json").read_text())
+DRIVE, COAST = 0, 1
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compile_inner(tmp_path_factory.mktemp("inner") / "inner.so")
+
+
+@pytest.fixture(scope="module")
+def relieved(library: Path) -> Inner:
+    return Inner(library, pair_blob(), {"effect.tip_relief": 1})
+
+
+@pytest.fixture(scope="module")
+def plain(library: Path) -> Inner:
+    return Inner(library, pair_blob(), {"effect.tip_relief": 0})
+
+
+def turned(phi: float, dx: float = 0.0, dy: float = 0.0, lead: float = 0.0) -> np.ndarray:
+    """Pinion at φ, wheel following without load and ahead by `lead` (m along the line of action); pinion shifted."""
+    return np.array([dx, dy, phi, 0.0, 0.0, -phi * BASE[0] / BASE[1] - lead / BASE[1], 0, 0, 0, 0])
+
+
+def one(places: list[Place], flank: int, tooth: int) -> Place | None:
+    return next((p for p in places if (p.flank, p.tooth) == (flank, tooth)), None)
+
+
+def test_unmodified_drive_flanks_touch_at_every_angle_and_the_coast_gap_is_the_backlash(plain: Inner):
+    for phi in np.linspace(-40.0, 40.0, 41):
+        places = plain.places(turned(phi))
+        on_line = [p for p in places if p.flank == DRIVE and p.roll[0] < TIP[0] and p.roll[1] < TIP[1]]
+        assert on_line and max(abs(p.gap) for p in on_line) < 1e-14
+        coast = [p.gap for p in places if p.flank == COAST and p.roll[0] < TIP[0] and p.roll[1] < TIP[1]]
+        nominal = 2 * np.pi * BASE[0] / TEETH[0] - 2 * BASE[0] * (PSI[0] - np.tan(WORKING) + WORKING) - 2 * BASE[1] * (PSI[1] - np.tan(WORKING) + WORKING)
+        assert coast and np.allclose(coast, nominal + 1e-4 * np.cos(WORKING), atol=1e-12)
+
+
+def test_number_of_pairs_in_contact_is_the_contact_ratio_on_average(plain: Inner):
+    count = [sum(p.flank == DRIVE and abs(p.gap) < 1e-12 for p in plain.places(turned(phi))) for phi in np.linspace(0, 2 * np.pi / TEETH[0], 400, endpoint=False)]
+    length = (sum(BASE) * np.tan(WORKING))
+    ratio = (TIP[0] + TIP[1] - length) / (2 * np.pi * BASE[0] / TEETH[0])
+    assert np.mean(count) == pytest.approx(ratio, abs=5e-3)
+
+
+@pytest.mark.parametrize("dx, dy, lead", [(0, 0, 0), (3e-5, -2e-5, 1e-5), (-1e-4, 5e-5, -2e-5)])
+def test_gradients_are_derivatives_of_the_gaps(relieved: Inner, dx: float, dy: float, lead: float):
+    step, kinds = np.array([1e-7, 1e-7, 1e-6, 1e-7, 1e-7, 1e-6]), set()
+    for phi in np.linspace(0, 2 * np.pi / TEETH[0], 57, endpoint=False):
+        frame = turned(phi, dx, dy, lead)
+        for place in relieved.places(frame):
+            kinds.add((place.flank, place.roll[0] >= TIP[0], place.roll[1] >= TIP[1]))
+            for c in range(6):
+                ends = []
+                for sign in (-1, 1):
+                    moved = frame.copy()
+                    moved[c] += sign * step[c]
+                    ends.append(one(relieved.places(moved, 2e-3), place.flank, place.tooth))
+                kind = {(e.roll[0] >= TIP[0], e.roll[1] >= TIP[1]) for e in ends if e}
+                if None in ends or len(kind) > 1:
+                    continue
+                slope = (ends[1].gap - ends[0].gap) / (2 * step[c])
+                assert slope == pytest.approx(place.gradient[c], abs=2e-6 * max(1.0, np.abs(place.gradient).max()))
+    assert kinds >= {(f, a, b) for f in (DRIVE, COAST) for a, b in ((False, False), (True, False), (False, True))}
+
+
+@pytest.mark.parametrize("tooth_end", [0, 1])
+@pytest.mark.parametrize("flank", [DRIVE, COAST])
+def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(relieved: Inner, flank: int, tooth_end: int):
+    def at(phi: float) -> tuple[Place | None, Place | None]:
+        places = relieved.places(turned(phi, 2e-5, 1e-5), 2e-3)
+        return next((p for p in places if p.flank == flank and p.roll[tooth_end] >= TIP[tooth_end]), None), None
+
+    found = 0
+    for phi in np.linspace(0, 2 * np.pi / TEETH[0], 200, endpoint=False):
+        corner = at(phi)[0]
+        if corner is None:
+            continue
+        sign = (1 if tooth_end == 0 else -1) * (1 if flank == DRIVE else -1)  # turn back onto the flank
+        low, high = 0.0, 0.2
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            place = one(relieved.places(turned(phi - sign * middle, 2e-5, 1e-5), 2e-3), flank, corner.tooth)
+            still = place is not None and place.roll[tooth_end] >= TIP[tooth_end]
+            low, high = (middle, high) if still else (low, middle)
+        before, after = (one(relieved.places(turned(phi - sign * (high + d), 2e-5, 1e-5), 2e-3), flank, corner.tooth) for d in (1e-9, -1e-9))
+        assert after is not None and before is not None
+        assert before.gap == pytest.approx(after.gap, abs=1e-10)
+        assert np.allclose(before.gradient, after.gradient, atol=1e-5)
+        assert before.curvature == pytest.approx(after.curvature, rel=1e-3)
+        found += 1
+        break
+    assert found
+
+
+def test_corner_gap_grows_quadratically_off_the_line_of_action(plain: Inner):
+    over, gap = [], []
+    for phi in np.linspace(0, 2 * np.pi / TEETH[0], 800, endpoint=False):
+        for p in plain.places(turned(phi), 3e-4):
+            virtual = BASE[0] * (phi + p.tooth * 2 * np.pi / TEETH[0] + PSI[0] + WORKING) - TIP[0]
+            if p.flank == DRIVE and p.roll[0] >= TIP[0] and 2e-4 < virtual < 1.5e-3:
+                over.append(virtual), gap.append(p.gap)
+    order = np.polyfit(np.log(over), np.log(gap), 1)[0]
+    assert len(over) > 10 and 1.7 < order < 2.1
+
+
+def test_local_law_is_continuous_with_its_slope_and_its_energy_is_the_integral(plain: Inner):
+    force = np.concatenate([np.geomspace(1e-3, 2e5, 4001)])
+    approach, slope, energy = np.array([plain.law(f, 150.0) for f in force]).T
+    assert np.all(slope > 0) and np.all(np.diff(approach) > 0)
+    middle = np.array([plain.law(f, 150.0)[1] for f in np.sqrt(force[1:] * force[:-1])])
+    assert np.allclose(np.diff(approach) / np.diff(force), middle, rtol=2e-3)
+    work = np.diff(approach) * 0.5 * (force[1:] + force[:-1])
+    assert np.allclose(np.diff(energy), work, rtol=3e-5)
+    assert plain.law(0.0, 150.0) [0] == 0.0 and plain.law(0.0, 150.0)[2] == 0.0
+
+
+def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(library: Path):
+    """Two cylinders: δ = Σ 2(1 − ν²)/(πEL)·F·[ln(4w/b) − 1], b from Hertz (numbers of tests/reference/hertz_line.json)."""
+    case = REFERENCE
+    sections = read_blob(pair_blob())
+    for g in (0, 1):
+        gear = sections[f"gear{g}"].copy()
+        gear[9] = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"])
+        gear[8], gear[10] = case["L"], 1e-3
+        sections[f"gear{g}"] = gear
+    inner = Inner(library, write_blob(sections), {"slices": 1})
+    curvature = 1 / case["R1"] + 1 / case["R2"]
+    local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"] * case["L"])
+    expected = 2 * local * case["F"] * (np.log(4 * 1e-3 / case["b"]) - 1)
+    assert inner.law(case["F"], curvature)[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_step_limit_grows_with_the_step_and_falls_with_gamma(plain: Inner):
+    steps = [2e-6, 4e-6, 8e-6, 16e-6]
+    mu = [plain.mu(h) for h in steps]
+    assert all(0 < a < b for a, b in zip(mu, mu[1:], strict=False))
+    assert plain.mu(8e-6, 0.0) == pytest.approx(0.0, abs=1e-12) and plain.mu(8e-6, 0.5) < mu[2]
