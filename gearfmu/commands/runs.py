@@ -31,6 +31,7 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
 @click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the pinion, "2000 rpm".')
 @click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
 @click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
+@click.option("--settle", type=Quantity("s"), default="0.02 s", show_default=True, help="From here on results and spectra are taken.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.")
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:

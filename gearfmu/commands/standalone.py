@@ -22,7 +22,7 @@ def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
 
 
 def steady_run(model: Any, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None) -> Any:
-    """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s."""
+    """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
     from gearfmu.stage import Steady, simulate
 
     soft = [name for name, port in model.spec.ports.items() if port.kind != "spring" or port.chain is not None]
@@ -31,7 +31,7 @@ def steady_run(model: Any, drive: Mapping[str, float], settings: Mapping[str, fl
     inputs = Steady(model, drive["speed"], drive["torque"])
     trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
     exchanged = abs(trace["energy.work"]).max() + trace["energy.stored"].max()
-    trace.meta.update(energy_residual=float(trace["energy.residual"][-1] / exchanged), H=drive["step"], scene="constant speed and load",
+    trace.meta.update(energy_residual=float(trace["energy.residual"][-1] / exchanged), H=drive["step"], settle=drive["settle"], scene="constant speed and load",
                       teeth={gear.name: gear.teeth for gear in model.spec.gears}, torque=drive["torque"], speed=drive["speed"])  # fmt: skip
     return trace
 

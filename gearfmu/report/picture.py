@@ -51,9 +51,9 @@ def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None
     drawn = [points + scale * u for points, u in zip(placed, world, strict=True)]
     drawn[0] = drawn[0] @ _rotation(sg * scale * approach / pair.gears[0].r_b).T
     shapes = [_shape(bodies[g].display, drawn[g], moved[g]) for g in (0, 1)]
-    caption = (f"At t = {trace.time[sample]:.5f} s, mesh force {force / 1e3:.2f} kN on the {'drive' if sg > 0 else 'coast'} flanks, "
-               f"{len(contacts)} tooth pair{'s' if len(contacts) > 1 else ''} in contact. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times: that force applied "
-               "statically and split evenly over the pairs in contact; rigid motion and local flattening are left out.")  # fmt: skip
+    caption = (f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the {'drive' if sg > 0 else 'coast'} flanks, tooth pairs in contact: "
+               f"{len(contacts)}. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, under that force applied statically and split "
+               "evenly over the pairs in contact; the pinion is turned on until the loaded flanks meet again. Local flattening is left out.")  # fmt: skip
     pitch_point = np.array([pair.r_w[0], 0, 0])
     image = draw(shapes, pitch_point, 3.2 * pair.gears[0].m, "elastic displacement in µm")
     return Plot("deformed_pair", "The deformed pair at the largest mesh force", caption, image, _columns(shapes, moved, spec))

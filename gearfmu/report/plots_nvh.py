@@ -14,6 +14,7 @@ from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
 ORDERS = 5
+SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 
 def force_channels(trace: Trace) -> list[str]:
@@ -38,6 +39,7 @@ def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) 
                 spectrum = spectra[name]
                 axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, lw=0.9)
             _level_axis(axis, "dB re 1 N")
+            axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
             _mark_orders(axis, part.time, trace, mesh_angle)
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
@@ -90,8 +92,8 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
         image = axis.pcolormesh(time, picture_data.frequency / 1e3, values.T, vmin=top - RANGE_DB, vmax=top, shading="nearest")
         figure.colorbar(image, ax=axis, label="level in dB re 1 N", pad=0.01, aspect=30)
         axis.grid(False)
-        axis.set(xlabel="time in s", ylabel="frequency in kHz", xlim=(time[0], time[-1]), ylim=(0, 0.5e-3 / step))
-        _overlay_orders(axis, trace, mesh_angle, 0.5 / step)
+        axis.set(xlabel="time in s", ylabel="frequency in kHz", xlim=(time[0], time[-1]), ylim=(0, 1e-3 * min(SHOWN_TO, 0.5 / step)))
+        _overlay_orders(axis, trace, mesh_angle, min(SHOWN_TO, 0.5 / step))
         picture = png(figure)
     caption = (f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
                f"Dashed: mesh orders from the instantaneous speed. {_sampling_words(step)}")  # fmt: skip
@@ -147,7 +149,7 @@ def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndar
     low, middle, high = np.percentile(frequency, [5, 50, 95])
     if middle <= 0 or high - low > 0.1 * middle:
         return
-    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 12) + 1):
+    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 24) + 1):
         axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
         axis.annotate(str(order), (order * middle / 1e3, 1), (3, -9), xycoords=("data", "axes fraction"),
                       textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
