@@ -1,4 +1,4 @@
-"""Compile gk_math.c, gk_blob.c and gk_sha256.c with the array functions of probe_*.c into a small library, and call it."""
+"""Builds of the kernel for tests: its parts behind the array functions of probe_*.c, and the whole with any compiler."""
 from __future__ import annotations
 
 import ctypes
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearfmu.kernel.build import FLAGS
+from gearfmu.kernel.build import FLAGS, build_library
 
 HERE = Path(__file__).parent
 SOURCES = ("gk_math.c", "gk_blob.c", "gk_sha256.c")
@@ -33,12 +33,24 @@ def compilers() -> dict[str, tuple[str, ...]]:
 
 
 def compile_probes(out: Path, command: Sequence[str] = ("cc",), flags: Sequence[str] = ()) -> Path:
-    """Compile the probe library with the project's flags, then `flags`; returns `out`, fails with the compiler's messages."""
-    files = [str(source_folder() / name) for name in SOURCES] + [str(p) for p in sorted(HERE.glob("probe_*.c"))]
-    line = [*command, *FLAGS, "-fvisibility=default", "-fPIC", "-shared", *flags, f"-I{source_folder()}", "-o", str(out), *files]
+    """Compile the probe library with the project's flags, then `flags`; returns `out`."""
+    files = [source_folder() / name for name in SOURCES] + sorted(HERE.glob("probe_*.c"))
+    return compile_c([*command, *FLAGS, "-fvisibility=default", "-fPIC", "-shared", *flags], files, out)
+
+
+def compile_c(command: Sequence[str], files: Sequence[Path], out: Path) -> Path:
+    """Compile and link C files that may include the kernel's headers; fails with the compiler's messages."""
+    line = [*command, f"-I{source_folder()}", "-o", str(out), *map(str, files), "-lm"]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, " ".join(line) + "\n" + done.stderr
     return out
+
+
+def build(folder: Path, command: Sequence[str] = ("cc",), flags: Sequence[str] = (), **variant: object) -> Path:
+    """The whole kernel into `folder` with this compiler, the project's flags and then `flags`.
+
+    libm is linked: without optimisation a compiler calls sqrt there, which is exact."""
+    return build_library(out=folder / "kernel.so", compiler=(*command, "-Wl,--no-as-needed", "-lm", *flags), **variant)
 
 
 class Probes:

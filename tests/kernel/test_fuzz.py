@@ -1,0 +1,111 @@
+"""Damaged model blobs and states under AddressSanitizer and UBSan: refused with a message or run with a named outcome, never a crash or garbage."""
+from __future__ import annotations
+
+import functools
+import struct
+import subprocess
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exact_bars import Bar
+from mutations import mutated
+from probes import compile_c, compilers, source_folder
+from small_model import bars_blob, pair_blob
+
+from gearfmu.kernel.build import FLAGS
+
+SANITIZE = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+SEED = 20150712
+REFUSED = ("open", "1")
+
+
+@functools.lru_cache
+def originals() -> tuple[bytes, ...]:
+    return (pair_blob(("chain", "spring")), pair_blob(("torque", "fixed")), pair_blob(("spring", "torque")),
+            bars_blob((Bar(0.1), Bar(0.2)), (5, 10), 1e-6))
+
+
+def sound(number: int) -> bytes:
+    return originals()[number % len(originals())]
+
+
+def damaged(number: int) -> bytes:
+    """Case `number`; the same on every machine."""
+    return mutated(sound(number), np.random.default_rng([SEED, number]))
+
+
+@pytest.fixture(scope="module")
+def fuzzer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """fuzz_kernel.c with the kernel's sources, sanitized."""
+    command = next((compilers()[name] for name in ("gcc", "clang") if name in compilers()), None)
+    if command is None:
+        pytest.skip("no gcc or clang with sanitizers: install gcc (Debian: apt-get install gcc)")
+    files = [Path(__file__).with_name("fuzz_kernel.c"), *sorted(source_folder().glob("gk_*.c"))]
+    return compile_c([*command, *FLAGS, *SANITIZE], files, tmp_path_factory.mktemp("fuzz") / "fuzz")
+
+
+@dataclass(frozen=True)
+class Findings:
+    """lines: case, call, outcome, complaint (may be missing) of every case finished; end: exit code and what the sanitizer wrote."""
+
+    lines: list[list[str]]
+    end: tuple[int, str]
+
+    @property
+    def outcomes(self) -> Counter:
+        return Counter((line[1], line[2]) for line in self.lines)
+
+    @property
+    def complaints(self) -> list[list[str]]:
+        return [line for line in self.lines if len(line) > 3]
+
+
+def feed(program: Path, make: Callable[[int], bytes], numbers: Iterable[int]) -> Findings:
+    """Run the fuzzer over the cases `numbers`."""
+    with subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        errors: list[bytes] = []
+
+        def write() -> None:
+            try:
+                for number in numbers:
+                    blob = make(number)
+                    process.stdin.write(struct.pack("<QQ", number, len(blob)) + blob)
+                process.stdin.close()
+            except BrokenPipeError:
+                pass  # the program ended early: its exit code says so
+
+        writer = threading.Thread(target=write)
+        reader = threading.Thread(target=lambda: errors.append(process.stderr.read()))
+        writer.start(), reader.start()
+        lines = [line.split() for line in process.stdout.read().decode().splitlines()]
+        writer.join(), reader.join()
+    return Findings(lines, (process.returncode, b"".join(errors).decode()[:4000]))
+
+
+def check(found: Findings, first: int, count: int) -> None:
+    assert found.end[0] == 0, f"case {first + len(found.lines)} ended the program: {found.end}"
+    assert len(found.lines) == count
+    assert not found.complaints, [f"case {first + int(line[0])}: {' '.join(line[1:])}" for line in found.complaints[:20]]
+
+
+def test_sound_blobs_with_random_parameters_and_inputs(fuzzer: Path) -> None:
+    found = feed(fuzzer, sound, range(200))
+    check(found, 0, 200)
+    assert found.outcomes[REFUSED] == 0 and found.outcomes["step", "0"] > 100
+
+
+def test_a_thousand_damaged_blobs(fuzzer: Path) -> None:
+    found = feed(fuzzer, damaged, range(1000))
+    check(found, 0, 1000)
+    assert found.outcomes[REFUSED] > 300 and found.outcomes["step", "0"] > 100
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("part", range(10))
+def test_a_hundred_thousand_damaged_blobs(fuzzer: Path, part: int) -> None:
+    check(feed(fuzzer, damaged, range(10_000 * part, 10_000 * (part + 1))), 10_000 * part, 10_000)
