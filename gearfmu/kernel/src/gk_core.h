@@ -200,6 +200,9 @@ typedef struct gk_system { /* unknown forces of one step: contacts, then links *
     double *D, *C;                    /* (n, n) row-major: what forces do to gaps in the step; massless compliance C′ without the local law */
     double *J, *rhs;                  /* factorised tangent of the active set */
     double direction[MAX_ROWS], alpha; /* η = α·direction + dashpot */
+    double path[MAX_ROWS], slope[MAX_ROWS]; /* C′λ + δ of active rows; δ′ in the tangent */
+    double stored0;                   /* energy of the massless part at the start of the step */
+    int column[MAX_ROWS], columns;    /* rows that can carry force */
     int pivot[MAX_ROWS], rank, map[MAX_ROWS];
     int rounds, limit_reached, curved;
 } gk_system;

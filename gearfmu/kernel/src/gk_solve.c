@@ -8,51 +8,58 @@
 #include "gk_core.h"
 
 enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, ENERGY_LIMIT = 12 };
+#ifdef GK_DOUBLE_MODES
+static const double SOLVED = 1e-11, STEADY_BALANCE = 1e-9;
+#else
+static const double SOLVED = 1e-9, STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
+#endif
+static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
 
 static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
 static int is_clutch(const gk_system *s, int i) { return s->kind[i] == ROW_CLUTCH; }
 
-static double massless(const gk_system *s, int i, double *slope)
-{ /* (C′λ)ᵢ + δ(λᵢ) */
-    const double *row = s->C + (size_t)i * s->n;
-    double sum = 0.0, d = 0.0;
-    for (int j = 0; j < s->n; j++) sum += row[j] * s->force[j];
-    if (is_contact(s, i)) sum += gk_law_approach(&s->local[i], s->force[i], &d);
-    *slope = d;
-    return sum;
+/* columns that can carry force: active rows, given torques, clutches, open contacts that η reaches */
+static void list_columns(gk_system *s)
+{
+    s->columns = 0;
+    for (int i = 0; i < s->n; i++)
+        if (s->active[i] || s->kind[i] == ROW_TORQUE || is_clutch(s, i) || s->direction[i] != 0.0) s->column[s->columns++] = i;
 }
 
-/* z of every row from λ, α and the dashpots; `path` = C′λ + δ of the active rows */
-static void total_force(gk_system *s, const double *path)
+static double times(const gk_system *s, const double *matrix, int i, const double *x)
 {
-    for (int i = 0; i < s->n; i++) {
-        s->eta[i] = s->alpha * s->direction[i];
-        if (s->active[i] && s->clip[i] != 2)
-            s->eta[i] += s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (path[i] + s->g0[i]);
-        if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
-        else if (s->active[i]) s->z[i] = s->force[i];
-    }
+    const double *row = matrix + (size_t)i * s->n;
+    double sum = 0.0;
+    for (int c = 0; c < s->columns; c++) sum += row[s->column[c]] * x[s->column[c]];
+    return sum;
 }
 
 double gk_solve_massless(const gk_system *s, int i)
-{
-    double slope;
-    return massless(s, i, &slope);
+{ /* (C′λ)ᵢ + δ(λᵢ) */
+    double slope, sum = times(s, s->C, i, s->force);
+    return is_contact(s, i) ? sum + gk_law_approach(&s->local[i], s->force[i], &slope) : sum;
 }
 
-double gk_solve_end_gap(const gk_system *s, int i)
-{ /* g₁ = g + D z */
-    const double *row = s->D + (size_t)i * s->n;
-    double sum = s->g[i];
-    for (int j = 0; j < s->n; j++) sum += row[j] * s->z[j];
-    return sum;
+double gk_solve_end_gap(const gk_system *s, int i) { return s->g[i] + times(s, s->D, i, s->z); } /* g₁ = g + D z */
+
+/* path = C′λ + δ of the active rows; z of every row from λ, α and the dashpots */
+static void total_force(gk_system *s)
+{
+    for (int a = 0; a < s->rank; a++) s->path[s->map[a]] = gk_solve_massless(s, s->map[a]);
+    for (int i = 0; i < s->n; i++) {
+        s->eta[i] = s->alpha * s->direction[i];
+        if (s->active[i] && s->clip[i] != 2)
+            s->eta[i] += s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (s->path[i] + s->g0[i]);
+        if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
+        else if (s->active[i]) s->z[i] = s->force[i];
+    }
 }
 
 /* J of the active rows at the present λ, factorised */
 static void factorise(gk_system *s)
 {
     const int n = s->n;
-    double slope[MAX_ROWS], *J = s->J;
+    double *slope = s->slope, *J = s->J;
     s->rank = 0;
     for (int i = 0; i < n; i++) {
         slope[i] = 0.0;
@@ -116,28 +123,41 @@ static void back_solve(const gk_system *s, double *x)
     }
 }
 
-/* λ of the active rows for the present set: chord iteration, tangent renewed when it is slow */
+/* λ of the active rows for the present set: chord iteration, tangent renewed when it is slow. Only the local law and its dashpots are not linear, so that after the first residual
+ * what a step leaves is e + D K e with e = δ(λ + x) − δ(λ) − δ′x. */
 static void newton(gk_system *s)
 {
-    double path[MAX_ROWS] = {0}, x[MAX_ROWS], slope, last = INFINITY;
+    double x[MAX_ROWS], e[MAX_ROWS], last = INFINITY;
+    list_columns(s);
     factorise(s);
+    total_force(s);
+    for (int a = 0; a < s->rank; a++) x[a] = -(gk_solve_end_gap(s, s->map[a]) + s->path[s->map[a]]);
     for (int round = 0; round < CHORD_LIMIT; round++) {
-        for (int a = 0; a < s->rank; a++) path[s->map[a]] = massless(s, s->map[a], &slope);
-        total_force(s, path);
-        for (int a = 0; a < s->rank; a++) x[a] = -(gk_solve_end_gap(s, s->map[a]) + path[s->map[a]]);
+        double change = 0.0, size = 0.0, unused;
         back_solve(s, x);
-        double change = 0.0, size = 0.0;
         for (int a = 0; a < s->rank; a++) {
-            s->force[s->map[a]] += x[a];
+            const int i = s->map[a];
+            e[a] = 0.0;
+            if (is_contact(s, i)) e[a] = -gk_law_approach(&s->local[i], s->force[i], &unused) - s->slope[i] * x[a];
+            s->force[i] += x[a];
+            if (is_contact(s, i)) e[a] += gk_law_approach(&s->local[i], s->force[i], &unused);
             change = gk_max(change, fabs(x[a]));
-            size = gk_max(size, fabs(s->force[s->map[a]]));
+            size = gk_max(size, fabs(s->force[i]));
         }
-        if (!(change > 1e-11 * size)) break;
-        if (change > 0.2 * last) factorise(s);
+        if (!s->curved || !(change > SOLVED * size)) break;
+        for (int a = 0; a < s->rank; a++) {
+            x[a] = -e[a];
+            for (int b = 0; b < s->rank; b++)
+                if (s->clip[s->map[b]] == 0) x[a] -= s->D[(size_t)s->map[a] * s->n + s->map[b]] * s->damping[s->map[b]] * e[b];
+        }
+        if (change > 0.2 * last) {
+            factorise(s);
+            total_force(s);
+            for (int a = 0; a < s->rank; a++) x[a] = -(gk_solve_end_gap(s, s->map[a]) + s->path[s->map[a]]);
+        }
         last = change;
     }
-    for (int a = 0; a < s->rank; a++) path[s->map[a]] = massless(s, s->map[a], &slope);
-    total_force(s, path);
+    total_force(s);
 }
 
 /* one row's verdict: does it contradict its status? */
@@ -145,8 +165,7 @@ static int violated(gk_system *s, int i)
 {
     if (is_contact(s, i)) {
         if (s->active[i]) return s->force[i] < 0.0;
-        double slope;
-        return gk_solve_end_gap(s, i) + massless(s, i, &slope) < 0.0;
+        return gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < 0.0;
     }
     if (!is_clutch(s, i)) return 0;
     if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
@@ -171,7 +190,7 @@ static int limit_dashpots(gk_system *s)
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2;
         if (s->active[i] && s->force0[i] > 0.0 && s->damping[i] > 0.0) {
-            double slope, free = s->damping[i] * (massless(s, i, &slope) + s->g0[i]), limit = s->force0[i] + s->force[i];
+            double free = s->damping[i] * (s->path[i] + s->g0[i]), limit = s->force0[i] + s->force[i];
             clip = free > limit ? 1 : free < -limit ? -1 : 0;
         }
         changed |= clip != s->clip[i];
@@ -186,9 +205,12 @@ void gk_solve_contacts(gk_system *s)
     int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = 3;
     for (int round = 0; round < ROUND_LIMIT; round++) {
         newton(s);
+        unsigned char wrong[MAX_ROWS];
         int count = 0, last = -1;
-        for (int i = 0; i < s->n; i++)
-            if (violated(s, i)) count++, last = i;
+        for (int i = 0; i < s->n; i++) {
+            wrong[i] = (unsigned char)violated(s, i);
+            if (wrong[i]) count++, last = i;
+        }
         if (!count) {
             if (dashpot_rounds-- > 0 && limit_dashpots(s)) continue;
             return;
@@ -196,12 +218,9 @@ void gk_solve_contacts(gk_system *s)
         if (count < fewest) fewest = count, patience = 4;
         else patience--;
         if (patience < 0) flip(s, last);
-        else {
-            unsigned char wrong[MAX_ROWS];
-            for (int i = 0; i < s->n; i++) wrong[i] = (unsigned char)violated(s, i);
+        else
             for (int i = 0; i < s->n; i++)
                 if (wrong[i]) flip(s, i);
-        }
         for (int i = 0; i < s->contacts; i++) /* a contact that opened has no dashpot */
             if (!s->active[i]) s->clip[i] = 2;
     }
@@ -213,6 +232,7 @@ double gk_solve_stored(const gk_system *s, const double *force)
 {
     double sum = 0.0;
     for (int i = 0; i < s->n; i++) {
+        if (force[i] == 0.0) continue;
         const double *row = s->C + (size_t)i * s->n;
         double c = 0.0;
         for (int j = 0; j < s->n; j++) c += row[j] * force[j];
@@ -224,54 +244,58 @@ double gk_solve_stored(const gk_system *s, const double *force)
 
 typedef struct balance { double defect, c1, c2, scale; } balance;
 
-/* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀) and its expansion in α along the solved direction p = dλ/dα */
-static balance energy_balance(const gk_system *s, double U0, const double *p, const double *w)
+/* change of the gap over the step as the energy balance sees it: what a given torque does to the massless part is work from outside and counts with its massless displacement alone */
+static double gap_change(const gk_system *s, int i)
 {
-    balance b = {-U0, 0.0, 0.0, fabs(U0)};
-    b.defect += gk_solve_stored(s, s->force);
+    if (s->kind[i] == ROW_TORQUE) return -gk_solve_massless(s, i) - s->g0[i];
+    return (s->active[i] ? -s->path[i] : gk_solve_end_gap(s, i)) - s->g0[i];
+}
+
+static double share(const gk_system *s, int i) { return 0.5 * (s->force0[i] + s->force[i] + s->alpha * s->direction[i]); } /* ½ (λ₀ + λ₁ + α d) */
+
+/* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀) */
+static balance defect(const gk_system *s)
+{
+    balance b = {-s->stored0, 0.0, 0.0, fabs(s->stored0)};
     for (int i = 0; i < s->n; i++) {
-        if (is_clutch(s, i)) continue;
-        const double *d = s->D + (size_t)i * s->n, *c = s->C + (size_t)i * s->n;
-        double Dw = 0.0, Cp = 0.0, slope = 0.0;
-        for (int j = 0; j < s->n; j++) Dw += d[j] * w[j], Cp += c[j] * p[j];
-        if (is_contact(s, i) && p[i] != 0.0) gk_law_approach(&s->local[i], s->force[i], &slope);
-        Cp += slope * p[i];
-        /* what a given torque does to the massless part is work from outside: it counts with its massless displacement alone */
-        const int given = s->kind[i] == ROW_TORQUE;
-        if (given) Dw = -Cp;
-        double change = (given ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i], sum = s->force0[i] + s->force[i] + s->alpha * s->direction[i], dw = p[i] + s->direction[i];
-        b.defect += 0.5 * sum * change;
-        b.c1 += s->force[i] * Cp + 0.5 * dw * change + 0.5 * sum * Dw;
-        b.c2 += 0.5 * p[i] * Cp + 0.5 * dw * Dw;
-        b.scale += 0.5 * (c[i] + slope) * s->force[i] * s->force[i];
+        if (is_clutch(s, i) || (s->force[i] == 0.0 && s->force0[i] == 0.0 && s->direction[i] == 0.0)) continue;
+        if (s->force[i] != 0.0) {
+            double slope, approach = is_contact(s, i) ? gk_law_approach(&s->local[i], s->force[i], &slope) : 0.0, path = s->active[i] ? s->path[i] : gk_solve_massless(s, i);
+            double energy = 0.5 * s->force[i] * (path - approach) + (is_contact(s, i) ? gk_law_energy(&s->local[i], s->force[i]) : 0.0);
+            b.defect += energy;
+            b.scale += fabs(energy);
+        }
+        b.defect += share(s, i) * gap_change(s, i);
     }
     return b;
+}
+
+/* expansion of Δ in α along the solved direction p = dλ/dα, w = dz/dα */
+static void expand(const gk_system *s, const double *p, const double *w, balance *b)
+{
+    for (int i = 0; i < s->n; i++) {
+        if (is_clutch(s, i)) continue;
+        double Cp = times(s, s->C, i, p) + (is_contact(s, i) && p[i] != 0.0 ? s->slope[i] * p[i] : 0.0);
+        double Dw = s->kind[i] == ROW_TORQUE ? -Cp : times(s, s->D, i, w), dw = p[i] + s->direction[i];
+        if (s->force[i] == 0.0 && s->force0[i] == 0.0 && dw == 0.0) continue;
+        b->c1 += s->force[i] * Cp + 0.5 * dw * gap_change(s, i) + share(s, i) * Dw;
+        b->c2 += 0.5 * p[i] * Cp + 0.5 * dw * Dw;
+    }
 }
 
 /* p = dλ/dα on the active rows, w = dz/dα everywhere */
 static void sensitivity(const gk_system *s, double *p, double *w)
 {
-    double x[MAX_ROWS], path[MAX_ROWS];
+    double x[MAX_ROWS];
     memset(p, 0, (size_t)s->n * sizeof *p);
-    for (int a = 0; a < s->rank; a++) {
-        const double *d = s->D + (size_t)s->map[a] * s->n;
-        x[a] = 0.0;
-        for (int j = 0; j < s->n; j++) x[a] -= d[j] * s->direction[j];
-    }
+    for (int a = 0; a < s->rank; a++) x[a] = -times(s, s->D, s->map[a], s->direction);
     back_solve(s, x);
     for (int a = 0; a < s->rank; a++) p[s->map[a]] = x[a];
     for (int i = 0; i < s->n; i++) {
         w[i] = p[i] + s->direction[i];
         if (!s->active[i] || s->clip[i] == 2) continue;
-        if (s->clip[i]) {
-            w[i] += s->clip[i] * p[i];
-            continue;
-        }
-        double slope = 0.0;
-        path[i] = 0.0;
-        for (int j = 0; j < s->n; j++) path[i] += s->C[(size_t)i * s->n + j] * p[j];
-        if (is_contact(s, i)) gk_law_approach(&s->local[i], s->force[i], &slope);
-        w[i] += s->damping[i] * (path[i] + slope * p[i]);
+        if (s->clip[i]) w[i] += s->clip[i] * p[i];
+        else if (s->damping[i] != 0.0) w[i] += s->damping[i] * (times(s, s->C, i, p) + (is_contact(s, i) ? s->slope[i] * p[i] : 0.0));
     }
 }
 
@@ -283,30 +307,36 @@ void gk_solve_plain(gk_system *s)
     gk_solve_contacts(s);
 }
 
+static int status_changed(const gk_system *s)
+{
+    for (int i = 0; i < s->contacts; i++)
+        if ((s->force0[i] > 0.0) != (s->force[i] > 0.0)) return 1;
+    return 0;
+}
+
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the massless part's energy change equal its work. */
 void gk_solve_energy(gk_system *s)
 {
     double p[MAX_ROWS] = {0}, w[MAX_ROWS] = {0};
     gk_solve_plain(s);
-    int changed = s->curved;
-    for (int i = 0; i < s->contacts; i++) changed |= (s->force0[i] > 0.0) != (s->force[i] > 0.0);
-    if (!changed) return;
-    double U0 = gk_solve_stored(s, s->force0);
-    balance b = energy_balance(s, U0, p, w);
-    if (!(fabs(b.defect) > 1e-9 * b.scale)) return;
+    const int changed = status_changed(s);
+    if (!changed && !s->curved) return;
+    balance b = defect(s);
+    if (!(fabs(b.defect) > (changed ? BALANCE : STEADY_BALANCE) * b.scale)) return;
     for (int i = 0; i < s->n; i++)
-        if (s->kind[i] != ROW_TORQUE && !is_clutch(s, i) && (s->force0[i] != 0.0 || s->force[i] != 0.0)) s->direction[i] = gk_solve_end_gap(s, i) - s->g0[i];
+        if (s->kind[i] != ROW_TORQUE && !is_clutch(s, i) && (s->force0[i] != 0.0 || s->force[i] != 0.0)) s->direction[i] = gap_change(s, i);
     for (int round = 0; round < ENERGY_LIMIT; round++) {
+        list_columns(s);
         sensitivity(s, p, w);
-        b = energy_balance(s, U0, p, w);
-        if (!(fabs(b.defect) > 1e-9 * b.scale)) return;
+        expand(s, p, w, &b);
         double root = sqrt(gk_max(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)), divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
         if (!(fabs(divisor) > 0.0)) break;
         double a = -2.0 * b.defect / divisor;
         s->alpha += a;
         for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
         gk_solve_contacts(s);
-        s->rounds++;
+        b = defect(s);
+        if (!(fabs(b.defect) > BALANCE * b.scale)) return;
     }
     s->limit_reached = 1;
 }

@@ -41,13 +41,16 @@ static int remembered(const gk_data *data, gk_key key)
 /* status and forces at the start of the step; gaps as this step's C′ sees them: g0 = s0 − C′λ0 − δ(λ0) */
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
 {
-    s->limit_reached = s->rounds = 0;
+    s->limit_reached = s->rounds = s->rank = 0;
+    s->alpha = s->stored0 = 0.0;
+    memset(s->direction, 0, sizeof s->direction);
     s->curved = setup->on.hertz && s->contacts > 0;
     for (int i = 0; i < s->n; i++) {
         const double *c = s->C + (size_t)i * s->n;
         double sum = 0.0, slope;
         const int link = s->link_of[i];
         for (int j = 0; j < s->n; j++) sum += c[j] * s->force0[j];
+        s->stored0 += 0.5 * sum * s->force0[i] + (s->kind[i] == ROW_CONTACT && s->force0[i] > 0.0 ? gk_law_energy(&s->local[i], s->force0[i]) : 0.0);
         s->force[i] = s->z[i] = s->force0[i];
         s->eta[i] = 0.0;
         s->clip[i] = 2;
