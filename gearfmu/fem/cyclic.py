@@ -29,10 +29,11 @@ _MATCH = 1e-7  # of the mesh's size: nodes that should coincide
 class Sector:
     """Finite-element model of one sector, in its own frame.
 
-    nodes (N, 3), m; stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired nodes.
+    nodes (N, 3), m; elements (E, 20); stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired nodes.
     """
 
     nodes: np.ndarray
+    elements: np.ndarray
     stiffness: sp.csr_array
     mass: sp.csr_array
     teeth: int
@@ -47,8 +48,9 @@ class SectorSpace:
     to_nodes : (3N, n) sparse with orthonormal columns; columns ordered interior, minus cut, plus cut.
     """
 
-    def __init__(self, sector: Sector, basis: sp.csc_array, owner: np.ndarray, parity: int):
+    def __init__(self, sector: Sector, mirror: np.ndarray, parity: int):
         self.parity, self.teeth = parity, sector.teeth
+        basis, owner = _parity_basis(mirror, parity) if parity else _all_fields(sector)
         minus, plus, interior = _split(owner, sector)
         self.interior, self.cut = len(interior), len(minus)
         self.to_nodes = sp.csc_array(_turn_plus(sector) @ basis[:, np.concatenate([interior, minus, plus])])
@@ -57,7 +59,8 @@ class SectorSpace:
         self.mass_matrix = sp.csr_array(self.from_nodes @ sector.mass @ self.to_nodes)
         self.rigid = self.from_nodes @ rigid_modes(sector.nodes)
         inside, border = slice(0, self.interior), slice(self.interior, None)
-        self._factor = Factor(stiffness[inside, inside])
+        inner = owner[interior] // 3
+        self._factor = Factor(stiffness[inside, inside], _cells(sector.elements, mirror, inner), inner)
         coupling = stiffness[inside, border].toarray()
         self.influence = self._factor.solve(coupling)
         self.schur = stiffness[border, border].toarray() - coupling.T @ self.influence
@@ -166,9 +169,8 @@ def sector_spaces(sector: Sector) -> list[SectorSpace]:
     _check_cuts(sector)
     mirror = mirror_nodes(sector.nodes)
     if mirror is None:
-        size = sector.nodes.size
-        return [SectorSpace(sector, sp.csc_array(sp.identity(size)), np.arange(size), 0)]
-    return [SectorSpace(sector, *_parity_basis(mirror, parity), parity) for parity in (1, -1)]
+        return [SectorSpace(sector, np.arange(len(sector.nodes)), 0)]
+    return [SectorSpace(sector, mirror, parity) for parity in (1, -1)]
 
 
 def mirror_nodes(nodes: np.ndarray) -> np.ndarray | None:
@@ -194,6 +196,21 @@ def _parity_basis(mirror: np.ndarray, parity: int) -> tuple[sp.csc_array, np.nda
     values = np.concatenate([weight, (weight * sign[component])[~alone]])
     basis = sp.coo_array((values, (rows, np.concatenate([columns, columns[~alone]]))), (3 * len(mirror), len(owner)))
     return sp.csc_array(basis), owner
+
+
+def _all_fields(sector: Sector) -> tuple[sp.csc_array, np.ndarray]:
+    size = sector.nodes.size
+    return sp.csc_array(sp.identity(size)), np.arange(size)
+
+
+def _cells(elements: np.ndarray, mirror: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Elements as nodes of the mirrored half, without the nodes that are not among `kept` (−1)."""
+    first = np.minimum(np.arange(len(mirror)), mirror)
+    present = np.zeros(len(mirror), bool)
+    present[kept] = True
+    folded = np.sort(first[elements], axis=1)
+    folded = np.unique(folded, axis=0)
+    return np.where(present[folded], folded, -1)
 
 
 def _check_cuts(sector: Sector) -> None:
@@ -226,7 +243,7 @@ def _turn_plus(sector: Sector) -> sp.csr_array:
     diagonal = np.ones(sector.nodes.size)
     diagonal[x] = diagonal[x + 1] = c
     turn = sp.coo_array((np.full(len(x), s), (x + 1, x)), (sector.nodes.size,) * 2).tocsr()
-    return sp.csr_array(sp.diags_array(diagonal) + turn - turn.T)
+    return sp.csr_array(sp.diags(diagonal) + turn - turn.T)
 
 
 def _real_times_any(matrix: sp.csr_array, vectors: np.ndarray) -> np.ndarray:

@@ -16,15 +16,15 @@ from gearfmu.fem.factor import Factor
 
 
 class FreeBody:
-    """Free–free body from its stiffness and mass matrix (3N, 3N) and nodes (N, 3).
+    """Free–free body from its stiffness and mass matrix (3N, 3N), nodes (N, 3) and elements (E, 20).
 
     `rigid` (3N, 6): mass-normalised rigid modes; `mass(v)`, `flexibility(f)` as the eigensolver needs them.
     """
 
     dtype = float
 
-    def __init__(self, stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray):
-        self.stiffness, self.mass_matrix = stiffness, mass
+    def __init__(self, stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray, elements: np.ndarray):
+        self.stiffness, self.mass_matrix, self.elements = stiffness, mass, elements
         self.size, self.elastic = 3 * len(nodes), 3 * len(nodes) - 6
         fields = rigid_modes(nodes)
         self.rigid_mass = fields.T @ (mass @ fields)
@@ -35,7 +35,7 @@ class FreeBody:
     @cached_property
     def _factor(self) -> tuple[np.ndarray, Factor]:
         free = np.setdiff1d(np.arange(self.size), self._held)
-        return free, Factor(self.stiffness[free][:, free])
+        return free, Factor(self.stiffness[free][:, free], self.elements, free // 3)
 
     def mass(self, vectors: np.ndarray) -> np.ndarray:
         """M v."""

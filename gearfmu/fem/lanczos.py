@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-_DEPENDENT = 1e-12
+_DEPENDENT = 1e-11  # relative norm at which a new direction counts as a combination of the others
 
 
 class Vibrating(Protocol):
@@ -28,7 +28,7 @@ class ModesError(ArithmeticError):
     """The eigensolver did not converge."""
 
 
-def lowest_modes(body: Vibrating, count: int, tolerance: float = 1e-9, block: int = 6) -> tuple[np.ndarray, np.ndarray]:
+def lowest_modes(body: Vibrating, count: int, tolerance: float = 1e-9, block: int = 8) -> tuple[np.ndarray, np.ndarray]:
     """The `count` lowest elastic modes (fewer when the body has fewer).
 
     Returns ω² (k,), rad²/s², ascending, and mass-normalised shapes (n, k). `tolerance` bounds the residual of
@@ -50,57 +50,71 @@ class _Krylov:
     """Basis V, orthonormal in M, and T = Vᴴ M C M V, one block larger with each `grow`."""
 
     def __init__(self, body: Vibrating, block: int):
-        self.body = body
-        self.v, self.mv, self.coefficients = [], [], []
+        self.body, self.size = body, 0
+        self.v = np.empty((body.size, 0), body.dtype, order="F")
+        self.mv = self.v.copy(order="F")
+        self.t = np.zeros((0, 0), body.dtype)
         start = np.random.default_rng(1).standard_normal((body.size, block)).astype(body.dtype)
+        self.last = block
         self.next = body.flexibility(body.mass(start))
         self.grow()
 
     def basis(self) -> np.ndarray:
-        return np.hstack(self.v)
+        return self.v[:, : self.size]
 
     def grow(self) -> bool:
         """Add the pending block and prepare the one after it; False when nothing independent is left."""
-        block, _ = self._orthonormal(self.next)
+        block, inertia = self._orthonormal(self.next)
         if block.shape[1] == 0:
             return False
-        self.v.append(block)
-        self.mv.append(self.body.mass(block))
-        image = self.body.flexibility(self.mv[-1])
-        column = 0.0
+        self._append(block, inertia)
+        image = self.body.flexibility(inertia)
+        column = np.zeros((self.size, self.last), self.body.dtype)
         for _ in range(2):
-            part = [m.conj().T @ image for m in self.mv]
-            for v, p in zip(self.v, part, strict=True):
-                image = image - v @ p
-            column = column + np.vstack(part)
-        self.coefficients.append(column)
+            part = self._project(image)
+            image = image - self.basis() @ part
+            column += part
+        self.t[: self.size, self.size - self.last : self.size] = column
         self.next = image
         return True
 
     def ritz(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Ritz values 1/ω² descending, their vectors in the basis and residual norms in M."""
-        size = sum(v.shape[1] for v in self.v)
-        t = np.zeros((size, size), dtype=self.body.dtype)
-        start = 0
-        for column in self.coefficients:
-            t[: column.shape[0], start : start + column.shape[1]] = column
-            start += column.shape[1]
+        t = self.t[: self.size, : self.size]
         upper = np.triu(t, 1)
         values, vectors = np.linalg.eigh(upper + upper.conj().T + np.diag(t.diagonal().real))
         values, vectors = values[::-1], vectors[:, ::-1]
-        last = self.v[-1].shape[1]
         gram = self.next.conj().T @ self.body.mass(self.next)
-        tail = vectors[-last:]
+        tail = vectors[-self.last :]
         return values, vectors, np.sqrt(np.abs(np.einsum("ik,ij,jk->k", tail.conj(), gram, tail)))
 
-    def _orthonormal(self, block: np.ndarray) -> tuple[np.ndarray, int]:
-        scale = None
-        for _ in range(3):
-            for v, m in zip(self.v, self.mv, strict=True):
-                block = block - v @ (m.conj().T @ block)
-            values, vectors = np.linalg.eigh(block.conj().T @ self.body.mass(block))
-            scale = values.max(initial=0.0) if scale is None else scale
-            keep = values > _DEPENDENT**2 * scale if scale > 0 else np.zeros(len(values), bool)
-            block = block @ (vectors[:, keep] / np.sqrt(values[keep]))
-            scale = 1.0
-        return block, block.shape[1]
+    def _project(self, block: np.ndarray) -> np.ndarray:
+        """Vᴴ M block."""
+        return (block.conj().T @ self.mv[:, : self.size]).conj().T
+
+    def _append(self, block: np.ndarray, inertia: np.ndarray) -> None:
+        self.last = block.shape[1]
+        first, self.size = self.size, self.size + self.last
+        if self.size > self.v.shape[1]:
+            room = 2 * self.size
+            for name in ("v", "mv"):
+                larger = np.empty((self.body.size, room), self.body.dtype, order="F")
+                larger[:, :first] = getattr(self, name)[:, :first]
+                setattr(self, name, larger)
+            t = np.zeros((room, room), self.body.dtype)
+            t[:first, :first] = self.t[:first, :first]
+            self.t = t
+        self.v[:, first : self.size], self.mv[:, first : self.size] = block, inertia
+
+    def _orthonormal(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The block freed of the basis and made orthonormal, without directions that vanish; and M times it."""
+        limit = None
+        for _ in range(2):
+            block = block - self.basis() @ self._project(block)
+            inertia = self.body.mass(block)
+            values, vectors = np.linalg.eigh(block.conj().T @ inertia)
+            limit = _DEPENDENT**2 * values.max(initial=0.0) if limit is None else 0.25
+            keep = values > max(limit, 0.0)
+            turn = vectors[:, keep] / np.sqrt(values[keep])
+            block, inertia = block @ turn, inertia @ turn
+        return block, inertia

@@ -1,0 +1,207 @@
+"""From a stage's numbers to its reduced bodies: mesh, finite elements, reduction, file; skipped when the hash matches."""
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy
+
+from gearfmu.body.layout import ALGORITHM_VERSION
+from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.store import load_body, save_body
+from gearfmu.errors import BodyError, MeshError
+from gearfmu.femesh import gear_sector, mesh_report
+from gearfmu.geometry import GearGeometry
+from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
+from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.frf import FrfCase, frf_error
+from gearfmu.reduction.modal import Modes, elastic_modes
+from gearfmu.reduction.sector import SectorBody
+from gearfmu.reduction.statics import Statics, static_tables
+from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.stage import StageSpec
+
+FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
+_PICTURE_MODES = 12
+_PICTURE_LOADS = 5
+
+Progress = Callable[[str, float], None]
+
+
+def expected_hash(spec: StageSpec, gear_index: int) -> str:
+    """Fingerprint a body of this gear must carry: its inputs and the version of the algorithms."""
+    return body_hash({**body_inputs(spec, gear_index), "algorithm_version": ALGORITHM_VERSION})
+
+
+def body_path(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Where the body of a gear lies: `<folder>/<gear name>.h5`, the folder of the stage file when None."""
+    home = Path(folder) if folder is not None else Path(spec.source).parent
+    return home / f"{spec.gears[gear_index].name}.h5"
+
+
+def load_stage_bodies(spec: StageSpec, folder: str | os.PathLike[str] | None = None) -> list[ReducedBody]:
+    """The stored bodies of a stage, one per gear. Raises BodyError when one is missing, damaged or stale."""
+    bodies = []
+    for index in range(len(spec.gears)):
+        path = body_path(spec, index, folder)
+        body = load_body(path)
+        if body.input_hash != expected_hash(spec, index):
+            raise BodyError(
+                f"{path}: stale: made from other numbers, or by another version, than {spec.source} asks for now; "
+                "make it again with 'gearfmu reduce STAGE'"
+            )
+        bodies.append(body)
+    return bodies
+
+
+def reduce_stage(
+    spec: StageSpec,
+    out_dir: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> list[ReducedBody]:
+    """Reduce every gear of a stage and store it; a stored body whose input hash matches is read instead.
+
+    out_dir : folder of the .h5 files, that of the stage file when None. force : reduce in any case.
+    progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
+    """
+    bodies = []
+    for index in range(len(spec.gears)):
+        path = body_path(spec, index, out_dir)
+        body = None if force else _stored(path, expected_hash(spec, index))
+        if body is None:
+            body = reduce_gear(spec, index, progress)
+            save_body(body, path)
+        bodies.append(body)
+    return bodies
+
+
+def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = None) -> ReducedBody:
+    """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
+    gear = spec.gears[gear_index]
+    report = _named(progress, gear.name)
+    started = time.process_time()
+    try:
+        report("mesh and finite elements", 0.0)
+        geometry = GearGeometry.of(gear, spec.pair)
+        full_order = full_order_body(geometry, gear)
+    except MeshError as error:
+        raise MeshError(f"{spec.source}: gears.{gear.name}: {error}") from error
+    modes = elastic_modes(full_order, gear.body.modes, report)
+    pictured = _pictured_loads(full_order)
+    statics = static_tables(full_order, pictured, report)
+    report("frequency response", 0.0)
+    frf = frf_error(full_order, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
+    inertia = full_order.inertia
+    return ReducedBody(
+        name=gear.name,
+        input_hash=expected_hash(spec, gear_index),
+        material=gear.material.model_dump(),
+        mesh=_mesh_facts(full_order, gear),
+        provenance=_provenance(time.process_time() - started),
+        teeth=geometry.z,
+        r_b=geometry.r_b,
+        psi_b=geometry.psi_b,
+        face_width=gear.face_width,
+        mass=float(inertia[0, 0]),
+        inertia=inertia[3:, 3:],
+        frequency=modes.frequency,
+        damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
+        nodal_diameter=modes.nodal_diameter,
+        part=modes.part,
+        parity=modes.parity,
+        flank_rows=_by_point(modes.flank_rows, full_order.points),
+        bore_rows=modes.bore_rows,
+        roll_range=np.array([geometry.s_form, geometry.s_tip]),
+        roll=full_order.points.rolls,
+        strip_half_width=gear.body.strip_half_width,
+        static_ff=statics.static_ff,
+        static_fb=statics.static_fb,
+        static_bb=statics.static_bb,
+        frf=frf,
+        display=_display(full_order, modes, statics, pictured),
+    )
+
+
+def full_order_body(geometry: GearGeometry, gear: GearSpec) -> SectorBody:
+    """The finite-element model of one gear with its load points."""
+    flank = ToothFlank(
+        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width
+    )
+    points = Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
+    return SectorBody(gear_sector(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
+
+
+def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:
+    """The body in this file if it is sound and not stale."""
+    try:
+        body = load_body(path)
+    except BodyError:
+        return None
+    return body if body.input_hash == wanted_hash else None
+
+
+def _named(progress: Progress | None, name: str) -> Progress:
+    return (lambda what, share: progress(f"{name}: {what}", share)) if progress else (lambda what, share: None)
+
+
+def _by_point(rows: np.ndarray, points: Points) -> np.ndarray:
+    return rows.reshape(2, len(points.rolls), points.functions, -1)
+
+
+def _pictured_loads(body: SectorBody) -> list[int]:
+    """Flat indices of the uniform loads on flank 0 at a few rolls from form circle to tip."""
+    rolls, functions = len(body.points.rolls), body.points.functions
+    chosen = sorted({round(k) for k in np.linspace(0, rolls - 1, _PICTURE_LOADS)})
+    return [roll * functions for roll in chosen]
+
+
+def _display(body: SectorBody, modes: Modes, statics: Statics, pictured: list[int]) -> Display:
+    sector = outline(body.mesh)
+    points, quads = whole_surface(body.mesh, sector)
+    index = [k for k in sorted(modes.shapes) if k < _PICTURE_MODES]
+    shapes = [unfold_mode(modes.shapes[k], int(modes.nodal_diameter[k]), sector, body.teeth) for k in index]
+    loads = [unfold_sectors(picture, sector) for picture in statics.pictures]
+    return Display(
+        points.astype("f4"),
+        quads,
+        np.array(shapes, "f4").reshape(-1, *points.shape),
+        np.array(index, int),
+        np.array(loads, "f4"),
+        body.points.rolls[[load // body.points.functions for load in pictured]],
+    )
+
+
+def _mesh_facts(body: SectorBody, gear: GearSpec) -> dict[str, Any]:
+    facts = mesh_report(body.mesh, body.flank.r_b, gear.body.strip_half_width)
+    sector_dofs = 3 * (len(body.mesh.nodes) - len(body.mesh.cut_plus))
+    return {**facts, "counts": gear.body.mesh.model_dump(), "dof_sector": sector_dofs, "dof_body": body.teeth * sector_dofs}
+
+
+def _provenance(seconds: float) -> dict[str, Any]:
+    return {
+        "gearfmu": metadata.version("gearfmu"),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "cpu_s": round(seconds, 1),
+        "peak_memory_GB": _peak_memory(),
+    }
+
+
+def _peak_memory() -> float | None:
+    """Largest resident memory of this process so far; None where the system does not tell (Windows)."""
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1e9 if sys.platform == "darwin" else 1e6), 2)

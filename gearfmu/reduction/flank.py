@@ -1,0 +1,149 @@
+"""Tooth loads: unit forces on a strip of the flank, and the displacement read back with the same weights.
+
+The load of roll point s, width function a has the density (1/b) P_a(2z/b) across the face width and 1/L along the
+involute's arc length σ = s²/(2 r_b), over the strip |σ − σ(s)| ≤ w clipped at form circle and tip (L: the length that
+is left). It acts along the outward normal of the analytic involute. Integration runs over the quadratic surface
+elements, split exactly where the strip begins and ends, so that the rows are smooth in s.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import surface
+from gearfmu.geometry import involute
+
+_GAUSS_ROLL = np.polynomial.legendre.leggauss(4)
+_GAUSS_WIDTH = np.polynomial.legendre.leggauss(6)
+
+
+@dataclass(frozen=True)
+class ToothFlank:
+    """The involute flanks of tooth 0 and their load strips (m, rad): base radius, half tooth-thickness angle at the
+    base circle, form and tip roll, face width, half-width of the strip in arc length."""
+
+    r_b: float
+    psi_b: float
+    s_form: float
+    s_tip: float
+    face_width: float
+    strip_half_width: float
+
+    def strip(self, rolls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Clipped strips: roll points (R,), m → first and last arc length (R,), m."""
+        arc, low, high = (np.square(s) / (2 * self.r_b) for s in (np.asarray(rolls, float), self.s_form, self.s_tip))
+        return np.clip(arc - self.strip_half_width, low, high), np.clip(arc + self.strip_half_width, low, high)
+
+    def normal(self, roll: np.ndarray, side: int) -> np.ndarray:
+        """Outward normals (…, 3) of flank index `side` (0 ↔ sg = +1) at roll (…)."""
+        plane = involute.flank_normal(roll, self.r_b, self.psi_b, 1 - 2 * side)
+        return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
+
+    def chebyshev_rolls(self, count: int) -> np.ndarray:
+        """Chebyshev points of the first kind on [s_form, s_tip], ascending: (count,), m."""
+        x = -np.cos(np.pi * (2 * np.arange(count) + 1) / (2 * count))
+        return 0.5 * (self.s_form + self.s_tip) + 0.5 * (self.s_tip - self.s_form) * x
+
+
+def flank_loads(nodes: np.ndarray, quads: np.ndarray, flank: ToothFlank, side: int, points: Points) -> np.ndarray:
+    """Nodal forces of the unit loads: (R, A, 3N), N.
+
+    nodes (N, 3); quads (Q, 8): the flank's surface elements, bounded by lines of constant roll and constant z.
+    Read as rows, the same numbers give the load-weighted mean displacement along the outward normal.
+    Raises MeshError when the elements do not cover the flank from form circle to tip over the face width.
+    """
+    patch = _Patch.of(nodes, quads, flank)
+    patch.check_cover(flank)
+    first, last = flank.strip(points.rolls)
+    low = patch.natural(np.maximum(first[:, None], patch.arc[:, 0]))
+    high = patch.natural(np.minimum(last[:, None], patch.arc[:, 2]))
+    xi = 0.5 * (low + high)[..., None] + 0.5 * (high - low)[..., None] * _GAUSS_ROLL[0]
+    length = np.maximum(high - low, 0.0)[..., None] * 0.5 * _GAUSS_ROLL[1]
+    arc, slope = patch.arc_at(xi)
+    along = length * slope / (last - first)[:, None, None]
+    normal = flank.normal(np.sqrt(2 * flank.r_b * arc), side)
+    across = _width_weights(patch.width, flank.face_width, points.functions)
+    grid = np.stack(np.broadcast_arrays(xi[..., None], _GAUSS_WIDTH[0]), axis=-1)
+    values = surface.shape(grid.reshape(-1, 2)).reshape(*grid.shape[:-1], 8)
+    per_node = np.einsum("rqg,rqgc,qah,rqghn->raqnc", along, normal, across, values, optimize=True)
+    loads = np.zeros((len(points.rolls), points.functions, len(nodes), 3))
+    np.add.at(loads, (slice(None), slice(None), patch.quads), per_node)
+    return loads.reshape(len(points.rolls), points.functions, -1)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Where the flank is loaded: roll points (R,), m, and the number A of width functions P_0 … P_{A−1}."""
+
+    rolls: np.ndarray
+    functions: int
+
+
+@dataclass(frozen=True)
+class _Patch:
+    """Flank elements turned so that the first natural coordinate runs with the roll: quads (Q, 8), arc length (Q, 3)
+    and z (Q, 3) at natural −1, 0, 1."""
+
+    quads: np.ndarray
+    arc: np.ndarray
+    width: np.ndarray
+
+    @staticmethod
+    def of(nodes: np.ndarray, quads: np.ndarray, flank: ToothFlank) -> _Patch:
+        radius = np.hypot(nodes[:, 0], nodes[:, 1])
+        arc = np.maximum(radius**2 - flank.r_b**2, 0.0) / (2 * flank.r_b)
+        quads = np.array([_with_roll_first(q, arc) for q in quads])
+        a, z = arc[quads], nodes[quads, 2]
+        lines_a = np.stack([a[:, [0, 3, 7]].mean(1), a[:, [4, 6]].mean(1), a[:, [1, 2, 5]].mean(1)], axis=1)
+        lines_z = np.stack([z[:, [0, 1, 4]].mean(1), z[:, [5, 7]].mean(1), z[:, [3, 2, 6]].mean(1)], axis=1)
+        spread = max(np.ptp(a[:, [0, 3, 7]], axis=1).max(), np.ptp(a[:, [1, 2, 5]], axis=1).max())
+        if spread > 1e-6 * np.ptp(arc[quads]):
+            raise MeshError("flank elements are not bounded by lines of constant roll")
+        return _Patch(quads, lines_a, lines_z)
+
+    def check_cover(self, flank: ToothFlank) -> None:
+        low, high = (s * s / (2 * flank.r_b) for s in (flank.s_form, flank.s_tip))
+        slack = 1e-6 * (high - low)
+        if self.arc.min() > low + slack or self.arc.max() < high - slack:
+            rolls = np.sqrt(2 * flank.r_b * np.array([self.arc.min(), self.arc.max()])) * 1e3
+            raise MeshError(
+                f"flank elements cover roll {rolls[0]:.4f}…{rolls[1]:.4f} mm, "
+                f"the flank is {flank.s_form * 1e3:.4f}…{flank.s_tip * 1e3:.4f} mm; mesh the whole flank"
+            )
+        area = ((self.arc[:, 2] - self.arc[:, 0]) * np.abs(self.width[:, 2] - self.width[:, 0])).sum()
+        if not np.isclose(area, np.ptp(self.arc) * flank.face_width, rtol=1e-6):
+            raise MeshError("flank elements leave holes, overlap, or do not span the face width")
+
+    def arc_at(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Arc length and its slope at natural coordinates (R, Q, G)."""
+        c, b, a = _quadratic(self.arc)
+        a, b, c = (k[None, :, None] for k in (a, b, c))
+        return c + xi * (b + a * xi), b + 2 * a * xi
+
+    def natural(self, arc: np.ndarray) -> np.ndarray:
+        """Natural coordinate of an arc length (R, Q), clipped to the element."""
+        c, b, a = _quadratic(self.arc)
+        inside = np.clip(arc, self.arc[:, 0], self.arc[:, 2])
+        return np.clip(2 * (inside - c) / (b + np.sqrt(b * b + 4 * a * (inside - c))), -1.0, 1.0)
+
+
+def _quadratic(lines: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coefficients c, b, a of c + b ξ + a ξ² through the values (Q, 3) at −1, 0, 1."""
+    return lines[:, 1], 0.5 * (lines[:, 2] - lines[:, 0]), 0.5 * (lines[:, 2] + lines[:, 0]) - lines[:, 1]
+
+
+def _with_roll_first(quad: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """Turn a VTK quadratic quad so that its edge from node 0 to node 1 climbs the flank."""
+    turns = [np.concatenate([np.roll(quad[:4], -k), np.roll(quad[4:], -k)]) for k in range(4)]
+    return max(turns, key=lambda q: arc[q[1]] - arc[q[0]])
+
+
+def _width_weights(width: np.ndarray, face_width: float, functions: int) -> np.ndarray:
+    """(1/b) P_a(2z/b) dz at the Gauss points across each element: (Q, A, H)."""
+    c, b, a = (k[:, None] for k in _quadratic(width))
+    eta = _GAUSS_WIDTH[0]
+    z, slope = c + eta * (b + a * eta), np.abs(b + 2 * a * eta)
+    legendre = np.polynomial.legendre.legvander(2 * z / face_width, functions - 1)
+    return np.einsum("qha,qh->qah", legendre, slope * _GAUSS_WIDTH[1] / face_width)

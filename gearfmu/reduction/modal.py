@@ -1,0 +1,136 @@
+"""Elastic modes of a free gear body: all nodal diameters, both mid-width parities, as real mass-normalised modes.
+
+A complex mode U e^{iθj} of 0 < ν < z/2 gives two real ones of the same frequency, its real and its imaginary part.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.reduction.sector import Family, SectorBody
+
+_SHAPES = 4  # lowest shapes of each family kept for pictures
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Modes:
+    """n real elastic modes by ascending frequency; conventions of `body.ReducedBody`.
+
+    frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
+    and kg^-½/m. shapes : index of a mode → (3N,) sector displacement in kg^-½, complex for a pair's first mode.
+    """
+
+    frequency: np.ndarray
+    nodal_diameter: np.ndarray
+    part: np.ndarray
+    parity: np.ndarray
+    flank_rows: np.ndarray
+    bore_rows: np.ndarray
+    shapes: dict[int, np.ndarray]
+
+
+@dataclass(frozen=True)
+class _FamilyModes:
+    """Sector modes of one family: ω² (k,), flank rows (2·R·A, k) and bore rows (6, k), complex for pairs."""
+
+    family: Family
+    space_index: int
+    squared: np.ndarray
+    flank_rows: np.ndarray
+    bore_rows: np.ndarray
+    shapes: np.ndarray
+
+
+def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None) -> Modes:
+    """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
+
+    Every family is solved for its expected share and again for more, until the highest frequency it was solved for
+    lies above the last mode kept: no mode is missed. Raises ModesError when the eigensolver fails.
+    """
+    families = [(s, nu) for s in range(len(body.spaces)) for nu in body.diameters()]
+    share = int(np.ceil(1.15 * count / (body.teeth * len(body.spaces)))) + 4
+    wanted = dict.fromkeys(families, share)
+    found: dict[tuple[int, int], _FamilyModes] = {}
+    while True:
+        open_families = [key for key in families if key not in found or _short(found[key], wanted[key])]
+        for number, key in enumerate(open_families):
+            if progress:
+                progress(f"modes, nodal diameter {key[1]}", number / len(open_families))
+            found[key] = _solve(body, key, wanted[key])
+        limit = _limit(found.values(), count)
+        again = [k for k in families if found[k].squared[-1] < limit and not _exhausted(found[k])]
+        if not again:
+            return _assembled(body, found, count)
+        for key in again:
+            wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
+
+
+def _short(modes: _FamilyModes, wanted: int) -> bool:
+    return len(modes.squared) < wanted and not _exhausted(modes)
+
+
+def _exhausted(modes: _FamilyModes) -> bool:
+    return len(modes.squared) >= modes.family.harmonic.elastic
+
+
+def _limit(found, count: int) -> float:
+    """ω² of the `count`-th real mode among those found."""
+    squared = np.sort(np.concatenate([np.repeat(m.squared, m.family.weight) for m in found]))
+    return squared[min(count, len(squared)) - 1]
+
+
+def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
+    family = body.family(*key)
+    harmonic = family.harmonic
+    squared, shapes = lowest_modes(harmonic, count)
+    shapes = shapes * np.sqrt(family.weight / body.teeth)
+    flank = np.zeros((len(body.flank_rows), len(squared)), shapes.dtype)
+    flank[family.columns] = family.flank.conj().T @ shapes
+    shapes = shapes * _gauge(flank)
+    flank = flank * _gauge(flank)
+    bore = body.teeth * (family.bore.conj().T @ shapes)
+    space = body.spaces[key[0]]
+    pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
+    return _FamilyModes(family, key[0], squared, flank, bore, pictures)
+
+
+def _gauge(rows: np.ndarray) -> np.ndarray:
+    """Factors that fix the free sign, or the free phase of a pair: the real part dominates the flank rows, its largest
+    entry is positive. Modes that leave the flanks at rest keep their sign."""
+    square = (rows**2).sum(axis=0)
+    moving = np.abs(square) > 1e-20 * (np.abs(rows) ** 2).sum(axis=0).max(initial=1e-300)
+    turn = np.where(moving, np.exp(-0.5j * np.angle(square)), 1.0)
+    turned = (rows * turn).real
+    largest = turned[np.abs(turned).argmax(axis=0), np.arange(rows.shape[1])]
+    turn = turn * np.where(largest < 0, -1.0, 1.0)
+    return turn if np.iscomplexobj(rows) else turn.real.round()
+
+
+def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], count: int) -> Modes:
+    entries = [(m.squared[k], key, k) for key, m in found.items() for k in range(len(m.squared))]
+    entries.sort(key=lambda entry: entry[0])
+    columns: dict[str, list] = {name: [] for name in ("frequency", "diameter", "part", "parity", "flank", "bore")}
+    shapes: dict[int, np.ndarray] = {}
+    for squared, key, k in entries:
+        modes = found[key]
+        pair = modes.family.weight == 2
+        if len(columns["part"]) + (2 if pair else 1) > count:
+            break
+        if k < modes.shapes.shape[1]:
+            shapes[len(columns["part"])] = modes.shapes[:, k]
+        for part in (1, 2) if pair else (0,):
+            columns["frequency"].append(np.sqrt(squared) / (2 * np.pi))
+            columns["diameter"].append(key[1])
+            columns["part"].append(part)
+            columns["parity"].append(body.spaces[key[0]].parity)
+            columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
+            columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
+    integers = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
+    return Modes(
+        np.array(columns["frequency"]), *integers, np.stack(columns["flank"], 1), np.stack(columns["bore"], 1), shapes
+    )

@@ -1,0 +1,68 @@
+"""Static compliance of a free gear body between tooth flanks and bore: C = Pᵀ K⁺ P, inertia relief, mean-axis gauge.
+
+Each harmonic contributes Fᴴ C_ν F; tooth offset m is their Fourier sum. For a body that is its own mirror image about
+mid-width, loads of even and odd width functions do not see each other: those entries are zero exactly.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.reduction.modal import Progress
+from gearfmu.reduction.sector import Family, SectorBody
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Static compliance, conventions of `body.ReducedBody`: C_ff (2, 2, z, R, R, A, A), m/N; C_fb (2, R, A, 6), m/N and
+    1/N; C_bb (6, 6), m/N … 1/(N·m). pictures : (p, z, 3N) displacement of all sectors, in sector frames, under the
+    unit flank loads asked for, m/N."""
+
+    static_ff: np.ndarray
+    static_fb: np.ndarray
+    static_bb: np.ndarray
+    pictures: np.ndarray
+
+
+def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress | None = None) -> Statics:
+    """Compliance of all flank points and the bore for every tooth offset.
+
+    picture_loads : flat indices (side, roll, function) of loads on tooth 0 whose displacement is wanted everywhere.
+    """
+    size, z = len(body.flank_rows), body.teeth
+    ff, fb, bb = np.zeros((z, size, size)), np.zeros((size, 6)), np.zeros((6, 6))
+    pictures = np.zeros((len(picture_loads), z, body.mesh.nodes.size))
+    for index, space in enumerate(body.spaces):
+        for nu in body.diameters():
+            if progress:
+                progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
+            family = body.family(index, nu)
+            response = family.flank_response()
+            turn = np.exp(-2j * np.pi * nu * np.arange(z) / z)
+            product = family.weight / z * (family.flank.conj().T @ response)
+            ff[np.ix_(range(z), family.columns, family.columns)] += np.multiply.outer(turn, product).real
+            _add_pictures(pictures, space, family, response, picture_loads)
+            if nu <= 1:
+                bore = family.harmonic.flexibility(family.bore)
+                fb[family.columns] += family.weight * (family.flank.conj().T @ bore).real
+                bb += z * family.weight * (family.bore.conj().T @ bore).real
+    return _shaped(body, ff, fb, bb, pictures)
+
+
+def _add_pictures(pictures: np.ndarray, space, family: Family, response: np.ndarray, loads: list[int]) -> None:
+    z, nu = space.teeth, family.harmonic.nodal_diameter
+    turn = np.exp(2j * np.pi * nu * np.arange(z) / z)
+    for row, load in enumerate(loads):
+        column = np.flatnonzero(family.columns == load)
+        if len(column):
+            shape = space.to_nodes @ family.harmonic.expand(response[:, column])
+            pictures[row] += family.weight / z * np.multiply.outer(turn, shape[:, 0]).real
+
+
+def _shaped(body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, pictures: np.ndarray) -> Statics:
+    rolls, functions, z = len(body.points.rolls), body.points.functions, body.teeth
+    back = ff[(-np.arange(z)) % z].transpose(0, 2, 1)
+    shaped = (0.5 * (ff + back)).reshape(z, 2, rolls, functions, 2, rolls, functions)
+    static_ff = np.ascontiguousarray(shaped.transpose(1, 4, 0, 2, 5, 3, 6))
+    return Statics(static_ff, fb.reshape(2, rolls, functions, 6), 0.5 * (bb + bb.T), pictures)
