@@ -18,6 +18,9 @@ from gearfmu.report.signals import angle_of_mesh, teeth, window_of_interest
 from gearfmu.stage.trace import Trace, write_columns
 
 
+NVH = ("spectrum", "orders", "spectrogram")
+
+
 def write(
     trace: Trace,
     summary: Mapping[str, Any],
@@ -52,10 +55,10 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
         lambda: plots.mesh_force_and_error(trace),
         lambda: plots.mesh_force_and_error(trace, detail_window(trace, angle)),
         lambda: plots.bearing_forces(trace),
+        lambda: picture.deformed_pair(trace, spec, bodies) if spec is not None and bodies else None,
         lambda: plots_nvh.force_spectrum(trace, window, angle),
         lambda: plots_nvh.order_cuts(trace, angle),
         lambda: plots_nvh.force_spectrogram(trace, angle),
-        lambda: picture.deformed_pair(trace, spec, bodies) if spec is not None and bodies else None,
     ]
     made, missing = [], []
     for maker in makers:
@@ -72,11 +75,16 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
 
 
 def detail_window(trace: Trace, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
-    """The last `periods` mesh periods (s), or the last twentieth of the run where mesh angle or motion is missing."""
-    end = float(trace.time[-1])
-    if angle is None or angle[-1] < 2 * np.pi * periods:
-        return end - 0.05 * (end - float(trace.time[0])), end
-    return float(np.interp(angle[-1] - 2 * np.pi * periods, angle, trace.time)), end
+    """About `periods` mesh periods (s) around the largest mesh force, or a twentieth of the run where the mesh angle is missing."""
+    start, end = float(trace.time[0]), float(trace.time[-1])
+    force = np.abs(trace["mesh.force"]) if "mesh.force" in trace else np.zeros(1)
+    centre = float(trace.time[int(np.argmax(force))])
+    half = 0.025 * (end - start)
+    if angle is not None and angle[-1] > 2 * np.pi * periods:
+        frequency = np.interp(centre, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
+        half = min(0.5 * periods / max(frequency, 1e-9), 0.5 * (end - start))
+    centre = min(max(centre, start + half), end - half)
+    return centre - half, centre + half
 
 
 def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[list[Plot], list[str]], bodies: Sequence[Any] | None) -> str:
@@ -87,14 +95,25 @@ def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[li
     body = [
         page.head(title, str(summary.get("outcome", "outcome not given")), f"{stage}{' · ' + about if about else ''}"),
         page.facts(_facts(summary)),
-        page.section("Results", _results(trace), _octaves(trace)),
-        *[page.figure(plot) for plot in made],
+        page.section("Results", _results(trace)),
+        *[page.figure(plot) for plot in made if plot.name not in NVH],
+        *_warned(trace),
+        *([page.section("Octave bands", bands)] if (bands := _octaves(trace)) else []),
+        *[page.figure(plot) for plot in made if plot.name in NVH],
         page.section("Accuracy and cost", *_accuracy(summary, bodies)),
         page.details("Where it comes from", page.pairs_table(_provenance(summary)), _channels(trace)),
     ]
     if missing:
         body.insert(3, page.section("Not shown", *[page.note(reason) for reason in missing]))
     return page.page(f"{title} – {stage}", body)
+
+
+def _warned(trace: Trace) -> list[str]:
+    try:
+        warning = plots_nvh.sampling_warning(trace)
+    except MetricsError:
+        return []
+    return [page.warning(warning)] if warning else []
 
 
 def _facts(summary: Mapping[str, Any]) -> dict[str, str]:
@@ -146,7 +165,7 @@ def _octaves(trace: Trace) -> str:
     if not bands:
         return ""
     rows = [(name, *(f"{row[band]:.1f}" for band in bands)) for name, row in levels.items()]
-    return "<h3>Octave bands, dB re 1 N (rms)</h3>" + page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
+    return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
 
 
 def _accuracy(summary: Mapping[str, Any], bodies: Sequence[Any] | None) -> list[str]:

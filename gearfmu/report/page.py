@@ -27,6 +27,7 @@ border:1px solid var(--line);border-radius:6px;overflow:hidden;margin:0 0 16px}
 .facts span{color:var(--muted);font-size:12.5px}
 .ok,.bad{display:inline-block;border-radius:4px;padding:1px 9px;font-size:13px;font-weight:600;vertical-align:5px;margin-left:8px}
 .ok{background:#dff0e4;color:#20623a}.bad{background:#f8dcd9;color:#8f2018}
+.warning{border-left:4px solid #c8642b;background:#fdf4ec;border-radius:4px;padding:10px 16px;margin:0 0 16px;font-size:14px}
 table{border-collapse:collapse;font-size:13.5px;min-width:min(560px,100%)}
 th,td{text-align:left;padding:4px 22px 4px 0;border-bottom:1px solid var(--line);vertical-align:top}
 th{color:var(--muted);font-weight:500}
@@ -95,3 +96,8 @@ def pairs_table(pairs: Mapping[str, str]) -> str:
 def note(text: str) -> str:
     """A small remark."""
     return f'<p class="note">{escape(text)}</p>'
+
+
+def warning(text: str) -> str:
+    """A remark that must not be overlooked."""
+    return f'<p class="warning">{escape(text)}</p>'

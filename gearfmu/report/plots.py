@@ -29,7 +29,7 @@ class Plot:
 def torque_and_slip(trace: Trace) -> Plot | None:
     """Torques around the clutch, the other torques, and the slip of every clutch with its lock-up; None without torques."""
     clutch = [name for suffix in CLUTCH_TORQUES for name in trace.channels if name.endswith(suffix)]
-    others = [name for name in trace.channels if name.endswith(".tau") and name not in clutch and not _twin(trace, name)]
+    others = [name for name in distinct(trace, [n for n in trace.channels if n.endswith(".tau")]) if name not in clutch]
     slips = [name for name in trace.channels if name.endswith(".slip")]
     rows = [(names, label) for names, label in ((clutch, "torque in N·m"), (others, "torque in N·m"), (slips, "slip in rad/s")) if names]
     if not clutch and not others:
@@ -49,8 +49,8 @@ def torque_and_slip(trace: Trace) -> Plot | None:
 
 
 def speeds(trace: Trace) -> Plot | None:
-    """Speed of everything that turns, in rpm, without sign; None when nothing does."""
-    names = [name for name in trace.channels if name.endswith(".w") and trace.channels[name].unit == "rad/s"]
+    """Speed of everything that turns, in rpm, without sign, each once; None when nothing does."""
+    names = distinct(trace, [name for name in trace.channels if name.endswith(".w") and trace.channels[name].unit == "rad/s"])
     if not names:
         return None
     with styled():
@@ -112,14 +112,15 @@ def columns(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
     return found
 
 
+def distinct(trace: Trace, names: Iterable[str]) -> list[str]:
+    """The names without those whose values repeat an earlier one's (a shaft end seen from both sides)."""
+    found: dict[bytes, str] = {}
+    for name in names:
+        found.setdefault(trace[name].tobytes(), name)
+    return list(found.values())
+
+
 _DASHED = {"ls": "--", "color": MUTED, "lw": 1.2}
-
-
-def _twin(trace: Trace, name: str) -> bool:
-    """A port torque that repeats the same shaft's own torque is shown once."""
-    stem = name.removesuffix(".tau")
-    other = f"{stem}.shaft.tau"
-    return name != other and other in trace and name == f"{stem}.tau" and np.array_equal(trace[name], trace[other])
 
 
 def _finish(axis: Axes, label: str) -> None:

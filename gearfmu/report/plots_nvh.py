@@ -14,13 +14,16 @@ from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
 ORDERS = 5
+TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
 SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 
 def force_channels(trace: Trace) -> list[str]:
-    """The channels whose sound matters, most important first: bearing forces, then the mesh force."""
-    names = [f"bearing.{shaft}.{direction}" for shaft in shafts(trace) for direction in ("fx", "fy")]
-    return [name for name in [*names, "mesh.force"] if name in trace]
+    """The channels whose sound matters: bearing forces, then the mesh force. Where the mean over the communication step was
+    recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back."""
+    names = [f"bearing.{shaft}.{direction}" for shaft in shafts(trace) for direction in ("fx", "fy")] + ["mesh.force"]
+    best = [next((n for n in (f"{name}_mean", name) if n in trace), None) for name in names]
+    return [name for name in best if name is not None]
 
 
 def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) -> Plot | None:
@@ -45,13 +48,13 @@ def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) 
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
     caption = (f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
-               f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). Dotted: mesh orders. {_sampling_words(step)}")  # fmt: skip
+               f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). Dotted: mesh orders.")  # fmt: skip
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
 
 
 def order_cuts(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
     """Level of the first mesh orders of every bearing force along the run; None without forces or without the speed."""
-    names = [name for name in force_channels(trace) if not name.endswith(".fx") or len(shafts(trace)) < 2]
+    names = [name for name in force_channels(trace) if ".fx" not in name or len(shafts(trace)) < 2]
     if mesh_angle is None or not names:
         return None
     cuts = {name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS) for name in names}
@@ -78,7 +81,7 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
     names = force_channels(trace)
     if not names:
         return None
-    name = next((n for n in names if n.endswith(".fy")), names[0])
+    name = next((n for n in names if ".fy" in n), names[0])
     step = metrics.sample_step(trace.time)
     segment = _segment(trace.time.size, windows=14)
     picture_data = metrics.spectrogram(trace[name], step, segment, max(segment // 16, 1))
@@ -96,7 +99,7 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
         _overlay_orders(axis, trace, mesh_angle, min(SHOWN_TO, 0.5 / step))
         picture = png(figure)
     caption = (f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
-               f"Dashed: mesh orders from the instantaneous speed. {_sampling_words(step)}")  # fmt: skip
+               f"Dashed: mesh orders from the instantaneous speed.")  # fmt: skip
     data = {"time_[s]": np.repeat(time, picture_data.frequency.size),
             "frequency_[Hz]": np.tile(picture_data.frequency, time.size), "level_[dB re 1 N]": values.ravel()}  # fmt: skip
     return Plot("spectrogram", "Spectrogram", caption, picture, data)
@@ -123,8 +126,17 @@ def _segment(samples: int, windows: int = 3) -> int:
     return min(wanted, samples)
 
 
-def _sampling_words(step: float) -> str:
-    return f"Sampled every {step * 1e6:.3g} µs without a filter: what the teeth do above {0.5e-3 / step:.3g} kHz folds back."
+def sampling_warning(trace: Trace) -> str | None:
+    """What the sampling does to spectra, in words, where it ends below TRUSTED_FROM; None where it does not or there are none."""
+    if not force_channels(trace) or trace.time.size < 16:
+        return None
+    limit = 0.5 / metrics.sample_step(trace.time)
+    if limit >= TRUSTED_FROM:
+        return None
+    means = [name for name in force_channels(trace) if name.endswith("_mean")]
+    weaker = f" ({', '.join(means)}: weakened, being means over the step)" if means else ""
+    return (f"Sampled every {0.5e6 / limit:.3g} µs without a filter: vibration above {limit / 1e3:.3g} kHz, where the mesh resonance of most pairs lies, folds back "
+            f"into the spectra, orders and bands below{weaker}. For levels to rely on, run with a communication step of 20 µs.")  # fmt: skip
 
 
 def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from gearfmu import report
+from gearfmu.report.plots import distinct
 from gearfmu.report.results import key_results, strict
 from gearfmu.report.signals import lock_time, spans, window_of_interest
 from gearfmu.stage.trace import Channel, Trace
@@ -195,3 +196,26 @@ def test_headless_chromium_draws_the_page(folder: Path, tmp_path: Path) -> None:
     assert pixels.shape[:2] == (4000, 1100)
     blue = np.all(np.abs(pixels - np.array([0x1F, 0x5A, 0x92]) / 255) < 0.08, axis=-1)
     assert np.flatnonzero(blue.any(axis=1)).max() > 3000 and blue.sum() > 2000
+
+
+def force_at(interval: float) -> Trace:
+    t = np.arange(4000) * interval
+    return Trace(t, {"mesh.force": Channel(1000 + np.sin(2 * np.pi * 800 * t), "N"), "mesh.force_mean": Channel(1000 + np.cos(t), "N")}, {})
+
+
+def test_coarse_sampling_warns_where_spectra_are_read(tmp_path: Path) -> None:
+    coarse = report.write(force_at(1e-4), {}, tmp_path / "a").read_text(encoding="utf-8")
+    fine = report.write(force_at(2e-5), {}, tmp_path / "b").read_text(encoding="utf-8")
+    assert '<p class="warning">Sampled every 100 µs' in coarse and '<p class="warning">' not in fine
+
+
+def test_step_means_stand_for_samples_in_spectra(tmp_path: Path) -> None:
+    report.write(force_at(2e-5), {}, tmp_path)
+    header = (tmp_path / "data" / "spectrum.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "mesh.force_mean_rms_[N]" in header and "mesh.force_rms_[N]" not in header
+
+
+def test_a_signal_seen_twice_is_drawn_once() -> None:
+    t = np.arange(4.0)
+    trace = Trace(t, {"a.w": Channel(t, "rad/s"), "b.w": Channel(t.copy(), "rad/s"), "c.w": Channel(-t, "rad/s")}, {})
+    assert distinct(trace, trace.channels) == ["a.w", "c.w"]
