@@ -118,14 +118,14 @@ def build_library(platform: str = "host", sanitize: bool = False, pattern: bool 
     return target
 
 
-def compile_program(source: Path, out: Path, platform: str = "host") -> Path:
+def compile_program(source: Path, out: Path, platform: str = "host", sanitize: bool = False) -> Path:
     """Compile one C program that loads FMUs (tests, benchmarks) with the library's compiler and flags; returns `out`.
 
     Raises BuildError with the compiler's messages."""
     name = _platform_name(platform)
     libraries = [] if name == "win64" else ["-ldl"]
-    _run([*_compiler(name, sanitize=False), *FLAGS, f"-I{fmi_headers()}", f"-I{HERE / 'src'}",
-          "-o", str(out), str(source), *libraries])
+    _run([*_compiler(name, sanitize), *FLAGS, *_variant_flags(sanitize, pattern=False, real="float"),
+          f"-I{fmi_headers()}", f"-I{HERE / 'src'}", "-o", str(out), str(source), *libraries])
     return out
 
 

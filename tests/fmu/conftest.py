@@ -1,0 +1,67 @@
+"""FMUs that all tests of this room share, made once per session from a small stage, and a helper to unpack them."""
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from small_stage import small_model
+
+from gearfmu.fmu import export
+
+
+@pytest.fixture(scope="session")
+def model():
+    """Pinion and wheel as spring ports, tip relief."""
+    return small_model()
+
+
+@pytest.fixture(scope="session")
+def other_model():
+    """Another stage: no relief, torque port on the wheel."""
+    return small_model("fzg_c", wheel={"kind": "torque"})
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory) -> Path:
+    """Where the session's FMUs lie; the name holds a space and letters beyond ASCII on purpose."""
+    return tmp_path_factory.mktemp("fmus with späce#")
+
+
+@pytest.fixture(scope="session")
+def native(model, folder) -> Path:
+    return export(model, folder / "native.fmu")
+
+
+@pytest.fixture(scope="session")
+def python(model, folder) -> Path:
+    return export(model, folder / "python.fmu", runtime="python")
+
+
+@pytest.fixture(scope="session")
+def other(other_model, folder) -> Path:
+    return export(other_model, folder / "other.fmu")
+
+
+@pytest.fixture(scope="session")
+def unpacked(native, folder) -> str:
+    """Folder of the unpacked native FMU."""
+    return unpack(native, folder / "native")
+
+
+@pytest.fixture(scope="session")
+def unpacked_python(python, tmp_path_factory) -> str:
+    """In a plain folder: pythonfmu's binary decodes no percent escape but %20."""
+    return unpack(python, tmp_path_factory.mktemp("python"))
+
+
+@pytest.fixture(scope="session")
+def unpacked_other(other, folder) -> str:
+    return unpack(other, folder / "other")
+
+
+def unpack(fmu: Path, target: Path) -> str:
+    """Unpack `fmu`; returns the folder as text."""
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(target)
+    return str(target)

@@ -1,0 +1,195 @@
+"""Who may call what when: the native FMU's answers to every call in every mode, and to what importers get wrong."""
+from __future__ import annotations
+
+import ctypes
+import math
+from pathlib import Path
+
+import pytest
+from fmpy.fmi2 import fmi2CallbackLoggerTYPE
+
+from gearfmu.fmu.probes import CHECKS, ERROR, OK, Subject
+
+MODES = ("instantiated", "initialization", "step", "discarded", "terminated")
+ALLOWED = {
+    "setupExperiment": {"instantiated"},
+    "enterInitializationMode": {"instantiated"},
+    "exitInitializationMode": {"initialization"},
+    "doStep": {"step"},
+    "terminate": {"step", "discarded"},
+    "reset": set(MODES),
+    "getReal": {"initialization", "step", "discarded", "terminated"},
+    "getInteger": {"initialization", "step", "discarded", "terminated"},
+    "getBoolean": {"initialization", "step", "discarded", "terminated"},
+    "setReal": {"instantiated", "initialization", "step"},
+    "setInteger": {"instantiated", "initialization"},  # fixed parameters
+    "getFMUstate": set(MODES),
+    "setDebugLogging": set(MODES),
+    "fmi2GetRealStatus": {"step", "discarded", "terminated"},
+    "fmi2CancelStep": set(),
+    "fmi2SetRealInputDerivatives": set(),
+    "fmi2GetDirectionalDerivative": set(),
+}
+
+
+def reference(subject: Subject, name: str) -> int:
+    return next(v.valueReference for v in subject.variables if v.name == name)
+
+
+def in_mode(folder: str, mode: str) -> Subject:
+    """A fresh instance brought into `mode`; a discarded step comes from a torque that no tooth can carry."""
+    subject = Subject(folder)
+    if mode == "instantiated":
+        return subject
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    if mode == "initialization":
+        return subject
+    subject.fmu.exitInitializationMode()
+    if mode == "discarded":
+        subject.fmu.setReal([reference(subject, "wheel.tau")], [-1e7])
+        statuses = [subject.status("doStep", k * 1e-4, 1e-4) for k in range(40)]
+        assert 2 in statuses, "the overload was not noticed"
+    if mode == "terminated":
+        subject.fmu.terminate()
+    return subject
+
+
+def arguments(subject: Subject, call: str) -> tuple:
+    real, level, truth = (reference(subject, name) for name in ("pinion.phi", "level", "effect.hertz"))
+    time, c = ctypes.c_double(), subject.fmu.component
+    return {"doStep": (0.0, 1e-4), "getReal": ([real],), "getInteger": ([level],), "getBoolean": ([truth],),
+            "setReal": ([real], [0.0]), "setInteger": ([level], [1]), "setDebugLogging": (True, ["logAll"]),
+            "fmi2GetRealStatus": (c, 2, ctypes.byref(time)), "fmi2CancelStep": (c,),
+            "fmi2SetRealInputDerivatives": (c, None, 0, None, None),
+            "fmi2GetDirectionalDerivative": (c, None, 0, None, 0, None, None)}.get(call, ())
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("call", ALLOWED)
+def test_every_call_in_every_mode(unpacked_other, call, mode):
+    subject = in_mode(unpacked_other, mode)
+    assert subject.status(call, *arguments(subject, call)) == (OK if mode in ALLOWED[call] else ERROR)
+    subject.close()
+    assert subject.status(call, *arguments(subject, call)) == ERROR, "a freed instance"
+
+
+def test_discarded_step_tells_how_far_it_came_and_can_be_taken_back(unpacked_other):
+    subject = in_mode(unpacked_other, "step")
+    plain = Subject(unpacked_other).initialized().run()
+    subject.excite()
+    state = subject.fmu.getFMUstate()
+    subject.fmu.setReal([reference(subject, "wheel.tau")], [-1e7])
+    steps = 0
+    while subject.status("doStep", steps * 1e-4, 1e-4) == OK:
+        steps += 1
+    reached = ctypes.c_double()
+    assert subject.status("fmi2GetRealStatus", subject.fmu.component, 2, ctypes.byref(reached)) == OK
+    assert steps * 1e-4 - 1e-12 <= reached.value < (steps + 1) * 1e-4
+    outputs = subject.fmu.getReal(subject.references("output", "Real"))
+    assert all(map(math.isfinite, outputs)), "the last good values stay readable"
+    subject.fmu.setFMUstate(state)
+    reference_run = in_mode(unpacked_other, "step")
+    reference_run.excite()
+    assert subject.run() == reference_run.run() and plain
+    subject.close()
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_probes_find_nothing(unpacked, check):
+    assert list(CHECKS[check](unpacked)) == []
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_probes_find_nothing_in_the_python_runtime(unpacked_python, check):
+    assert list(CHECKS[check](unpacked_python)) == []
+
+
+def test_refused_set_call_changes_no_value_of_it(unpacked):
+    subject = in_mode(unpacked, "step")
+    names = [reference(subject, name) for name in ("pinion.phi", "pinion.w", "pinion.phi", "wheel.w")]
+    subject.fmu.setReal(names[:2], [0.25, 3.0])
+    assert subject.status("setReal", names, [0.5, 4.0, 0.75, math.nan]) == ERROR
+    assert subject.fmu.getReal(names[:2]) == [0.25, 3.0]
+    subject.close()
+
+
+def test_outputs_in_initialization_mode_follow_the_inputs(unpacked):
+    subject = in_mode(unpacked, "initialization")
+    phi, te = reference(subject, "pinion.phi"), reference(subject, "mesh.te")
+    before = subject.fmu.getReal([te])
+    subject.fmu.setReal([phi], [2e-3])
+    loaded = subject.fmu.getReal([te])
+    subject.fmu.setReal([phi], [0.0])
+    assert loaded != before == subject.fmu.getReal([te]), "no trace of the settings in between"
+    subject.close()
+
+
+def test_stop_time_is_kept(unpacked):
+    subject = Subject(unpacked)
+    subject.fmu.setupExperiment(startTime=1.0, stopTime=1.0003)
+    subject.fmu.enterInitializationMode()
+    subject.fmu.exitInitializationMode()
+    assert [subject.status("doStep", 1.0 + k * 1e-4, 1e-4) for k in range(4)] == [OK, OK, OK, ERROR]
+    subject.close()
+
+
+def test_refusals_say_why(unpacked):
+    messages: list[tuple[int, str, str]] = []
+    subject = Subject(unpacked)
+    subject.close()
+    subject.callbacks.logger = fmi2CallbackLoggerTYPE(
+        lambda _, name, status, category, text: messages.append((status, category.decode(), text.decode())))
+    subject.fmu.instantiate(callbacks=subject.callbacks, loggingOn=False)
+    subject.status("setReal", [reference(subject, "level")], [1.0])
+    subject.status("doStep", 0.0, 1e-4)
+    subject.status("setReal", [reference(subject, "pinion.phi")], [math.nan])
+    assert [m[:2] for m in messages] == [(ERROR, "logStatusError")] * 3, "errors are told even with logging off"
+    assert "is Integer or Enumeration" in messages[0][2] and "'instantiated'" in messages[1][2] and "nan" in messages[2][2]
+    subject.fmu.setDebugLogging(True, ["logEvents"])
+    subject.fmu.setupExperiment()
+    subject.fmu.enterInitializationMode()
+    subject.fmu.exitInitializationMode()
+    assert messages[-1][1] == "logEvents"
+    assert subject.status("setDebugLogging", True, ["logNonsense"]) == ERROR
+    subject.close()
+
+
+@pytest.mark.parametrize("spelling", ["{uri}", "{uri}/", "file://localhost{path}", "file:{path}", "{plain}"])
+def test_resource_locations(unpacked, spelling):
+    resources = Path(unpacked) / "resources"
+    uri = resources.as_uri()
+    location = spelling.format(uri=uri, path=uri.removeprefix("file://"), plain=resources)
+    assert "%" in uri, "the folder's name needs escapes"
+    subject = Subject(unpacked)
+    component = subject.fmu.fmi2Instantiate(b"x", 1, subject.description.guid.encode(), location.encode(),
+                                            ctypes.byref(subject.callbacks), 0, 0)
+    assert component
+    subject.fmu.fmi2FreeInstance(component)
+    subject.close()
+
+
+@pytest.mark.parametrize("location", [b"", b"file:///%zz", b"file:///%00", b"file:///no/such/folder", b"x" * 9000, None])
+def test_bad_resource_locations(unpacked, location):
+    subject = Subject(unpacked)
+    assert not subject.fmu.fmi2Instantiate(b"x", 1, subject.description.guid.encode(), location,
+                                           ctypes.byref(subject.callbacks), 0, 0)
+    subject.close()
+
+
+@pytest.mark.parametrize("name, kind, guid", [(b"", 1, None), (None, 1, None), (b"x", 0, None), (b"x", 1, b"?"), (b"x", 1, b"")])
+def test_bad_instantiation(unpacked, name, kind, guid):
+    subject = Subject(unpacked)
+    location = (Path(unpacked) / "resources").as_uri().encode()
+    guid = subject.description.guid.encode() if guid is None else guid
+    assert not subject.fmu.fmi2Instantiate(name, kind, guid, location, ctypes.byref(subject.callbacks), 0, 0)
+    subject.close()
+
+
+def test_many_instances_live_side_by_side(unpacked):
+    subjects = [Subject(unpacked) for _ in range(40)]
+    for subject in subjects[::2]:
+        subject.close()
+    assert [s.status("enterInitializationMode") for s in subjects] == [ERROR, OK] * 20
+    for subject in subjects[1::2]:
+        subject.close()

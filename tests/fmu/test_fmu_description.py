@@ -1,0 +1,134 @@
+"""What lies in the FMU: XML from the kernel's table, units, terminals, library, licences; the same bytes every time."""
+from __future__ import annotations
+
+import os
+import time
+import zipfile
+from xml.etree import ElementTree as ET
+
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+from gearfmu.errors import FmuError
+from gearfmu.fmu import export
+from gearfmu.fmu.package import content_identifier, write_archive
+from gearfmu.fmu.units import ATOMS, base_exponents
+from gearfmu.kernel import library_path
+
+
+@pytest.mark.parametrize("unit, expected", [
+    ("rad/s2", {"s": -2, "rad": 1}), ("N.s/m2", {"kg": 1, "m": -1, "s": -1}), ("N.m", {"kg": 1, "m": 2, "s": -2}),
+    ("J/N.m", {}), ("kg.m2", {"kg": 1, "m": 2}), ("m-1", {"m": -1})])
+def test_units_are_reduced_to_base_units(unit, expected):
+    assert base_exponents(unit) == expected
+
+
+def test_product_of_units_adds_exponents():
+    for first in ATOMS:
+        for second in ATOMS:
+            product, quotient = base_exponents(f"{first}.{second}"), base_exponents(f"{first}/{second}")
+            for base in ("kg", "m", "s", "rad"):
+                a, b = ATOMS[first].get(base, 0), ATOMS[second].get(base, 0)
+                assert product.get(base, 0) == a + b and quotient.get(base, 0) == a - b
+
+
+@pytest.mark.parametrize("unit", ["furlong", "N*m", "m^2", "N/", "2m"])
+def test_unknown_units_are_refused_by_name(unit):
+    if unit == "N/":
+        assert base_exponents(unit) == base_exponents("N")
+        return
+    with pytest.raises(FmuError, match="unit"):
+        base_exponents(unit)
+
+
+def test_fmpy_finds_nothing_wrong(native, python, other):
+    assert [validate_fmu(str(fmu)) for fmu in (native, python, other)] == [[], [], []]
+
+
+def test_description_is_the_kernels_table(model, native):
+    description = read_model_description(str(native))
+    listed = description.modelVariables
+    assert [v.name for v in listed] == [v.name for v in model.kernel_variables()]
+    for ours, theirs in zip(model.kernel_variables(), listed):
+        assert (ours.reference, ours.type, ours.causality, ours.unit or None) == (
+            theirs.valueReference, theirs.type, theirs.causality, theirs.unit)
+        assert theirs.description == ours.description
+        if ours.causality != "output" and ours.type != "Boolean":
+            assert float(theirs.start) == ours.start
+    assert description.guid == model.hash
+    assert description.coSimulation.canSerializeFMUstate and not description.coSimulation.providesDirectionalDerivative
+
+
+def test_model_structure_lists_every_output_twice(native):
+    description = read_model_description(str(native))
+    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    assert [unknown.variable.name for unknown in description.outputs] == outputs
+    assert [unknown.variable.name for unknown in description.initialUnknowns] == outputs
+    assert all(unknown.dependencies == [] for unknown in description.outputs), "outputs follow inputs only by a step"
+
+
+def test_ports_decide_terminals_and_causality(unpacked, unpacked_other):
+    def causalities(folder):
+        terminals = ET.parse(os.path.join(folder, "terminalsAndIcons", "terminalsAndIcons.xml"))
+        by_name = {v.name: v.causality for v in read_model_description(folder).modelVariables}
+        return {t.get("name"): {m.get("memberName"): by_name[m.get("variableName")] for m in t} for t in terminals.iter("Terminal")}
+
+    spring = {"phi": "input", "w": "input", "a": "input", "tau": "output", "tau_mean": "output"}
+    torque = {"tau": "input", "phi": "output", "w": "output", "a": "output"}
+    assert causalities(unpacked) == {"pinion": spring, "wheel": spring}
+    assert causalities(unpacked_other) == {"pinion": spring, "wheel": torque}
+
+
+def test_library_is_a_byte_copy(native, python):
+    library = library_path().read_bytes()
+    for fmu in (native, python):
+        with zipfile.ZipFile(fmu) as archive:
+            copies = [name for name in archive.namelist() if archive.read(name) == library]
+        assert len(copies) == 1 and copies[0].startswith("binaries/" if fmu is native else "resources/")
+
+
+def test_same_model_same_bytes(model, native, python, tmp_path, monkeypatch):
+    monkeypatch.setattr(time, "time", lambda: 4e9)
+    monkeypatch.setenv("TZ", "Asia/Tokyo")
+    for fmu, runtime in ((native, "native"), (python, "python")):
+        assert export(model, tmp_path / "again.fmu", runtime=runtime).read_bytes() == fmu.read_bytes()
+
+
+def test_identifiers_are_c_names_that_tell_contents_apart():
+    names = [content_identifier(name, [b"a"]) for name in ("fzg_c", "2 gears-à", "", "x" * 200)]
+    assert all(name.isidentifier() and name.isascii() and len(name) < 64 for name in names)
+    contents = ([b"a"], [b"b"], [b"a", b""], [b"", b"a"], [b"ab"], [b"a", b"b"])
+    assert len({content_identifier("s", content) for content in contents}) == len(contents)
+
+
+def test_licences_travel_along(native, python):
+    def text(fmu, name):
+        with zipfile.ZipFile(fmu) as archive:
+            return archive.read(f"documentation/licenses/{name}").decode()
+
+    assert "BSD 3-Clause" in text(native, "license.txt") and "MODELISAR" in text(native, "license.txt")
+    assert "Permission is hereby granted" in text(python, "pythonfmu.txt")
+
+
+def test_documentation_refers_to_nothing_outside(native, model):
+    with zipfile.ZipFile(native) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "http" not in page and "src=" not in page
+    assert all(f"<td>{v.name}</td>" in page for v in model.kernel_variables())
+
+
+def test_failed_export_leaves_the_old_file(model, tmp_path):
+    target = tmp_path / "kept.fmu"
+    target.write_bytes(b"old")
+    with pytest.raises(TypeError):
+        write_archive(target, {"good": b"x" * 9, "bad": None})
+    assert target.read_bytes() == b"old" and list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("options, word", [({"runtime": "java"}, "runtime"), ({"platforms": ()}, "platforms"),
+                                           ({"platforms": ("amiga",)}, "amiga")])
+def test_unknown_options_are_named(model, tmp_path, options, word):
+    with pytest.raises(Exception, match=word):
+        export(model, tmp_path / "x.fmu", **options)
+    assert not list(tmp_path.iterdir())
