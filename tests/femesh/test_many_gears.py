@@ -61,31 +61,46 @@ def check_meshes(pair: PairSpec, gears: list[GearSpec], scale: float) -> None:
         assert gap <= 1e-12 * shape.r_a
 
 
-def check_reasons(problems: list[Problem], gears: list[GearSpec]) -> None:
+def check_reasons(problems: list[Problem]) -> None:
     for problem in problems:
         assert problem.field.split(".")[0] in ("gears", "pair")
         assert problem.value and len(problem.remedy) > 20
 
 
-both = lambda values: st.tuples(values, values)  # noqa: E731
+def both(values: st.SearchStrategy) -> st.SearchStrategy:
+    return st.tuples(values, values)
+
+
+PAIRS = {
+    "teeth": both(st.integers(12, 80)),
+    "shifts": both(st.floats(-0.5, 0.9)),
+    "module": st.floats(0.5e-3, 20e-3),
+    "widths": both(st.floats(1, 20)),
+    "bores": both(st.floats(0.05, 0.98)),
+    "widening": st.floats(-0.1, 0.2),
+}
+
+
+def valid_mesh_or_a_reason(scale: float, numbers: dict) -> None:
+    pair, gears = pair_of(**numbers)
+    problems = geometry_problems("stage.toml", pair, gears, None)
+    event("refused" if problems else "meshed")
+    check_reasons(problems)
+    if not problems:
+        check_meshes(pair, gears, scale)
 
 
 @settings(max_examples=300, deadline=None)
-@given(
-    teeth=both(st.integers(12, 80)),
-    shifts=both(st.floats(-0.5, 0.9)),
-    module=st.floats(0.5e-3, 20e-3),
-    widths=both(st.floats(1, 20)),
-    bores=both(st.floats(0.05, 0.98)),
-    widening=st.floats(-0.1, 0.2),
-)
-def test_valid_mesh_or_a_reason(teeth, shifts, module, widths, bores, widening) -> None:
-    pair, gears = pair_of(teeth, shifts, module, widths, bores, widening)
-    problems = geometry_problems("stage.toml", pair, gears, None)
-    event("refused" if problems else "meshed")
-    check_reasons(problems, gears)
-    if not problems:
-        check_meshes(pair, gears, 0.3)
+@given(st.fixed_dictionaries(PAIRS))
+def test_valid_mesh_or_a_reason(numbers: dict) -> None:
+    valid_mesh_or_a_reason(0.3, numbers)
+
+
+@pytest.mark.full
+@settings(max_examples=3000, deadline=None)
+@given(st.fixed_dictionaries(PAIRS), st.sampled_from([0.2, 0.5, 1.0]))
+def test_valid_mesh_or_a_reason_at_length(numbers: dict, scale: float) -> None:
+    valid_mesh_or_a_reason(scale, numbers)
 
 
 def test_ordinary_pairs_are_not_refused() -> None:

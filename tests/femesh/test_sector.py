@@ -114,14 +114,20 @@ def test_volume_converges_to_the_section_with_high_order(shape: GearGeometry) ->
     assert math.log2(errors[0] / errors[2]) / 2 > 3
 
 
-def test_quality_of_the_shipped_meshes() -> None:
+def test_quality_of_the_shipped_gears_and_of_the_default_counts() -> None:
     for shape, gear in zip(SHAPES, STAGE.gears, strict=True):
-        mesh = gear_sector(shape, gear.face_width, gear.body.mesh)
-        facts = mesh_report(mesh, shape.r_b, gear.body.strip_half_width)
-        assert facts["scaled_jacobian_min"] > 0.6
+        for counts in (gear.body.mesh, MeshSpec()):
+            mesh = gear_sector(shape, gear.face_width, counts)
+            facts = mesh_report(mesh, shape.r_b, gear.body.strip_half_width)
+            assert facts["scaled_jacobian_min"] > 0.6
+            assert facts["nodes"] < 35_000
+            assert facts["dof"] == mesh.nodes.size
         assert facts["elements_per_strip"] > 2
-        assert facts["nodes"] < 35_000
-        assert facts["dof"] == mesh.nodes.size
+        assert facts["flank_element_length"] * MeshSpec().flank == pytest.approx(flank_length(shape), rel=1e-12)
+
+
+def flank_length(shape: GearGeometry) -> float:
+    return (shape.s_tip**2 - shape.s_form**2) / (2 * shape.r_b)
 
 
 def test_scale_divides_every_element_along_the_same_lines() -> None:

@@ -32,7 +32,7 @@ def test_every_field_has_a_comment_and_every_default_is_shown(tmp_path: Path) ->
     fields = [line for line in text.splitlines() if " = " in line and not line.startswith("# A line")]
     assert all(re.search(r"= .*  # \S", line) for line in fields)
     assert any(line.startswith("backlash = ") and line.endswith("[m]") for line in fields)
-    assert any(line.startswith("# width_functions = 6") for line in fields)
+    assert any(line.startswith('# law = "line"') for line in fields)
     assert any(line.startswith("# helix_angle = ") for line in fields)
 
 
@@ -40,7 +40,7 @@ def test_shown_defaults_are_the_defaults(tmp_path: Path) -> None:
     path = new_stage("mine", "fzg_c/stage_relief", tmp_path)
     before = load_stage(path)
     text = re.sub(r"^# (\w+ = [^…]*?)$", r"\1", path.read_text(encoding="utf-8"), flags=re.M)
-    assert "\nhelix_angle = " in text and "\nscale = " in text
+    assert "\nhelix_angle = " in text and "\nlaw = " in text
     path.write_text(text, encoding="utf-8")
     assert load_stage(path) == before
 
