@@ -14,7 +14,7 @@ from gearfmu.report import page, picture, plots, plots_nvh
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
 from gearfmu.report.results import key_results, strict
-from gearfmu.report.signals import angle_of_mesh, teeth, window_of_interest
+from gearfmu.report.signals import SETTLED, angle_of_mesh, teeth, window_of_interest
 from gearfmu.stage.trace import Trace, write_columns
 
 
@@ -139,8 +139,8 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
 
 
 NAMES = {
-    "mesh_force_mean_N": "mesh force, mean, N", "mesh_force_rms_ac_N": "mesh force, rms without mean, N",
-    "te_mean_um": "transmission error, mean, µm", "te_rms_ac_um": "transmission error, rms without mean, µm",
+    "mesh_force_mean_N": "mesh force, mean, N", "mesh_force_rms_ac_N": "mesh force, rms of the alternating part, N",
+    "te_mean_um": "transmission error, mean, µm", "te_rms_ac_um": "transmission error, rms of the alternating part, µm",
     "contact_loss_percent": "teeth apart, % of the samples, whole run", "coast_contact_percent": "coast flanks carry, % of the samples, whole run",
     "impacts": "impacts, whole run", "lock_time_s": "clutch locked from, s",
 }  # fmt: skip
@@ -151,8 +151,9 @@ def _results(trace: Trace) -> str:
     rows = []
     for key, value in key_results(trace).items():
         bearing = key.removeprefix("bearing_").removesuffix("_rms_ac_N")
-        rows.append((NAMES.get(key, f"bearing {bearing}, rms of both directions without mean, N"), f"{value:.4g}"))
-    where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise."
+        rows.append((NAMES.get(key, f"bearing {bearing}, rms of the alternating part, both directions, N"), f"{value:.4g}"))
+    where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise. "
+    where += "Alternating: without the mean." if window.reason == SETTLED else "Alternating: without a moving average of 10 ms."
     return page.table(("", "value"), rows) + page.note(where) if rows else page.note("The trace holds no mesh or bearing channel.")
 
 

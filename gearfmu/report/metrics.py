@@ -145,7 +145,7 @@ def order_cuts(time: np.ndarray, values: np.ndarray, angle: np.ndarray, orders: 
 
 
 def _coefficients(angle: np.ndarray, values: np.ndarray, orders: np.ndarray, width: float) -> np.ndarray:
-    """Rms amplitude of each order by Hann-weighted least squares in angle (docs/theory eq. 20)."""
+    """Rms amplitude of each order by Hann-weighted least squares in angle  (docs/theory eq. 14)."""
     weight = np.cos(np.pi * angle / width) * np.sqrt(np.gradient(angle))
     harmonics = np.outer(angle, orders)
     basis = np.column_stack([np.ones_like(angle), np.cos(harmonics), np.sin(harmonics)])

@@ -61,7 +61,7 @@ def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None
 
 def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
     """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching:
-    the rolls of docs/theory eq. (7) add up to L."""
+    the rolls of docs/theory eq. 4 add up to L."""
     a, b = pair.gears
     t = _action_angle(pair, sg)
     roll = a.r_b * sg * (phi + sg * a.psi_b - t)

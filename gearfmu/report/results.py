@@ -7,24 +7,28 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.report.metrics import rms_ac
-from gearfmu.report.signals import lock_time, shafts, window_of_interest
+from gearfmu.cosim.accuracy import alternating, rms
+from gearfmu.report.signals import SETTLED, lock_time, shafts, window_of_interest
 from gearfmu.stage.trace import Trace
 
 
 def key_results(trace: Trace) -> dict[str, float]:
-    """The numbers to compare runs by, over the window of interest; names carry the unit. Peaks are left out: they do not repeat."""
+    """The numbers to compare runs by, over the window of interest; names carry the unit. Peaks are left out: they do not repeat.
+
+    "ac" is the signal minus its mean where the scene has a settling time (steady running), else minus a 10 ms moving average.
+    """
     window = window_of_interest(trace)
     part = trace.window(window.start, window.end)
+    steady = window.reason == SETTLED
     found: dict[str, float] = {}
     if "mesh.force" in part:
-        found |= {"mesh_force_mean_N": float(np.mean(part["mesh.force"])), "mesh_force_rms_ac_N": rms_ac(part["mesh.force"])}
+        found |= {"mesh_force_mean_N": float(np.mean(part["mesh.force"])), "mesh_force_rms_ac_N": _rms_ac(part, "mesh.force", steady)}
     if "mesh.te" in part:
-        found |= {"te_mean_um": 1e6 * float(np.mean(part["mesh.te"])), "te_rms_ac_um": 1e6 * rms_ac(part["mesh.te"])}
+        found |= {"te_mean_um": 1e6 * float(np.mean(part["mesh.te"])), "te_rms_ac_um": 1e6 * _rms_ac(part, "mesh.te", steady)}
     for shaft in shafts(part):
-        forces = [part[f"bearing.{shaft}.{d}"] for d in ("fx", "fy") if f"bearing.{shaft}.{d}" in part]
+        forces = [name for d in "xy" if (name := f"bearing.{shaft}.f{d}") in part]
         if len(forces) == 2:
-            found[f"bearing_{shaft}_rms_ac_N"] = math.hypot(rms_ac(forces[0]), rms_ac(forces[1]))
+            found[f"bearing_{shaft}_rms_ac_N"] = math.hypot(*[_rms_ac(part, name, steady) for name in forces])
     if "mesh.contact" in trace:
         found["contact_loss_percent"] = 100 * float(np.mean(trace["mesh.contact"] == 0))
         found["coast_contact_percent"] = 100 * float(np.mean(trace["mesh.contact"] == -1))
@@ -34,6 +38,11 @@ def key_results(trace: Trace) -> dict[str, float]:
     if locked is not None:
         found["lock_time_s"] = locked
     return found
+
+
+def _rms_ac(trace: Trace, name: str, steady: bool) -> float:
+    interval = float(trace.time[-1] - trace.time[0]) / max(trace.time.size - 1, 1)
+    return rms(alternating(trace[name], interval, steady or interval <= 0))
 
 
 def strict(value: Any) -> Any:

@@ -12,6 +12,7 @@ from gearfmu.stage.trace import Trace
 GEAR_SPEED = ".gear.w"
 GEAR_PHI = ".gear.phi"
 LOCKED = ".clutch.locked"
+SETTLED = "after the scene's settling time"
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def window_of_interest(trace: Trace) -> Window:
         return Window(locked, end, "after the clutch has locked")
     settled = float(trace.meta.get("settle") or 0.0)
     if start < settled < end:
-        return Window(settled, end, "after the scene's settling time")
+        return Window(settled, end, SETTLED)
     return Window(start, end, "the whole run")
 
 
