@@ -39,8 +39,9 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     return write_blob(sections)
 
 
-def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float) -> bytes:
-    """Two coaxial bars `gap` apart, with the residual of the modes left out; no local compliance to speak of."""
+def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: float = 1e-20) -> bytes:
+    """Two coaxial bars `gap` apart, with the residual of the modes left out; `local`: 2 (1 − ν²)/(πE) of the contact
+    strip of 1 m, 1/Pa (as good as rigid when left out)."""
     sections: dict = {
         "model": np.array([1, FLAT, 1, 0], np.int32), "name": "bars", "shafts": "left|right", "degrees": np.array([0], np.int32),
         "pair": np.array([gap, 0.0, 0.0, 1.0, 1.0, 1e9, 1e9, 1e-3, 0.0]),
@@ -49,7 +50,7 @@ def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float) -> byte
         row = np.broadcast_to(bar.end_row(n)[1:], (2, 4, 1, n))
         static = np.zeros((2, 2, 7, 4, 4, 1, 1))
         static[0, 0, 3] = bar.static_compliance()
-        numbers = [1, 0.01, 0, 0.01, 0, 0, bar.mass, bar.mass, 1.0, 1e-20, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
+        numbers = [1, 0.01, 0, 0.01, 0, 0, bar.mass, bar.mass, 1.0, local, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
         sections |= {
             f"gear{g}": np.array(numbers, float), f"port{g}": np.array([TORQUE, 0, 1, 0, 1, 1, 1, 0], float),
             f"size{g}": np.array([n, 4, 1], np.int32), f"omega{g}": bar.frequencies(n), f"zeta{g}": np.zeros(n),
