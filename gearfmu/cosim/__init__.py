@@ -2,6 +2,7 @@
 
 `run` is imported when it is asked for: units and masters need neither bodies nor FMUs.
 """
+
 from __future__ import annotations
 
 from typing import Any

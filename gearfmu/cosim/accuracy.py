@@ -1,4 +1,5 @@
 """What the coupling costs: Richardson's estimate of its error from a run with half the communication step."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -19,7 +20,8 @@ class Window:
 
 
 def coupling_errors(coarse: Trace, fine: Trace, order: int, window: Window) -> dict[str, float]:
-    """Estimated error of `coarse` (communication step H) by signal: 2^p/(2^p − 1)·rms(y_H − y_{H/2}) over the rms of the AC part of y_{H/2}.
+    """Estimated error of `coarse` (communication step H) by signal: 2^p/(2^p − 1)·rms(y_H − y_{H/2}) over the rms of
+    the AC part of y_{H/2}.
 
     fine : the same scene with H/2. Only real-valued signals in both, and with an AC part; sampled at the common times.
     """
@@ -39,7 +41,8 @@ def coupling_errors(coarse: Trace, fine: Trace, order: int, window: Window) -> d
 
 
 def alternating(values: np.ndarray, interval: float, steady: bool) -> np.ndarray:
-    """AC part (n,) of samples `interval` s apart: minus the mean, or minus the centred 10 ms moving average (shorter at the ends)."""
+    """AC part (n,) of samples `interval` s apart: minus the mean, or minus the centred 10 ms moving average (shorter
+    at the ends)."""
     if steady:
         return values - values.mean()
     width = max(1, round(AVERAGE_OVER / interval)) | 1

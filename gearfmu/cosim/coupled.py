@@ -1,23 +1,27 @@
 """One coupled run: a master steps a stage and a drivetrain to the end of a scene, or to the last good time."""
+
 from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gearfmu.cosim.masters import Cut, Master, master
 from gearfmu.cosim.recorder import Recorder
-from gearfmu.errors import CouplingError, FmuError, SimulationError
+from gearfmu.cosim.units import Unit
+from gearfmu.errors import CouplingError, FmuError, ModelError, SimulationError
 from gearfmu.stage.trace import Trace
 
 OK = "ok"
+STOPPED = "stopped"  # a call was refused: the message says which
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How a cut is stepped: master, communication step H in s, number of steps, what to record; progress is told the done fraction."""
+    """How a cut is stepped: master, communication step H in s, number of steps, what to record; progress is told the
+    done fraction."""
 
     master: str
     step: float
@@ -28,12 +32,17 @@ class Plan:
 
 @dataclass(frozen=True)
 class Result:
-    """Trace up to the last good time, how the run ended, and its cost. work, throughput: J at the cut, on the drivetrain, signed sum and sum of magnitudes."""
+    """Trace up to the last good time, how the run ended, and its cost: CPU time of the whole loop and of the stage
+    alone.
+
+    work, throughput : J at the cut, on the drivetrain: signed sum and sum of magnitudes.
+    """
 
     trace: Trace
     outcome: str
     message: str
     cpu_s: float
+    stage_cpu_s: float
     work: float
     throughput: float
     order: int
@@ -41,25 +50,43 @@ class Result:
 
     @property
     def energy_residual(self) -> float | None:
-        """Work that one side of the cut gave and the other did not get, over the exchanged work; None when the stage does not tell its work."""
+        """Work that one side of the cut gave and the other did not get, over the exchanged work; None when the stage
+        does not tell its work."""
         work = self.facts.get("energy.work")
         return None if work is None or not self.throughput else (self.work + work) / self.throughput
 
 
 def run_coupled(cut: Cut, plan: Plan) -> Result:
-    """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good communication point."""
-    with_recorder = _Run(cut, plan)
+    """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good
+    communication point. A failure before the first point is raised as it is."""
+    timed = _Timed(cut.stage)
+    coupled = _Run(replace(cut, stage=timed), plan)
     outcome, message, started = OK, "", clock.process_time()
     try:
-        with_recorder.go()
-    except SimulationError as error:
-        outcome, message = error.outcome, str(error)
-    except (FmuError, CouplingError) as error:
-        if not with_recorder.recorder.count:
+        coupled.go()
+    except (SimulationError, FmuError, ModelError, CouplingError) as error:
+        if not coupled.recorder.count:
             raise
-        outcome, message = "stopped", str(error)
-    cpu = clock.process_time() - started
-    return with_recorder.result(outcome, message, cpu)
+        outcome, message = getattr(error, "outcome", STOPPED), str(error)
+    facts, exchange = coupled.facts(), coupled.master.exchange
+    cpu, trace = clock.process_time() - started, coupled.recorder.trace({})
+    return Result(
+        trace, outcome, message, cpu, timed.cpu_s, exchange.work, exchange.throughput, coupled.master.order, facts
+    )
+
+
+class _Timed:
+    """A unit whose steps are timed."""
+
+    def __init__(self, unit: Unit) -> None:
+        self.unit, self.cpu_s = unit, 0.0
+        for name in ("outputs", "initialize", "resolve", "set", "get", "save", "restore"):
+            setattr(self, name, getattr(unit, name))
+
+    def step(self, time: float, h: float) -> None:
+        started = clock.process_time()
+        self.unit.step(time, h)
+        self.cpu_s += clock.process_time() - started
 
 
 class _Run:
@@ -68,7 +95,11 @@ class _Run:
         self.master: Master = master(plan.master, cut)
         self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1)
         known = cut.stage.outputs()
-        self._fact_names = [name for name in ("energy.work", "energy.residual", "solver.n_dyn", "solver.h", "solver.trouble", "solver.steps") if name in known]
+        self._fact_names = [
+            name
+            for name in ("energy.work", "energy.residual", "solver.n_dyn", "solver.h", "solver.trouble", "solver.steps")
+            if name in known
+        ]
         self._facts: Any = cut.stage.resolve(self._fact_names)
 
     def go(self) -> None:
@@ -82,8 +113,7 @@ class _Run:
             if self.plan.progress and (n + 1) % tell == 0:
                 self.plan.progress((n + 1) / self.plan.steps)
 
-    def result(self, outcome: str, message: str, cpu: float) -> Result:
-        """What came of it. After a failure the facts are those of the last good time too: a failed step leaves the stage there."""
-        exchange = self.master.exchange
-        facts = dict(zip(self._fact_names, map(float, self.cut.stage.get(self._facts)), strict=True))
-        return Result(self.recorder.trace({}), outcome, message, cpu, exchange.work, exchange.throughput, self.master.order, facts)
+    def facts(self) -> dict[str, float]:
+        """Numbers about the run itself. After a failure those of the last good time: a failed step leaves the stage
+        there."""
+        return dict(zip(self._fact_names, map(float, self.cut.stage.get(self._facts)), strict=True))

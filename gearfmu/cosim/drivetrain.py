@@ -2,6 +2,7 @@
 
 Angles and speeds behind the wheel gear are those of the output shaft: negative while the pinion turns positively.
 """
+
 from __future__ import annotations
 
 import math
@@ -12,7 +13,7 @@ from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spri
 from gearfmu.cosim.signals import Constant, Ramp, Signal
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import ChainSpec, PortSpec
+from gearfmu.spec.stage import ChainSpec, PortSpec, StageSpec
 
 ROLLING_SPEED = 0.1  # m/s over which rolling resistance builds up: no force at standstill
 SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffens
@@ -27,24 +28,42 @@ class Shafts:
     ratio: float
 
 
+def shafts_of(spec: StageSpec) -> Shafts:
+    """Names and ratio of the stage's shafts."""
+    pinion, wheel = spec.gears
+    return Shafts(pinion.name, wheel.name, wheel.teeth / pinion.teeth)
+
+
 def build(scene: SceneSpec, shafts: Shafts) -> Network:
     """The drivetrain of a scene: torque ports named as the shafts."""
     return _car(scene, scene.passenger_car, shafts) if scene.passenger_car else _rig(scene, scene.test_rig, shafts)
 
 
 def stage_ports(scene: SceneSpec, shafts: Shafts) -> dict[str, PortSpec]:
-    """What the stage's ports must be in this drivetrain: the cut runs through compliant elements, which belong to the stage."""
+    """What the stage's ports must be in this drivetrain: the cut runs through compliant elements, which belong to the
+    stage."""
     if scene.test_rig:
         rig = scene.test_rig
         pinion = PortSpec(kind="spring", k=rig.pinion_shaft_stiffness, c=rig.pinion_shaft_damping)
-        return {shafts.pinion: pinion, shafts.wheel: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping)}
+        return {
+            shafts.pinion: pinion,
+            shafts.wheel: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
+        }
     car = scene.passenger_car
     if car.chain_in_fmu:
-        chain = ChainSpec(inertia=car.secondary_inertia, disc_inertia=car.disc_inertia, shaft_k=car.input_shaft_stiffness, shaft_c=car.input_shaft_damping)
+        chain = ChainSpec(
+            inertia=car.secondary_inertia,
+            disc_inertia=car.disc_inertia,
+            shaft_k=car.input_shaft_stiffness,
+            shaft_c=car.input_shaft_damping,
+        )
         pinion = PortSpec(kind="spring", k=car.dmf_stiffness, c=car.dmf_damping, chain=chain)
     else:
         pinion = PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping)
-    return {shafts.pinion: pinion, shafts.wheel: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping)}
+    return {
+        shafts.pinion: pinion,
+        shafts.wheel: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
+    }
 
 
 def capacity(scene: SceneSpec) -> Signal:
@@ -59,13 +78,15 @@ def stage_signals(scene: SceneSpec, shafts: Shafts) -> tuple[tuple[str, Signal],
 
 
 def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
-    """Start values of the stage that follow from the drivetrain: behind an open clutch the gears turn with the vehicle, not with the engine."""
+    """Start values of the stage that follow from the drivetrain: behind an open clutch the gears turn with the
+    vehicle, not with the engine."""
     in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
     return {f"{shafts.pinion}.disc.w_start": scene.start.pinion_speed} if in_stage else {}
 
 
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
-    """Torque of a four-stroke four-cylinder engine, N·m, over the crank angle: mean and orders 2, 4, 6 (cosines, all at their maximum at angle zero)."""
+    """Torque of a four-stroke four-cylinder engine, N·m, over the crank angle: mean and orders 2, 4, 6 (cosines, all
+    at their maximum at angle zero)."""
     mean, second, fourth, sixth, cos = car.engine_torque, car.order_2, car.order_4, car.order_6, math.cos
 
     def torque(time: float, phi: float, w: float) -> float:
@@ -76,7 +97,8 @@ def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
 
 
 def road_load(car: PassengerCar) -> Callable[[float, float, float], float]:
-    """Torque of air and rolling resistance on the vehicle's inertia, N·m, referred to the output shaft, against its motion."""
+    """Torque of air and rolling resistance on the vehicle's inertia, N·m, referred to the output shaft, against its
+    motion."""
     lever = car.road_wheel_radius / car.final_drive_ratio
     rolling, air = car.rolling_resistance * car.vehicle_mass * car.gravity, 0.5 * car.air_density * car.drag_area
 
@@ -93,27 +115,50 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
     nodes, springs, port = _vehicle(scene, car, shafts)
     sources = (Source("combustion", "engine", engine_torque(car)), Source("road", "vehicle", road_load(car)))
     if car.chain_in_fmu:
-        return Network((engine, *nodes), springs, (), sources, torque_ports={shafts.pinion: "engine", shafts.wheel: port})
-    secondary, disc = Inertia("secondary", car.secondary_inertia, w=engine_w), Inertia("disc", car.disc_inertia, w=scene.start.pinion_speed)
+        return Network(
+            (engine, *nodes), springs, (), sources, torque_ports={shafts.pinion: "engine", shafts.wheel: port}
+        )
+    secondary, disc = (
+        Inertia("secondary", car.secondary_inertia, w=engine_w),
+        Inertia("disc", car.disc_inertia, w=scene.start.pinion_speed),
+    )
     dmf = Spring("dmf", {"engine": 1.0, "secondary": -1.0}, car.dmf_stiffness, car.dmf_damping)
     clutch = Clutch("clutch", "secondary", "disc", capacity(scene), scene.clutch.peak)
-    return Network((engine, secondary, disc, *nodes), (dmf, *springs), (clutch,), sources, torque_ports={shafts.pinion: "disc", shafts.wheel: port})
+    return Network(
+        (engine, secondary, disc, *nodes),
+        (dmf, *springs),
+        (clutch,),
+        sources,
+        torque_ports={shafts.pinion: "disc", shafts.wheel: port},
+    )
 
 
-def _vehicle(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> tuple[tuple[Inertia, ...], tuple[Spring, ...], str]:
-    """Final drive – half shafts – driven wheels – tyres – vehicle with the other two wheels, all referred to the output shaft."""
+def _vehicle(
+    scene: SceneSpec, car: PassengerCar, shafts: Shafts
+) -> tuple[tuple[Inertia, ...], tuple[Spring, ...], str]:
+    """Final drive – half shafts – driven wheels – tyres – vehicle with the other two wheels, all referred to the
+    output shaft."""
     w, referred = -scene.start.pinion_speed / shafts.ratio, 1.0 / car.final_drive_ratio**2
     speed = max(abs(w) * car.road_wheel_radius / car.final_drive_ratio, SLOWEST_TYRE)
     tyre = car.tyre_slip_stiffness * car.road_wheel_radius**2 / speed * referred
     body = (car.vehicle_mass * car.road_wheel_radius**2 + 2.0 * car.road_wheel_inertia) * referred
-    nodes = (Inertia("final_drive", car.final_drive_inertia, w=w), Inertia("wheels", 2.0 * car.road_wheel_inertia * referred, w=w),
-             Inertia("vehicle", body, w=w))
-    half_shafts = Spring("half_shafts", {"final_drive": 1.0, "wheels": -1.0}, car.half_shaft_stiffness * referred, car.half_shaft_damping * referred)
+    nodes = (
+        Inertia("final_drive", car.final_drive_inertia, w=w),
+        Inertia("wheels", 2.0 * car.road_wheel_inertia * referred, w=w),
+        Inertia("vehicle", body, w=w),
+    )
+    half_shafts = Spring(
+        "half_shafts",
+        {"final_drive": 1.0, "wheels": -1.0},
+        car.half_shaft_stiffness * referred,
+        car.half_shaft_damping * referred,
+    )
     return nodes, (half_shafts, Spring("tyres", {"wheels": 1.0, "vehicle": -1.0}, 0.0, tyre)), "final_drive"
 
 
 def _rig(scene: SceneSpec, rig: TestRig, shafts: Shafts) -> Network:
-    """Drive with its controller on the pinion's shaft; the wheel's shaft ends at constant speed. The shafts start twisted by the mean torque."""
+    """Drive with its controller on the pinion's shaft; the wheel's shaft ends at constant speed. The shafts start
+    twisted by the mean torque."""
     w = scene.start.pinion_speed
     twist = rig.torque / rig.pinion_shaft_stiffness + rig.torque * shafts.ratio**2 / rig.wheel_shaft_stiffness
     nodes = (Inertia("drive", rig.drive_inertia, phi=twist, w=w), Driven("brake", w=-w / shafts.ratio))
@@ -121,4 +166,3 @@ def _rig(scene: SceneSpec, rig: TestRig, shafts: Shafts) -> Network:
     droop = Spring("droop", {"drive": 1.0}, 0.0, rig.speed_droop)
     source = Source("motor", "drive", lambda time, phi, w: mean)
     return Network(nodes, (droop,), (), (source,), torque_ports={shafts.pinion: "drive", shafts.wheel: "brake"})
-

@@ -1,12 +1,17 @@
-"""Equations of a network: linear between events, one set of matrices for each mode, exact propagation by matrix exponentials.
+"""Equations of a network: linear between events, one set of matrices for each mode, exact propagation by matrix
+exponentials.
 
 State   x = [φ (n), w (n), impulse on every driven node (d)]
-Input   u = [torque on every node (n), capacity·sign of every slipping clutch (c), acceleration of every driven node (d), 1]
-Mode    (clutch signs, gap signs): clutch 0 sticks, ±1 slips with that sign of the slip; gap +1 drive flanks, −1 coast flanks, 0 open.
+Input   u = [torque on every node (n), capacity·sign of every slipping clutch (c), acceleration of every driven node
+(d), 1]
+Mode    (clutch signs, gap signs): clutch 0 sticks, ±1 slips with that sign of the slip; gap +1 drive flanks, −1 coast
+flanks, 0 open.
 
-With W = M⁻¹ − M⁻¹DᵀG⁻¹DM⁻¹, G = DM⁻¹Dᵀ and D the slip rows of the sticking clutches, the accelerations are W f + (1 − M⁻¹DᵀG⁻¹D) E a
-and the sticking torques G⁻¹D (M⁻¹ f + E a) (Lagrange multipliers; f: all other torques, E a: prescribed accelerations, where M⁻¹ = 0).
+With W = M⁻¹ − M⁻¹DᵀG⁻¹DM⁻¹, G = DM⁻¹Dᵀ and D the slip rows of the sticking clutches, the accelerations are W f + (1 −
+M⁻¹DᵀG⁻¹D) E a and the sticking torques G⁻¹D (M⁻¹ f + E a) (Lagrange multipliers; f: all other torques, E a:
+prescribed accelerations, where M⁻¹ = 0).
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -31,7 +36,8 @@ class ModeMatrices:
 
 
 class Dynamics:
-    """Matrices of a network for every mode, formed once and kept; immutable from outside, so that units may share it."""
+    """Matrices of a network for every mode, formed once and kept; immutable from outside, so that units may share
+    it."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
@@ -70,7 +76,8 @@ class Dynamics:
         return self._transitions[key]
 
     def transition_once(self, mode: Mode, h: float) -> np.ndarray:
-        """As `transition`, without keeping it (for steps that end at an event). Van Loan, IEEE Trans. Autom. Control 23 (1978) 395."""
+        """As `transition`, without keeping it (for steps that end at an event). Van Loan, IEEE Trans. Autom. Control
+        23 (1978) 395."""
         m, nx, nu = self.matrices(mode), self.states, self.inputs
         block = np.zeros((nx + 2 * nu, nx + 2 * nu))
         block[:nx, :nx], block[:nx, nx : nx + nu] = m.a * h, m.b * h
@@ -112,7 +119,9 @@ class Dynamics:
         stick_u[:, n : n + self.n_clutches] += np.diag(slipping.astype(float))
         return ModeMatrices(a, b, *self._outputs(a, b, (spring_x, spring_1), (stick_x, stick_u)))
 
-    def _stick_torques(self, slipping: np.ndarray, free_x: np.ndarray, free_u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _stick_torques(
+        self, slipping: np.ndarray, free_x: np.ndarray, free_u: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         stick_x, stick_u = np.zeros((self.n_clutches, self.states)), np.zeros((self.n_clutches, self.inputs))
         rows = self.slip[~slipping]
         if len(rows):
@@ -121,11 +130,16 @@ class Dynamics:
             stick_u[~slipping] = np.linalg.solve(delassus, rows @ free_u)
         return stick_x, stick_u
 
-    def _outputs(self, a: np.ndarray, b: np.ndarray, spring: tuple[np.ndarray, np.ndarray],
-                 clutch: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _outputs(
+        self, a: np.ndarray, b: np.ndarray, spring: tuple[np.ndarray, np.ndarray], clutch: tuple[np.ndarray, np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
         n, nx, nu = self.n, self.states, self.inputs
         zeros = np.zeros((2 * n, nu))
-        spring_u, extension, slip = np.zeros((len(spring[0]), nu)), np.zeros((len(spring[0]), nx)), np.zeros((self.n_clutches, nx))
+        spring_u, extension, slip = (
+            np.zeros((len(spring[0]), nu)),
+            np.zeros((len(spring[0]), nx)),
+            np.zeros((self.n_clutches, nx)),
+        )
         spring_u[:, -1], extension[:, :n], slip[:, n : 2 * n] = spring[1], self.extension, self.slip
         c = np.vstack([np.eye(2 * n, nx), a[n:], spring[0], extension, clutch[0], slip])
         d = np.vstack([zeros, b[n:], spring_u, np.zeros_like(spring_u), clutch[1], np.zeros((self.n_clutches, nu))])

@@ -1,4 +1,5 @@
 """Events of a network: which part leaves its mode first, exactly when, and what mode follows."""
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -36,7 +37,8 @@ class Attempt(NamedTuple):
 
 
 class Found(NamedTuple):
-    """First event of an attempted step: part by kind and index, fraction of the step, state, input and capacities there."""
+    """First event of an attempted step: part by kind and index, fraction of the step, state, input and capacities
+    there."""
 
     kind: str
     index: int
@@ -117,7 +119,8 @@ def _found(dynamics: Dynamics, part: int, fraction: float, attempt: Attempt, x: 
 
 
 def switch(dynamics: Dynamics, mode: Mode, found: Found, x: np.ndarray) -> Mode:
-    """Mode after the event; slips of the clutches that meet there are set to exactly zero in `x`, keeping the momentum."""
+    """Mode after the event; slips of the clutches that meet there are set to exactly zero in `x`, keeping the
+    momentum."""
     signs, gaps = list(mode[0]), list(mode[1])
     if found.kind == "gap":
         s = float(dynamics.extension[dynamics.gaps[found.index]] @ x[: dynamics.n])
@@ -149,10 +152,14 @@ def _stop(dynamics: Dynamics, x: np.ndarray, clutches: list[int]) -> None:
     x[n : 2 * n] -= through @ np.linalg.lstsq(rows @ through, rows @ x[n : 2 * n], rcond=None)[0]
 
 
-def resolve(dynamics: Dynamics, mode: Mode, at_rest: list[int], x: np.ndarray, u: np.ndarray, capacity: np.ndarray) -> Mode:
-    """Which of the clutches `at_rest` (slip zero) stick, and in which direction the others start to slip, given the signs of those that slip already.
+def resolve(
+    dynamics: Dynamics, mode: Mode, at_rest: list[int], x: np.ndarray, u: np.ndarray, capacity: np.ndarray
+) -> Mode:
+    """Which of the clutches `at_rest` (slip zero) stick, and in which direction the others start to slip, given the
+    signs of those that slip already.
 
-    Sticking clutches hold up to peak·capacity; one that starts to slip transmits its capacity, which may break the next one loose.
+    Sticking clutches hold up to peak·capacity; one that starts to slip transmits its capacity, which may break the
+    next one loose.
     """
     n, n_c, signs, rest = dynamics.n, dynamics.n_clutches, list(mode[0]), list(at_rest)
     while rest:
@@ -174,7 +181,8 @@ def resolve(dynamics: Dynamics, mode: Mode, at_rest: list[int], x: np.ndarray, u
 
 
 def initial_mode(dynamics: Dynamics, x: np.ndarray, u: np.ndarray, capacity: np.ndarray) -> Mode:
-    """Mode of a state from nothing but the state: gaps by extension, clutches by slip, then `resolve` for those without slip."""
+    """Mode of a state from nothing but the state: gaps by extension, clutches by slip, then `resolve` for those
+    without slip."""
     gaps = []
     for k in dynamics.gaps:
         s, backlash = float(dynamics.extension[k] @ x[: dynamics.n]), dynamics.network.springs[k].backlash

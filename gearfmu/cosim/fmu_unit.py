@@ -1,4 +1,5 @@
 """FmuUnit: an FMI 2.0 co-simulation FMU as a unit, through fmpy's low-level interface with buffers taken once."""
+
 from __future__ import annotations
 
 import shutil
@@ -34,7 +35,12 @@ from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError, FmuError, SimulationError
 from gearfmu.kernel.binding import OUTCOMES, load
 
-KINDS = {"Real": ("Real", fmi2Real), "Integer": ("Integer", fmi2Integer), "Enumeration": ("Integer", fmi2Integer), "Boolean": ("Boolean", fmi2Boolean)}
+KINDS = {
+    "Real": ("Real", fmi2Real),
+    "Integer": ("Integer", fmi2Integer),
+    "Enumeration": ("Integer", fmi2Integer),
+    "Boolean": ("Boolean", fmi2Boolean),
+}
 MESSAGES_KEPT = 200
 
 
@@ -60,12 +66,18 @@ class FmuHandle:
 class FmuUnit:
     """Unit of an FMU.
 
-    path : the .fmu; parameters : start values by name, numbers, booleans or the items of an enumeration; folder : where to unpack (a temporary one if None).
-    Raises FmuError when the FMU cannot be loaded, knows no such variable or refuses a call; SimulationError when it discards a step.
-    `close` (or the end of a with block) frees the instance.
+    path : the .fmu; parameters : start values by name, numbers, booleans or the items of an enumeration; folder :
+    where to unpack (a temporary one if None). Raises FmuError when the FMU cannot be loaded, knows no such variable
+    or refuses a call; SimulationError when it discards a step. `close` (or the end of a with block) frees the
+    instance.
     """
 
-    def __init__(self, path: str | Path, parameters: Mapping[str, float | bool | str] | None = None, folder: str | Path | None = None) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        parameters: Mapping[str, float | bool | str] | None = None,
+        folder: str | Path | None = None,
+    ) -> None:
         self.path = Path(path)
         self.messages: list[str] = []
         self._own_folder = None if folder else tempfile.mkdtemp(prefix="gearfmu-")
@@ -77,7 +89,9 @@ class FmuUnit:
             raise FmuError(f"{self.path}: {error} {self._last_message()}") from error
         except Exception as error:
             self._remove_folder()
-            raise error if isinstance(error, FmuError) else FmuError(f"{self.path}: cannot be loaded: {error}") from error
+            raise (
+                error if isinstance(error, FmuError) else FmuError(f"{self.path}: cannot be loaded: {error}")
+            ) from error
 
     def _load(self, folder: str) -> None:
         self.description = read_model_description(str(self.path), validate=False)
@@ -85,8 +99,12 @@ class FmuUnit:
             raise FmuError(f"{self.path}: not an FMI 2.0 co-simulation FMU (it is FMI {self.description.fmiVersion})")
         extract(str(self.path), folder)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
-        self._fmu = FMU2Slave(guid=self.description.guid, unzipDirectory=folder, modelIdentifier=self.description.coSimulation.modelIdentifier,
-                              instanceName=self.description.modelName)
+        self._fmu = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=self.description.modelName,
+        )
         self._callbacks = fmi2CallbackFunctions()
         self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
@@ -97,7 +115,7 @@ class FmuUnit:
         self.messages.append(message.decode("utf-8", "replace"))
         del self.messages[:-MESSAGES_KEPT]
 
-    # -- life -------------------------------------------------------------------------------------------------------------------------------------------
+    # -- life ----------------------------------------------------------------------------------------------------------
     def instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
         """A fresh instance with these start values."""
         self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
@@ -110,7 +128,8 @@ class FmuUnit:
             self.set(self.resolve(list(parameters)), [self._number(name, value) for name, value in parameters.items()])
 
     def initialize(self, time: float) -> None:
-        """Enter and leave initialisation mode at `time`, with the inputs set so far. Raises FmuError with the FMU's own message."""
+        """Enter and leave initialisation mode at `time`, with the inputs set so far. Raises FmuError with the FMU's
+        own message."""
         try:
             self._fmu.setupExperiment(startTime=time)
             self._fmu.enterInitializationMode()
@@ -131,24 +150,33 @@ class FmuUnit:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    # -- variables --------------------------------------------------------------------------------------------------------------------------------------
+    # -- variables -----------------------------------------------------------------------------------------------------
     def outputs(self) -> dict[str, Variable]:
         """The numeric outputs of the FMU, in its order."""
-        return {name: Variable(variable.unit or "", variable.description or "", variable.type != "Real")
-                for name, variable in self.variables.items() if variable.causality == "output" and variable.type in KINDS}
+        return {
+            name: Variable(variable.unit or "", variable.description or "", variable.type != "Real")
+            for name, variable in self.variables.items()
+            if variable.causality == "output" and variable.type in KINDS
+        }
 
     def resolve(self, names: Sequence[str]) -> FmuHandle:
         """Handle of variables; raises CouplingError naming those that the FMU does not have."""
         unknown = [name for name in names if name not in self.variables]
         if unknown:
-            raise CouplingError(f"{self.path}: no variable {', '.join(unknown)}; it has {', '.join(sorted(self.variables))}")
+            raise CouplingError(
+                f"{self.path}: no variable {', '.join(unknown)}; it has {', '.join(sorted(self.variables))}"
+            )
         groups = []
-        for call, kind in {kind: None for kind in KINDS.values()}:
+        for call, kind in dict.fromkeys(KINDS.values()):
             places = [k for k, name in enumerate(names) if KINDS.get(self.variables[name].type) == (call, kind)]
             if places:
                 values = (kind * len(places))()
-                references = (fmi2ValueReference * len(places))(*[self.variables[names[k]].valueReference for k in places])
-                groups.append(_Group(call, references, values, np.frombuffer(values, dtype=np.dtype(kind)), np.array(places)))
+                references = (fmi2ValueReference * len(places))(
+                    *[self.variables[names[k]].valueReference for k in places]
+                )
+                groups.append(
+                    _Group(call, references, values, np.frombuffer(values, dtype=np.dtype(kind)), np.array(places))
+                )
         return FmuHandle(tuple(groups), np.zeros(len(names)))
 
     def set(self, handle: FmuHandle, values: Sequence[float]) -> None:
@@ -156,13 +184,19 @@ class FmuUnit:
         handle.buffer[:] = values
         for group in handle.groups:
             group.view[:] = handle.buffer[group.places]
-            if self._setters[group.call](self._component, group.references, len(group.places), group.values) > fmi2Warning:
+            if (
+                self._setters[group.call](self._component, group.references, len(group.places), group.values)
+                > fmi2Warning
+            ):
                 raise FmuError(f"{self.path}: fmi2Set{group.call} refused. {self._last_message()}")
 
     def get(self, handle: FmuHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer, one call a type."""
         for group in handle.groups:
-            if self._getters[group.call](self._component, group.references, len(group.places), group.values) > fmi2Warning:
+            if (
+                self._getters[group.call](self._component, group.references, len(group.places), group.values)
+                > fmi2Warning
+            ):
                 raise FmuError(f"{self.path}: fmi2Get{group.call} refused. {self._last_message()}")
             handle.buffer[group.places] = group.view
         return handle.buffer
@@ -179,10 +213,12 @@ class FmuUnit:
             raise SimulationError(f"{self.path}: {message}", outcome_of(message), reached.value)
         raise FmuError(f"{self.path}: fmi2DoStep({time:g}, {h:g}) refused. {self._last_message()}")
 
-    # -- state ------------------------------------------------------------------------------------------------------------------------------------------
+    # -- state ---------------------------------------------------------------------------------------------------------
     def save(self) -> bytes:
         """The FMU's state as bytes. Raises FmuError when it cannot be saved."""
-        if not (self.description.coSimulation.canGetAndSetFMUstate and self.description.coSimulation.canSerializeFMUstate):
+        if not (
+            self.description.coSimulation.canGetAndSetFMUstate and self.description.coSimulation.canSerializeFMUstate
+        ):
             raise FmuError(f"{self.path}: this FMU cannot save its state; use a master without rollback")
         state = self._fmu.getFMUstate()
         try:
@@ -198,14 +234,16 @@ class FmuUnit:
         finally:
             self._fmu.freeFMUstate(own)
 
-    # -- small helpers ----------------------------------------------------------------------------------------------------------------------------------
+    # -- small helpers -------------------------------------------------------------------------------------------------
     def _number(self, name: str, value: float | bool | str) -> float:
         if not isinstance(value, str):
             return float(value)
         declared = getattr(self.variables.get(name), "declaredType", None)
         items = {item.name: int(item.value) for item in (declared.items if declared and declared.items else [])}
         if value not in items:
-            raise FmuError(f"{self.path}: {name} = {value!r}: use one of {', '.join(items) or 'the numbers of its range'}")
+            raise FmuError(
+                f"{self.path}: {name} = {value!r}: use one of {', '.join(items) or 'the numbers of its range'}"
+            )
         return float(items[value])
 
     def _last_message(self) -> str:
@@ -217,6 +255,7 @@ class FmuUnit:
 
 
 def outcome_of(message: str) -> str:
-    """The kernel's name of the outcome whose text the message ends with ("diverged", "penetration", "energy"); "discarded" for another FMU's words."""
+    """The kernel's name of the outcome whose text the message ends with ("diverged", "penetration", "energy");
+    "discarded" for another FMU's words."""
     texts = {name: load().gk_outcome_text(number).decode() for number, name in enumerate(OUTCOMES)}
     return next((name for name, text in texts.items() if message.rstrip().endswith(text)), "discarded")

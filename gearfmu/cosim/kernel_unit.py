@@ -1,4 +1,5 @@
 """KernelUnit: the kernel without an FMU around it, as a unit. Same library, same numbers as the FMU."""
+
 from __future__ import annotations
 
 import ctypes

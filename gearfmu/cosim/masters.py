@@ -1,11 +1,13 @@
 """Masters: who steps when, with what. One stage (motion in, torque out) and one drivetrain (torque in, motion out).
 
-gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion over the step with the stage's last mean torque and take it back. (2) Step the stage
-         along that motion: φ, w at the start, and the constant acceleration that ends at the predicted angle. (3) Step the drivetrain with the stage's mean
-         torque of this very step. The momentum that crosses the cut is exact; the motion errs by O(H³) in a step: second order, no rollback of the stage,
-         stable for ωH < 2, ω of the softest spring of the cut against the inertia behind it.
+gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion over the step with the stage's last mean
+         torque and take it back. (2) Step the stage along that motion: φ, w at the start, and the constant
+         acceleration that ends at the predicted angle. (3) Step the drivetrain with the stage's mean torque of this
+         very step. The momentum that crosses the cut is exact; the motion errs by O(H³) in a step: second order, no
+         rollback of the stage, stable for ωH < 2, ω of the softest spring of the cut against the inertia behind it.
 jacobi   What importers do: all outputs are exchanged at the communication points and held. First order.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -21,7 +23,8 @@ from gearfmu.errors import CouplingError
 
 @dataclass(frozen=True)
 class Cut:
-    """Where two units meet: the stage's spring ports and the drivetrain's torque ports of the same names, and signals that only the stage receives."""
+    """Where two units meet: the stage's spring ports and the drivetrain's torque ports of the same names, and signals
+    that only the stage receives."""
 
     stage: Unit
     drive: Unit
@@ -92,7 +95,8 @@ class GsMean:
         x.step_drive(self._tau, motion[0], time, h)
 
     def _predict(self, time: float, h: float) -> np.ndarray:
-        """(3, shafts) φ, w at the start of the step, and the constant acceleration that leads to the predicted angle."""
+        """(3, shafts) φ, w at the start of the step, and the constant acceleration that leads to the predicted
+        angle."""
         x, drive = self.exchange, self.exchange.cut.drive
         motion = self._motion
         motion[:2].flat = drive.get(x.drive_phi_w)

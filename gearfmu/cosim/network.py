@@ -1,4 +1,6 @@
-"""Description of a torsional network: inertias, driven nodes, springs with backlash, clutches, torque sources, ports."""
+"""Description of a torsional network: inertias, driven nodes, springs with backlash, clutches, torque sources,
+ports."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -31,8 +33,9 @@ class Driven:
 class Spring:
     """Spring k and damper c on the extension s = Σ factor·φ of the nodes in `on`.
 
-    Torque on a node = −factor·(k·e + c·ds/dt), e = s outside the dead zone [−backlash, 0], measured from its near end. The damper acts always.
-    Factors 1 and −1: a shaft, k in N·m/rad. Radii: a gear pair, k in N/m; its drive flanks touch at s = 0, its coast flanks at −backlash.
+    Torque on a node = −factor·(k·e + c·ds/dt), e = s outside the dead zone [−backlash, 0], measured from its near
+    end. The damper acts always. Factors 1 and −1: a shaft, k in N·m/rad. Radii: a gear pair, k in N/m; its drive
+    flanks touch at s = 0, its coast flanks at −backlash.
     """
 
     name: str
@@ -67,7 +70,8 @@ class Source:
 
 @dataclass(frozen=True)
 class Network:
-    """The whole network. `torque_ports`: port → node (torque in, motion out; a driven node yields to no torque). `motion_ports`: port → driven node (motion in, torque out)."""
+    """The whole network. `torque_ports`: port → node (torque in, motion out; a driven node yields to no torque).
+    `motion_ports`: port → driven node (motion in, torque out)."""
 
     nodes: tuple[Inertia | Driven, ...]
     springs: tuple[Spring, ...] = ()
@@ -94,16 +98,31 @@ def _node_problems(network: Network) -> list[str]:
     used += [(clutch.name, name) for clutch in network.clutches for name in (clutch.a, clutch.b)]
     used += [(source.name, source.node) for source in network.sources]
     used += [*network.torque_ports.items(), *network.motion_ports.items()]
-    problems = [f"{part}: there is no node {name!r}; known: {', '.join(sorted(known))}" for part, name in used if name not in known]
+    problems = [
+        f"{part}: there is no node {name!r}; known: {', '.join(sorted(known))}"
+        for part, name in used
+        if name not in known
+    ]
     driven = {node.name for node in network.nodes if isinstance(node, Driven)}
-    return problems + [f"port {port}: node {name!r} is an inertia; a motion needs a driven node"
-                       for port, name in network.motion_ports.items() if name in known - driven]
+    return problems + [
+        f"port {port}: node {name!r} is an inertia; a motion needs a driven node"
+        for port, name in network.motion_ports.items()
+        if name in known - driven
+    ]
 
 
 def _value_problems(network: Network) -> list[str]:
-    problems = [f"{node.name}: inertia {node.inertia} kg·m² must be positive" for node in network.nodes
-                if isinstance(node, Inertia) and not node.inertia > 0]
+    problems = [
+        f"{node.name}: inertia {node.inertia} kg·m² must be positive"
+        for node in network.nodes
+        if isinstance(node, Inertia) and not node.inertia > 0
+    ]
     for spring in network.springs:
-        problems += [f"{spring.name}: {key} = {getattr(spring, key)} must not be negative" for key in ("k", "c", "backlash")
-                     if not getattr(spring, key) >= 0]
-    return problems + [f"{clutch.name}: peak {clutch.peak} must be at least 1" for clutch in network.clutches if not clutch.peak >= 1]
+        problems += [
+            f"{spring.name}: {key} = {getattr(spring, key)} must not be negative"
+            for key in ("k", "c", "backlash")
+            if not getattr(spring, key) >= 0
+        ]
+    return problems + [
+        f"{clutch.name}: peak {clutch.peak} must be at least 1" for clutch in network.clutches if not clutch.peak >= 1
+    ]

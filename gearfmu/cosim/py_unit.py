@@ -1,4 +1,6 @@
-"""PyUnit: a torsional network as a unit. Exact between events for inputs linear in time; clutches stick and slip at exact instants."""
+"""PyUnit: a torsional network as a unit. Exact between events for inputs linear in time; clutches stick and slip at
+exact instants."""
+
 from __future__ import annotations
 
 import math
@@ -32,11 +34,21 @@ class _State:
     events: tuple[Event, ...]
 
     def copy(self) -> _State:
-        return _State(self.time, self.x, self.mode, self.torque.copy(), self.motion.copy(), self.tau_mean.copy(), self.work, self.events)
+        return _State(
+            self.time,
+            self.x,
+            self.mode,
+            self.torque.copy(),
+            self.motion.copy(),
+            self.tau_mean.copy(),
+            self.work,
+            self.events,
+        )
 
 
 class Handle(NamedTuple):
-    """Resolved names. `outputs`: positions for get; `inputs`: (kind, position) for set; None where a name is of the other kind only."""
+    """Resolved names. `outputs`: positions for get; `inputs`: (kind, position) for set; None where a name is of the
+    other kind only."""
 
     names: tuple[str, ...]
     outputs: np.ndarray | None
@@ -46,11 +58,17 @@ class Handle(NamedTuple):
 
 
 KEYS = {
-    "phi": Variable("rad", "angle"), "w": Variable("rad/s", "speed"), "a": Variable("rad/s2", "acceleration"), "tau": Variable("N.m", "torque"),
-    "tau_mean": Variable("N.m", "mean torque of the step"), "extension": Variable("rad", "twist of the spring"), "slip": Variable("rad/s", "slip speed"),
-    "locked": Variable("", "true while the clutch sticks", True), "work": Variable("J", "work of the motion ports since the start"),
+    "phi": Variable("rad", "angle"),
+    "w": Variable("rad/s", "speed"),
+    "a": Variable("rad/s2", "acceleration"),
+    "tau": Variable("N.m", "torque"),
+    "tau_mean": Variable("N.m", "mean torque of the step"),
+    "extension": Variable("rad", "twist of the spring"),
+    "slip": Variable("rad/s", "slip speed"),
+    "locked": Variable("", "true while the clutch sticks", True),
+    "work": Variable("J", "work of the motion ports since the start"),
     "stored": Variable("J", "kinetic and potential energy"),
-}  # fmt: skip
+}
 
 
 def _variable(name: str) -> Variable:
@@ -62,13 +80,15 @@ def _variable(name: str) -> Variable:
 class PyUnit:
     """Unit of a Network.
 
-    Inputs: `<port>.tau` of a torque port (torque on the node, held over the step); `<port>.phi`, `.w`, `.a` of a motion port: the node moves with constant
-    acceleration; a difference between the given angle and the one it has reached is blended over the step. Outputs: `.phi`, `.w`, `.a` of ports and nodes,
-    `.tau` (torque on the outside) and `.tau_mean` of motion ports, `.tau` and `.extension` of springs, `.tau`, `.slip`, `.locked` of clutches, `.tau` of
-    sources, `energy.work`, `energy.stored`.
+    Inputs: `<port>.tau` of a torque port (torque on the node, held over the step); `<port>.phi`, `.w`, `.a` of a
+    motion port: the node moves with constant acceleration; a difference between the given angle and the one it has
+    reached is blended over the step. Outputs: `.phi`, `.w`, `.a` of ports and nodes, `.tau` (torque on the outside)
+    and `.tau_mean` of motion ports, `.tau` and `.extension` of springs, `.tau`, `.slip`, `.locked` of clutches,
+    `.tau` of sources, `energy.work`, `energy.stored`.
 
-    micro_step : s, largest step between evaluations of sources and events; None: the communication step. Sources are taken linear over a micro-step between
-    their values at its ends (predictor and corrector, second order); everything else is exact. An event that comes and goes within a micro-step is not seen.
+    micro_step : s, largest step between evaluations of sources and events; None: the communication step. Sources are
+    taken linear over a micro-step between their values at its ends (predictor and corrector, second order);
+    everything else is exact. An event that comes and goes within a micro-step is not seen.
     """
 
     def __init__(self, network: Network, micro_step: float | None = None) -> None:
@@ -82,11 +102,13 @@ class PyUnit:
         self._outputs = self._name_outputs()
         self._output_rows: dict[tuple[tuple[str, ...], Mode], np.ndarray] = {}
         self._z = np.zeros(d.states + 2 * d.inputs)
+        self._x0, self._u0, self._u1 = np.split(self._z, [d.states, d.states + d.inputs])
         self._state = self._start(0.0)
 
-    # -- life -------------------------------------------------------------------------------------------------------------------------------------------
+    # -- life ----------------------------------------------------------------------------------------------------------
     def initialize(self, time: float) -> None:
-        """Start at `time` from the initial angles and speeds of the nodes; what motion ports were given before replaces that of their nodes."""
+        """Start at `time` from the initial angles and speeds of the nodes; what motion ports were given before
+        replaces that of their nodes."""
         d, given = self.dynamics, self._state
         self._state = state = self._start(time)
         state.torque[:] = given.torque
@@ -109,7 +131,7 @@ class PyUnit:
         """Instants at which a clutch locked or slipped or a backlash closed or opened, in order."""
         return self._state.events
 
-    # -- variables --------------------------------------------------------------------------------------------------------------------------------------
+    # -- variables -----------------------------------------------------------------------------------------------------
     def resolve(self, names: Sequence[str]) -> Handle:
         """Handle of variables; raises CouplingError with the known names."""
         inputs = {f"{port}.tau": ("torque", k) for port, k in self._torque_ports.items()}
@@ -117,10 +139,19 @@ class PyUnit:
             inputs |= {f"{port}.{key}": ("motion", 3 * k + i) for i, key in enumerate(("phi", "w", "a"))}
         unknown = [name for name in names if name not in self._outputs and name not in inputs]
         if unknown:
-            raise CouplingError(f"no variable {', '.join(unknown)}; inputs: {', '.join(sorted(inputs))}; outputs: {', '.join(sorted(self._outputs))}")
-        outputs = np.array([self._outputs[name] for name in names], dtype=int) if all(name in self._outputs for name in names) else None
+            known = f"inputs: {', '.join(sorted(inputs))}; outputs: {', '.join(sorted(self._outputs))}"
+            raise CouplingError(f"no variable {', '.join(unknown)}; {known}")
+        outputs = (
+            np.array([self._outputs[name] for name in names], dtype=int)
+            if all(name in self._outputs for name in names)
+            else None
+        )
         places = tuple(inputs[name] for name in names) if all(name in inputs for name in names) else None
-        special = np.flatnonzero(outputs >= len(self.dynamics.output_names)) if outputs is not None else np.zeros(0, dtype=int)
+        special = (
+            np.flatnonzero(outputs >= len(self.dynamics.output_names))
+            if outputs is not None
+            else np.zeros(0, dtype=int)
+        )
         return Handle(tuple(names), outputs, places, special, np.zeros(len(names)))
 
     def outputs(self) -> dict[str, Variable]:
@@ -159,7 +190,7 @@ class PyUnit:
             self._output_rows[key] = rows if rows[:, states:].any() else np.ascontiguousarray(rows[:, :states])
         return self._output_rows[key]
 
-    # -- stepping ---------------------------------------------------------------------------------------------------------------------------------------
+    # -- stepping ------------------------------------------------------------------------------------------------------
     def step(self, time: float, h: float) -> None:
         """From `time` to time + h."""
         state, d = self._state, self.dynamics
@@ -188,8 +219,21 @@ class PyUnit:
             state.x[d.n + d.driven[k]] = w + a * h
 
     def _smooth_step(self, time: float, h: float) -> None:
-        u0 = self._inputs(time, self._state.x)
-        self._advance(self._attempt(time, h, u0, u0.copy())[0])
+        """One micro-step without clutches and backlash: straight through preset memory."""
+        state, d = self._state, self.dynamics
+        s = d.transition(state.mode, h)
+        self._u0[d.n :] = self._u1[d.n :] = 0.0
+        self._u0[-1] = self._u1[-1] = 1.0
+        if d.n_driven:
+            self._u0[d.n : -1] = self._u1[d.n : -1] = state.motion[:, 2]
+        self._x0[:] = state.x
+        self._node_torques(self._u0, time, state.x)
+        self._u1[: d.n] = self._u0[: d.n]
+        x1 = s.dot(self._z)
+        if self._sources:
+            self._node_torques(self._u1, time + h, x1)
+            x1 = s.dot(self._z)
+        self._advance(x1)
 
     def _hybrid_step(self, time: float, h: float) -> None:
         state, d, done = self._state, self.dynamics, 0.0
@@ -208,18 +252,23 @@ class PyUnit:
             done += found.fraction * rest
             if done >= h:
                 return
-        raise CouplingError(f"more than {MAX_EVENTS} stick–slip or backlash events between {time} and {time + h} s; choose a shorter micro_step")
+        raise CouplingError(
+            f"more than {MAX_EVENTS} stick–slip or backlash events between {time} and {time + h} s; "
+            "choose a shorter micro_step"
+        )
 
-    def _attempt(self, time: float, h: float, u0: np.ndarray, u1: np.ndarray, keep: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    def _attempt(
+        self, time: float, h: float, u0: np.ndarray, u1: np.ndarray, keep: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
         """State at the end of a step in the present mode, and the input there with the sources at that state."""
-        d, z, state = self.dynamics, self._z, self._state
-        s = (d.transition if keep else d.transition_once)(state.mode, h)
-        z[: d.states], z[d.states : d.states + d.inputs], z[d.states + d.inputs :] = state.x, u0, u1
-        x1 = s.dot(z)
+        d = self.dynamics
+        s = (d.transition if keep else d.transition_once)(self._state.mode, h)
+        self._x0[:], self._u0[:], self._u1[:] = self._state.x, u0, u1
+        x1 = s.dot(self._z)
         if self._sources:
             self._node_torques(u1, time + h, x1)
-            z[d.states + d.inputs :] = u1
-            x1 = s.dot(z)
+            self._u1[:] = u1
+            x1 = s.dot(self._z)
         return x1, u1
 
     def _advance(self, x1: np.ndarray) -> None:
@@ -229,12 +278,14 @@ class PyUnit:
             state.work -= (x1[impulse] - state.x[impulse]) * 0.5 * (state.x[d.n + node] + x1[d.n + node])
         state.x = x1
 
-    # -- inputs and outputs -----------------------------------------------------------------------------------------------------------------------------
+    # -- inputs and outputs --------------------------------------------------------------------------------------------
     def _start(self, time: float) -> _State:
         d, nodes = self.dynamics, self.network.nodes
         x = np.array([p.phi for p in nodes] + [p.w for p in nodes] + [0.0] * d.n_driven, dtype=float)
         motion = np.array([[nodes[k].phi, nodes[k].w, 0.0] for k in d.driven], dtype=float).reshape(-1, 3)
-        state = _State(time, x, ((0,) * d.n_clutches, (0,) * len(d.gaps)), np.zeros(d.n), motion, np.zeros(d.n_driven), 0.0, ())
+        state = _State(
+            time, x, ((0,) * d.n_clutches, (0,) * len(d.gaps)), np.zeros(d.n), motion, np.zeros(d.n_driven), 0.0, ()
+        )
         self._state = state
         state.mode = initial_mode(d, x, self._inputs(time, x), self._capacity(time, time)[0])
         return state
@@ -244,7 +295,7 @@ class PyUnit:
         n = self.dynamics.n
         u[:n] = self._state.torque
         for node, function in self._sources:
-            u[node] += function(time, float(x[node]), float(x[n + node]))
+            u[node] += function(time, x.item(node), x.item(n + node))
 
     def _inputs(self, time: float, x: np.ndarray, capacity: np.ndarray | None = None) -> np.ndarray:
         d = self.dynamics
@@ -276,7 +327,10 @@ class PyUnit:
         network, d = self.network, self.dynamics
         found = {f"{network.nodes[node].name}.tau_mean": partial(self._mean, k) for k, node in enumerate(d.driven)}
         found |= {f"{clutch.name}.locked": partial(self._locked, k) for k, clutch in enumerate(network.clutches)}
-        found |= {f"{source.name}.tau": partial(self._source, d.node[source.node], source.torque) for source in network.sources}
+        found |= {
+            f"{source.name}.tau": partial(self._source, d.node[source.node], source.torque)
+            for source in network.sources
+        }
         return found | {"energy.work": lambda: self._state.work, "energy.stored": self.energy}
 
     def _mean(self, k: int) -> float:

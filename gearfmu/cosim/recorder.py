@@ -1,4 +1,5 @@
 """Recorder: chosen outputs of stage and drivetrain at every communication point, in arrays taken once."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -28,7 +29,9 @@ class Recorder:
         if unfit:
             raise CouplingError(f"nothing to record for {', '.join(unfit)}; there are {', '.join(everything)}")
         self._units = {"": stage, DRIVE: drive}
-        self._handles: dict[str, Any] = {prefix: unit.resolve(list(self._names[prefix])) for prefix, unit in self._units.items()}
+        self._handles: dict[str, Any] = {
+            prefix: unit.resolve(list(self._names[prefix])) for prefix, unit in self._units.items()
+        }
         self._rows = {prefix: np.zeros((points, len(names))) for prefix, names in self._names.items()}
         self._time = np.zeros(points)
         self.count = 0
@@ -52,4 +55,8 @@ class Recorder:
 
 
 def _chosen(prefix: str, unit: Unit, patterns: Sequence[str]) -> dict[str, Variable]:
-    return {name: about for name, about in unit.outputs().items() if any(fnmatchcase(prefix + name, pattern) for pattern in patterns)}
+    return {
+        name: about
+        for name, about in unit.outputs().items()
+        if any(fnmatchcase(prefix + name, pattern) for pattern in patterns)
+    }

@@ -1,4 +1,5 @@
 """Functions of time that may jump: what a drivetrain receives from outside (clutch capacity, torque)."""
+
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right

@@ -1,4 +1,5 @@
 """docs/drivetrain.md from the one table of values: python -m gearfmu.cosim.table > docs/drivetrain.md"""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -8,31 +9,51 @@ from gearfmu.spec.scene import load_scene, shipped_scenes
 
 INTRODUCTION = """# Drivetrains and scenes
 
-This page is made by `python -m gearfmu.cosim.table > docs/drivetrain.md` from `gearfmu/spec/drivetrain.py` and the shipped scenes. A scene may give other
-values in its table `[passenger_car]` or `[test_rig]`. "Assumed" means: of the size that is usual in such a car, taken from no measurement.
+This page is made by `python -m gearfmu.cosim.table > docs/drivetrain.md` from `gearfmu/spec/drivetrain.py` and the
+shipped scenes. A scene may give other values in its table `[passenger_car]` or `[test_rig]`. "Assumed" means: of the
+size that is usual in such a car, taken from no measurement.
 
-## Signs
-All angles about +z; an external pair counter-rotates, so that everything behind the wheel gear turns negatively while the pinion turns positively. In a
-spring port the outside gives `.phi`, `.w`, `.a` of the spring's outer end and receives `.tau`, the torque on the outside.
+## Signs All angles about +z; an external pair counter-rotates, so that everything behind the wheel gear turns
+negatively while the pinion turns positively. In a spring port the outside gives `.phi`, `.w`, `.a` of the spring's
+outer end and receives `.tau`, the torque on the outside.
 
 ## Where the cut lies
 The stage is cut off at compliant elements, and the springs belong to the stage. With `chain_in_fmu = true`:
 
-    outside            stage (FMU or kernel)                                                       outside
-    engine, primary ─┤ dual-mass flywheel ─ secondary ─ clutch ─ disc ─ input shaft ─ pinion
-                                                                             wheel ─ output shaft ├─ final drive ─ half shafts ─ wheels ─ tyres ─ vehicle
+    outside            stage (FMU or kernel)                                                       outside engine,
+    primary ─┤ dual-mass flywheel ─ secondary ─ clutch ─ disc ─ input shaft ─ pinion wheel ─ output shaft ├─ final
+    drive ─ half shafts ─ wheels ─ tyres ─ vehicle
 
-With `chain_in_fmu = false` secondary mass, clutch and disc are computed outside and the cut on the pinion's side is the input shaft."""
+With `chain_in_fmu = false` secondary mass, clutch and disc are computed outside and the cut on the pinion's side is
+               the input shaft."""
 
 
 def page() -> str:
     """The text of docs/drivetrain.md."""
-    return "\n\n".join([INTRODUCTION, *(_drivetrain(kind, title) for kind, title in ((PassengerCar, "Passenger car"), (TestRig, "Test rig"))), _scenes()]) + "\n"
+    return (
+        "\n\n".join(
+            [
+                INTRODUCTION,
+                *(_drivetrain(kind, title) for kind, title in ((PassengerCar, "Passenger car"), (TestRig, "Test rig"))),
+                _scenes(),
+            ]
+        )
+        + "\n"
+    )
 
 
 def _drivetrain(kind: type[PassengerCar] | type[TestRig], title: str) -> str:
     what = " ".join((kind.__doc__ or "").split())
-    rows = [(f"`{row.name}`", row.meaning, "given by the scene" if row.value is None else f"{row.value:g}", row.unit, row.source) for row in table(kind)]
+    rows = [
+        (
+            f"`{row.name}`",
+            row.meaning,
+            "given by the scene" if row.value is None else f"{row.value:g}",
+            row.unit,
+            row.source,
+        )
+        for row in table(kind)
+    ]
     return f"## {title}\n{what}\n\n" + _table(("name", "meaning", "value", "unit", "source"), rows)
 
 
@@ -40,7 +61,16 @@ def _scenes() -> str:
     rows = []
     for name in shipped_scenes():
         scene = load_scene(name)
-        rows.append((f"`{name}`", scene.description, f"{scene.duration:g} s", f"{1e6 * scene.coupling.step:g} µs", scene.coupling.master, scene.stage.level))
+        rows.append(
+            (
+                f"`{name}`",
+                scene.description,
+                f"{scene.duration:g} s",
+                f"{1e6 * scene.coupling.step:g} µs",
+                scene.coupling.master,
+                scene.stage.level,
+            )
+        )
     return "## Scenes\n" + _table(("name", "what", "duration", "communication step", "master", "level"), rows)
 
 

@@ -1,4 +1,5 @@
 """What a master knows of a unit: names resolved once, then set / step / get / save / restore."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -8,7 +9,8 @@ import numpy as np
 
 
 class Variable(NamedTuple):
-    """What a recorded variable is: unit as in the FMU ("N.m"), description, and whether it counts (integers and booleans)."""
+    """What a recorded variable is: unit as in the FMU ("N.m"), description, and whether it counts (integers and
+    booleans)."""
 
     unit: str
     description: str
@@ -18,9 +20,9 @@ class Variable(NamedTuple):
 class Unit(Protocol):
     """One side of a coupling.
 
-    `resolve` is called once for each set of names and returns a handle with its own buffers; `get` fills and returns the handle's buffer (k,), which
-    the next `get` with that handle overwrites. `save` returns a state that `restore` takes back any number of times, bit for bit.
-    `step` raises SimulationError when the unit cannot go on.
+    `resolve` is called once for each set of names and returns a handle with its own buffers; `get` fills and returns
+    the handle's buffer (k,), which the next `get` with that handle overwrites. `save` returns a state that `restore`
+    takes back any number of times, bit for bit. `step` raises SimulationError when the unit cannot go on.
     """
 
     def outputs(self) -> Mapping[str, Variable]: ...

@@ -1,4 +1,5 @@
 """SceneSpec: a stage in a drivetrain, what happens to it, for how long, and how the two are coupled."""
+
 from __future__ import annotations
 
 import hashlib
@@ -31,7 +32,8 @@ class StageChoice(Spec):
 
 
 class CouplingChoice(Spec):
-    """Master and communication step; micro_step: largest step of the drivetrain between evaluations of its torques, 0 for the communication step."""
+    """Master and communication step; micro_step: largest step of the drivetrain between evaluations of its torques, 0
+    for the communication step."""
 
     step: Annotated[float, Quantity("s", above=0), Field(description="communication step")]
     master: Literal["gs_mean", "jacobi"] = "gs_mean"
@@ -104,20 +106,33 @@ def scene_path(path_or_name: str | Path) -> Path:
         return given
     if str(path_or_name) in shipped_scenes():
         return shipped
-    raise SpecError([Problem(str(path_or_name), "", "", f"no such file and no shipped scene; shipped are {', '.join(shipped_scenes())}")])
+    raise SpecError(
+        [
+            Problem(
+                str(path_or_name),
+                "",
+                "",
+                f"no such file and no shipped scene; shipped are {', '.join(shipped_scenes())}",
+            )
+        ]
+    )
 
 
 def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
     """What no single field shows."""
     chosen = [key for key in ("passenger_car", "test_rig") if getattr(scene, key) is not None]
     if len(chosen) != 1:
-        yield Problem(file, "", "", f"give exactly one of [passenger_car] and [test_rig], found {' and '.join(chosen) or 'none'}")
+        yield Problem(
+            file, "", "", f"give exactly one of [passenger_car] and [test_rig], found {' and '.join(chosen) or 'none'}"
+        )
     if scene.passenger_car is not None and scene.clutch is None:
         yield Problem(file, "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity")
     if scene.passenger_car is None and scene.clutch is not None:
         yield Problem(file, "clutch", "", "only the passenger car has a clutch: remove this table")
     if scene.passenger_car is None and scene.start.slip:
-        yield Problem(file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it")
+        yield Problem(
+            file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it"
+        )
     if scene.clutch is not None:
         yield from _clutch_problems(scene, scene.clutch, file)
     yield from _time_problems(scene, file)
@@ -128,7 +143,12 @@ def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterato
     if any(b < a for a, b in zip(times, times[1:], strict=False)):
         yield Problem(file, "clutch.capacity", "", "times must not decrease: sort the points by time")
     if clutch.peak != 1.0 and scene.passenger_car is not None and scene.passenger_car.chain_in_fmu:
-        yield Problem(file, "clutch.peak", f"{clutch.peak:g}", "the clutch inside the FMU has no peak: remove it, or set passenger_car.chain_in_fmu = false")
+        yield Problem(
+            file,
+            "clutch.peak",
+            f"{clutch.peak:g}",
+            "the clutch inside the FMU has no peak: remove it, or set passenger_car.chain_in_fmu = false",
+        )
 
 
 def _time_problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
@@ -138,6 +158,16 @@ def _time_problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
     if step > duration:
         yield Problem(file, "coupling.step", f"{step:g} s", f"must not exceed the duration, {duration:g} s")
     elif abs(scene.steps * step - duration) > 1e-9 * duration:
-        yield Problem(file, "coupling.step", f"{step:g} s", f"the duration, {duration:g} s, must be a whole number of steps: use {duration / scene.steps:.6g} s")
+        yield Problem(
+            file,
+            "coupling.step",
+            f"{step:g} s",
+            f"the duration, {duration:g} s, must be a whole number of steps: use {duration / scene.steps:.6g} s",
+        )
     if scene.coupling.micro_step > step:
-        yield Problem(file, "coupling.micro_step", f"{scene.coupling.micro_step:g} s", f"must not exceed the communication step, {step:g} s")
+        yield Problem(
+            file,
+            "coupling.micro_step",
+            f"{scene.coupling.micro_step:g} s",
+            f"must not exceed the communication step, {step:g} s",
+        )

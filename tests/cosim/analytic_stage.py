@@ -1,4 +1,6 @@
-"""A gear stage one can solve exactly: two inertias, mesh spring with backlash, and the same equations once cut in two and once whole."""
+"""A gear stage one can solve exactly: two inertias, mesh spring with backlash, and the same equations once cut in two
+and once whole."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -13,7 +15,8 @@ MESH_K, MESH_C = 2.0e8, 2.0e3  # N/m, N·s/m
 
 @dataclass(frozen=True)
 class Plant:
-    """Engine – [cut] – chain or shaft – pinion = wheel – shaft – [cut] – vehicle. Torques N·m, speeds rad/s of the pinion side."""
+    """Engine – [cut] – chain or shaft – pinion = wheel – shaft – [cut] – vehicle. Torques N·m, speeds rad/s of the
+    pinion side."""
 
     chain: bool = False
     backlash: float = 0.0
@@ -40,12 +43,17 @@ class Plant:
         """Everything between the two outer nodes; the nodes themselves come from the caller."""
         wheel_w = -self.w * R1 / R2
         nodes: tuple = (Inertia("gear1", PINION, w=self.w), Inertia("gear2", WHEEL, w=wheel_w))
-        springs: tuple = (Spring("mesh", {"gear1": R1, "gear2": R2}, MESH_K, MESH_C, self.backlash),
-                          Spring("output", {"gear2": 1.0, vehicle: -1.0}, 2.0e4, 1.0))
+        springs: tuple = (
+            Spring("mesh", {"gear1": R1, "gear2": R2}, MESH_K, MESH_C, self.backlash),
+            Spring("output", {"gear2": 1.0, vehicle: -1.0}, 2.0e4, 1.0),
+        )
         clutches: tuple = ()
         if self.chain:
             nodes = (Inertia("secondary", 0.06, w=self.engine_w), Inertia("disc", 0.005, w=self.w), *nodes)
-            springs += (Spring("dmf", {engine: 1.0, "secondary": -1.0}, 800.0, 1.0), Spring("input", {"disc": 1.0, "gear1": -1.0}, 1.5e4, 0.5))
+            springs += (
+                Spring("dmf", {engine: 1.0, "secondary": -1.0}, 800.0, 1.0),
+                Spring("input", {"disc": 1.0, "gear1": -1.0}, 1.5e4, 0.5),
+            )
             clutches = (Clutch("clutch", "secondary", "disc", self.capacity),)
         else:
             springs += (Spring("input", {engine: 1.0, "gear1": -1.0}, 3.0e3, 1.0),)
@@ -60,10 +68,15 @@ class Plant:
         """The stage's side of the cut."""
         parts = self.stage_parts("pinion.outside", "wheel.outside")
         ends = (Driven("pinion.outside", w=self.engine_w), Driven("wheel.outside", w=-self.w * R1 / R2))
-        return replace(parts, nodes=ends + parts.nodes[2:], motion_ports={"pinion": "pinion.outside", "wheel": "wheel.outside"})
+        return replace(
+            parts, nodes=ends + parts.nodes[2:], motion_ports={"pinion": "pinion.outside", "wheel": "wheel.outside"}
+        )
 
     def drive(self) -> Network:
         """The drivetrain's side of the cut."""
-        nodes = (Inertia("engine", self.engine_inertia, w=self.engine_w), Inertia("vehicle", self.vehicle_inertia, w=-self.w * R1 / R2))
+        nodes = (
+            Inertia("engine", self.engine_inertia, w=self.engine_w),
+            Inertia("vehicle", self.vehicle_inertia, w=-self.w * R1 / R2),
+        )
         sources = (Source("combustion", "engine", self.torque), Source("load", "vehicle", self.load))
         return Network(nodes, sources=sources, torque_ports={"pinion": "engine", "wheel": "vehicle"})

@@ -1,4 +1,5 @@
 """Dry clutches against closed forms: when they lock, when they break loose, what they transmit."""
+
 from __future__ import annotations
 
 import math
@@ -17,8 +18,11 @@ J1, J2 = 0.2, 0.7
 
 
 def two_inertias(capacity, torque=lambda t, phi, w: 0.0, w1=0.0, w2=0.0, peak=1.0) -> PyUnit:
-    network = Network((Inertia("a", J1, w=w1), Inertia("b", J2, w=w2)), clutches=(Clutch("clutch", "a", "b", capacity, peak),),
-                      sources=(Source("drive", "a", torque),))
+    network = Network(
+        (Inertia("a", J1, w=w1), Inertia("b", J2, w=w2)),
+        clutches=(Clutch("clutch", "a", "b", capacity, peak),),
+        sources=(Source("drive", "a", torque),),
+    )
     unit = PyUnit(network)
     unit.initialize(0.0)
     return unit
@@ -89,14 +93,19 @@ def test_a_jump_of_capacity_between_steps_is_exact():
 
 
 @settings(max_examples=60, deadline=None)
-@given(speeds=st.lists(st.floats(-50, 50), min_size=4, max_size=4), capacities=st.lists(st.floats(0.0, 40.0), min_size=3, max_size=3),
-       stiffness=st.floats(10.0, 1e4))
+@given(
+    speeds=st.lists(st.floats(-50, 50), min_size=4, max_size=4),
+    capacities=st.lists(st.floats(0.0, 40.0), min_size=3, max_size=3),
+    stiffness=st.floats(10.0, 1e4),
+)
 def test_energy_never_grows_and_momentum_stays(speeds, capacities, stiffness):
     """Four inertias, three clutches and a spring around them, no torque from outside."""
     names = ("a", "b", "c", "d")
-    network = Network(tuple(Inertia(name, 0.1 + 0.2 * k, w=w) for k, (name, w) in enumerate(zip(names, speeds, strict=True))),
-                      springs=(Spring("spring", {"a": 1.0, "d": -1.0}, stiffness),),
-                      clutches=tuple(Clutch(f"clutch{k}", names[k], names[k + 1], Constant(c)) for k, c in enumerate(capacities)))
+    network = Network(
+        tuple(Inertia(name, 0.1 + 0.2 * k, w=w) for k, (name, w) in enumerate(zip(names, speeds, strict=True))),
+        springs=(Spring("spring", {"a": 1.0, "d": -1.0}, stiffness),),
+        clutches=tuple(Clutch(f"clutch{k}", names[k], names[k + 1], Constant(c)) for k, c in enumerate(capacities)),
+    )
     unit = PyUnit(network)
     unit.initialize(0.0)
     handle = unit.resolve(["energy.stored", *(f"{name}.w" for name in names), *(f"clutch{k}.tau" for k in range(3))])
@@ -112,8 +121,11 @@ def test_energy_never_grows_and_momentum_stays(speeds, capacities, stiffness):
 
 
 @settings(max_examples=100, deadline=None)
-@given(entries=st.lists(st.floats(-1, 1), min_size=16, max_size=16), wanted=st.lists(st.floats(-100, 100), min_size=4, max_size=4),
-       bound=st.lists(st.floats(0, 20), min_size=4, max_size=4))
+@given(
+    entries=st.lists(st.floats(-1, 1), min_size=16, max_size=16),
+    wanted=st.lists(st.floats(-100, 100), min_size=4, max_size=4),
+    bound=st.lists(st.floats(0, 20), min_size=4, max_size=4),
+)
 def test_sticking_torques_solve_the_complementarity_problem(entries, wanted, bound):
     """Inside the bounds the slip acceleration is zero; at a bound it points the way of the torque."""
     a = np.array(entries).reshape(4, 4)
@@ -129,6 +141,7 @@ def test_sticking_torques_solve_the_complementarity_problem(entries, wanted, bou
 
 def test_a_smooth_capacity_converges_with_second_order():
     """Capacity is taken linear over a step."""
+
     def final(h):
         unit = two_inertias(Smooth(lambda t: 30.0 * (1 + math.sin(9 * t))), w1=400.0)
         advance(unit, h, round(0.2 / h))
@@ -136,4 +149,6 @@ def test_a_smooth_capacity_converges_with_second_order():
 
     exact = 400.0 - 30.0 * (0.2 + (1 - math.cos(1.8)) / 9) / J1
     errors = [abs(final(h) - exact) for h in (0.04, 0.02, 0.01)]
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05) and errors[1] / errors[2] == pytest.approx(4.0, rel=0.05)
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05) and errors[1] / errors[2] == pytest.approx(
+        4.0, rel=0.05
+    )

@@ -1,4 +1,6 @@
-"""Modelica Standard Library, Rotational.Examples.CoupledClutches: three clutches in a row, against a converged Dymola result."""
+"""Modelica Standard Library, Rotational.Examples.CoupledClutches: three clutches in a row, against a converged Dymola
+result."""
+
 from __future__ import annotations
 
 import json
@@ -11,7 +13,9 @@ from gearfmu.cosim.network import Clutch, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.signals import Ramp, Smooth
 
-FACTS = json.loads((Path(__file__).parent.parent / "reference" / "coupled_clutches.json").read_text())["coupled_clutches"]
+FACTS = json.loads((Path(__file__).parent.parent / "reference" / "coupled_clutches.json").read_text())[
+    "coupled_clutches"
+]
 MU, PEAK, FORCE = FACTS["params"]["mu"], FACTS["params"]["peak"], FACTS["params"]["fn_max"]
 
 
@@ -21,7 +25,10 @@ def coupled_clutches() -> Network:
     names = ("J1", "J2", "J3", "J4")
     return Network(
         nodes=tuple(Inertia(name, 1.0, w=w) for name, w in zip(names, FACTS["params"]["w0"], strict=True)),
-        clutches=tuple(Clutch(f"clutch{k + 1}", names[k], names[k + 1], capacity, PEAK) for k, capacity in enumerate((closing, *steps))),
+        clutches=tuple(
+            Clutch(f"clutch{k + 1}", names[k], names[k + 1], capacity, PEAK)
+            for k, capacity in enumerate((closing, *steps))
+        ),
         sources=(Source("torque", "J1", lambda t, phi, w: 10.0 * math.sin(10.0 * math.pi * t)),),
     )
 
@@ -42,8 +49,14 @@ def run() -> tuple[PyUnit, dict[str, list[float]]]:
 def test_events_within_1e_4_s(run):
     """Every lock and slip that Dymola reports happens, at its instant."""
     events = run[0].events
-    expected = [("clutch1", "lock", "clutch1_lock"), ("clutch1", "slip", "clutch1_slip"), ("clutch1", "lock", "clutch1_lock2"),
-                ("clutch1", "slip", "clutch1_slip2"), ("clutch2", "lock", "clutch2_lock"), ("clutch3", "lock", "clutch3_lock")]
+    expected = [
+        ("clutch1", "lock", "clutch1_lock"),
+        ("clutch1", "slip", "clutch1_slip"),
+        ("clutch1", "lock", "clutch1_lock2"),
+        ("clutch1", "slip", "clutch1_slip2"),
+        ("clutch2", "lock", "clutch2_lock"),
+        ("clutch3", "lock", "clutch3_lock"),
+    ]
     for part, what, key in expected:
         times = [event.time for event in events if (event.part, event.what) == (part, what)]
         assert min(abs(time - FACTS["events_dymola"][key]) for time in times) < 1e-4, (key, times)
@@ -52,7 +65,14 @@ def test_events_within_1e_4_s(run):
 def test_nothing_else_happens(run):
     """Between 0.4 s and 1.25 s there are exactly the events of the reference."""
     after = [(event.part, event.what) for event in run[0].events if 0.5 < event.time < 1.25]
-    assert after == [("clutch2", "lock"), ("clutch1", "lock"), ("clutch1", "slip"), ("clutch1", "lock"), ("clutch1", "slip"), ("clutch3", "lock")]
+    assert after == [
+        ("clutch2", "lock"),
+        ("clutch1", "lock"),
+        ("clutch1", "slip"),
+        ("clutch1", "lock"),
+        ("clutch1", "slip"),
+        ("clutch3", "lock"),
+    ]
 
 
 def test_speeds_within_1e_4(run):

@@ -1,4 +1,6 @@
-"""Masters against the same equations solved whole: order, size of the error, energy at the cut, what holding torques costs."""
+"""Masters against the same equations solved whole: order, size of the error, energy at the cut, what holding torques
+costs."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -57,7 +59,8 @@ def test_order(plant, name, order):
 
 
 def test_gs_mean_at_100_us_errs_by_less_than_a_tenth_of_a_percent():
-    """Input-shaft torque: vibration 0.009 %, closure with the chain inside the stage 0.001 %, rattle 0.02 %, with a margin of 3."""
+    """Input-shaft torque: vibration 0.009 %, closure with the chain inside the stage 0.001 %, rattle 0.02 %, with a
+    margin of 3."""
     assert error(VIBRATION, "gs_mean", 1e-4)[0] < 2.7e-4
     assert error(CLOSURE, "gs_mean", 1e-4)[0] < 3e-5
     assert error(RATTLE, "gs_mean", 1e-4)[0] < 6e-4
@@ -68,7 +71,8 @@ def test_gs_mean_beats_jacobi_by_two_orders():
 
 
 def test_jacobi_at_1_ms_stays_within_five_percent_with_the_chain_inside():
-    """What importers do, with the cut at the dual-mass flywheel and clutch and shafts inside: 4.5 % at 1 ms (2.2 % at 0.5 ms)."""
+    """What importers do, with the cut at the dual-mass flywheel and clutch and shafts inside: 4.5 % at 1 ms (2.2 % at
+    0.5 ms)."""
     assert error(CLOSURE, "jacobi", 1e-3)[0] < 0.05
 
 

@@ -1,4 +1,5 @@
 """Networks against closed forms: free vibration, backlash, prescribed motion, sources; saved states; errors."""
+
 from __future__ import annotations
 
 import math
@@ -23,7 +24,9 @@ def started(network: Network, micro_step: float | None = None) -> PyUnit:
 def chain(n: int, **first) -> Network:
     names = [f"j{k}" for k in range(n)]
     nodes = (Inertia(names[0], 0.1, **first), *(Inertia(name, 0.1 * (k + 2)) for k, name in enumerate(names[1:])))
-    return Network(nodes, tuple(Spring(f"s{k}", {names[k]: 1.0, names[k + 1]: -1.0}, 1000.0 * (k + 1)) for k in range(n - 1)))
+    return Network(
+        nodes, tuple(Spring(f"s{k}", {names[k]: 1.0, names[k + 1]: -1.0}, 1000.0 * (k + 1)) for k in range(n - 1))
+    )
 
 
 def test_free_vibration_equals_the_sum_of_eigenmodes():
@@ -67,15 +70,20 @@ def test_dual_mass_flywheel_frequency_and_damping():
     unit.step(0.0, t)
     sigma, omega = 0.5 * c * (1 / j1 + 1 / j2), math.sqrt(k * (1 / j1 + 1 / j2))
     damped = math.sqrt(omega**2 - sigma**2)
-    assert unit.get(unit.resolve(["dmf.extension"]))[0] == pytest.approx(2.0 / damped * math.exp(-sigma * t) * math.sin(damped * t), abs=1e-14)
+    assert unit.get(unit.resolve(["dmf.extension"]))[0] == pytest.approx(
+        2.0 / damped * math.exp(-sigma * t) * math.sin(damped * t), abs=1e-14
+    )
 
 
 def rattle(speed: float, j1: float = 0.001, j2: float = 0.004, k: float = 2e8, backlash: float = 1e-4) -> Network:
-    return Network((Inertia("g1", j1, w=speed), Inertia("g2", j2)), (Spring("mesh", {"g1": R1, "g2": R2}, k, backlash=backlash),))
+    return Network(
+        (Inertia("g1", j1, w=speed), Inertia("g2", j2)), (Spring("mesh", {"g1": R1, "g2": R2}, k, backlash=backlash),)
+    )
 
 
 def test_rattle_between_two_flanks_has_the_closed_form_period():
-    """Free flight j/(r w) and half a contact period, forever: every impact at its instant, energy to 1e-9 after 400 impacts."""
+    """Free flight j/(r w) and half a contact period, forever: every impact at its instant, energy to 1e-9 after 400
+    impacts."""
     speed, j1, j2, k, backlash = 10.0, 0.001, 0.004, 2e8, 1e-4
     unit = started(rattle(speed, j1, j2, k, backlash), micro_step=2e-5)
     before, contact, flight = unit.energy(), math.pi / math.sqrt(k * (R1**2 / j1 + R2**2 / j2)), backlash / (R1 * speed)
@@ -101,8 +109,13 @@ def test_rattle_alternates_between_drive_and_coast_flanks():
 
 
 def test_prescribed_motion_through_a_spring_has_its_closed_form():
-    """Constant acceleration of the outer end: torque k·e with e'' = a − (k/J) e, and the mean torque is the momentum over the step."""
-    network = Network((Driven("out"), Inertia("gear", 0.01)), (Spring("shaft", {"out": 1.0, "gear": -1.0}, 100.0),), motion_ports={"pinion": "out"})
+    """Constant acceleration of the outer end: torque k·e with e'' = a − (k/J) e, and the mean torque is the momentum
+    over the step."""
+    network = Network(
+        (Driven("out"), Inertia("gear", 0.01)),
+        (Spring("shaft", {"out": 1.0, "gear": -1.0}, 100.0),),
+        motion_ports={"pinion": "out"},
+    )
     unit = PyUnit(network)
     unit.set(unit.resolve(["pinion.phi", "pinion.w", "pinion.a"]), [0.0, 0.0, 5.0])
     unit.initialize(0.0)
@@ -116,7 +129,11 @@ def test_prescribed_motion_through_a_spring_has_its_closed_form():
 
 def test_a_jump_of_the_given_angle_is_blended_over_the_step():
     """The node arrives at the given angle's path at the end of the step; energy.work is the energy that came in."""
-    network = Network((Driven("out"), Inertia("gear", 0.01)), (Spring("shaft", {"out": 1.0, "gear": -1.0}, 100.0),), motion_ports={"pinion": "out"})
+    network = Network(
+        (Driven("out"), Inertia("gear", 0.01)),
+        (Spring("shaft", {"out": 1.0, "gear": -1.0}, 100.0),),
+        motion_ports={"pinion": "out"},
+    )
     unit = started(network, micro_step=1e-6)
     unit.set(unit.resolve(["pinion.phi", "pinion.w", "pinion.a"]), [0.01, 2.0, 0.0])
     unit.step(0.0, 1e-3)
@@ -127,8 +144,11 @@ def test_a_jump_of_the_given_angle_is_blended_over_the_step():
 
 def test_sources_converge_with_second_order():
     """A pendulum: torque −sin φ, against half the step."""
+
     def angle(h):
-        unit = started(Network((Inertia("j", 1.0, w=1.5),), sources=(Source("g", "j", lambda t, phi, w: -math.sin(phi)),)))
+        unit = started(
+            Network((Inertia("j", 1.0, w=1.5),), sources=(Source("g", "j", lambda t, phi, w: -math.sin(phi)),))
+        )
         for n in range(round(2.0 / h)):
             unit.step(n * h, h)
         return unit.get(unit.resolve(["j.phi"]))[0]
@@ -168,9 +188,21 @@ def test_restored_state_gives_the_same_bits():
 
 def test_every_problem_of_a_network_is_told_at_once():
     with pytest.raises(CouplingError) as told:
-        Network((Inertia("a", -1.0), Inertia("b", 1.0), Inertia("b", 1.0)), (Spring("s", {"a": 1.0, "x": -1.0}, -5.0),),
-                (Clutch("c", "a", "y", Constant(1.0), peak=0.5),), motion_ports={"pinion": "a"})
-    for part in ("'b' names two parts", "'x'", "'y'", "inertia -1.0", "k = -5.0", "peak 0.5", "a motion needs a driven node"):
+        Network(
+            (Inertia("a", -1.0), Inertia("b", 1.0), Inertia("b", 1.0)),
+            (Spring("s", {"a": 1.0, "x": -1.0}, -5.0),),
+            (Clutch("c", "a", "y", Constant(1.0), peak=0.5),),
+            motion_ports={"pinion": "a"},
+        )
+    for part in (
+        "'b' names two parts",
+        "'x'",
+        "'y'",
+        "inertia -1.0",
+        "k = -5.0",
+        "peak 0.5",
+        "a motion needs a driven node",
+    ):
         assert part in str(told.value)
 
 

@@ -1,4 +1,6 @@
-"""The passenger car: its table, its masses and frequencies, firing orders, and that the cut does not move the physics."""
+"""The passenger car: its table, its masses and frequencies, firing orders, and that the cut does not move the
+physics."""
+
 from __future__ import annotations
 
 import math
@@ -8,7 +10,16 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from gearfmu.cosim.drivetrain import Shafts, build, capacity, engine_torque, road_load, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.drivetrain import (
+    Shafts,
+    build,
+    capacity,
+    engine_torque,
+    road_load,
+    stage_ports,
+    stage_signals,
+    stage_start,
+)
 from gearfmu.cosim.network import Driven, Inertia, Network, Source
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.table import page
@@ -25,17 +36,27 @@ def closure(**changes) -> SceneSpec:
 
 
 def test_docs_show_the_table():
-    assert (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8") == page(), "run: python -m gearfmu.cosim.table > docs/drivetrain.md"
+    assert (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8") == page(), (
+        "run: python -m gearfmu.cosim.table > docs/drivetrain.md"
+    )
 
 
 def test_every_value_has_unit_meaning_and_source():
     for kind in (PassengerCar, TestRig):
         for row in table(kind):
-            assert row.meaning and row.source and (row.unit or row.name in ("final_drive_ratio", "rolling_resistance")), row
+            assert (
+                row.meaning and row.source and (row.unit or row.name in ("final_drive_ratio", "rolling_resistance"))
+            ), row
 
 
-@pytest.mark.parametrize(("name", "diameter", "length", "count"), [
-    ("input_shaft_stiffness", 0.028, 0.2, 1), ("output_shaft_stiffness", 0.030, 0.25, 1), ("half_shaft_stiffness", 0.025, 0.6, 2)])
+@pytest.mark.parametrize(
+    ("name", "diameter", "length", "count"),
+    [
+        ("input_shaft_stiffness", 0.028, 0.2, 1),
+        ("output_shaft_stiffness", 0.030, 0.25, 1),
+        ("half_shaft_stiffness", 0.025, 0.6, 2),
+    ],
+)
 def test_shafts_that_are_called_computed_are(name, diameter, length, count):
     """Solid steel: k = G π d⁴ / (32 l); G = 79.3 GPa; the table rounds to three digits."""
     assert getattr(CAR, name) == pytest.approx(count * 79.3e9 * math.pi * diameter**4 / (32 * length), rel=5e-3)
@@ -61,7 +82,9 @@ def test_firing_orders_reach_the_crankshaft_as_speed_ripple():
     """Free engine at 2000 rpm: ripple of order k is A_k / (J k Ω), seen in the spectrum of a run."""
     omega, inertia, revolutions = 2000 * 2 * math.pi / 60, 0.16, 20
     car = CAR.model_copy(update={"engine_torque": 0.0, "order_2": 5.0, "order_4": 3.0, "order_6": 1.0})
-    unit = PyUnit(Network((Inertia("engine", inertia, w=omega),), sources=(Source("combustion", "engine", engine_torque(car)),)))
+    unit = PyUnit(
+        Network((Inertia("engine", inertia, w=omega),), sources=(Source("combustion", "engine", engine_torque(car)),))
+    )
     unit.initialize(0.0)
     h, speeds = 2 * math.pi / omega / 240, []
     for n in range(240 * revolutions):
@@ -81,18 +104,26 @@ def test_road_load_opposes_the_motion_and_vanishes_at_rest():
 
 
 def test_kinetic_energy_is_that_of_the_moving_vehicle():
-    """Referred inertias hold the energy of mass and four road wheels at the vehicle's speed, besides final drive and engine."""
+    """Referred inertias hold the energy of mass and four road wheels at the vehicle's speed, besides final drive and
+    engine."""
     scene = closure()
     unit = PyUnit(build(scene, SHAFTS))
     wheel_w = scene.start.pinion_speed / SHAFTS.ratio
     road_w = wheel_w / CAR.final_drive_ratio
     v, engine_w = road_w * CAR.road_wheel_radius, scene.start.pinion_speed + scene.start.slip
-    expected = 0.5 * CAR.vehicle_mass * v**2 + 4 * 0.5 * CAR.road_wheel_inertia * road_w**2 + 0.5 * CAR.final_drive_inertia * wheel_w**2
-    assert unit.energy() == pytest.approx(expected + 0.5 * (CAR.crank_inertia + CAR.dmf_primary_inertia) * engine_w**2, rel=1e-12)
+    expected = (
+        0.5 * CAR.vehicle_mass * v**2
+        + 4 * 0.5 * CAR.road_wheel_inertia * road_w**2
+        + 0.5 * CAR.final_drive_inertia * wheel_w**2
+    )
+    assert unit.energy() == pytest.approx(
+        expected + 0.5 * (CAR.crank_inertia + CAR.dmf_primary_inertia) * engine_w**2, rel=1e-12
+    )
 
 
 def test_vehicle_side_frequencies():
-    """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to slip."""
+    """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to
+    slip."""
     network = build(closure(tyre_slip_stiffness=1e-6, half_shaft_damping=0.0), SHAFTS)
     unit = PyUnit(network)
     mass = np.diag([node.inertia for node in network.nodes])
@@ -111,7 +142,11 @@ def test_ports_and_drivetrain_hold_every_inertia_and_spring_once():
     total_in = sum(node.inertia for node in build(inside, SHAFTS).nodes) + chain.inertia + chain.disc_inertia
     assert total_in == pytest.approx(sum(node.inertia for node in build(outside, SHAFTS).nodes), rel=1e-14)
     springs_out = [spring.k for spring in build(outside, SHAFTS).springs] + [port.k for port in ports_out.values()]
-    springs_in = [spring.k for spring in build(inside, SHAFTS).springs] + [port.k for port in ports_in.values()] + [chain.shaft_k]
+    springs_in = (
+        [spring.k for spring in build(inside, SHAFTS).springs]
+        + [port.k for port in ports_in.values()]
+        + [chain.shaft_k]
+    )
     assert sorted(springs_in) == pytest.approx(sorted(springs_out))
     assert stage_signals(outside, SHAFTS) == () and stage_start(outside, SHAFTS) == {}
 

@@ -1,4 +1,5 @@
 """Scene files: the shipped ones are what the field expects of them; bad ones are told everything at once."""
+
 from __future__ import annotations
 
 import math
@@ -13,13 +14,27 @@ def test_shipped_scenes():
     assert shipped_scenes() == ["clutch_closure", "clutch_dump", "pair_light", "pair_loaded"]
     for name in shipped_scenes():
         scene = load_scene(name)
-        assert scene.name == name and scene.stage.name == "fzg_c/stage_relief" and scene.stage.level == "standard" and scene.stage.slices == 5
+        assert (
+            scene.name == name
+            and scene.stage.name == "fzg_c/stage_relief"
+            and scene.stage.level == "standard"
+            and scene.stage.slices == 5
+        )
 
 
 def test_clutch_closure_is_the_demo():
     scene = load_scene("clutch_closure")
-    assert (scene.start.slip, scene.duration, scene.coupling.step, scene.coupling.master) == (52.0, 0.4, 1e-4, "gs_mean")
-    assert scene.clutch.capacity == ((0.0, 0.0), (0.05, 250.0)) and scene.passenger_car.chain_in_fmu and scene.steps == 4000
+    assert (scene.start.slip, scene.duration, scene.coupling.step, scene.coupling.master) == (
+        52.0,
+        0.4,
+        1e-4,
+        "gs_mean",
+    )
+    assert (
+        scene.clutch.capacity == ((0.0, 0.0), (0.05, 250.0))
+        and scene.passenger_car.chain_in_fmu
+        and scene.steps == 4000
+    )
 
 
 @pytest.mark.parametrize(("name", "torque", "rpm"), [("pair_loaded", 302.0, 2000.0), ("pair_light", 80.0, 6000.0)])
@@ -31,7 +46,9 @@ def test_pairs_run_at_least_20_mesh_periods_after_settling(name, torque, rpm):
 
 def test_hash_follows_values_not_text(tmp_path):
     text = (SHIPPED / "pair_light.toml").read_text(encoding="utf-8")
-    (tmp_path / "a.toml").write_text(text.replace('"80 N*m"', '"0.08 kN*m"').replace("# Light", "# Very light"), encoding="utf-8")
+    (tmp_path / "a.toml").write_text(
+        text.replace('"80 N*m"', '"0.08 kN*m"').replace("# Light", "# Very light"), encoding="utf-8"
+    )
     (tmp_path / "b.toml").write_text(text.replace('"80 N*m"', '"81 N*m"'), encoding="utf-8")
     assert load_scene(tmp_path / "a.toml").hash == load_scene("pair_light").hash != load_scene(tmp_path / "b.toml").hash
 
@@ -59,19 +76,42 @@ def test_every_problem_of_a_file_at_once(tmp_path):
     with pytest.raises(SpecError) as told:
         load_scene(tmp_path / "bad.toml")
     fields = {problem.field for problem in told.value.problems}
-    assert {"name", "duration", "stage.level", "stage.slices", "coupling.step", "coupling.mastr", "start.pinion_speed"} <= fields
+    assert {
+        "name",
+        "duration",
+        "stage.level",
+        "stage.slices",
+        "coupling.step",
+        "coupling.mastr",
+        "start.pinion_speed",
+    } <= fields
     assert any(field.startswith("clutch.capacity") for field in fields)
-    assert 'did you mean "master"?' in str(told.value) and all(problem.file.endswith("bad.toml") for problem in told.value.problems)
+    assert 'did you mean "master"?' in str(told.value) and all(
+        problem.file.endswith("bad.toml") for problem in told.value.problems
+    )
 
 
-@pytest.mark.parametrize(("old", "new", "field", "remedy"), [
-    ('[test_rig]\ntorque = "80 N*m"', "", "", "exactly one of"),
-    ('settle = "0.05 s"', 'settle = "0.2 s"', "settle", "shorter than the duration"),
-    ('step = "20 us"', 'step = "30 us"', "coupling.step", "whole number of steps"),
-    ('step = "20 us"', 'step = "20 us"\nmicro_step = "50 us"', "coupling.micro_step", "not exceed the communication step"),
-    ('pinion_speed = "6000 rpm"', 'pinion_speed = "6000 rpm"\nslip = "1 rad/s"', "start.slip", "remove it"),
-    ("[test_rig]", '[clutch]\ncapacity = [["1 s", "1 N*m"], ["0 s", "2 N*m"]]\n[test_rig]', "clutch.capacity", "must not decrease"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "field", "remedy"),
+    [
+        ('[test_rig]\ntorque = "80 N*m"', "", "", "exactly one of"),
+        ('settle = "0.05 s"', 'settle = "0.2 s"', "settle", "shorter than the duration"),
+        ('step = "20 us"', 'step = "30 us"', "coupling.step", "whole number of steps"),
+        (
+            'step = "20 us"',
+            'step = "20 us"\nmicro_step = "50 us"',
+            "coupling.micro_step",
+            "not exceed the communication step",
+        ),
+        ('pinion_speed = "6000 rpm"', 'pinion_speed = "6000 rpm"\nslip = "1 rad/s"', "start.slip", "remove it"),
+        (
+            "[test_rig]",
+            '[clutch]\ncapacity = [["1 s", "1 N*m"], ["0 s", "2 N*m"]]\n[test_rig]',
+            "clutch.capacity",
+            "must not decrease",
+        ),
+    ],
+)
 def test_what_no_single_field_shows(tmp_path, old, new, field, remedy):
     text = (SHIPPED / "pair_light.toml").read_text(encoding="utf-8")
     assert old in text
@@ -83,7 +123,9 @@ def test_what_no_single_field_shows(tmp_path, old, new, field, remedy):
 
 def test_a_car_without_clutch_and_a_peak_inside_the_fmu(tmp_path):
     text = (SHIPPED / "clutch_closure.toml").read_text(encoding="utf-8")
-    (tmp_path / "a.toml").write_text(text.replace('[clutch]\ncapacity = [["0 s", "0 N*m"], ["50 ms", "250 N*m"]]', ""), encoding="utf-8")
+    (tmp_path / "a.toml").write_text(
+        text.replace('[clutch]\ncapacity = [["0 s", "0 N*m"], ["50 ms", "250 N*m"]]', ""), encoding="utf-8"
+    )
     (tmp_path / "b.toml").write_text(text.replace("[clutch]", "[clutch]\npeak = 1.2"), encoding="utf-8")
     for name, words in (("a", "the passenger car has a clutch"), ("b", "has no peak")):
         with pytest.raises(SpecError, match=words):

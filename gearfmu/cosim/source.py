@@ -1,0 +1,25 @@
+"""Where the stage of a run comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gearfmu.cosim.fmu_unit import FmuUnit
+from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.stage import StageModel
+
+
+@dataclass(frozen=True)
+class Source:
+    """The kernel itself (fmu_path None) or an FMU; the model it was made from."""
+
+    model: StageModel
+    fmu_path: Path | None = None
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> FmuUnit | KernelUnit:
+        """A fresh instance with these start values."""
+        if self.fmu_path is None:
+            return KernelUnit(self.model.blob, parameters)
+        return FmuUnit(self.fmu_path, parameters)

@@ -1,0 +1,81 @@
+"""Summary of a coupled run: plain JSON, SI. It is the trace's meta and summary.json."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import platform
+from importlib.metadata import version
+from typing import Any
+
+from gearfmu.cosim.coupled import Result
+from gearfmu.cosim.source import Source
+from gearfmu.spec.scene import SceneSpec
+
+TORQUES = (
+    "{}.shaft.tau",
+    "{}.tau",
+)  # whose coupling error is the run's: the input shaft's torque, in a chain or in the port
+COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "trouble": "solver.trouble"}
+
+
+def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, float] | None) -> dict[str, Any]:
+    """What was run, how it ended, what it cost, and where it came from.
+
+    errors : coupling error by channel, None when the run was not verified.
+    """
+    return _what(scene, source) | _price(result) | _accuracy(source, result, errors) | _origin(scene, source)
+
+
+def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
+    return {
+        "scene": scene.name,
+        "description": scene.description,
+        "stage": scene.stage.name,
+        "level": scene.stage.level,
+        "integrator": scene.stage.integrator,
+        "slices": scene.stage.slices,
+        "H": scene.coupling.step,
+        "master": scene.coupling.master,
+        "settle": scene.settle,
+        "unit": "kernel" if source.fmu_path is None else "fmu",
+        "chain_in_fmu": bool(scene.passenger_car and scene.passenger_car.chain_in_fmu),
+        "teeth": {gear.name: gear.teeth for gear in source.model.spec.gears},
+    }
+
+
+def _price(result: Result) -> dict[str, Any]:
+    end = float(result.trace.time[-1])
+    counts = {key: int(result.facts[name]) for key, name in COUNTS.items() if name in result.facts}
+    return counts | {
+        "outcome": result.outcome,
+        "message": result.message,
+        "simulated_s": end,
+        "cpu_s": result.cpu_s,
+        "realtime_factor": result.cpu_s / end if end else None,
+        "stage_cpu_s": result.stage_cpu_s,
+        "stage_realtime_factor": result.stage_cpu_s / end if end else None,
+        "h": result.facts.get("solver.h"),
+    }
+
+
+def _accuracy(source: Source, result: Result, errors: dict[str, float] | None) -> dict[str, Any]:
+    pinion = source.model.spec.gears[0].name
+    torques = [name for name in (text.format(pinion) for text in TORQUES) if name in (errors or {})]
+    return {
+        "coupling_error": errors[torques[0]] if errors and torques else None,
+        "coupling_errors": errors,
+        "energy_residual": result.energy_residual,
+        "exchanged_work_J": result.throughput,
+    }
+
+
+def _origin(scene: SceneSpec, source: Source) -> dict[str, Any]:
+    names = [gear.name for gear in source.model.spec.gears]
+    hashes = {f"body {name}": text for name, text in zip(names, source.model.body_hashes, strict=True)}
+    hashes |= {"scene": scene.hash, "model": source.model.hash}
+    if source.fmu_path is not None:
+        hashes["fmu"] = hashlib.sha256(source.fmu_path.read_bytes()).hexdigest()
+    versions = {name: version(name) for name in ("gearfmu", "numpy", "scipy", "fmpy")}
+    finished = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+    return {"hashes": hashes, "versions": {"python": platform.python_version(), **versions}, "finished": finished}
