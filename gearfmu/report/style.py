@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager
 import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from PIL import Image
 
 COLOURS = ("#1f5a92", "#c8642b", "#3f8f5f", "#8a5a9e", "#9a8a2f", "#4c4f56", "#b23a48", "#2f9aa0")
 INK, MUTED, GRID, OPEN, COAST = "#23262b", "#6a7079", "#e3e6ea", "#f3d9c8", "#d8e4f2"
@@ -48,10 +49,11 @@ def svg(figure: Figure, name: str) -> str:
 
 
 def png(figure: Figure) -> str:
-    """`figure` as an <img> element that holds its PNG, for pictures of many cells."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=170, metadata={"Software": None})
-    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'
+    """`figure` as an <img> element that holds its PNG (256 colours), for pictures of many cells."""
+    raw, packed = io.BytesIO(), io.BytesIO()
+    figure.savefig(raw, format="png", dpi=170)
+    Image.open(raw).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(packed, "PNG", optimize=True)
+    return f'<img alt="" src="data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}">'
 
 
 def _bare_head(text: str) -> str:

@@ -1,0 +1,57 @@
+"""Every example runs as it stands, and one number of it is right."""
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+BASE_RADIUS = 0.5 * 4.5e-3 * 16 * 0.9396926207859084  # m, pinion of fzg_c
+
+
+def example(name: str, *arguments: object, cwd: Path) -> str:
+    """Standard output of the example."""
+    command = [sys.executable, str(ROOT / "examples" / name), *map(str, arguments)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def numbers(text: str) -> list[float]:
+    return [float(word) for word in re.findall(r"(?<![\w.])-?\d+\.?\d*(?![\w.])", text)]
+
+
+def test_drive_with_fmpy(tmp_path: Path) -> None:
+    """At rest the mesh force is torque over base radius, and the held wheel carries 24/16 of the torque."""
+    te, force, torque = numbers(example("drive_with_fmpy.py", cwd=tmp_path).splitlines()[-1])
+    assert force == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
+    assert abs(torque) == pytest.approx(302 * 24 / 16, rel=5e-3)
+    assert 50 < te < 200
+
+
+def test_loaded_te(tmp_path: Path) -> None:
+    """Tip relief of 15 µm removes material: more mean transmission error at the same load."""
+    plain, relieved = example("loaded_te.py", cwd=tmp_path).splitlines()
+    assert "fzg_c:" in plain and "fzg_c_relief:" in relieved
+    mean = [float(re.search(r"mean ([\d.]+)", line)[1]) for line in (plain, relieved)]
+    assert mean[0] < mean[1] < mean[0] + 15
+
+
+def test_read_a_trace(tmp_path: Path) -> None:
+    """Mesh orders of a pair at 2000 rpm are multiples of 16 · 2000/60 Hz."""
+    command = [sys.executable, "-m", "gearfmu.cli", "simulate", "fzg_c", "--torque", "302 N*m", "--speed", "2000 rpm",
+               "--duration", "0.05 s", "--set", "level=fast", "--out", str(tmp_path)]  # fmt: skip
+    subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    text = example("read_a_trace.py", tmp_path / "trace.h5", cwd=tmp_path)
+    first = re.search(r"mesh order 1: +(-?[\d.]+) dB re 1 N at (\d+) Hz", text)
+    assert first and float(first[2]) == pytest.approx(16 * 2000 / 60, abs=2)
+
+
+def test_every_example_has_its_test() -> None:
+    tested = set(re.findall(r'example\("([\w.]+)"', Path(__file__).read_text(encoding="utf-8")))
+    assert tested == {path.name for path in (ROOT / "examples").glob("*.py")}
