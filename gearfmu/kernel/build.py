@@ -169,7 +169,7 @@ def _compiler(name: str, sanitize: bool) -> tuple[str, ...]:
 def _variant_flags(sanitize: bool, pattern: bool, real: str) -> list[str]:
     flags = ["-DGK_DOUBLE_MODES"] if real == "double" else []
     flags += ["-ftrivial-auto-var-init=pattern"] if pattern else []
-    checks = ["-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    checks = ["-g", "-O1", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     return flags + (checks if sanitize else [])
 
 

@@ -224,7 +224,7 @@ struct gk_work {
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
     double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
-    double matrix[4 * MAX_ROWS * MAX_ROWS];
+    double matrix[4 * MAX_ROWS * MAX_ROWS];       /* D, C′, J and the gathered C″ */
 };
 
 /* gk_vars.c */

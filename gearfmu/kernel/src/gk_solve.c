@@ -55,35 +55,45 @@ static void total_force(gk_system *s)
     }
 }
 
-/* J of the active rows at the present λ, factorised */
-static void factorise(gk_system *s)
+/* J = D (I + K C″) + C″ of the active rows at the present λ: C″ is gathered into rows without gaps first, so that the product runs over contiguous memory */
+static void tangent(gk_system *s)
 {
-    const int n = s->n;
-    double *slope = s->slope, *J = s->J;
-    s->rank = 0;
-    for (int i = 0; i < n; i++) {
-        slope[i] = 0.0;
-        if (is_contact(s, i)) gk_law_approach(&s->local[i], s->force[i], &slope[i]);
-        if (s->active[i]) s->map[s->rank++] = i;
-    }
-    const int m = s->rank;
+    const int n = s->n, m = s->rank;
+    double *J = s->J, *massless = J + (size_t)m * m;
     for (int a = 0; a < m; a++) {
-        const int i = s->map[a];
-        const double *d = s->D + (size_t)i * n, *c = s->C + (size_t)i * n;
+        const double *c = s->C + (size_t)s->map[a] * n;
+        for (int b = 0; b < m; b++) massless[a * m + b] = c[s->map[b]];
+        massless[a * m + a] += s->slope[s->map[a]];
+    }
+    for (int a = 0; a < m; a++) {
+        const double *d = s->D + (size_t)s->map[a] * n;
         double *row = J + (size_t)a * m;
         for (int b = 0; b < m; b++) {
             const int j = s->map[b];
-            row[b] = d[j] + c[j] + (i == j ? slope[i] : 0.0);
-            if (s->clip[j] && s->clip[j] != 2) row[b] += s->clip[j] * d[j];
+            row[b] = d[j] * (s->clip[j] == 2 ? 1.0 : 1.0 + s->clip[j]) + massless[a * m + b];
         }
-        for (int e = 0; e < m; e++) { /* dashpots: D K C″ */
+        for (int e = 0; e < m; e++) {
             const int k = s->map[e];
             if (s->damping[k] == 0.0 || s->clip[k]) continue;
-            const double weight = d[k] * s->damping[k], *ck = s->C + (size_t)k * n;
-            for (int b = 0; b < m; b++) row[b] += weight * ck[s->map[b]];
-            row[e] += weight * slope[k];
+            const double weight = d[k] * s->damping[k], *c = massless + (size_t)e * m;
+            for (int b = 0; b < m; b++) row[b] += weight * c[b];
         }
     }
+}
+
+/* the tangent as LU with partial pivoting */
+static void factorise(gk_system *s)
+{
+    double *J = s->J;
+    s->rank = 0;
+    for (int i = 0; i < s->n; i++) {
+        s->slope[i] = 0.0;
+        if (!s->active[i]) continue;
+        if (is_contact(s, i)) gk_law_approach(&s->local[i], s->force[i], &s->slope[i]);
+        s->map[s->rank++] = i;
+    }
+    const int m = s->rank;
+    tangent(s);
     for (int k = 0; k < m; k++) {
         int best = k;
         for (int a = k + 1; a < m; a++)

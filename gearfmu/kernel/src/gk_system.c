@@ -126,24 +126,29 @@ int gk_system_basis(const gk_model *model, const gk_setup *setup, const gk_work 
     return 1;
 }
 
-/* basis Gram matrix → system matrix */
+/* basis Gram matrix → upper triangle of the system matrix; contacts read −(width functions), links one bore row */
 static void project(const gk_model *model, const gk_setup *setup, const gk_work *work, int g, int rows, const double *basis, double *out)
 {
     const gk_system *s = &work->system;
+    const int A = setup->functions, S = s->slices;
     for (int i = 0; i < s->n; i++) {
         const double *ci;
         int first, count = gk_system_basis(model, setup, work, i, g, &first, &ci);
         if (!count) continue;
-        double line[MAX_BASIS] = {0};
+        double line[MAX_BASIS] = {0}, *row = out + (size_t)i * s->n;
+        const double sign = i < s->contacts ? -1.0 : 1.0;
         for (int a = 0; a < count; a++)
-            for (int k = 0; k < rows; k++) line[k] += ci[a] * basis[(first + a) * rows + k];
-        double sign_i = i < s->contacts ? -1.0 : 1.0;
-        for (int j = i; j < s->n; j++) {
-            const double *cj;
-            int start, number = gk_system_basis(model, setup, work, j, g, &start, &cj);
-            double sum = 0.0;
-            for (int b = 0; b < number; b++) sum += cj[b] * line[start + b];
-            out[i * s->n + j] += (j < s->contacts ? -sign_i : sign_i) * sum;
+            for (int k = 0; k < rows; k++) line[k] += sign * ci[a] * basis[(first + a) * rows + k];
+        for (int p = i / S * (i < s->contacts) + work->places * (i >= s->contacts); p < work->places; p++)
+            for (int c = 0; c < S; c++) {
+                const double *t = setup->slice_row[g][c], *l = line + p * A;
+                double sum = 0.0;
+                for (int a = 0; a < A; a++) sum += t[a] * l[a];
+                row[p * S + c] -= sum;
+            }
+        for (int j = i < s->contacts ? s->contacts : i; j < s->n; j++) {
+            const int bore = bore_row(model, s->link_of[j], g);
+            if (bore >= 0) row[j] += line[work->places * A + bore];
         }
     }
 }
