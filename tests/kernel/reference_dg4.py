@@ -209,7 +209,8 @@ class Reference:
             z = force + alpha * direction
             moved = g + d @ z - before
             defect = 0.5 * force @ c @ force - stored + 0.5 * (force0 + z) @ moved
-            if abs(defect) < self.scheme.tolerance * (stored + 0.5 * np.diag(c) @ force**2):
+            rounding = 4e-16 * (np.abs(force0) + np.abs(force)) @ np.abs(moved)  # all that counts where flanks just graze
+            if abs(defect) <= self.scheme.tolerance * (stored + 0.5 * np.diag(c) @ force**2) + rounding:
                 return force, alpha * direction
             self.rounds += 1
             p = np.zeros_like(force)

@@ -4,6 +4,8 @@ Shapes and meaning of the sections are those of gearfmu/stage (model.py, tables.
 """
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from exact_bars import Bar
 
@@ -42,20 +44,52 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
 def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: float = 1e-20) -> bytes:
     """Two coaxial bars `gap` apart, with the residual of the modes left out; `local`: 2 (1 − ν²)/(πE) of the contact
     strip of 1 m, 1/Pa (as good as rigid when left out)."""
+    bodies = tuple(FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.static_compliance()]]))
+                   for b, n in zip(bars, modes, strict=True))
+    return flat_blob(bodies, Block(gap=gap, local=local))
+
+
+@dataclass(frozen=True)
+class FlatBody:
+    """mass kg · omega rad/s, zeta (n,) · rows (A, n): outward displacement of width function a per mode · static (A, A) m/N."""
+
+    mass: float
+    omega: np.ndarray
+    zeta: np.ndarray
+    rows: np.ndarray
+    static: np.ndarray
+
+
+@dataclass(frozen=True)
+class Block:
+    """Flat engagement 1 m wide: slices, degrees of the width functions, gap m, local 1/Pa, damping N·s/m per m of width."""
+
+    slices: int = 1
+    degrees: tuple[int, ...] = (0,)
+    gap: float = 1e-9
+    local: float = 1e-20
+    damping: float = 0.0
+
+
+def flat_blob(bodies: tuple[FlatBody, FlatBody], block: Block) -> bytes:
+    """Two bodies that meet in a flat contact: gap = x_B − x_A − outward displacements, in every slice."""
+    functions = len(block.degrees)
     sections: dict = {
-        "model": np.array([1, FLAT, 1, 0], np.int32), "name": "bars", "shafts": "left|right", "degrees": np.array([0], np.int32),
-        "pair": np.array([gap, 0.0, 0.0, 1.0, 1.0, 1e9, 1e9, 1e-3, 0.0]),
+        "model": np.array([1, FLAT, block.slices, 0], np.int32), "name": "bars", "shafts": "left|right",
+        "degrees": np.array(block.degrees, np.int32),
+        "pair": np.array([block.gap, 0.0, block.damping, 1.0, 1.0, 1e9, 1e9, 1e-3, 0.0]),
     }
-    for g, (bar, n) in enumerate(zip(bars, modes, strict=True)):
-        row = np.broadcast_to(bar.end_row(n)[1:], (2, 4, 1, n))
-        static = np.zeros((2, 2, 7, 4, 4, 1, 1))
-        static[0, 0, 3] = bar.static_compliance()
-        numbers = [1, 0.01, 0, 0.01, 0, 0, bar.mass, bar.mass, 1.0, local, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
+    for g, body in enumerate(bodies):
+        n = body.omega.size
+        static = np.zeros((2, 2, 7, 4, 4, functions, functions))
+        static[0, 0, 3] = body.static
+        numbers = [1, 0.01, 0, 0.01, 0, 0, body.mass, body.mass, 1.0, block.local, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
         sections |= {
             f"gear{g}": np.array(numbers, float), f"port{g}": np.array([TORQUE, 0, 1, 0, 1, 1, 1, 0], float),
-            f"size{g}": np.array([n, 4, 1], np.int32), f"omega{g}": bar.frequencies(n), f"zeta{g}": np.zeros(n),
-            f"diameter{g}": np.zeros(n, np.int32), f"part{g}": np.zeros(n, np.int32), f"rows{g}": row, f"bore{g}": np.zeros((3, n)),
-            f"c_ff{g}": static, f"c_fb{g}": np.zeros((2, 4, 1, 3)), f"c_bb{g}": np.zeros((3, 3)),
+            f"size{g}": np.array([n, 4, functions], np.int32), f"omega{g}": body.omega, f"zeta{g}": body.zeta,
+            f"diameter{g}": np.zeros(n, np.int32), f"part{g}": np.zeros(n, np.int32),
+            f"rows{g}": np.broadcast_to(body.rows, (2, 4, functions, n)), f"bore{g}": np.zeros((3, n)),
+            f"c_ff{g}": static, f"c_fb{g}": np.zeros((2, 4, functions, 3)), f"c_bb{g}": np.zeros((3, 3)),
         }
     return write_blob(sections)
 
