@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
+from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint32, c_uint64, c_void_p
 from functools import lru_cache
 from pathlib import Path
 
@@ -43,6 +43,7 @@ _SIGNATURES = {
     "gk_step": (c_int, [c_void_p, c_void_p, c_void_p, c_double, c_double]),
     "gk_time": (c_double, [c_void_p]),
     "gk_te": (c_int, [c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, POINTER(c_double), POINTER(c_int)]),
+    "gk_profile": (c_int, [c_void_p, c_int, POINTER(c_char_p), POINTER(c_uint64)]),
     "gk_state_size": (c_size_t, [c_void_p]),
     "gk_state_check": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t]),
 }
@@ -68,4 +69,5 @@ def aligned(size: int) -> tuple[ctypes.Array, int]:
 
 
 def blank_message() -> ctypes.Array:
+    """Room for one message of the kernel."""
     return ctypes.create_string_buffer(MESSAGE)

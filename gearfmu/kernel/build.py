@@ -110,7 +110,7 @@ def build_library(platform: str = "host", sanitize: bool = False, pattern: bool 
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=".build-") as work:
         made = Path(work) / target.name
         _run([*command, *FLAGS, *_variant_flags(sanitize, pattern, real), *_link_flags(name, sanitize),
-              f"-I{fmi_headers()}", *own_flags, "-o", str(made), *[str(p) for p in files if p.suffix == ".c"]])
+              f"-I{fmi_headers()}", *own_flags, "-o", str(made), *[str(p) for p in files if p.suffix == ".c"], *_libraries(name)])
         digest = Path(work) / "digest"
         digest.write_text(source_hash(files) + "\n")
         os.replace(made, target)
@@ -123,9 +123,8 @@ def compile_program(source: Path, out: Path, platform: str = "host", sanitize: b
 
     Raises BuildError with the compiler's messages."""
     name = _platform_name(platform)
-    libraries = [] if name == "win64" else ["-ldl"]
     _run([*_compiler(name, sanitize), *FLAGS, *_variant_flags(sanitize, pattern=False, real="float"),
-          f"-I{fmi_headers()}", f"-I{HERE / 'src'}", "-o", str(out), str(source), *libraries])
+          f"-I{fmi_headers()}", f"-I{HERE / 'src'}", "-o", str(out), str(source), *_libraries(name)])
     return out
 
 
@@ -179,6 +178,11 @@ def _link_flags(name: str, sanitize: bool) -> list[str]:
     if name == "darwin64":
         return ["-fPIC", "-shared"]
     return ["-fPIC", "-shared", "-Wl,-Bsymbolic", *([] if sanitize else ["-Wl,--no-undefined", "-Wl,-s"])]
+
+
+def _libraries(name: str) -> list[str]:
+    """dlopen for programs; sqrt where a compiler without optimisation calls it (IEEE exact in every C library)."""
+    return ["-Wl,--as-needed", "-lm", "-ldl"] if name == "linux64" else []
 
 
 def _run(command: Sequence[str]) -> None:

@@ -149,6 +149,13 @@ class Kernel:
         rows = [out[1 + i * (2 + slices): 1 + (i + 1) * (2 + slices)] for i in range(count.value)]
         return TeState(out[0], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
 
+    def profile(self) -> dict[str, int]:
+        """Processor cycles by phase of the step since `prepare`; zeros unless the library was built with -DGK_PROFILE."""
+        found, name, cycles = {}, ctypes.c_char_p(), ctypes.c_uint64()
+        while self._lib.gk_profile(self._setup, len(found), ctypes.byref(name), ctypes.byref(cycles)):
+            found[name.value.decode()] = cycles.value
+        return found
+
     def _text(self, outcome: int) -> str:
         return self._lib.gk_outcome_text(outcome).decode()
 

@@ -84,6 +84,9 @@ GK_API double gk_time(const gk_data *data);
  * out[0] = te (m), then for each of *places tooth pairs {flank 0 drive 1 coast, tooth number of the pinion, force of each slice (N)}; at most 1 + 8·12 numbers. */
 GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque, int keep, double *out, int *places);
 
+/* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds with -DGK_PROFILE only, else they stay 0. */
+GK_API int gk_profile(const gk_setup *setup, int phase, const char **name, uint64_t *cycles);
+
 /* state = the first gk_state_size bytes of gk_data */
 GK_API size_t gk_state_size(const gk_setup *setup);
 /* check bytes that come from outside (another process, a file) before they become a state */

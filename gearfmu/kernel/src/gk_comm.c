@@ -2,6 +2,7 @@
 #include "gk_core.h"
 
 static const double ULP = 2.220446049250313e-16;
+static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
 enum { HALVINGS = 3 };
 
 double gk_time(const gk_data *data) { return data->time_base + (double)data->count * data->step_H; }
@@ -112,14 +113,14 @@ static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data,
     v[V_M_NDYN] = setup->modal[0].count + setup->modal[1].count;
 }
 
-/* stored energy and what the balance does not close; a new h is a new invariant: the balance goes on from there */
-static void balance(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
+/* stored energy and what the balance does not close; 0 when that is more than the model can mean; a new h is a new invariant: the balance goes on from there */
+static int balance(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
 {
     const gk_coefficients *k = setup->integrator == RK45 ? &setup->work->explicit_rows : gk_flow_for(setup, h, setup->gamma);
     double *v = data->value, stored = gk_step_energy(model, setup, data, k);
     if (setup->integrator == RK45) { /* keeps no account of works: no balance */
         v[V_M_ENERGY] = stored;
-        return;
+        return 1;
     }
     if (data->balance_h != h) {
         data->ledger.baseline = stored - data->ledger.work + data->ledger.dissipated - v[V_M_RESIDUAL];
@@ -127,6 +128,7 @@ static void balance(const gk_model *model, const gk_setup *setup, gk_data *data,
     }
     v[V_M_ENERGY] = stored;
     v[V_M_RESIDUAL] = stored - data->ledger.baseline - data->ledger.work + data->ledger.dissipated;
+    return !(fabs(v[V_M_RESIDUAL]) > BROKEN * (stored + fabs(data->ledger.work) + data->ledger.dissipated) + 1e-6);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------------------------------------------------------- */
@@ -299,8 +301,10 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     data->value[V_M_FORCE_MEAN] = t.force / c.H;
     data->value[V_M_FORCE_MAX] = t.highest;
     outputs(model, setup, data, h);
-    balance(model, setup, data, h);
-    return GK_OK;
+    if (balance(model, setup, data, h)) return GK_OK;
+    data->phase = PHASE_FAILED; /* no state to go on from: only a restored one */
+    data->time_base = c.start, data->count = 0, data->step_H = 0.0;
+    return GK_ENERGY;
 }
 
 gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const void *bytes, size_t size)

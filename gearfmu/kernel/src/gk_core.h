@@ -32,6 +32,8 @@ enum {
 /* what a row of the small system is: λ ≥ 0; any λ; given torque; velocity-level friction */
 typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
 enum { BEARING_0X, BEARING_0Y, BEARING_1X, BEARING_1Y, PORT_0, PORT_1, SHAFT_0, SHAFT_1, CLUTCH_0, CLUTCH_1, LINKS };
+/* phases of a step, for the profile */
+enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
 /* rigid coordinates */
 enum { XA, YA, PHIA, XB, YB, PHIB, INERTIA_0, INERTIA_1, DISC_0, DISC_1, RIGID };
 enum { BORE_X, BORE_Y, BORE_RZ, BORE_ROWS };
@@ -224,6 +226,7 @@ struct gk_work {
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
     double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
+    uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
     double matrix[4 * MAX_ROWS * MAX_ROWS];       /* D, C′, J and the gathered C″ */
 };
 
@@ -264,6 +267,15 @@ double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_dat
 /* gk_static.c */
 typedef struct gk_boundary { gk_port_kind kind; double torque, phi, k; } gk_boundary;
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data *data, const gk_boundary boundary[2], int keep);
+
+#ifdef GK_PROFILE /* processor cycles by phase; the product has no clock in it */
+#include <x86intrin.h>
+#define GK_MARK(work) ((work)->mark = __rdtsc())
+#define GK_LAP(work, phase) ((work)->cycles[phase] -= (work)->mark, (work)->cycles[phase] += ((work)->mark = __rdtsc()))
+#else
+#define GK_MARK(work) ((void)(work))
+#define GK_LAP(work, phase) ((void)(work))
+#endif
 
 static inline double gk_clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 /* the C library stays out (only sqrt and memory functions come from the compiler): NaN on the right goes through */

@@ -286,6 +286,33 @@ static void fill_timeless(gk_setup *setup)
     }
 }
 
+/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, rk45 (dg4 where a clutch hangs on a port) */
+static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+{
+    const int clutch = model->port[0].chain || model->port[1].chain;
+    setup->level = (gk_level)(int)data->value[V_M_LEVEL];
+    setup->integrator = (gk_integrator)(int)data->value[V_M_INTEGRATOR];
+    setup->on = gk_effects_of(data);
+    setup->slices = (int)data->value[V_M_SLICES];
+    setup->functions = model->gear[0].functions;
+    setup->damping = data->value[V_M_DAMPING];
+    if (model->kind == KIND_PAIR)
+        setup->allowance = (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance;
+    if (setup->integrator == RK45 && clutch) {
+        snprintf(message, GK_MESSAGE, "integrator rk45 knows no clutch: use dg4, or export the stage without the chain");
+        return GK_BAD_VALUE;
+    }
+    if (setup->level == LEVEL_PAPER) {
+        setup->on.residual = 0;
+        if (setup->integrator == DG4 && !clutch) setup->integrator = RK45;
+        snprintf(message, GK_MESSAGE, "level paper leaves the static compliance of all higher modes out: tooth stiffness is 15 to 40 %% too high; use it for comparison only");
+    } else if (!setup->on.residual) {
+        snprintf(message, GK_MESSAGE, "effect.residual = false leaves the static compliance of all higher modes out: allowed at level paper only");
+        return GK_BAD_VALUE;
+    }
+    return GK_OK;
+}
+
 gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
 {
     message[0] = 0;
@@ -294,24 +321,15 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
         return GK_BAD_CALL;
     }
     memset(setup, 0, sizeof *setup);
-    setup->level = (gk_level)(int)data->value[V_M_LEVEL];
-    setup->integrator = (gk_integrator)(int)data->value[V_M_INTEGRATOR];
-    setup->on = gk_effects_of(data);
-    if (setup->level == LEVEL_PAPER) setup->on.residual = 0;
-    setup->slices = (int)data->value[V_M_SLICES];
-    setup->functions = model->gear[0].functions;
-    if (setup->integrator == RK45 && (model->port[0].chain || model->port[1].chain)) {
-        snprintf(message, GK_MESSAGE, "integrator rk45 knows no clutch: use dg4, or export the stage without the chain");
-        return GK_BAD_VALUE;
-    }
-    setup->allowance = model->kind == KIND_PAIR ? (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance : 0.0;
-    setup->damping = data->value[V_M_DAMPING];
-    int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
-    uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
+    gk_outcome outcome = choose(model, data, setup, message);
+    if (outcome) return outcome;
+    const int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
+    const uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
     lay_out(model, setup, (char *)base, modes);
     gk_work *work = setup->work;
     work->clock = 0;
     for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;
+    memset(work->cycles, 0, sizeof work->cycles);
     setup->state_size = sizeof(gk_data);
     for (int g = 0; g < 2; g++) {
         fill_modes(&model->gear[g], &setup->modal[g]);
@@ -322,7 +340,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     fill_slices(model, setup);
     fill_links(model, setup);
     fill_timeless(setup);
-    gk_outcome outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);
+    outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
     return outcome;
 }

@@ -207,26 +207,44 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_work *work = setup->work;
     gk_system *s = &work->system;
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
+    GK_MARK(work);
     predict(setup, data, k);
+    GK_LAP(work, PHASE_PREDICT);
     work->places = gk_flank_find(model, setup, work->frame, data->reach, work->place);
     if (work->places < 0) return work->places = 0, GK_DIVERGED;
     for (int p = 0; p < work->places; p++) {
         work->place[p].memory = remembered(data, work->place[p].key);
         if (work->place[p].gap < -model->overlap_max) return GK_PENETRATION;
     }
+    GK_LAP(work, PHASE_FIND);
     gk_rows_form(model, setup, work->frame, work);
+    GK_LAP(work, PHASE_ROWS);
     gk_system_form(model, setup, data, k, work);
     gk_step_recall(setup, data, s);
+    GK_LAP(work, PHASE_SYSTEM);
     if (setup->integrator == MIX4) gk_solve_plain(s);
     else gk_solve_energy(s);
     if (!all_finite(s)) return GK_DIVERGED;
+    GK_LAP(work, PHASE_SOLVE);
     correct(model, setup, data, k);
+    GK_LAP(work, PHASE_CORRECT);
     account(setup, data);
     gk_step_remember(setup, data);
     data->rounds += s->rounds;
     data->steps++;
     if (s->limit_reached) data->trouble++, data->status |= 4;
+    GK_LAP(work, PHASE_REMEMBER);
     return GK_OK;
+}
+
+/* Phase profile: names and cycles since gk_prepare (zero unless built with GK_PROFILE) */
+int gk_profile(const gk_setup *setup, int phase, const char **name, uint64_t *cycles)
+{
+    static const char *const names[PHASES] = {"predict", "find", "rows", "system", "solve", "correct", "remember"};
+    if (phase < 0 || phase >= PHASES) return 0;
+    *name = names[phase];
+    *cycles = setup->work->cycles[phase];
+    return 1;
 }
 
 /* The scheme's invariant: ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step */
