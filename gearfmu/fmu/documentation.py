@@ -65,7 +65,8 @@ def _row(variable: Variable) -> tuple[str, ...]:
 
 
 def _licence_of(package: str) -> str:
-    files = [f for found in metadata.distributions(name=package) for f in found.files or []]  # a checkout's egg-info may stand before the installation
+    distributions = metadata.distributions(name=package)  # a checkout's egg-info may stand before the installation
+    files = [file for distribution in distributions for file in distribution.files or []]
     found = next((f for f in files if f.name.upper().startswith("LICENSE") and ".dist-info" in str(f)), None)
     if found is None:
         raise FmuError(f"the installation of {package} has lost its licence, which an FMU must carry: reinstall it")

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -115,7 +114,9 @@ def _common_files(model: Model, identifier: str, native: bool) -> dict[str, byte
 
 
 def _pythonfmu_folder() -> Path:
-    spec = importlib.util.find_spec("pythonfmu")
-    if spec is None or spec.origin is None:
-        raise FmuError("runtime python needs the package pythonfmu: pip install pythonfmu")
-    return Path(spec.origin).parent
+    """The installed package, found by its metadata: in a process that has run a pythonfmu FMU, the import system knows
+    only the copy inside that FMU."""
+    try:
+        return Path(str(metadata.distribution("pythonfmu").locate_file("pythonfmu")))
+    except metadata.PackageNotFoundError:
+        raise FmuError("runtime python needs the package pythonfmu: pip install pythonfmu") from None

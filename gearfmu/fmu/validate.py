@@ -31,25 +31,34 @@ def validate(path: str | Path) -> list[Problem]:
     Raises FmuError when the file cannot be read as an FMU at all."""
     file = Path(path)
     with tempfile.TemporaryDirectory(prefix="gearfmu-validate-") as work:
-        folder = Path(work) / "fmu"
-        description = _open(file, folder)
+        folder = _unpack(file, Path(work) / "fmu")
         found = [("modelDescription.xml", text, EXPORT_AGAIN) for text in validate_fmu(str(file))]
-        for check in (_units, _terminals, _binaries):
-            found += check(folder, description)
-        if (folder / "binaries" / host_platform()).is_dir():
-            found += _answers(folder)
+        try:
+            description = fmpy.read_model_description(str(folder), validate=False)
+        except Exception as error:  # fmpy stumbles over what its own validation has found
+            found = found or [("modelDescription.xml", str(error), EXPORT_AGAIN)]
+        else:
+            found += _contents(folder, description)
         return [Problem(str(file), field, value, remedy) for field, value, remedy in found]
 
 
-def _open(file: Path, folder: Path) -> ModelDescription:
+def _unpack(file: Path, folder: Path) -> Path:
     try:
         fmpy.extract(str(file), str(folder))
-        description = fmpy.read_model_description(str(folder), validate=False)
-    except Exception as error:  # fmpy and what it calls raise many kinds
+    except Exception as error:  # zipfile raises many kinds on damaged archives
         raise FmuError(f"{file}: cannot be read as an FMU: {error}") from error
+    if not (folder / "modelDescription.xml").is_file():
+        raise FmuError(f"{file}: cannot be read as an FMU: it holds no modelDescription.xml")
+    return folder
+
+
+def _contents(folder: Path, description: ModelDescription) -> list[tuple[str, str, str]]:
     if description.coSimulation is None or not description.fmiVersion.startswith("2."):
-        raise FmuError(f"{file}: not an FMI 2.0 co-simulation FMU (FMI {description.fmiVersion})")
-    return description
+        return [("modelDescription.xml", f"FMI {description.fmiVersion}", "only FMI 2.0 co-simulation is looked at")]
+    found = [finding for check in (_units, _terminals, _binaries) for finding in check(folder, description)]
+    if (folder / "binaries" / host_platform()).is_dir():
+        found += _answers(folder)
+    return found
 
 
 def _units(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:

@@ -1,11 +1,10 @@
 """FMUs that all tests of this room share, made once per session from a small stage, and a helper to unpack them."""
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import pytest
-from small_stage import small_model
+from small_stage import small_model, unpack
 
 from gearfmu.fmu import export
 
@@ -58,10 +57,3 @@ def unpacked_python(python, tmp_path_factory) -> str:
 @pytest.fixture(scope="session")
 def unpacked_other(other, folder) -> str:
     return unpack(other, folder / "other")
-
-
-def unpack(fmu: Path, target: Path) -> str:
-    """Unpack `fmu`; returns the folder as text."""
-    with zipfile.ZipFile(fmu) as archive:
-        archive.extractall(target)
-    return str(target)

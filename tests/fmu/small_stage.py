@@ -1,9 +1,11 @@
-"""A small but complete stage model: the shipped FZG pair with bodies of a few invented modes (one tooth-bending family).
+"""A small but complete stage model: the shipped FZG pair with bodies of a few invented modes, a tooth-bending family.
 
-The numbers are of the right size (tooth stiffness, frequencies), the tables consistent (static compliance = modes + local
-part, positive semidefinite), the blob small and made in milliseconds: for tests of the FMU, not of the physics."""
+The numbers are of the right size (tooth stiffness, frequencies), the tables consistent (static compliance = modes and a
+local part, positive semidefinite), the blob small and quickly made: for tests of the FMU, not of the physics."""
 from __future__ import annotations
 
+import zipfile
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +27,13 @@ def small_model(stage: str = "fzg_c/stage_relief", name: str | None = None, **po
     spec = spec.model_copy(update={"ports": changed, "name": name or spec.name})
     geometry = PairGeometry.of(spec)
     return assemble(spec, [body(spec.gears[i], geometry.gears[i]) for i in (0, 1)])
+
+
+def unpack(fmu: Path, target: Path) -> str:
+    """Unpack `fmu`; returns the folder as text."""
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(target)
+    return str(target)
 
 
 def body(gear, shape) -> SimpleNamespace:

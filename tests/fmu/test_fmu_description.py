@@ -72,7 +72,8 @@ def test_ports_decide_terminals_and_causality(unpacked, unpacked_other):
     def causalities(folder):
         terminals = ET.parse(os.path.join(folder, "terminalsAndIcons", "terminalsAndIcons.xml"))
         by_name = {v.name: v.causality for v in read_model_description(folder).modelVariables}
-        return {t.get("name"): {m.get("memberName"): by_name[m.get("variableName")] for m in t} for t in terminals.iter("Terminal")}
+        return {terminal.get("name"): {m.get("memberName"): by_name[m.get("variableName")] for m in terminal}
+                for terminal in terminals.iter("Terminal")}
 
     spring = {"phi": "input", "w": "input", "a": "input", "tau": "output", "tau_mean": "output"}
     torque = {"tau": "input", "phi": "output", "w": "output", "a": "output"}

@@ -1,0 +1,102 @@
+"""Building the kernel library: a stale one is noticed, bad wishes are named, only the agreed symbols are exported."""
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gearfmu.fmu.symbols import exported_symbols
+from gearfmu.fmu.validate import fmi_functions
+from gearfmu.kernel import build, library_path
+from gearfmu.kernel.build import BuildError
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch) -> Path:
+    """A copy of the kernel's folder that the search looks into, without library."""
+    shutil.copytree(build.HERE / "src", tmp_path / "src")
+    monkeypatch.setattr(build, "_package_folders", lambda: [tmp_path])
+    return tmp_path
+
+
+def place_library(package: Path) -> Path:
+    """A library there that claims to come from the sources there."""
+    library = package / "lib" / build.host_platform() / (build.STEM + build.SUFFIX[build.host_platform()])
+    library.parent.mkdir(parents=True)
+    library.write_bytes(b"library")
+    library.with_suffix(".sources").write_text(build.source_hash(build.sources(package)) + "\n")
+    return library
+
+
+def test_missing_library_names_the_remedy(package):
+    with pytest.raises(BuildError, match="build it with `python -m gearfmu.kernel`"):
+        library_path()
+
+
+def test_library_of_these_sources_is_found(package):
+    library = place_library(package)
+    assert library_path() == library
+
+
+@pytest.mark.parametrize("change", ["edit", "add", "remove"])
+def test_any_change_of_the_sources_makes_it_stale(package, change):
+    place_library(package)
+    some = package / "src" / "gk_math.c"
+    if change == "edit":
+        some.write_text(some.read_text() + "/* edited */\n")
+    elif change == "add":
+        (package / "src" / "gk_new.c").write_text("")
+    else:
+        some.unlink()
+    with pytest.raises(BuildError, match="rebuild it with `python -m gearfmu.kernel`"):
+        library_path()
+
+
+def test_touching_or_changing_line_ends_does_not(package):
+    place_library(package)
+    some = package / "src" / "gk_math.c"
+    some.write_bytes(some.read_bytes().replace(b"\n", b"\r\n"))
+    assert library_path().is_file()
+
+
+def test_compiler_errors_are_shown_and_leave_the_old_library(tmp_path, monkeypatch):
+    broken = tmp_path / "broken.c"
+    broken.write_text("int f(void) { return undeclared_name; }\n")
+    monkeypatch.setattr(build, "sources", lambda: [broken])
+    target = tmp_path / "kept.so"
+    target.write_bytes(b"old")
+    with pytest.raises(BuildError, match="undeclared_name"):
+        build.build_library(out=target, compiler=("cc",))
+    assert target.read_bytes() == b"old" and sorted(p.name for p in tmp_path.iterdir()) == ["broken.c", "kept.so"]
+
+
+@pytest.mark.parametrize("wish, word", [({"platform": "amiga"}, "amiga"), ({"real": "half"}, "half")])
+def test_bad_wishes_are_named(wish, word):
+    with pytest.raises(BuildError, match=word):
+        build.build_library(**wish)
+
+
+def test_command_line_fails_with_one_line():
+    command = [sys.executable, "-m", "gearfmu.kernel", "--platform", "amiga"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1 and done.stderr.startswith("error: ") and done.stderr.count("\n") == 1
+
+
+def test_exported_symbols_are_the_two_interfaces():
+    names = exported_symbols(library_path())
+    kernel = {name for name in names if name.startswith("gk_")}
+    assert names - kernel == fmi_functions() and len(fmi_functions()) == 34
+    header = (build.HERE / "src" / "gk.h").read_text(encoding="utf-8")
+    prototypes = [line for line in header.splitlines() if line.startswith("GK_API ")]
+    declared = {line.split("(")[0].split()[-1].lstrip("*") for line in prototypes}
+    assert kernel == declared
+
+
+def test_host_library_needs_no_new_glibc():
+    """With ziglang it is built against glibc 2.17, which every supported Linux has."""
+    pytest.importorskip("ziglang", reason="needs ziglang: pip install \"gearfmu[cross]\"")
+    versions = {word.decode() for word in library_path().read_bytes().split(b"\0") if word.startswith(b"GLIBC_2.")}
+    assert versions and max(tuple(map(int, v.removeprefix("GLIBC_").split("."))) for v in versions) <= (2, 17)

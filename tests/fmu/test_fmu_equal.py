@@ -1,0 +1,155 @@
+"""Two roads, one answer: FMU and kernel, native and pythonfmu, one stage beside another, fmpy and other importers."""
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description
+
+from gearfmu.fmu.probes import Subject
+
+STEPS, H = 200, 1e-4
+TURN, RATIO = 2e-2, 16 / 24  # rad per step; the wheel turns the other way
+INPUTS = {"pinion.phi": (1e-3, TURN), "pinion.w": (TURN / H, 0.0),
+          "wheel.phi": (0.0, -TURN * RATIO), "wheel.w": (-TURN / H * RATIO, 0.0)}
+
+SIDE_BY_SIDE = """
+import ctypes, json, sys
+mode, folders = getattr(ctypes, sys.argv[1]), sys.argv[2:]
+ctypes.cdll.LoadLibrary = lambda path: ctypes.CDLL(path, mode=mode)
+from gearfmu.fmu.probes import Subject
+subjects = [Subject(folder).initialized() for folder in folders]
+runs = [b"" for _ in folders]
+for _ in range(20):
+    for k, subject in enumerate(subjects):
+        runs[k] += subject.run(1)
+assert hasattr(ctypes.CDLL(None), "gk_step") == (mode == ctypes.RTLD_GLOBAL), "the mode had no effect"
+print(json.dumps([bits.hex() for bits in runs]))
+"""
+
+
+def inputs_at(step: int) -> dict[str, float]:
+    """A loaded pair that turns: angle, speed, and no acceleration."""
+    return {name: base + step * slope for name, (base, slope) in INPUTS.items()}
+
+
+def fmu_run(folder: str, outputs: list[str]) -> np.ndarray:
+    subject = Subject(folder)
+    by_name = {v.name: v.valueReference for v in subject.variables}
+    references = [by_name[name] for name in INPUTS]
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    subject.fmu.setReal(references, list(inputs_at(0).values()))
+    subject.fmu.exitInitializationMode()
+    rows = []
+    for k in range(STEPS):
+        subject.fmu.setReal(references, list(inputs_at(k).values()))
+        subject.fmu.doStep(k * H, H)
+        rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
+    subject.close()
+    return np.array(rows)
+
+
+def kernel_run(model, outputs: list[str]) -> np.ndarray:
+    kernel = model.kernel()
+    for name, value in inputs_at(0).items():
+        kernel.set(name, value)
+    kernel.initialize(0.0)
+    rows = []
+    for k in range(STEPS):
+        for name, value in inputs_at(k).items():
+            kernel.set(name, value)
+        kernel.step(k * H, H)
+        rows.append([kernel.get(name) for name in outputs])
+    return np.array(rows)
+
+
+@pytest.fixture(scope="module")
+def outputs(model) -> list[str]:
+    return [v.name for v in model.kernel_variables() if v.causality == "output" and v.type == "Real"]
+
+
+def test_fmu_is_the_kernel_bit_for_bit(model, unpacked, unpacked_python, outputs):
+    expected = kernel_run(model, outputs)
+    assert np.ptp(expected[:, outputs.index("mesh.force")]) > 100, "the run loads the teeth"
+    for folder in (unpacked, unpacked_python):
+        assert fmu_run(folder, outputs).tobytes() == expected.tobytes()
+
+
+def test_two_runtimes_agree_under_fmpys_own_master(native, python):
+    starts = {"pinion.phi": 2e-3, "pinion.w": 1.0}
+    runs = [fmpy.simulate_fmu(str(fmu), stop_time=0.02, step_size=H, output_interval=H, start_values=starts)
+            for fmu in (native, python)]
+    assert runs[0].dtype == runs[1].dtype and runs[0].tobytes() == runs[1].tobytes()
+
+
+@pytest.mark.parametrize("mode", ["RTLD_LOCAL", "RTLD_GLOBAL"])
+def test_two_stages_in_one_process(unpacked, unpacked_other, mode):
+    """Also with all symbols global (RTLD_GLOBAL): the second FMU must not run the first one's kernel."""
+    alone = []
+    for folder in (unpacked, unpacked_other):
+        subject = Subject(folder).initialized()
+        alone.append(subject.run(20).hex())
+        subject.close()
+    assert alone[0] != alone[1]
+    for order in ((0, 1), (1, 0)):
+        folders = [(unpacked, unpacked_other)[k] for k in order]
+        done = subprocess.run([sys.executable, "-c", SIDE_BY_SIDE, mode, *folders], capture_output=True, text=True,
+                              check=True, env={**os.environ, "LD_DEBUG": "bindings"})
+        assert json.loads(done.stdout.splitlines()[-1]) == [alone[k] for k in order]
+        assert not crossing(done.stderr, folders), "the dynamic linker tied one FMU to the other"
+
+
+def crossing(log: str, folders: list[str]) -> list[str]:
+    """Pairs in glibc's LD_DEBUG=bindings that tie a symbol of one folder's library to a library of another folder."""
+    pairs = re.findall(r"binding file (.*?) \[\d+\] to (.*?) \[\d+\]: .*", log)
+    assert sys.platform != "linux" or any("libc.so" in target for _, target in pairs), "no bindings in the log"
+    owners = {side: [folder for folder in folders if side.startswith(folder)] for pair in pairs for side in pair}
+    return [pair for pair in pairs if all(map(owners.get, pair)) and owners[pair[0]] != owners[pair[1]]]
+
+
+@pytest.mark.needs("libcosimpy")
+def test_libcosim_gives_the_numbers_of_fmpy(native, unpacked):
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    variables = {v.name: v.valueReference for v in read_model_description(unpacked).modelVariables}
+    names = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
+    execution = CosimExecution.from_step_size(int(H * 1e9))
+    slave = execution.add_local_slave(CosimLocalSlave(fmu_path=str(native), instance_name="stage"))
+    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
+    execution.add_observer(observer)
+    execution.add_manipulator(manipulator)
+    values = [2e-3, 1.0]
+    manipulator.slave_real_values(slave, [variables["pinion.phi"], variables["pinion.w"]], values)
+    rows = []
+    for _ in range(STEPS):
+        execution.step()
+        rows.append(observer.last_real_values(slave, [variables[name] for name in names]))
+    expected = held_run(unpacked, dict(zip(("pinion.phi", "pinion.w"), values)), names)
+    scale = np.abs(expected).max(axis=0)
+    assert (np.abs(np.array(rows) - expected) / scale).max() <= 1e-12
+
+
+def held_run(folder: str, inputs: dict[str, float], outputs: list[str]) -> np.ndarray:
+    """Outputs after each of STEPS steps with inputs that are set after the initialisation and then held."""
+    subject = Subject(folder)
+    by_name = {v.name: v.valueReference for v in subject.variables}
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    subject.fmu.exitInitializationMode()
+    subject.fmu.setReal([by_name[name] for name in inputs], list(inputs.values()))
+    rows = []
+    for k in range(STEPS):
+        subject.fmu.doStep(k * H, H)
+        rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
+    subject.close()
+    return np.array(rows)

@@ -1,0 +1,159 @@
+"""Saved states: bitwise over a thousand rollbacks, in a fresh process, with other parameters; not from damage."""
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+
+import pytest
+from fmpy.fmi2 import fmi2FMUstate
+
+from gearfmu.fmu.probes import ERROR, OK, Subject
+
+FRESH = """
+import json, sys
+from gearfmu.fmu.probes import Subject
+subject = Subject(sys.argv[1])
+state = subject.fmu.deSerializeFMUstate(bytes.fromhex(sys.stdin.readline().strip()))
+subject.fmu.setFMUstate(state)
+subject.time = int(sys.argv[2])
+print(json.dumps([subject.run(1).hex() for _ in range(int(sys.argv[3]))]))
+"""
+
+
+def reference(subject: Subject, name: str) -> int:
+    return next(v.valueReference for v in subject.variables if v.name == name)
+
+
+@pytest.fixture(scope="module")
+def history(unpacked) -> list[bytes]:
+    """Bits of all outputs after each of the first 60 steps of a plain run."""
+    subject = Subject(unpacked).initialized()
+    bits = [subject.run(1) for _ in range(60)]
+    subject.close()
+    return bits
+
+
+def test_a_thousand_random_rollbacks(unpacked, history):
+    dice = random.Random(1)
+    subject = Subject(unpacked).initialized()
+    saved = {0: subject.fmu.getFMUstate()}
+    for _ in range(1000):
+        subject.time = dice.choice(list(saved))
+        subject.fmu.setFMUstate(saved[subject.time])
+        for _ in range(dice.randint(1, 4)):
+            if subject.time < len(history):
+                assert subject.run(1) == history[subject.time - 1]
+        if dice.random() < 0.3:
+            old = saved.pop(subject.time, None)
+            saved[subject.time] = subject.fmu.getFMUstate()
+            if old is not None:
+                subject.fmu.freeFMUstate(old)
+    assert max(saved) > 40, "the walk came far enough to mean something"
+    subject.close()
+
+
+@pytest.mark.parametrize("runtime", ["native", "python"])
+def test_restore_in_a_fresh_process(unpacked, unpacked_python, history, runtime):
+    folder = unpacked if runtime == "native" else unpacked_python
+    subject = Subject(folder).initialized()
+    subject.run(20)
+    state = subject.fmu.getFMUstate()
+    image = subject.fmu.serializeFMUstate(state)
+    assert fresh_process(folder, image, 20, 20) == [bits.hex() for bits in history[20:40]]
+    subject.close()
+
+
+def test_parameters_travel_with_the_state(unpacked):
+    """An instance with other parameters takes over those of the state, and can go back to its own."""
+    coarse = with_parameters(unpacked, level=1, slices=3)
+    coarse.run(5)
+    state, own = coarse.fmu.getFMUstate(), None
+    expected = coarse.run(10)
+    image = coarse.fmu.serializeFMUstate(state)
+    other = with_parameters(unpacked, level=2, slices=5)
+    other.run(5)
+    own = other.fmu.getFMUstate()
+    own_expected = other.run(10)
+    assert own_expected != expected
+    foreign = other.fmu.deSerializeFMUstate(image)
+    for saved, bits in ((foreign, expected), (own, own_expected), (foreign, expected)):
+        other.fmu.setFMUstate(saved)
+        other.time = 5
+        assert other.run(10) == bits
+    assert "".join(fresh_process(unpacked, image, 5, 10)) == expected.hex()
+    coarse.close()
+    other.close()
+
+
+def with_parameters(folder: str, **values: int) -> Subject:
+    subject = Subject(folder)
+    for name, value in values.items():
+        subject.fmu.setInteger([reference(subject, name)], [value])
+    return subject.initialized()
+
+
+def fresh_process(folder: str, image: bytes, time: int, steps: int) -> list[str]:
+    """Output bits (hex) of `steps` steps in a new process that only knows the bytes of the state."""
+    done = subprocess.run([sys.executable, "-c", FRESH, folder, str(time), str(steps)], input=image.hex() + "\n",
+                          capture_output=True, text=True, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_states_of_every_mode(unpacked, history):
+    """Also before and within the initialisation, and after the end."""
+    subject = Subject(unpacked)
+    subject.excite()
+    states = [subject.fmu.getFMUstate()]
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    states.append(subject.fmu.getFMUstate())
+    subject.fmu.exitInitializationMode()
+    subject.run(7)
+    subject.fmu.terminate()
+    states.append(subject.fmu.getFMUstate())
+    images = [subject.fmu.serializeFMUstate(state) for state in states]
+    other = Subject(unpacked)
+    for image, mode in zip(images, ("instantiated", "initialization", "terminated")):
+        other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(image))
+        if mode == "instantiated":
+            other.fmu.setupExperiment(startTime=0.0)
+            other.fmu.enterInitializationMode()
+        if mode != "terminated":
+            other.fmu.exitInitializationMode()
+            other.time = 0
+            assert other.run(3) == b"".join(history[:3])
+        else:
+            assert other.outputs() == history[6] and other.status("doStep", 7e-4, 1e-4) == ERROR
+    subject.close()
+    other.close()
+
+
+def test_damaged_bytes_are_refused_and_change_nothing(unpacked, history):
+    dice = random.Random(2)
+    subject = Subject(unpacked).initialized()
+    subject.run(3)
+    image = bytearray(subject.fmu.serializeFMUstate(subject.fmu.getFMUstate()))
+    for _ in range(300):
+        damaged = bytearray(image)
+        damaged[dice.randrange(len(image))] ^= 1 << dice.randrange(8)
+        cut = bytes(damaged[:dice.randrange(len(image))]) if dice.random() < 0.2 else bytes(damaged)
+        assert subject.status("deSerializeFMUstate", cut) == ERROR
+    assert subject.run(5) == b"".join(history[3:8])
+    subject.close()
+
+
+def test_foreign_and_freed_states_are_refused(unpacked, unpacked_other):
+    first, second, stranger = Subject(unpacked).initialized(), Subject(unpacked).initialized(), Subject(unpacked_other)
+    state = first.fmu.getFMUstate()
+    image = first.fmu.serializeFMUstate(state)
+    assert second.status("setFMUstate", state) == ERROR, "a handle belongs to its instance"
+    assert stranger.status("deSerializeFMUstate", image) == ERROR, "a state belongs to its model"
+    assert first.status("setFMUstate", fmi2FMUstate(4096)) == ERROR
+    copy = fmi2FMUstate(state.value)
+    first.fmu.freeFMUstate(state)
+    assert first.status("setFMUstate", copy) == ERROR and first.status("freeFMUstate", copy) == ERROR
+    assert first.status("freeFMUstate", fmi2FMUstate()) == OK, "freeing NULL does nothing"
+    for subject in (first, second, stranger):
+        subject.close()

@@ -1,0 +1,119 @@
+"""validate finds what is wrong, and only that: each damage to a good FMU gives the finding that names it."""
+from __future__ import annotations
+
+import struct
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from gearfmu.errors import FmuError, Problem
+from gearfmu.fmu import validate
+from gearfmu.fmu.package import write_archive
+from gearfmu.kernel.build import build_library, host_platform
+
+
+@pytest.fixture(scope="module")
+def members(native) -> dict[str, bytes]:
+    with zipfile.ZipFile(native) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def binary_of(members: dict[str, bytes]) -> str:
+    return next(name for name in members if name.startswith(f"binaries/{host_platform()}/"))
+
+
+def findings(members: dict[str, bytes], changes: dict[str, bytes | None], folder: Path) -> list[Problem]:
+    """Problems of the FMU with these members replaced, or left out where None."""
+    changed = {name: content for name, content in {**members, **changes}.items() if content is not None}
+    return validate(write_archive(folder / "damaged.fmu", changed))
+
+
+def edited(members: dict[str, bytes], old: str, new: str, name: str = "modelDescription.xml") -> dict[str, bytes]:
+    text = members[name].decode()
+    assert old in text
+    return {name: text.replace(old, new, 1).encode()}
+
+
+def test_good_fmus_have_no_problems(native, python, other):
+    assert [validate(fmu) for fmu in (native, python, other)] == [[], [], []]
+
+
+@pytest.mark.parametrize("old, new, expected", [
+    ('name="mesh.te"', 'name="mesh.tee"', "mesh.te = only in the binary"),
+    ('unit="N.m"', 'unit="N"', "unit = N: the binary says N.m"),
+    ('start="0.0"', 'start="0.5"', "modelDescription.xml declares start=0.5"),
+    ('<BaseUnit kg="1" m="1" s="-2" />', "", "declare a unit with its SI base units"),
+    ('guid="', 'guid="0', "Failed to instantiate model"),
+    ('<Unknown index="', '<Unknown index="9', "modelDescription.xml"),
+    ('causality="output"', 'causality="local"', "causality = local: the binary says output"),
+])
+def test_changes_of_the_description(members, tmp_path, old, new, expected):
+    problems = findings(members, edited(members, old, new), tmp_path)
+    assert any(expected in str(problem) for problem in problems), "\n".join(map(str, problems))
+    assert all(problem.file.endswith("damaged.fmu") and problem.remedy for problem in problems)
+
+
+def test_terminals_are_looked_at(members, tmp_path):
+    name = "terminalsAndIcons/terminalsAndIcons.xml"
+    unknown = findings(members, edited(members, '"pinion.phi"', '"pinion.psi"', name), tmp_path)
+    assert [problem.value for problem in unknown] == ["is no variable of the FMU"]
+    shapeless = findings(members, edited(members, "matchingRule=", "matching=", name), tmp_path)
+    assert any("matching" in problem.value for problem in shapeless)
+
+
+def test_missing_and_misnamed_binaries(members, tmp_path):
+    name = binary_of(members)
+    gone = findings(members, {name: None}, tmp_path)
+    assert [problem.value for problem in gone] == ["no binary for a platform known here"]
+    moved = findings(members, {name: None, name + "x.so": members[name]}, tmp_path)
+    assert any("is missing" in problem.value for problem in moved)
+
+
+def test_damaged_model_is_refused_by_the_binary(members, tmp_path):
+    problems = findings(members, {"resources/model.gkb": members["resources/model.gkb"][:-1]}, tmp_path)
+    assert problems and all("export" in p.remedy or "check" in p.remedy for p in problems)
+
+
+@pytest.mark.needs("gcc")
+def test_leaked_symbols_are_found(members, tmp_path):
+    leaky = build_library(out=tmp_path / "leaky.so", compiler=("gcc", "-O0", "-Wl,--defsym=leaked=fmi2GetVersion"))
+    problems = findings(members, {binary_of(members): leaky.read_bytes()}, tmp_path)
+    assert [problem.value for problem in problems] == ["leaked is exported"]
+
+
+@pytest.mark.needs("gcc")
+def test_a_crash_is_a_finding(members, tmp_path):
+    """A binary whose fmi2DoStep holds an invalid instruction: every check that steps is named, the others still run."""
+    library = tmp_path / "library.so"
+    library.write_bytes(members[binary_of(members)])
+    listed = subprocess.run(["nm", "-D", str(library)], capture_output=True, text=True, check=True).stdout
+    address = int(next(line.split()[0] for line in listed.splitlines() if line.endswith(" fmi2DoStep")), 16)
+    data = bytearray(library.read_bytes())
+    place = file_offset(data, address)
+    data[place:place + 2] = b"\x0f\x0b"
+    problems = findings(members, {binary_of(members): bytes(data)}, tmp_path)
+    crashed = {problem.field for problem in problems}
+    assert {"bad_steps", "saved_state", "instances", "clocks"} <= crashed and "start_values" not in crashed
+    assert all("brings its process down" in problem.remedy for problem in problems)
+
+
+def file_offset(data: bytearray, address: int) -> int:
+    """Place in an ELF file of a virtual address (program headers)."""
+    table, size, count = struct.unpack_from("<Q", data, 32)[0], *struct.unpack_from("<HH", data, 54)
+    for k in range(count):
+        kind, _, offset, start, _, length = struct.unpack_from("<IIQQQQ", data, table + k * size)
+        if kind == 1 and start <= address < start + length:
+            return address - start + offset
+    raise AssertionError("the address lies in no segment")
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 cut"])
+def test_what_is_no_fmu_at_all(tmp_path, content):
+    file = tmp_path / "x.fmu"
+    file.write_bytes(content)
+    with pytest.raises(FmuError, match="cannot be read as an FMU"):
+        validate(file)
+    with pytest.raises(FmuError, match="cannot be read as an FMU"):
+        validate(tmp_path / "missing.fmu")
