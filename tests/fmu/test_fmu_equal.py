@@ -153,3 +153,35 @@ def held_run(folder: str, inputs: dict[str, float], outputs: list[str]) -> np.nd
         rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
     subject.close()
     return np.array(rows)
+
+
+ECOS = """
+import json, sys
+from ecospy import EcosSimulation, EcosSimulationStructure
+fmu, steps, h, inputs, outputs = json.loads(sys.argv[1])
+with EcosSimulationStructure() as structure:
+    structure.add_model("stage", fmu)
+    with EcosSimulation(structure=structure, step_size=h) as simulation:
+        simulation.init()
+        for name, value in inputs.items():
+            simulation.set_real("stage::" + name, value)
+        rows = []
+        for _ in range(steps):
+            simulation.step()
+            rows.append([simulation.get_real("stage::" + name) for name in outputs])
+        simulation.terminate()
+print(json.dumps(rows))
+"""
+
+
+@pytest.mark.needs("ecospy")
+def test_ecos_gives_the_numbers_of_fmpy(native, unpacked):
+    inputs, names = {"pinion.phi": 2e-3, "pinion.w": 1.0}, ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
+    setting = json.dumps([str(native), STEPS, H, inputs, names])
+    done = subprocess.run([sys.executable, "-c", ECOS, setting], capture_output=True, text=True)
+    if "libtbb" in done.stderr:
+        pytest.skip("needs the library libtbb: apt-get install libtbb12")
+    assert done.returncode == 0, done.stderr[-2000:]
+    expected = held_run(unpacked, inputs, names)
+    rows = np.array(json.loads(done.stdout.splitlines()[-1]))
+    assert (np.abs(rows - expected) / np.abs(expected).max(axis=0)).max() <= 1e-12
