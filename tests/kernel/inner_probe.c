@@ -23,6 +23,7 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
 {
     gk_local law;
     gk_law_set(model, setup, curvature, &law);
+    law.width = setup->width / setup->slices;
     out[0] = gk_law_approach(&law, force, &out[1]);
     out[2] = gk_law_energy(&law, force);
 }

@@ -33,7 +33,7 @@ static void mesh_outputs(const gk_setup *setup, gk_data *data)
     int pairs = 0;
     for (int p = 0; p < work->places; p++) {
         int touches = 0;
-        for (int i = p * s->slices; i < (p + 1) * s->slices; i++) {
+        for (int i = p * s->strips; i < (p + 1) * s->strips; i++) {
             side[work->place[p].flank] += reported(s, i);
             touches |= s->force[i] > 0.0;
         }

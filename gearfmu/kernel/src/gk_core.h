@@ -124,8 +124,10 @@ struct gk_setup {
     gk_integrator integrator;
     gk_effects on;
     int slices, functions;
-    double h, gamma, allowance, damping, slice_width[2]; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal */
-    double slice_row[2][MAX_SLICES][MAX_FUNCTIONS]; /* slice ← width functions, per gear */
+    int strips;                  /* contact rows of a place: slices, or half of them where both halves of the face width do the same */
+    double h, gamma, allowance, damping, width; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal; width: common face width */
+    double strip_width[MAX_SLICES], strip_term;
+    double strip_row[2][MAX_SLICES][MAX_FUNCTIONS]; /* strip ← width functions, per gear */
     double inverse_mass[RIGID];
     int link[LINKS];             /* live bilateral rows */
     int given_torque[2];         /* the port's row carries a given torque */
@@ -184,10 +186,10 @@ typedef struct gk_place { /* one tooth pair on one flank at the predicted positi
     int memory;                       /* its entry in gk_data.memory, −1 if new */
 } gk_place;
 
-typedef struct gk_local { double c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high; } gk_local;
+typedef struct gk_local { double width, c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high; } gk_local;
 
 typedef struct gk_system { /* unknown forces of one step: contacts, then links */
-    int contacts, n, slices;
+    int contacts, n, strips;
     gk_row_kind kind[MAX_ROWS];
     int link_of[MAX_ROWS];            /* −1 for contacts */
     int place_of[MAX_CONTACTS];

@@ -63,7 +63,7 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
     gk_rows_form(model, setup, frame, work);
     gk_system_form(model, setup, data, gk_flow_for(setup, h, gamma), work);
     const int n = s->n;
-    double *C = s->J, *K = C + n * n, full = model->torque_max / (model->gear[0].r_b * setup->slices);
+    double *C = s->J, *K = C + n * n, full = model->torque_max / (model->gear[0].r_b * setup->width);
     memcpy(K, s->C, (size_t)n * n * sizeof *K);
     gk_coefficients plain = *gk_flow_for(setup, h, gamma);
     plain.rigid_kappa = 0.0;
@@ -74,7 +74,7 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
         K[i] = C[i] - K[i];
     }
     for (int i = 0; i < n; i++) {
-        if (i < s->contacts) gk_law_approach(&s->local[i], full, &slope), C[i * n + i] += slope;
+        if (i < s->contacts) gk_law_approach(&s->local[i], full * s->local[i].width, &slope), C[i * n + i] += slope;
         if (s->kind[i] == ROW_CLUTCH || s->kind[i] == ROW_TORQUE) {
             for (int j = 0; j < n; j++) C[i * n + j] = C[j * n + i] = K[i * n + j] = K[j * n + i] = 0.0;
             C[i * n + i] = 1.0;

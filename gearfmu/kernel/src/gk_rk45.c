@@ -41,7 +41,7 @@ static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data 
     for (int r = 0; r < s->n; r++) { /* dashpots parallel to the massless path; contacts never pull */
         if (s->kind[r] == ROW_TORQUE || s->kind[r] == ROW_CLUTCH) continue;
         const int contact = s->kind[r] == ROW_CONTACT;
-        const double c = contact ? (setup->on.damping ? setup->damping * gk_min(setup->slice_width[0], setup->slice_width[1]) : 0.0) : setup->link_d[s->link_of[r]];
+        const double c = contact ? (setup->on.damping ? setup->damping * setup->strip_width[r % s->strips] : 0.0) : setup->link_d[s->link_of[r]];
         double dashpot = -c * rate[r];
         if (contact) dashpot = gk_clamp(dashpot, -s->force[r], s->force[r]);
         s->z[r] = s->force[r] + dashpot;

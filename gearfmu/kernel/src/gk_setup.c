@@ -228,17 +228,23 @@ static double legendre_integral(int degree, double x)
     return (now - minus) / (2.0 * degree + 1.0);
 }
 
-static void fill_slices(const gk_model *model, gk_setup *setup)
+/* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row of twice the length. */
+static void fill_strips(const gk_model *model, gk_setup *setup)
 {
-    const double width = gk_min(model->gear[0].width, model->gear[1].width);
+    int mirrored = 1;
+    for (int a = 0; a < setup->functions; a++) mirrored &= model->degree[a] % 2 == 0;
+    setup->strips = mirrored ? (setup->slices + 1) / 2 : setup->slices;
+    setup->width = gk_min(model->gear[0].width, model->gear[1].width);
+    setup->strip_term = 0.0;
+    for (int s = 0; s < setup->strips; s++) setup->strip_width[s] = setup->width / setup->slices * (mirrored && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
     for (int g = 0; g < 2; g++) {
-        setup->slice_width[g] = width / setup->slices;
-        double edge = width / model->gear[g].width;
-        for (int s = 0; s < setup->slices; s++)
+        setup->strip_term += model->gear[g].local * (gk_log(4.0 * model->gear[g].strip) - 1.0);
+        const double edge = setup->width / model->gear[g].width;
+        for (int s = 0; s < setup->strips; s++)
             for (int a = 0; a < setup->functions; a++) {
-                double from = edge * (2.0 * s / setup->slices - 1.0), to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
-                int d = model->degree[a];
-                setup->slice_row[g][s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+                const double from = edge * (2.0 * s / setup->slices - 1.0), to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
+                const int d = model->degree[a];
+                setup->strip_row[g][s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
             }
     }
 }
@@ -337,7 +343,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
         if (setup->on.residual) fill_bore_residual(&model->gear[g], &setup->modal[g], work->matrix);
         setup->state_size += 3 * (size_t)setup->modal[g].n * sizeof(gk_real);
     }
-    fill_slices(model, setup);
+    fill_strips(model, setup);
     fill_links(model, setup);
     fill_timeless(setup);
     outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);

@@ -144,10 +144,13 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, do
         if (s->link_of[i] == PORT_0) phi_pinion = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
     *out++ = model->gear[0].r_b * phi_pinion + model->gear[1].r_b * phi_wheel;
     *places = setup->work->places;
-    for (int p = 0; p < *places; p++, out += 2 + s->slices) {
+    for (int p = 0; p < *places; p++, out += 2 + setup->slices) {
         out[0] = setup->work->place[p].key.flank;
         out[1] = setup->work->place[p].key.tooth;
-        for (int i = 0; i < s->slices; i++) out[2 + i] = s->force[p * s->slices + i];
+        for (int i = 0; i < setup->slices; i++) {
+            const int strip = i < s->strips ? i : setup->slices - 1 - i;
+            out[2 + i] = s->force[p * s->strips + strip] * setup->width / (setup->slices * setup->strip_width[strip]);
+        }
     }
     return GK_OK;
 }

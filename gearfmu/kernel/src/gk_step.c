@@ -60,7 +60,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         case ROW_CONTACT: {
             const gk_place *p = &setup->work->place[s->place_of[i]];
             const gk_memory *m = p->memory < 0 ? NULL : &data->memory[p->memory];
-            s->g0[i] = m ? m->gap[i % s->slices] - sum - gk_law_approach(&s->local[i], s->force0[i], &slope) : s->g[i];
+            s->g0[i] = m ? m->gap[i % s->strips] - sum - gk_law_approach(&s->local[i], s->force0[i], &slope) : s->g[i];
             s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
             if (s->force0[i] > 0.0 && s->damping[i] > 0.0) s->clip[i] = 0;
             break;
@@ -194,8 +194,8 @@ void gk_step_remember(const gk_setup *setup, gk_data *data)
             continue;
         }
         gk_memory *m = &data->memory[s->place_of[i]];
-        m->force[i % s->slices] = s->force[i];
-        m->gap[i % s->slices] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+        m->force[i % s->strips] = s->force[i];
+        m->gap[i % s->strips] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
         deepest = gk_max(deepest, -work->place[s->place_of[i]].gap);
     }
     data->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */

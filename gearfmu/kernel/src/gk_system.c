@@ -116,7 +116,7 @@ int gk_system_basis(const gk_model *model, const gk_setup *setup, const gk_work 
     const gk_system *s = &work->system;
     if (row < s->contacts) {
         *first = s->place_of[row] * setup->functions;
-        *c = setup->slice_row[g][row % s->slices];
+        *c = setup->strip_row[g][row % s->strips];
         return setup->functions;
     }
     int bore = bore_row(model, s->link_of[row], g);
@@ -130,7 +130,7 @@ int gk_system_basis(const gk_model *model, const gk_setup *setup, const gk_work 
 static void project(const gk_model *model, const gk_setup *setup, const gk_work *work, int g, int rows, const double *basis, double *out)
 {
     const gk_system *s = &work->system;
-    const int A = setup->functions, S = s->slices;
+    const int A = setup->functions, S = s->strips;
     for (int i = 0; i < s->n; i++) {
         const double *ci;
         int first, count = gk_system_basis(model, setup, work, i, g, &first, &ci);
@@ -141,7 +141,7 @@ static void project(const gk_model *model, const gk_setup *setup, const gk_work 
             for (int k = 0; k < rows; k++) line[k] += sign * ci[a] * basis[(first + a) * rows + k];
         for (int p = i / S * (i < s->contacts) + work->places * (i >= s->contacts); p < work->places; p++)
             for (int c = 0; c < S; c++) {
-                const double *t = setup->slice_row[g][c], *l = line + p * A;
+                const double *t = setup->strip_row[g][c], *l = line + p * A;
                 double sum = 0.0;
                 for (int a = 0; a < A; a++) sum += t[a] * l[a];
                 row[p * S + c] -= sum;
@@ -156,18 +156,18 @@ static void project(const gk_model *model, const gk_setup *setup, const gk_work 
 static void list_contacts(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work)
 {
     gk_system *s = &work->system;
-    const double width = gk_min(setup->slice_width[0], setup->slice_width[1]);
     for (int p = 0; p < work->places; p++)
-        for (int i = 0; i < s->slices; i++, s->n++) {
+        for (int i = 0; i < s->strips; i++, s->n++) {
             const gk_place *place = &work->place[p];
             s->kind[s->n] = ROW_CONTACT;
             s->link_of[s->n] = -1;
             s->place_of[s->n] = p;
             s->force0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].force[i];
-            s->damping[s->n] = setup->on.damping ? 2.0 * setup->damping * width / h : 0.0;
+            s->damping[s->n] = setup->on.damping ? 2.0 * setup->damping * setup->strip_width[i] / h : 0.0;
             s->bound[s->n] = 0.0;
             if (i == 0) gk_law_set(model, setup, place->curvature, &s->local[s->n]);
             else s->local[s->n] = s->local[s->n - i];
+            s->local[s->n].width = setup->strip_width[i];
         }
     s->contacts = s->n;
 }
@@ -175,7 +175,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
 static void list_rows(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work)
 {
     gk_system *s = &work->system;
-    s->slices = setup->slices;
+    s->strips = setup->strips;
     s->n = 0;
     list_contacts(model, setup, data, h, work);
     for (int link = 0; link < LINKS; link++) {
