@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,25 +20,35 @@ class Window:
     steady: bool
 
 
-def coupling_errors(coarse: Trace, fine: Trace, order: int, window: Window) -> dict[str, float]:
-    """Estimated error of `coarse` (communication step H) by signal: 2^p/(2^p − 1)·rms(y_H − y_{H/2}) over the rms of
-    the AC part of y_{H/2}.
+class ChannelError(NamedTuple):
+    """Estimated coupling error of a channel: rms in its unit, and that over the rms of the channel's AC part."""
 
-    fine : the same scene with H/2. Only real-valued signals in both, and with an AC part; sampled at the common times.
+    rms: float
+    relative: float
+
+
+def coupling_errors(coarse: Trace, fine: Trace, order: int, window: Window) -> dict[str, ChannelError]:
+    """Error of `coarse` (communication step H) by channel: 2^p/(2^p − 1)·rms(y_H − y_{H/2}).
+
+    fine : the same scene with H/2. Only real-valued channels with an AC part, at the common times; not the means and
+    maxima over a communication step, which are other quantities when the step is another one.
     """
-    keep = coarse.time >= window.start
-    index = np.arange(coarse.time.size)[keep] * 2
+    index = 2 * np.flatnonzero(coarse.time >= window.start)
     index = index[index < fine.time.size]
-    keep = np.flatnonzero(keep)[: index.size]
-    factor = 2.0**order / (2.0**order - 1.0)
+    factor, interval = 2.0**order / (2.0**order - 1.0), float(coarse.time[1] - coarse.time[0])
     found = {}
-    for name in coarse.channels:
-        if name in fine.channels and coarse[name].dtype == np.float64 and index.size > 1:
-            reference = fine[name][index]
-            ac = rms(alternating(reference, coarse.time[1] - coarse.time[0], window.steady))
-            if ac > 1e-9 * rms(reference):
-                found[name] = factor * rms(coarse[name][keep] - reference) / ac
+    for name in _comparable(coarse, fine) if index.size > 1 else ():
+        reference = fine[name][index]
+        ac = rms(alternating(reference, interval, window.steady))
+        if ac > 1e-9 * rms(reference):
+            error = factor * rms(coarse[name][index // 2] - reference)
+            found[name] = ChannelError(error, error / ac)
     return found
+
+
+def _comparable(coarse: Trace, fine: Trace) -> list[str]:
+    real = [name for name in coarse.channels if name in fine.channels and coarse[name].dtype == np.float64]
+    return [name for name in real if not name.endswith(("_mean", "_max"))]
 
 
 def alternating(values: np.ndarray, interval: float, steady: bool) -> np.ndarray:

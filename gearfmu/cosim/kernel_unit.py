@@ -14,11 +14,12 @@ from gearfmu.kernel import Kernel
 
 
 class KernelHandle(NamedTuple):
-    """Value references of resolved names and the buffer of their values."""
+    """Value references of resolved names, the buffer of their values and its numbers one by one, as the kernel fills it."""
 
     names: tuple[str, ...]
     references: tuple[int, ...]
     buffer: np.ndarray
+    cells: tuple[ctypes.c_double, ...]
 
 
 class KernelUnit:
@@ -30,7 +31,6 @@ class KernelUnit:
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str] | None = None) -> None:
         self.kernel = Kernel(blob)
-        self._value = ctypes.c_double()
         for name, value in (parameters or {}).items():
             self.kernel.set(name, self._number(name, value))
 
@@ -57,7 +57,10 @@ class KernelUnit:
         unknown = [name for name in names if name not in known]
         if unknown:
             raise CouplingError(f"{self.kernel.name}: no variable {', '.join(unknown)}; it has {', '.join(known)}")
-        return KernelHandle(tuple(names), tuple(known[name].reference for name in names), np.zeros(len(names)))
+        memory = (ctypes.c_double * max(len(names), 1))()
+        cells = tuple(ctypes.c_double.from_buffer(memory, 8 * k) for k in range(len(names)))
+        buffer = np.frombuffer(memory, count=len(names))
+        return KernelHandle(tuple(names), tuple(known[name].reference for name in names), buffer, cells)
 
     def set(self, handle: KernelHandle, values: Sequence[float]) -> None:
         """Inputs for the next step."""
@@ -68,11 +71,10 @@ class KernelUnit:
 
     def get(self, handle: KernelHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer."""
-        get_one, value, buffer = self.kernel.get_reference, self._value, handle.buffer
-        for k, reference in enumerate(handle.references):
-            get_one(reference, value)
-            buffer[k] = value.value
-        return buffer
+        get_one = self.kernel.get_reference
+        for reference, cell in zip(handle.references, handle.cells, strict=True):
+            get_one(reference, cell)
+        return handle.buffer
 
     def step(self, time: float, h: float) -> None:
         """One communication step."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gearfmu import fmu
 from gearfmu.body import load_stage_bodies
-from gearfmu.cosim.accuracy import Window, coupling_errors
+from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, shafts_of, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.masters import Cut
@@ -95,7 +95,9 @@ def run_once(scene: SceneSpec, source: Source, progress: Progress | None = None)
         stage.close()
 
 
-def verified(scene: SceneSpec, source: Source, coarse: Result, progress: Progress | None = None) -> dict[str, float]:
+def verified(
+    scene: SceneSpec, source: Source, coarse: Result, progress: Progress | None = None
+) -> dict[str, ChannelError]:
     """Coupling error of every real-valued channel, relative to its AC part: Richardson's estimate from a run with
     half the communication step."""
     halved = scene.model_copy(

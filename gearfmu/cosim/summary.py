@@ -8,6 +8,7 @@ import platform
 from importlib.metadata import version
 from typing import Any
 
+from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import SceneSpec
@@ -19,7 +20,7 @@ TORQUES = (
 COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "trouble": "solver.trouble"}
 
 
-def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, float] | None) -> dict[str, Any]:
+def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:
     """What was run, how it ended, what it cost, and where it came from.
 
     errors : coupling error by channel, None when the run was not verified.
@@ -59,12 +60,14 @@ def _price(result: Result) -> dict[str, Any]:
     }
 
 
-def _accuracy(source: Source, result: Result, errors: dict[str, float] | None) -> dict[str, Any]:
-    pinion = source.model.spec.gears[0].name
-    torques = [name for name in (text.format(pinion) for text in TORQUES) if name in (errors or {})]
+def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:
+    pinion, errors = source.model.spec.gears[0].name, errors or {}
+    torque = next((name for name in (text.format(pinion) for text in TORQUES) if name in errors), None)
     return {
-        "coupling_error": errors[torques[0]] if errors and torques else None,
-        "coupling_errors": errors,
+        "coupling_error": errors[torque].relative if torque else None,
+        "coupling_error_rms_Nm": errors[torque].rms if torque else None,
+        "coupling_error_of": torque,
+        "coupling_errors": {name: error.relative for name, error in errors.items()},
         "energy_residual": result.energy_residual,
         "exchanged_work_J": result.throughput,
     }
