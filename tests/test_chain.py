@@ -1,0 +1,135 @@
+"""From numbers to report through the command line, on the shipped bodies; slow ones: demo, a second pair from its numbers, the wheel."""
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu.stage.trace import Trace
+
+ROOT = Path(__file__).resolve().parents[1]
+SHORT = """
+name = "short"
+description = "the first milliseconds of a clutch closure"
+duration = "6 ms"
+[stage]
+name = "fzg_c/stage_relief"
+level = "fast"
+[coupling]
+step = "100 us"
+[start]
+pinion_speed = "150 rad/s"
+slip = "52 rad/s"
+[clutch]
+capacity = [["0 s", "0 N*m"], ["5 ms", "100 N*m"]]
+[passenger_car]
+chain_in_fmu = true
+"""
+
+
+def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
+    """Standard output of the verb."""
+    command = [sys.executable, "-m", "gearfmu.cli", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)
+    assert done.returncode == expect, done.stderr + done.stdout
+    return done.stdout
+
+
+def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
+    out = tmp_path / "te.csv"
+    gearfmu("te", "fzg_c", "--torque", "302 N*m", "--torque", "100 N*m", "--positions", 8, "--rigid-bearings", "--out", out)
+    rows = list(csv.reader(out.open(encoding="utf-8")))
+    assert rows[0][:5] == ["torque_Nm", "position", "te_um", "mesh_stiffness_N_per_um", "share_1"]
+    data = np.array(rows[1:], dtype=float)
+    assert data[:, 0].tolist() == [302.0] * 8 + [100.0] * 8
+    assert data[:8, 1].tolist() == [i / 8 for i in range(8)]
+    assert np.all(data[:, 2] > 0) and np.all(data[:8, 2] > data[8:, 2]) and np.all(data[:, 3] > 0)
+    assert np.allclose(data[:, 4:].sum(axis=1), 1, atol=1e-9)
+    assert (tmp_path / "te.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_export_and_validate(tmp_path: Path) -> None:
+    gearfmu("export", "fzg_c", "-o", tmp_path / "pair.fmu", "--port", "pinion=torque", "--port", "wheel=fixed")
+    assert "0 problems" in gearfmu("validate", tmp_path / "pair.fmu")
+    shown = json.loads(gearfmu("inspect", tmp_path / "pair.fmu", "--json"))
+    assert shown["kind"] == "fmu" and "pinion.w" in shown["variables"] and "wheel.phi" not in shown["variables"]
+
+
+def test_run_through_the_fmu_equals_the_kernel_bit_for_bit(tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
+    for unit in ("fmu", "kernel"):
+        gearfmu("run", "short.toml", "--unit", unit, "--out", unit, cwd=tmp_path)
+        assert {"trace.h5", "summary.json", "report.html", "data"} <= {path.name for path in (tmp_path / unit).iterdir()}
+    fmu, kernel = (Trace.load(tmp_path / unit / "trace.h5") for unit in ("fmu", "kernel"))
+    assert list(fmu.channels) == list(kernel.channels)
+    assert all(fmu[name].tobytes() == kernel[name].tobytes() for name in fmu.channels)
+
+
+def test_summary_has_the_promised_fields(tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
+    gearfmu("run", "short.toml", "--unit", "kernel", "--verify", "--out", "out", cwd=tmp_path)
+    found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    wanted = {"outcome", "simulated_s", "cpu_s", "realtime_factor", "coupling_error", "energy_residual", "level", "n_dyn", "slices", "h", "hashes", "versions"}
+    assert wanted <= set(found) and found["outcome"] == "ok" and found["simulated_s"] == pytest.approx(6e-3)
+    assert 0 <= found["coupling_error"] < 0.05 and found["hashes"]["model"]
+
+
+def test_simulate_writes_the_same_kind_of_trace(tmp_path: Path) -> None:
+    gearfmu("simulate", "fzg_c/stage_relief", "--torque", "302 N*m", "--speed", "2000 rpm", "--duration", "5 ms", "--settle", "1 ms",
+            "--set", "level=rigid", "--set", "effect.tip_relief=false", "--out", tmp_path)  # fmt: skip
+    trace = Trace.load(tmp_path / "trace.h5")
+    assert trace.meta["level"] == "rigid" and trace.meta["n_dyn"] == 0 and trace.time[-1] == pytest.approx(5e-3)
+
+
+@pytest.mark.full
+def test_demo_ends_with_a_report(tmp_path: Path) -> None:
+    out = gearfmu("demo", "--out", tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert str(tmp_path / "report.html") in out
+    assert (summary["scene"], summary["level"], summary["slices"], summary["master"], summary["H"], summary["unit"]) == (
+        "clutch_closure", "standard", 5, "gs_mean", 1e-4, "fmu")  # fmt: skip
+    assert 0.05 < summary["results"]["lock_time_s"] < 0.3 and summary["chain_in_fmu"]
+
+
+SECOND_PAIR = {
+    '"91.5 mm"': '"69.6 mm"', '"4.5 mm"': '"2.5 mm"', "teeth = 16": "teeth = 21", "teeth = 24": "teeth = 34", "0.1817": "0.25", "0.1715": "0.10",
+    '"82.46 mm"': '"58.6 mm"', '"118.36 mm"': '"90.3 mm"', '"14 mm"': '"18 mm"', '"30 mm"': '"25 mm"', '"40 mm"': '"35 mm"', '"600 N*m"': '"120 N*m"',
+}  # fmt: skip
+
+
+@pytest.mark.full
+def test_a_second_pair_goes_from_numbers_to_fmu(tmp_path: Path) -> None:
+    """z = 21/34, m = 2.5 mm, other shifts, width and bores."""
+    gearfmu("new", "second", "--like", "fzg_c", cwd=tmp_path)
+    path = tmp_path / "second" / "stage.toml"
+    text = path.read_text(encoding="utf-8")
+    for old, new in SECOND_PAIR.items():
+        assert old in text, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    gearfmu("reduce", "second", cwd=tmp_path)
+    gearfmu("export", "second", "-o", "second.fmu", cwd=tmp_path)
+    assert "0 problems" in gearfmu("validate", "second.fmu", cwd=tmp_path)
+    gearfmu("te", "second", "--torque", "60 N*m", "--positions", 5, "--out", "te.csv", cwd=tmp_path)
+
+
+@pytest.mark.full
+@pytest.mark.needs("ziglang", "build")
+def test_the_wheel_runs_the_demo_in_an_empty_environment(tmp_path: Path) -> None:
+    """Installed without compiler and away from the checkout; needs a package index for the dependencies."""
+    subprocess.run(["make", "wheel", f"VENV={sys.prefix}"], cwd=ROOT, check=True, capture_output=True)
+    wheel = max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
+    venv.create(tmp_path / "venv", with_pip=True)
+    python = tmp_path / "venv" / "bin" / "python"
+    subprocess.run([python, "-m", "pip", "install", "--quiet", wheel], check=True, capture_output=True)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    command = [tmp_path / "venv" / "bin" / "gearfmu", "demo", "--out", tmp_path / "out"]
+    subprocess.run(command, check=True, cwd=tmp_path, env={**environment, "CC": "false"}, capture_output=True)
+    assert (tmp_path / "out" / "report.html").is_file()
