@@ -161,6 +161,7 @@ struct gk_data {
     gk_motion input[2], blend[2]; /* outer ends at the start of the communication step; jump that is blended away */
     double hold[2];              /* angle a port is referred to */
     double v_bore[2], balance_h, rk_h;
+    double state_h, state_gamma; /* the step for which x and q are expressed; 0: physical */
     double angle[2];             /* bore angle at a torque port, massless part included */
     double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
     gk_ledger ledger;
@@ -201,10 +202,11 @@ typedef struct gk_system { /* unknown forces of one step: contacts, then links *
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
     double rigid[MAX_ROWS][RIGID];
-    double *D, *C;                    /* (n, n) row-major: what forces do to gaps in the step; massless compliance C′ without the local law */
+    double *D, *C, *K;                /* (n, n) row-major: what forces do to gaps in the step; massless compliance C′ without the local law; κ part, C′ + K is the compliance itself */
     double *J, *rhs;                  /* factorised tangent of the active set */
     double direction[MAX_ROWS], alpha; /* η = α·direction + dashpot */
     double path[MAX_ROWS], slope[MAX_ROWS]; /* C′λ + δ of active rows; δ′ in the tangent */
+    double squeeze[MAX_ROWS], squeeze0[MAX_ROWS]; /* deflection of the massless path, (C′ + K)λ + δ, at the end and at the start */
     double stored0;                   /* energy of the massless part at the start of the step */
     int column[MAX_ROWS], columns;    /* rows that can carry force */
     int pivot[MAX_ROWS], rank, map[MAX_ROWS];
@@ -226,10 +228,10 @@ struct gk_work {
     double frame[RIGID], speed[RIGID];        /* predicted */
     double moved[RIGID];
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
-    double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
+    double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], gram_k[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
-    double matrix[4 * MAX_ROWS * MAX_ROWS];       /* D, C′, J and the gathered C″ */
+    double matrix[5 * MAX_ROWS * MAX_ROWS];       /* D, C′, K, J and the gathered C″ */
 };
 
 /* gk_vars.c */

@@ -1,9 +1,9 @@
 /* The complementarity problem of a step and the one scalar that keeps its energy (docs/theory: the step; discrete gradient after Gonzalez 1996).
  *
  *   closed contact, bilateral row, sticking clutch:   g + D z + C′λ + δ(λ) = 0,   z = λ + η;   open contact: λ = 0 and g + D z + C′λ ≥ 0;   slipping clutch: z = ±bound.
- *   η = α·direction + dashpot; the dashpot on the massless path of a row that is closed at both ends is −K (g₁ − g₀), K = 2c/h, limited to |λ₀ + λ₁| (no pull),
- *   and with g₁ = −(C′λ + δ) it is linear in λ:  K (C′λ + δ + g₀).
- * Active-set Newton: tangent J = D (I + K C″) + C″, C″ = C′ + diag δ′, of the active rows, LU with partial pivoting; chord steps; all violated rows flip at once, after four rounds
+ *   η = α·direction + dashpot; the dashpot on the massless path of a row that is closed at both ends is 2c/h times the change of the path's deflection (C′ + K)λ + δ
+ *   (K: the κ part, so that C′ + K is the compliance itself), limited to |λ₀ + λ₁| (no pull).
+ * Active-set Newton: tangent J = D (I + (2c/h)(C″ + K)) + C″, C″ = C′ + diag δ′, of the active rows, LU with partial pivoting; chord steps; all violated rows flip at once, after four rounds
  * without progress only the last one (block principal pivoting, Júdice & Pires 1994). */
 #include "gk_core.h"
 
@@ -42,40 +42,45 @@ double gk_solve_massless(const gk_system *s, int i)
 
 double gk_solve_end_gap(const gk_system *s, int i) { return s->g[i] + times(s, s->D, i, s->z); } /* g₁ = g + D z */
 
-/* path = C′λ + δ of the active rows; z of every row from λ, α and the dashpots */
+/* path = C′λ + δ of the active rows and, where a dashpot may act, the deflection of the massless path; z of every row from λ, α and the dashpots */
 static void total_force(gk_system *s)
 {
-    for (int a = 0; a < s->rank; a++) s->path[s->map[a]] = gk_solve_massless(s, s->map[a]);
+    for (int a = 0; a < s->rank; a++) {
+        const int i = s->map[a];
+        s->path[i] = gk_solve_massless(s, i);
+        if (s->damping[i] != 0.0) s->squeeze[i] = s->path[i] + times(s, s->K, i, s->force);
+    }
     for (int i = 0; i < s->n; i++) {
         s->eta[i] = s->alpha * s->direction[i];
         if (s->active[i] && s->clip[i] != 2)
-            s->eta[i] += s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (s->path[i] + s->g0[i]);
+            s->eta[i] += s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] != 0.0 ? s->damping[i] * (s->squeeze[i] - s->squeeze0[i]) : 0.0;
         if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
         else if (s->active[i]) s->z[i] = s->force[i];
     }
 }
 
-/* J = D (I + K C″) + C″ of the active rows at the present λ: C″ is gathered into rows without gaps first, so that the product runs over contiguous memory */
+/* J = D (I + (2c/h) (C″ + K)) + C″ of the active rows at the present λ: C″ + K is gathered into rows without gaps first, so that the product runs over contiguous memory */
 static void tangent(gk_system *s)
 {
     const int n = s->n, m = s->rank;
-    double *J = s->J, *massless = J + (size_t)m * m;
+    double *J = s->J, *squeeze = J + (size_t)m * m;
     for (int a = 0; a < m; a++) {
-        const double *c = s->C + (size_t)s->map[a] * n;
-        for (int b = 0; b < m; b++) massless[a * m + b] = c[s->map[b]];
-        massless[a * m + a] += s->slope[s->map[a]];
+        const double *c = s->C + (size_t)s->map[a] * n, *kappa = s->K + (size_t)s->map[a] * n;
+        for (int b = 0; b < m; b++) squeeze[a * m + b] = c[s->map[b]] + kappa[s->map[b]];
+        squeeze[a * m + a] += s->slope[s->map[a]];
     }
     for (int a = 0; a < m; a++) {
         const double *d = s->D + (size_t)s->map[a] * n;
         double *row = J + (size_t)a * m;
         for (int b = 0; b < m; b++) {
             const int j = s->map[b];
-            row[b] = d[j] * (s->clip[j] == 2 ? 1.0 : 1.0 + s->clip[j]) + massless[a * m + b];
+            row[b] = d[j] * (s->clip[j] == 2 ? 1.0 : 1.0 + s->clip[j]) + s->C[(size_t)s->map[a] * n + j];
         }
+        row[a] += s->slope[s->map[a]];
         for (int e = 0; e < m; e++) {
             const int k = s->map[e];
             if (s->damping[k] == 0.0 || s->clip[k]) continue;
-            const double weight = d[k] * s->damping[k], *c = massless + (size_t)e * m;
+            const double weight = d[k] * s->damping[k], *c = squeeze + (size_t)e * m;
             for (int b = 0; b < m; b++) row[b] += weight * c[b];
         }
     }
@@ -200,7 +205,7 @@ static int limit_dashpots(gk_system *s)
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2;
         if (s->active[i] && s->force0[i] > 0.0 && s->damping[i] > 0.0) {
-            double free = s->damping[i] * (s->path[i] + s->g0[i]), limit = s->force0[i] + s->force[i];
+            double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i];
             clip = free > limit ? 1 : free < -limit ? -1 : 0;
         }
         changed |= clip != s->clip[i];
@@ -305,7 +310,7 @@ static void sensitivity(const gk_system *s, double *p, double *w)
         w[i] = p[i] + s->direction[i];
         if (!s->active[i] || s->clip[i] == 2) continue;
         if (s->clip[i]) w[i] += s->clip[i] * p[i];
-        else if (s->damping[i] != 0.0) w[i] += s->damping[i] * (times(s, s->C, i, p) + (is_contact(s, i) ? s->slope[i] * p[i] : 0.0));
+        else if (s->damping[i] != 0.0) w[i] += s->damping[i] * (times(s, s->C, i, p) + times(s, s->K, i, p) + (is_contact(s, i) ? s->slope[i] * p[i] : 0.0));
     }
 }
 

@@ -81,6 +81,7 @@ static void spread(const gk_model *model, const gk_setup *setup, gk_data *data)
 {
     const gk_system *s = &setup->work->system;
     gk_real *q = data->modal;
+    data->state_h = data->state_gamma = 0.0;
     for (int g = 0; g < 2; g++) {
         const int n = setup->modal[g].n;
         if (n) gk_step_scatter(model, setup, g, s->force, q + 2 * n);

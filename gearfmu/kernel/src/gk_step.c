@@ -1,8 +1,24 @@
 /* One internal step of dg4 (docs/theory: the step). It reads like its description: predict, find, form, recall, solve, and only if all is finite: correct and remember.
- * Until `correct` nothing of gk_data changes, so a step that fails can be repeated with another h or scheme. */
+ * Until `correct` nothing of gk_data changes but its expression for another h, so a step that fails can be repeated with another h or scheme. */
 #include "gk_core.h"
 
 static const double ENERGY_SMALL = 1e-300;
+
+/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays. At rest κ = 0. */
+static void express(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
+{
+    if (data->state_h == k->h && data->state_gamma == k->gamma) return;
+    const gk_coefficients *old = data->state_h > 0.0 ? gk_flow_for(setup, data->state_h, data->state_gamma) : &setup->work->explicit_rows;
+    gk_real *q = data->modal;
+    for (int g = 0; g < 2; g++) {
+        const int n = setup->modal[g].n;
+        for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
+        q += 3 * n;
+    }
+    for (int d = 0; d < RIGID; d++) data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_mass[d] * data->f[d];
+    data->state_h = k->h;
+    data->state_gamma = k->gamma;
+}
 
 /* modal and rigid state one step ahead under the forces of the last step */
 static void predict(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
@@ -47,9 +63,12 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
     s->curved = setup->on.hertz && s->contacts > 0;
     for (int i = 0; i < s->n; i++) {
         const double *c = s->C + (size_t)i * s->n;
-        double sum = 0.0, slope;
+        const double *kappa = s->K + (size_t)i * s->n;
+        double sum = 0.0, plain = 0.0, approach = 0.0, slope;
         const int link = s->link_of[i];
-        for (int j = 0; j < s->n; j++) sum += c[j] * s->force0[j];
+        for (int j = 0; j < s->n; j++) sum += c[j] * s->force0[j], plain += kappa[j] * s->force0[j];
+        if (s->kind[i] == ROW_CONTACT && s->force0[i] > 0.0) approach = gk_law_approach(&s->local[i], s->force0[i], &slope);
+        s->squeeze0[i] = sum + plain + approach;
         s->stored0 += 0.5 * sum * s->force0[i] + (s->kind[i] == ROW_CONTACT && s->force0[i] > 0.0 ? gk_law_energy(&s->local[i], s->force0[i]) : 0.0);
         s->force[i] = s->z[i] = s->force0[i];
         s->eta[i] = 0.0;
@@ -60,7 +79,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         case ROW_CONTACT: {
             const gk_place *p = &setup->work->place[s->place_of[i]];
             const gk_memory *m = p->memory < 0 ? NULL : &data->memory[p->memory];
-            s->g0[i] = m ? m->gap[i % s->strips] - sum - gk_law_approach(&s->local[i], s->force0[i], &slope) : s->g[i];
+            s->g0[i] = m ? m->gap[i % s->strips] - sum - approach : s->g[i];
             s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
             if (s->force0[i] > 0.0 && s->damping[i] > 0.0) s->clip[i] = 0;
             break;
@@ -208,6 +227,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_system *s = &work->system;
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
     GK_MARK(work);
+    express(setup, data, k);
     predict(setup, data, k);
     GK_LAP(work, PHASE_PREDICT);
     work->places = gk_flank_find(model, setup, work->frame, data->reach, work->place);

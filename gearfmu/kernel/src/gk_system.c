@@ -45,8 +45,8 @@ static void gather(const gk_setup *setup, const gk_work *work, int g, int rows, 
     for (int i = 0; i < rows; i++) read[i] = n ? gk_dot(work->basis[g] + (size_t)i * n, y, n) : 0.0;
 }
 
-/* B diag(w) Bᵀ over `lanes` of both halves, added to out with factor */
-static void gram(const gk_setup *setup, gk_work *work, int g, int rows, const gk_real *w, int lanes, double factor, double *out)
+/* B diag(w) Bᵀ over `lanes` of both halves, added to out */
+static void gram(const gk_setup *setup, gk_work *work, int g, int rows, const gk_real *w, int lanes, double *out)
 {
     const int n = setup->modal[g].n, P = setup->modal[g].pairs;
     if (!n || !lanes) return;
@@ -58,8 +58,8 @@ static void gram(const gk_setup *setup, gk_work *work, int g, int rows, const gk
         for (int j = i; j < rows; j++) {
             const gk_real *other = work->basis[g] + (size_t)j * n;
             double sum = lanes == P ? gk_dot(v, other, n) : gk_dot(v, other, lanes) + gk_dot(v + P, other + P, lanes);
-            out[i * rows + j] += factor * sum;
-            if (j != i) out[j * rows + i] += factor * sum;
+            out[i * rows + j] += sum;
+            if (j != i) out[j * rows + i] += sum;
         }
     }
 }
@@ -251,38 +251,52 @@ void gk_system_rates(const gk_model *model, const gk_setup *setup, gk_work *work
     }
 }
 
-/* Forms the system at work->place for the weights of k: D from bq, C′ = residual − κ part + 1/k on the links' diagonal.
- * The local law is not in C (it depends on the force). */
-void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work)
+static void rigid_part_of_matrices(const gk_setup *setup, const gk_coefficients *k, gk_system *s)
 {
-    gk_system *s = &work->system;
-    list_rows(model, setup, data, k->h, work);
-    const int n = s->n, rows = work->places * setup->functions + BORE_ROWS;
-    s->D = work->matrix;
-    s->C = s->D + n * n;
-    s->J = s->C + n * n;
-    memset(s->D, 0, 2 * (size_t)n * n * sizeof(double));
-    for (int g = 0; g < 2; g++) {
-        double *d = work->gram_d[g], *c = work->gram_c[g];
-        gather(setup, work, g, rows, work->y[g], work->read[g]);
-        memset(d, 0, (size_t)rows * rows * sizeof *d);
-        memset(c, 0, (size_t)rows * rows * sizeof *c);
-        if (setup->on.residual) residual(model, setup, work->frame, work, g, rows, c);
-        gram(setup, work, g, rows, k->flow[g].mobility, setup->modal[g].pairs, 1.0, d);
-        gram(setup, work, g, rows, k->flow[g].kappa, k->flow[g].exact, -1.0, c);
-        project(model, setup, work, g, rows, d, s->D);
-        project(model, setup, work, g, rows, c, s->C);
-    }
-    gaps(model, setup, k->h, work);
+    const int n = s->n;
     for (int i = 0; i < n; i++) {
         for (int j = i; j < n; j++) {
             double sum = 0.0;
             for (int d = 0; d < RIGID; d++) sum += s->rigid[i][d] * s->rigid[j][d] * setup->inverse_mass[d];
             s->D[i * n + j] += k->rigid_mobility * sum;
-            if (s->kind[i] != ROW_CLUTCH && s->kind[j] != ROW_CLUTCH) s->C[i * n + j] -= k->rigid_kappa * sum;
+            if (s->kind[i] != ROW_CLUTCH && s->kind[j] != ROW_CLUTCH) s->K[i * n + j] += k->rigid_kappa * sum;
+            s->C[i * n + j] -= s->K[i * n + j];
             s->D[j * n + i] = s->D[i * n + j];
             s->C[j * n + i] = s->C[i * n + j];
+            s->K[j * n + i] = s->K[i * n + j];
         }
         if (s->link_of[i] >= 0) s->C[i * n + i] += setup->link_c[s->link_of[i]];
     }
+}
+
+/* Forms the system at work->place for the weights of k: D from the mobilities, K from κ, C′ = residual − K + 1/k on the links' diagonal.
+ * The local law is not in C′ (it depends on the force). */
+void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work)
+{
+    gk_system *s = &work->system;
+    list_rows(model, setup, data, k->h, work);
+    const int n = s->n, rows = work->places * setup->functions + BORE_ROWS;
+    const size_t size = (size_t)n * n, basis = (size_t)rows * rows * sizeof(double);
+    s->D = work->matrix;
+    s->C = s->D + size;
+    s->K = s->C + size;
+    s->J = s->K + size;
+    memset(s->D, 0, 3 * size * sizeof(double));
+    for (int g = 0; g < 2; g++) {
+        gather(setup, work, g, rows, work->y[g], work->read[g]);
+        memset(work->gram_d[g], 0, basis);
+        gram(setup, work, g, rows, k->flow[g].mobility, setup->modal[g].pairs, work->gram_d[g]);
+        project(model, setup, work, g, rows, work->gram_d[g], s->D);
+        if (setup->on.residual) {
+            residual(model, setup, work->frame, work, g, rows, work->gram_c[g]);
+            project(model, setup, work, g, rows, work->gram_c[g], s->C);
+        }
+        if (k->flow[g].exact) {
+            memset(work->gram_k[g], 0, basis);
+            gram(setup, work, g, rows, k->flow[g].kappa, k->flow[g].exact, work->gram_k[g]);
+            project(model, setup, work, g, rows, work->gram_k[g], s->K);
+        }
+    }
+    gaps(model, setup, k->h, work);
+    rigid_part_of_matrices(setup, k, s);
 }
