@@ -4,6 +4,7 @@ VENV   ?= .venv
 RUN     = $(VENV)/bin/python
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
+BENCHMARKS ?= phases fmu_overhead levels
 OUT    ?= out
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -23,9 +24,9 @@ test: $(STAMP)
 test-full: $(STAMP)
 	$(RUN) -m pytest -n $(JOBS) -rs -m "full or not full"
 
-## make bench       speed and error of this machine, into out/bench
+## make bench       speed and error on this machine: the tables beside the benchmarks and the stages' price lists
 bench: $(STAMP)
-	$(RUN) -m benchmarks.run --out $(OUT)/bench
+	for benchmark in $(BENCHMARKS); do echo "== $$benchmark"; $(RUN) benchmarks/$$benchmark.py || exit 1; done
 
 ## make wheel       dist/*.whl with the linux64 and win64 kernels
 wheel: $(STAMP)

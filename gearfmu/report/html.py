@@ -11,6 +11,7 @@ import numpy as np
 
 from gearfmu.files import write_text
 from gearfmu.report import page, picture, plots, plots_nvh
+from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
 from gearfmu.report.results import key_results, strict
@@ -41,7 +42,7 @@ def write(
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
     write_text(folder / "summary.json", json.dumps(strict({**summary, "results": results}), indent=2) + "\n")
-    write_text(folder / "report.html", _document(trace, summary, (made, missing), bodies))
+    write_text(folder / "report.html", _document(trace, summary, (made, missing), spec, bodies))
     return folder / "report.html"
 
 
@@ -87,7 +88,7 @@ def detail_window(trace: Trace, angle: np.ndarray | None, periods: float = 6) ->
     return centre - half, centre + half
 
 
-def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[list[Plot], list[str]], bodies: Sequence[Any] | None) -> str:
+def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[list[Plot], list[str]], spec: Any, bodies: Sequence[Any] | None) -> str:
     made, missing = plots_and_gaps
     title = str(summary.get("scene") or trace.meta.get("scene") or "simulation")
     stage = str(summary.get("stage") or trace.meta.get("stage") or "stage not named")
@@ -100,7 +101,7 @@ def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[li
         *_warned(trace),
         *([page.section("Octave bands", bands)] if (bands := _octaves(trace)) else []),
         *[page.figure(plot) for plot in made if plot.name in NVH],
-        page.section("Accuracy and cost", *_accuracy(summary, bodies)),
+        page.section("Accuracy and cost", *_accuracy(summary, spec, bodies)),
         page.details("Where it comes from", page.pairs_table(_provenance(summary)), _channels(trace)),
     ]
     if missing:
@@ -169,20 +170,26 @@ def _octaves(trace: Trace) -> str:
     return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
 
 
-def _accuracy(summary: Mapping[str, Any], bodies: Sequence[Any] | None) -> list[str]:
+def _accuracy(summary: Mapping[str, Any], spec: Any, bodies: Sequence[Any] | None) -> list[str]:
     rows = {
         "Coupling error (Richardson, relative)": _text(summary, "coupling_error"),
         "Energy residual (relative)": _text(summary, "energy_residual"),
-        "CPU time per simulated second": _text(summary, "realtime_factor"),
+        "CPU time per simulated second, stage alone": _text(summary, "stage_realtime_factor"),
+        "CPU time per simulated second, whole run": _text(summary, "realtime_factor"),
     }
     parts = [page.pairs_table({name: "not measured in this run" if text == "not given" else text for name, text in rows.items()})]
-    for level, numbers in dict(summary.get("level_errors") or {}).items():
-        parts.append(page.pairs_table({f"level {level}": ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())}))
-    for body in bodies or ():
-        parts.append(page.note(_frf_words(body)))
-    if not summary.get("level_errors"):
-        parts.append(page.note("The error of this fidelity level against the full model was not measured for this run."))
-    return parts
+    made_with = fingerprint(body.input_hash for body in bodies or ())
+    prices = [row for row in read_levels(levels_path(spec)) if row["bodies"] == made_with] if spec is not None else []
+    if prices:
+        parts += ["<h3>What the fidelity levels of this stage cost and how far they are off</h3>",
+                  page.table(HEADER, shown_rows(prices, str(summary.get("level")))), page.note(PRICES)]  # fmt: skip
+    else:
+        parts.append(page.note("The error of the fidelity levels of this stage with these bodies has not been measured (benchmarks/levels.py does it)."))
+    return parts + [page.note(_frf_words(body)) for body in bodies or ()]
+
+
+PRICES = ("Errors of the alternating part against level full at a fifth of its step, after settling, each level at its default step; "
+          "CPU time of the stage as measured when the list was made.")  # fmt: skip
 
 
 def _frf_words(body: Any) -> str:
@@ -192,7 +199,7 @@ def _frf_words(body: Any) -> str:
 
 
 def _provenance(summary: Mapping[str, Any]) -> dict[str, str]:
-    shown = {"scene", "stage", "outcome", "level", "n_dyn", "slices", "h", "H", "simulated_s", "cpu_s", "realtime_factor", "level_errors"}
+    shown = {"scene", "stage", "outcome", "level", "n_dyn", "slices", "h", "H", "simulated_s", "cpu_s", "realtime_factor"}
     flat: dict[str, str] = {}
     for key, value in summary.items():
         if isinstance(value, Mapping) and key not in shown:

@@ -1,0 +1,47 @@
+"""The price list of a stage's fidelity levels, as benchmarks/levels.py measured it: levels.csv beside the stage file."""
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from gearfmu.spec.library import model_folder
+
+COLUMNS = ("scene", "level", "n_dyn", "slices", "h_us", "te_error", "force_error", "bearing_error", "te_mean_error_um", "time_per_second", "bodies")
+HEADER = ("scene, level", "dynamic modes", "slices", "step, µs", "TE", "mesh force", "bearing force", "mean TE, µm", "CPU time per second")
+TEXT, WHOLE = ("scene", "level", "bodies"), ("n_dyn", "slices")
+
+
+def levels_path(spec: Any) -> Path:
+    """Where the price list of a StageSpec lies."""
+    return model_folder(spec) / f"levels_{spec.name}.csv"
+
+
+def read_levels(path: Path) -> list[dict[str, Any]]:
+    """Rows of the list, numbers as numbers; empty when there is none or it is of another version."""
+    if not path.is_file():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            return []
+        return [{key: _value(key, text) for key, text in row.items()} for row in reader]
+
+
+def fingerprint(hashes: Iterable[str]) -> str:
+    """Which bodies a row was measured with, from their input hashes, pinion first."""
+    return "+".join(text[:12] for text in hashes)
+
+
+def shown_rows(rows: list[dict[str, Any]], level: str) -> list[tuple[str, ...]]:
+    """Rows as text for a page; the level in use is marked."""
+    return [
+        (f"{row['scene']}, {row['level']}{' ←' if row['level'] == level else ''}", str(row["n_dyn"]), str(row["slices"]), f"{row['h_us']:.3g}",
+         *(f"{100 * row[f'{name}_error']:.2g} %" for name in ("te", "force", "bearing")), f"{row['te_mean_error_um']:.2g}", f"{row['time_per_second']:.3g}")
+        for row in rows
+    ]  # fmt: skip
+
+
+def _value(key: str, text: str) -> Any:
+    return text if key in TEXT else int(text) if key in WHOLE else float(text)
