@@ -1,4 +1,5 @@
-"""The model blob: named constant arrays in one checked block of bytes, read in place by the kernel (layout: docs/file-formats.md, "Model blob").
+"""The model blob: named constant arrays in one checked block of bytes, read in place by the kernel (layout:
+docs/file-formats.md, "Model blob").
 
 The same rules are checked here and in gearfmu/kernel/src/gk_blob.c; one content has exactly one sequence of bytes.
 """
@@ -29,7 +30,8 @@ Sections = Mapping[str, "np.ndarray | str"]
 def write_blob(sections: Sections) -> bytes:
     """Bytes of a blob with `sections` in the order given.
 
-    Values: arrays of floats (stored as f64, any shape, C order, all finite), arrays of integers or booleans (stored as i32), or text without NUL.
+    Values: arrays of floats (stored as f64, any shape, C order, all finite),
+    arrays of integers or booleans (stored as i32), or text without NUL.
     Raises ModelError that lists every section that cannot be stored.
     """
     problems: list[str] = []
@@ -90,7 +92,8 @@ def _encode(name: str, value: np.ndarray | str, problems: list[str]) -> tuple[in
     array = np.asarray(value)
     if array.dtype.kind == "f":
         if not np.all(np.isfinite(array)):
-            problems.append(f"section '{name}': {np.count_nonzero(~np.isfinite(array))} of {array.size} values are not finite")
+            wrong = np.count_nonzero(~np.isfinite(array))
+            problems.append(f"section '{name}': {wrong} of {array.size} values are not finite")
         return F64, np.ascontiguousarray(array, DTYPE[F64])
     if array.dtype.kind in "iub":
         limits = np.iinfo(np.int32)
@@ -136,9 +139,11 @@ def _check_header(blob: bytes) -> int:
     if magic != MAGIC:
         raise ModelError("model blob: does not begin with GFMB, this is not a gearfmu model")
     if version != FORMAT:
-        raise ModelError(f"model blob: format version {version}, this package reads version {FORMAT}: assemble the stage again")
+        raise ModelError(f"model blob: format version {version}, this package reads version {FORMAT}: "
+                         "assemble the stage again")
     if size != len(blob):
-        raise ModelError(f"model blob: header says {size} bytes, there are {len(blob)}: the blob is cut short or padded")
+        raise ModelError(f"model blob: header says {size} bytes, there are {len(blob)}: "
+                         "the blob is cut short or padded")
     if count > MOST_SECTIONS or HEADER.size + count * ENTRY.size > size:
         raise ModelError(f"model blob: {count} sections do not fit")
     if any(blob[52 : HEADER.size]):

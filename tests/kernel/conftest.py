@@ -1,4 +1,5 @@
-"""Shared by the kernel's tests: the folder's helper modules can be imported by name, and libraries are compiled once."""
+"""Shared by the kernel's tests: the folder's helper modules can be imported by name,
+and libraries are compiled once."""
 from __future__ import annotations
 
 import sys
@@ -13,7 +14,8 @@ from probes import Probes, build, compile_probes  # noqa: E402  (found through t
 
 @pytest.fixture(scope="session")
 def probes(tmp_path_factory: pytest.TempPathFactory) -> Probes:
-    """gk_math.c, gk_blob.c and gk_sha256.c behind array functions, with the project's flags and the system's compiler."""
+    """gk_math.c, gk_blob.c and gk_sha256.c behind array functions,
+    with the project's flags and the system's compiler."""
     return Probes(compile_probes(tmp_path_factory.mktemp("probes") / "probes.so"))
 
 

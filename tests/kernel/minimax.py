@@ -1,7 +1,10 @@
-"""Polynomial coefficients of gearfmu/kernel/src/gk_math.c, made from scratch: `python tests/kernel/minimax.py` prints the C arrays.
+"""Polynomial coefficients of gearfmu/kernel/src/gk_math.c, made from scratch:
+`python tests/kernel/minimax.py` prints the C arrays.
 
-Each kernel polynomial p(z) interpolates its function at the Chebyshev points of the argument range with 60 digits (within a factor of
-about two of the true minimax polynomial: Powell, Computer J. 9, 1967) and its coefficients are then rounded to double. `test_math.py`
+Each kernel polynomial p(z) interpolates its function at the Chebyshev points of the argument range with 60 digits
+(within a factor of
+about two of the true minimax polynomial: Powell, Computer J.
+9, 1967) and its coefficients are then rounded to double. `test_math.py`
 checks that the arrays in the C source are these numbers.
 """
 from __future__ import annotations
@@ -16,7 +19,8 @@ mp.mp.dps = 60
 
 @dataclass(frozen=True)
 class Kernel:
-    """One polynomial of the C source: name of the array, function of z, range [low, high] of z, number of coefficients."""
+    """One polynomial of the C source: name of the array, function of z, range [low, high] of z,
+    number of coefficients."""
 
     name: str
     function: Callable[[mp.mpf], mp.mpf]
@@ -72,12 +76,16 @@ _octant = (mp.sqrt(2) - 1) ** 2 * (1 + mp.mpf(2) ** -20)
 _half_ln2 = mp.log(2) / 2 * (1 + mp.mpf(2) ** -20)
 _s_max = ((mp.sqrt(2) - 1) / (mp.sqrt(2) + 1)) ** 2 * (1 + mp.mpf(2) ** -20)
 
+_zero = mp.mpf(0)
 KERNELS = (
     Kernel("EXP", _series_safe(_exp_tail, _power_series(lambda k: 1 / mp.factorial(k + 2))), -_half_ln2, _half_ln2, 11),
     Kernel("LOG", _series_safe(_log_tail, _power_series(lambda k: mp.mpf(2) / (2 * k + 3))), mp.mpf(0), _s_max, 7),
-    Kernel("SIN", _series_safe(_sin_tail, _power_series(lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3))), mp.mpf(0), _quarter, 6),
-    Kernel("COS", _series_safe(_cos_tail, _power_series(lambda k: (-1) ** k / mp.factorial(2 * k + 4))), mp.mpf(0), _quarter, 6),
-    Kernel("ATAN", _series_safe(_atan_tail, _power_series(lambda k: mp.mpf((-1) ** (k + 1)) / (2 * k + 3))), mp.mpf(0), _octant, 11),
+    Kernel("SIN", _series_safe(_sin_tail, _power_series(lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3))),
+           _zero, _quarter, 6),
+    Kernel("COS", _series_safe(_cos_tail, _power_series(lambda k: (-1) ** k / mp.factorial(2 * k + 4))),
+           _zero, _quarter, 6),
+    Kernel("ATAN", _series_safe(_atan_tail, _power_series(lambda k: mp.mpf((-1) ** (k + 1)) / (2 * k + 3))),
+           _zero, _octant, 11),
     Kernel("ASIN", _series_safe(_asin_tail, _power_series(_asin_coefficient)), mp.mpf(0), mp.mpf(1) / 4, 13),
 )
 
@@ -114,11 +122,12 @@ def main() -> None:
         print(f"/* largest error {largest_error(kernel):.1e} */")
         print(f"static const double {kernel.name}[] = {{" + ", ".join(c.hex() for c in coefficients(kernel)) + "};")
     print("static const double PIO2[] = {" + ", ".join(p.hex() for p in pio2_parts()) + "};")
-    for name, value in (("LN2", mp.log(2)), ("PI/4", mp.pi / 4), ("PI/2", mp.pi / 2), ("3PI/4", 3 * mp.pi / 4), ("PI", mp.pi)):
-        print(name, float(value).hex(), float(value - float(value)).hex())
-    unit = mp.mpf(2) ** -33
-    ln2_high = mp.floor(mp.log(2) / unit) * unit
-    print("LN2 33 bits", float(ln2_high).hex(), float(mp.log(2) - ln2_high).hex(), "1/ln2", float(1 / mp.log(2)).hex(), "2/pi", float(2 / mp.pi).hex())
+    constants = {"PI/4": mp.pi / 4, "PI/2": mp.pi / 2, "3PI/4": 3 * mp.pi / 4, "PI": mp.pi,
+                 "1/LN2": 1 / mp.log(2), "2/PI": 2 / mp.pi}
+    for name, value in constants.items():
+        print(f"{name}: {float(value).hex()} + {float(value - float(value)).hex()}")
+    ln2_high = mp.floor(mp.log(2) * 2**33) / 2**33
+    print(f"LN2: {float(ln2_high).hex()} + {float(mp.log(2) - ln2_high).hex()}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""Builds of the kernel for tests: its parts behind the array functions of probe_*.c, and the whole with any compiler."""
+"""Builds of the kernel for tests: its parts behind the array functions of probe_*.c,
+and the whole with any compiler."""
 from __future__ import annotations
 
 import ctypes
@@ -78,9 +79,11 @@ class Probes:
         return angle
 
     def blob_open(self, blob: bytes, shift: int = 0) -> tuple[int, str, str, int]:
-        """Outcome, message, hash and number of sections of a blob that lies `shift` bytes behind an address divisible by 64."""
+        """Outcome, message, hash and number of sections of a blob that lies `shift` bytes behind an address divisible
+        by 64."""
         memory, address = _placed(blob, shift)
-        message, digest, sections = ctypes.create_string_buffer(MESSAGE), ctypes.create_string_buffer(65), ctypes.c_uint32()
+        message, digest = ctypes.create_string_buffer(MESSAGE), ctypes.create_string_buffer(65)
+        sections = ctypes.c_uint32()
         outcome = self._library.probe_blob_open(
             ctypes.c_void_p(address), ctypes.c_size_t(len(blob)), message, digest, ctypes.byref(sections))
         assert memory is not None
@@ -91,7 +94,8 @@ class Probes:
         memory, address = _placed(blob, 0)
         total, count = ctypes.c_double(), ctypes.c_uint64()
         outcome = self._library.probe_blob_sum(
-            ctypes.c_void_p(address), ctypes.c_size_t(len(blob)), name.encode(), kind, ctypes.byref(total), ctypes.byref(count))
+            ctypes.c_void_p(address), ctypes.c_size_t(len(blob)), name.encode(), kind,
+            ctypes.byref(total), ctypes.byref(count))
         assert memory is not None and outcome == 0
         return None if count.value == 2**64 - 1 else (total.value, count.value)
 

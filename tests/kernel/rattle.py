@@ -1,6 +1,8 @@
-"""Small conservation problems for the time step: two bodies with elastic modes, tooth pairs of coupled slices, both flanks, frozen in place.
+"""Small conservation problems for the time step: two bodies with elastic modes, tooth pairs of coupled slices,
+both flanks, frozen in place.
 
-Orders of magnitude are those of a steel spur pair (1 kg a gear, 7e8 N/m of massless path a tooth pair, modes from 4 to 60 kHz). Gaps of drive flanks grow with
+Orders of magnitude are those of a steel spur pair (1 kg a gear, 7e8 N/m of massless path a tooth pair,
+modes from 4 to 60 kHz). Gaps of drive flanks grow with
 x_B − x_A, gaps of coast flanks shrink with it.
 """
 from __future__ import annotations
@@ -16,7 +18,8 @@ LOCAL_COMPLIANCE = 0.15  # share of a slice's own compliance that its neighbours
 
 @dataclass(frozen=True)
 class Layout:
-    """pairs and slices in contact; backlash between the flanks, m (negative: jammed); coupling C_ab/C_aa of slices of one pair;
+    """pairs and slices in contact; backlash between the flanks, m (negative:
+    jammed); coupling C_ab/C_aa of slices of one pair;
     modes per body; zeta; stops: stiffness of each body's bearing as a bilateral row, N/m, or 0; seed."""
 
     pairs: int = 2
@@ -57,7 +60,7 @@ def _body(layout: Layout, mass: float, rng: np.random.Generator) -> tuple[np.nda
     """ω (n,) and the displacement of every slice per mode (pairs·slices, n) of one body, rigid motion first."""
     omega = np.concatenate([[0.0], 2 * np.pi * np.sort(rng.uniform(4e3, 60e3, layout.modes))])
     z = np.linspace(-1, 1, layout.slices) if layout.slices > 1 else np.zeros(1)
-    pairs = [np.outer(np.ones_like(z), rng.uniform(-1, 1, layout.modes)) + np.outer(z, 0.3 * rng.uniform(-1, 1, layout.modes))
+    pairs = [rng.uniform(-1, 1, layout.modes) + np.outer(z, 0.3 * rng.uniform(-1, 1, layout.modes))
              for _ in range(layout.pairs)]
     elastic = np.vstack(pairs) / np.sqrt(mass)
     return omega, np.hstack([np.full((len(elastic), 1), 1 / np.sqrt(mass)), elastic])

@@ -5,10 +5,14 @@ Written from the formulas of the theory page alone, not from the C kernel, so th
 The problem. Modes q_k with unit mass, q̈ + 2ζωq̇ + ω²q = F + Wᵀλ (ω = 0: rigid), unknown forces λ and their gaps
 G = offset + W q + C λ. A contact has 0 ≤ λ ⊥ G ≥ 0, a bilateral row G = 0. C is the compliance of what has no mass.
 
-The step. The force is constant in a step, λ̄ = ½(λ₀ + λ₁ + η); modes answer exactly (ωh < 1.2) or by the trapezoidal rule.
-With σ = sin(ωh)/(ωh), rows scaled by σ^(−γ/2) and the compliance C′ = C − W κ Wᵀ, κ = (1 − σ^γ)/ω² (rigid: γh²/6), closed
-contact is of 4th order for γ = 1 (Fox and Goodwin's rule for rigid modes) and of 2nd for γ = 0 (`em`). η, along one direction
-and of one scalar, makes the work of a step in which a contact opens or closes equal to the change of ½ λᵀC′λ (a discrete
+The step. The force is constant in a step, λ̄ = ½(λ₀ + λ₁ + η);
+modes answer exactly (ωh < 1.2) or by the trapezoidal rule.
+With σ = sin(ωh)/(ωh), rows scaled by σ^(−γ/2) and the compliance C′ = C − W κ Wᵀ, κ = (1 − σ^γ)/ω² (rigid:
+γh²/6), closed
+contact is of 4th order for γ = 1 (Fox and Goodwin's rule for rigid modes) and of 2nd for γ = 0 (`em`).
+η, along one direction
+and of one scalar, makes the work of a step in which a contact opens or closes equal to the change of ½ λᵀC′λ (a
+discrete
 gradient after Gonzalez, J. Nonlinear Sci. 6, 1996).
 """
 from __future__ import annotations
@@ -26,7 +30,8 @@ class Problem:
     """Modes and unknown forces; n modes, m forces.
 
     omega (n,) rad/s, 0 for rigid · zeta (n,) · rows (m, n): gap per modal coordinate · compliance (m, m), m/N ·
-    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, of the contacts' massless path.
+    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, of the contacts' massless path ·
+    weight (m,): share of a row in η, proportional to the length it stands for.
     """
 
     omega: np.ndarray
@@ -36,10 +41,11 @@ class Problem:
     offset: np.ndarray
     bilateral: np.ndarray = field(default=None)
     dashpot: np.ndarray = field(default=None)
+    weight: np.ndarray = field(default=None)
 
     def __post_init__(self) -> None:
         m = len(self.offset)
-        for name, default in (("bilateral", np.zeros(m, bool)), ("dashpot", np.zeros(m))):
+        for name, default in (("bilateral", np.zeros(m, bool)), ("dashpot", np.zeros(m)), ("weight", np.ones(m))):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default)
 
@@ -73,7 +79,8 @@ class State:
         return self.force + 0.5 * self.eta
 
 
-def solve_lcp(matrix: np.ndarray, gap: np.ndarray, bilateral: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solve_lcp(matrix: np.ndarray, gap: np.ndarray, bilateral: np.ndarray,
+              start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces and active set of 0 ≤ λ ⊥ gap + matrix λ ≥ 0 (bilateral rows: = 0, λ of any sign); matrix is a P-matrix.
 
     Block principal pivoting: flip everything that is violated; after four rounds without progress only the last one
@@ -101,6 +108,17 @@ def _last(flags: np.ndarray) -> np.ndarray:
     only = np.zeros_like(flags)
     only[np.flatnonzero(flags)[-1]] = True
     return only
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step starts from: gap (m,) at the predicted state, gap before (m,), force0 (m,), lag (m, m):
+    η = lag Δλ."""
+
+    gap: np.ndarray
+    before: np.ndarray
+    force0: np.ndarray
+    lag: np.ndarray
 
 
 class Reference:
@@ -168,62 +186,69 @@ class Reference:
         before = state.gap - self.c @ state.force
         if not was.any() and np.all(gap >= 0):
             return np.zeros_like(gap), np.zeros_like(gap)
-        d, g, force, active, rate = self._with_dashpot(gap, before, state.force, was)
+        force, active, rate = self._with_dashpot(gap, state.force, was)
         changed = bool(np.any(active != was))
         self.changes += changed
+        eta = np.zeros_like(force)
         if changed and s.energy:
-            force, eta = self._conserve(d, g, before, state.force, force, active, was)
+            step = Step(gap, before, state.force, rate[:, None] * p.compliance)
+            force, eta = self._conserve(step, force, active, was)
         elif not changed and s.epsilon:
-            force, _ = solve_lcp(d * (1 + 2 * s.epsilon) + self.c, g - 2 * s.epsilon * d @ state.force, p.bilateral, was)
+            lag = rate[:, None] * p.compliance + 2 * s.epsilon * np.eye(len(gap))
+            force, active = self._closed(gap, state.force, lag, was)
             eta = 2 * s.epsilon * (force - state.force)
-        else:
-            eta = np.zeros_like(force)
-        return force, eta - rate * (g + d @ (force + eta) - before)
+        return force, eta + rate * (p.compliance @ (force - state.force))
 
-    def _with_dashpot(self, gap: np.ndarray, before: np.ndarray, force0: np.ndarray, was: np.ndarray) -> tuple:
-        """D, gap, λ₁, active set and rate 2c/h with the dashpots η_d = −(2c/h)(g₁ − g₀) eliminated.
+    def _closed(self, gap: np.ndarray, force0: np.ndarray, lag: np.ndarray,
+                start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ₁ and active set for η = lag (λ₁ − λ₀)."""
+        matrix = self.d + self.d @ lag + self.c
+        return solve_lcp(matrix, gap - self.d @ lag @ force0, self.problem.bilateral, start)
+
+    def _with_dashpot(self, gap: np.ndarray, force0: np.ndarray, was: np.ndarray) -> tuple:
+        """λ₁, active set and rate 2c/h of the dashpots, η_d = (2c/h) C (λ₁ − λ₀): on the massless path's deflection.
 
         A dashpot acts on a contact closed at both ends and at most doubles or cancels its elastic force λ₀ + λ₁."""
         p = self.problem
         rate = np.where(was, 2 * p.dashpot / self.scheme.h, 0.0)
         for _ in range(200):
-            inverse = np.linalg.inv(np.eye(len(gap)) + self.d * rate)
-            d, g = inverse @ self.d, inverse @ (gap + self.d @ (rate * before))
-            force, active = solve_lcp(d + self.c, g, p.bilateral, was)
-            closing = np.abs(rate * (g + d @ force - before))
+            force, active = self._closed(gap, force0, rate[:, None] * p.compliance, was)
+            wished = np.abs(rate * (p.compliance @ (force - force0)))
             limit = np.where(p.bilateral, np.inf, force0 + force) * active
-            over = closing > limit * (1 + 1e-13)
+            over = wished > limit * (1 + 1e-13)
             if not over.any():
-                return d, g, force, active, rate
-            rate = np.where(over, rate * limit / np.where(over, closing, 1.0), rate)
+                return force, active, rate
+            rate = np.where(over, rate * limit / np.where(over, wished, 1.0), rate)
         raise AssertionError("the limit of the dashpots was not found")
 
-    def _conserve(self, d: np.ndarray, g: np.ndarray, before: np.ndarray, force0: np.ndarray, force: np.ndarray,
-                  active: np.ndarray, was: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ₁ and η = α·Δg with which the step's work equals the change of ½λᵀC′λ."""
-        c, bilateral = self.c, self.problem.bilateral
+    def _conserve(self, step: Step, force: np.ndarray, active: np.ndarray,
+                  was: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """λ₁ and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
+        c, d, bilateral, before, force0 = self.c, self.d, self.problem.bilateral, step.before, step.force0
+        lagged = d + d @ step.lag
+        g = step.gap - d @ step.lag @ force0
         stored = 0.5 * force0 @ c @ force0
-        direction = np.where(active | was, g + d @ force - before, 0.0)
+        direction = np.where(active | was, self.problem.weight * (g + lagged @ force - before), 0.0)
         alpha = 0.0
         for _ in range(ROUNDS):
             z = force + alpha * direction
-            moved = g + d @ z - before
+            moved = g + lagged @ force + alpha * (d @ direction) - before
             defect = 0.5 * force @ c @ force - stored + 0.5 * (force0 + z) @ moved
-            rounding = 4e-16 * (np.abs(force0) + np.abs(force)) @ np.abs(moved)  # all that counts where flanks just graze
+            rounding = 4e-16 * (np.abs(force0) + np.abs(force)) @ np.abs(moved)  # decides where flanks just graze
             if abs(defect) <= self.scheme.tolerance * (stored + 0.5 * np.diag(c) @ force**2) + rounding:
                 return force, alpha * direction
             self.rounds += 1
             p = np.zeros_like(force)
             if active.any():
-                p[active] = -np.linalg.solve((d + c)[np.ix_(active, active)], (d @ direction)[active])
-            w = p + direction
-            c1 = force @ c @ p + 0.5 * w @ moved + 0.5 * (force0 + z) @ (d @ w)
-            c2 = 0.5 * p @ c @ p + 0.5 * w @ d @ w
+                p[active] = -np.linalg.solve((lagged + c)[np.ix_(active, active)], (d @ direction)[active])
+            w, shift = p + direction, lagged @ p + d @ direction
+            c1 = force @ c @ p + 0.5 * w @ moved + 0.5 * (force0 + z) @ shift
+            c2 = 0.5 * p @ c @ p + 0.5 * w @ shift
             a = -2 * defect / (c1 + np.copysign(np.sqrt(max(0.0, c1**2 - 4 * defect * c2)), c1))
             alpha, force = alpha + a, force + a * p
             shifted = g + alpha * (d @ direction)
-            if np.any(active & ~bilateral & (force <= 0)) or np.any(~active & (shifted + (d + c) @ force < 0)):
-                force, active = solve_lcp(d + c, shifted, bilateral, active)
+            if np.any(active & ~bilateral & (force <= 0)) or np.any(~active & (shifted + (lagged + c) @ force < 0)):
+                force, active = solve_lcp(lagged + c, shifted, bilateral, active)
         self.failures += 1
         return force, alpha * direction
 

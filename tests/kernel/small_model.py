@@ -1,4 +1,5 @@
-"""Small model blobs made without finite elements: a spur pair of FZG C size with a few invented modes, and two coaxial bars.
+"""Small model blobs made without finite elements: a spur pair of FZG C size with a few invented modes,
+and two coaxial bars.
 
 Shapes and meaning of the sections are those of gearfmu/stage (model.py, tables.py) and gearfmu/kernel/src/gk_model.c.
 """
@@ -16,7 +17,7 @@ OFFSETS = np.arange(-3, 4)
 DISTANCE, TEETH, SHIFT, MASS, INERTIA = 91.5e-3, (16, 24), (0.1817, 0.1715), (0.35, 0.95), (2.2e-4, 1.5e-3)
 ALPHA = np.radians(20)
 BASE = tuple(0.5 * 4.5e-3 * z * np.cos(ALPHA) for z in TEETH)
-PSI = tuple(np.pi / (2 * z) + np.tan(ALPHA) - ALPHA + 2 * x * np.tan(ALPHA) / z for z, x in zip(TEETH, SHIFT, strict=True))
+PSI = tuple((np.pi / 2 + 2 * x * np.tan(ALPHA)) / z + np.tan(ALPHA) - ALPHA for z, x in zip(TEETH, SHIFT, strict=True))
 WORKING = np.arccos(sum(BASE) / DISTANCE)
 LENGTH = DISTANCE * np.sin(WORKING)
 PHASE = (0.0, np.pi - WORKING - PSI[1] + (LENGTH - BASE[0] * (PSI[0] + WORKING)) / BASE[1])  # drive flanks just touch
@@ -44,14 +45,16 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
 def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: float = 1e-20) -> bytes:
     """Two coaxial bars `gap` apart, with the residual of the modes left out; `local`: 2 (1 − ν²)/(πE) of the contact
     strip of 1 m, 1/Pa (as good as rigid when left out)."""
-    bodies = tuple(FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.static_compliance()]]))
-                   for b, n in zip(bars, modes, strict=True))
+    bodies = tuple(
+        FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.static_compliance()]]))
+        for b, n in zip(bars, modes, strict=True))
     return flat_blob(bodies, Block(gap=gap, local=local))
 
 
 @dataclass(frozen=True)
 class FlatBody:
-    """mass kg · omega rad/s, zeta (n,) · rows (A, n): outward displacement of width function a per mode · static (A, A) m/N."""
+    """mass kg · omega rad/s, zeta (n,) · rows (A, n): outward displacement of width function a per mode · static (A,
+    A) m/N."""
 
     mass: float
     omega: np.ndarray
@@ -62,7 +65,8 @@ class FlatBody:
 
 @dataclass(frozen=True)
 class Block:
-    """Flat engagement 1 m wide: slices, degrees of the width functions, gap m, local 1/Pa, damping N·s/m per m of width."""
+    """Flat engagement 1 m wide: slices, degrees of the width functions, gap m, local 1/Pa,
+    damping N·s/m per m of width."""
 
     slices: int = 1
     degrees: tuple[int, ...] = (0,)
@@ -97,8 +101,8 @@ def flat_blob(bodies: tuple[FlatBody, FlatBody], block: Block) -> bytes:
 def _coast_shift() -> int:
     """The wheel's tooth whose coast flank is nearest to that of the pinion's tooth 0."""
     def gap(shift: int) -> float:
-        roll = (BASE[0] * (PSI[0] + WORKING), BASE[1] * (PSI[1] + WORKING + np.pi - PHASE[1] - shift * 2 * np.pi / TEETH[1]))
-        return abs(LENGTH - sum(roll))
+        turned = PHASE[1] + shift * 2 * np.pi / TEETH[1] - np.pi
+        return abs(LENGTH - BASE[0] * (PSI[0] + WORKING) - BASE[1] * (PSI[1] + WORKING - turned))
     return min((-1, 0, 1), key=gap)
 
 
@@ -121,12 +125,13 @@ def _tables(g: int, rng: np.random.Generator) -> dict:
     turned = np.stack([_turn(rows, diameter, part, 2 * np.pi * o / TEETH[g]) for o in OFFSETS])
     static = np.einsum("fiak,ogjbk->fgoijab", rows / omega**2, turned)
     roll = np.linspace(0.7, 1.3, ROLLS)
-    own = np.einsum("i,j,ab->ijab", roll, roll, np.diag([2e-9, 4e-10])) + 1e-10 * np.einsum("ij,ab->ijab", np.eye(ROLLS), np.eye(2))
+    own = np.einsum("ij,ab->ijab", np.outer(roll, roll), np.diag([2e-9, 4e-10]))
+    own += np.einsum("ij,ab->ijab", np.eye(ROLLS), 1e-10 * np.eye(2))
     for f in (0, 1):
         static[f, f, 3] += own
     return {
-        f"size{g}": np.array([5, ROLLS, 2], np.int32), f"omega{g}": omega, f"zeta{g}": np.full(5, 0.01), f"diameter{g}": diameter,
-        f"part{g}": part, f"rows{g}": rows, f"bore{g}": bore, f"c_ff{g}": static,
+        f"size{g}": np.array([5, ROLLS, 2], np.int32), f"omega{g}": omega, f"zeta{g}": np.full(5, 0.01),
+        f"diameter{g}": diameter, f"part{g}": part, f"rows{g}": rows, f"bore{g}": bore, f"c_ff{g}": static,
         f"c_fb{g}": np.einsum("fiak,ck->fiac", rows / omega**2, bore),
         f"c_bb{g}": np.einsum("ck,dk->cd", bore / omega**2, bore) + np.diag([3e-10, 3e-10, 3e-8]),
     }

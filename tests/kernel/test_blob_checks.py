@@ -1,4 +1,5 @@
-"""The kernel's checks of a blob: SHA-256 against hashlib, each rule broken once, and the same verdict as the Python reader on random damage."""
+"""The kernel's checks of a blob: SHA-256 against hashlib, each rule broken once,
+and the same verdict as the Python reader on random damage."""
 from __future__ import annotations
 
 import hashlib
@@ -15,7 +16,8 @@ from gearfmu.errors import ModelError
 from gearfmu.stage.blob import ENTRY, HEADER, F64, I32, TEXT, blob_hash, read_blob, seal, write_blob
 
 BAD_BLOB = 1
-SAMPLE = {"name": "fzg_c µ", "roll": np.arange(1.0, 20.0), "teeth": np.array([16, -24]), "none": np.zeros(0), "more": np.full(8, -2.5)}
+SAMPLE = {"name": "fzg_c µ", "roll": np.arange(1.0, 20.0), "teeth": np.array([16, -24]), "none": np.zeros(0),
+          "more": np.full(8, -2.5)}
 BLOB = write_blob(SAMPLE)
 TYPE, COUNT, OFFSET = 24, 32, 40  # places in a table entry
 
@@ -104,7 +106,9 @@ def test_utf8_verdict_is_python_s(probes: Probes, data: bytes) -> None:
 def test_every_unicode_boundary(probes: Probes) -> None:
     text = "".join(map(chr, (1, 0x7F, 0x80, 0x7FF, 0x800, 0xD7FF, 0xE000, 0xFFFF, 0x10000, 0x10FFFF)))
     assert probes.blob_open(write_blob({"t": text}))[0] == 0
-    for wrong in (b"\xc0\x80", b"\xe0\x80\x80", b"\xed\xa0\x80", b"\xf0\x80\x80\x80", b"\xf4\x90\x80\x80", b"\xf5\x80\x80\x80", b"\x80", b"\xe2\x82"):
+    overlong, surrogate = (b"\xc0\x80", b"\xe0\x80\x80", b"\xf0\x80\x80\x80"), (b"\xed\xa0\x80",)
+    beyond, torn = (b"\xf4\x90\x80\x80", b"\xf5\x80\x80\x80"), (b"\x80", b"\xe2\x82")
+    for wrong in overlong + surrogate + beyond + torn:
         blob = bytearray(write_blob({"t": "x" * len(wrong)}))
         start = ENTRY.unpack_from(blob, HEADER.size)[4]
         blob[start : start + len(wrong)] = wrong

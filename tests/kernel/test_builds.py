@@ -14,13 +14,15 @@ from gearfmu.kernel import Kernel
 
 FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": (), "native": ("-march=native",)}
 QUICK = {("gcc", "O0"), ("clang", "O3")}
-VARIANTS = [pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full]) for c in compilers() for f in FLAG_SETS]
+VARIANTS = [pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full])
+            for c in compilers() for f in FLAG_SETS]
 WATCHED = ("mesh.force", "mesh.te", "energy.stored", "energy.residual", "bearing.pinion.fx", "wheel.gear.phi")
 
 
 @lru_cache
 def bits(library: Path) -> str:
-    """SHA-256 over states and outputs of short runs: every integrator through reversals of torque, dg4 with a slipping clutch."""
+    """SHA-256 over states and outputs of short runs: every integrator through reversals of torque,
+    dg4 with a slipping clutch."""
     digest = hashlib.sha256()
     for integrator in range(4):
         digest.update(run(library, ("torque", "spring"), integrator, 200))

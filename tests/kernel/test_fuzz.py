@@ -1,4 +1,5 @@
-"""Damaged model blobs and states under AddressSanitizer and UBSan: refused with a message or run with a named outcome, never a crash or garbage."""
+"""Damaged model blobs and states under AddressSanitizer and UBSan:
+refused with a message or run with a named outcome, never a crash or garbage."""
 from __future__ import annotations
 
 import functools
@@ -51,7 +52,8 @@ def fuzzer(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @dataclass(frozen=True)
 class Findings:
-    """lines: case, call, outcome, complaint (may be missing) of every case finished; end: exit code and what the sanitizer wrote."""
+    """lines: case, call, outcome, complaint (may be missing) of every case finished; end:
+    exit code and what the sanitizer wrote."""
 
     lines: list[list[str]]
     end: tuple[int, str]
@@ -90,7 +92,8 @@ def feed(program: Path, make: Callable[[int], bytes], numbers: Iterable[int]) ->
 def check(found: Findings, first: int, count: int) -> None:
     assert found.end[0] == 0, f"case {first + len(found.lines)} ended the program: {found.end}"
     assert len(found.lines) == count
-    assert not found.complaints, [f"case {first + int(line[0])}: {' '.join(line[1:])}" for line in found.complaints[:20]]
+    wrong = [f"case {first + int(line[0])}: {' '.join(line[1:])}" for line in found.complaints]
+    assert not wrong, wrong[:20]
 
 
 def test_sound_blobs_with_random_parameters_and_inputs(fuzzer: Path) -> None:

@@ -1,4 +1,5 @@
-"""The reference time step keeps what it promises: order, energy through every change of contact, dissipation, impulse, static values."""
+"""The reference time step keeps what it promises: order, energy through every change of contact, dissipation,
+impulse, static values."""
 from __future__ import annotations
 
 from dataclasses import replace
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from rattle import Layout, rattle
 from reference_dg4 import Problem, Reference, Scheme, State, solve_lcp
 
-DRIFT = 1e-10  # of the kinetic energy at the start; measured: 1e-13 (rattle), 1e-11 (under load, where the stored energy is 300 times larger)
+DRIFT = 1e-10  # of the kinetic energy at the start; measured: 1e-13 in rattle, 1e-11 under load (300 times the energy)
 SEEN_TO_FAIL = 1e-4
 
 
@@ -24,8 +25,10 @@ def start(reference: Reference, layout: Layout, speed: float, load: float = 0.0)
     return reference.start(q, v, external), external
 
 
-def drift(layout: Layout, scheme: Scheme, speed: float, load: float = 0.0, steps: int = 1500) -> tuple[float, Reference]:
-    """Largest change of the invariant (with the potential of the constant load) over the kinetic energy at the start."""
+def drift(layout: Layout, scheme: Scheme, speed: float, load: float = 0.0,
+          steps: int = 1500) -> tuple[float, Reference]:
+    """Largest change of the invariant (with the potential of the constant load) over the kinetic energy at the
+    start."""
     reference = Reference(rattle(layout), scheme)
     state, external = start(reference, layout, speed, load)
 
@@ -59,7 +62,7 @@ def test_undamped_energy_through_changes_of_contact(name: str, h: float) -> None
     assert worst <= DRIFT, f"{name}: {worst:.1e} in {reference.changes} changes of contact"
 
 
-@pytest.mark.parametrize("name", ["one contact", "two pairs of five slices", "two pairs of ten slices", "under load", "jammed"])
+@pytest.mark.parametrize("name", [name for name in RATTLE if "bearing" not in name])
 def test_control_without_eta_is_seen_to_fail(name: str) -> None:
     layout, speed, load = RATTLE[name]
     assert drift(layout, Scheme(5e-6, energy=False), speed, load)[0] > SEEN_TO_FAIL
@@ -129,7 +132,8 @@ def test_dashpot_neither_pulls_nor_more_than_doubles_the_force() -> None:
 
 
 def linear_contact() -> tuple[Problem, np.ndarray]:
-    """Two sprung masses with two low modes each, pressed together over two coupled slices that never part; external forces."""
+    """Two sprung masses with two low modes each, pressed together over two coupled slices that never part;
+    external forces."""
     omega = np.array([0.0, 9e3, 2.1e4, 0.0, 1.3e4, 2.6e4])
     rows = np.array([[-1.1, 0.9, -0.5, 0.7, 0.6, 0.8], [-1.1, 0.7, -0.8, 0.7, 0.9, 0.5]])
     compliance = np.array([[6e-9, 3e-9], [3e-9, 6e-9]])
@@ -163,7 +167,8 @@ def test_order_in_closed_contact(gamma: float, order: int) -> None:
         for _ in range(count):
             state = reference.step(state, external)
             assert np.all(state.force > 0)
-        errors.append(np.abs(problem.rows @ (reference.displacement(state) - exact_motion(problem, external, q0, end))).max())
+        missed = reference.displacement(state) - exact_motion(problem, external, q0, end)
+        errors.append(np.abs(problem.rows @ missed).max())
     rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert rates[-1] == pytest.approx(order, abs=0.25), f"errors {errors}, rates {rates}"
 
