@@ -58,4 +58,5 @@ class BinaryDistribution(Distribution):
         return True
 
 
-setup(distclass=BinaryDistribution, cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel})
+setup(distclass=BinaryDistribution, cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel},
+      setup_requires=["ziglang==0.16.0"] if chosen_platforms() else [])
