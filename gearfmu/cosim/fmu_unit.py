@@ -32,7 +32,7 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 from gearfmu.cosim.units import Variable
-from gearfmu.errors import CouplingError, FmuError, SimulationError
+from gearfmu.errors import CouplingError, FmuError, GearfmuError, SimulationError
 from gearfmu.kernel.binding import OUTCOMES, load
 
 KINDS = {
@@ -84,14 +84,12 @@ class FmuUnit:
         try:
             self._load(str(folder or self._own_folder))
             self.instantiate(parameters or {})
-        except FMICallException as error:
+        except GearfmuError:
             self._remove_folder()
-            raise FmuError(f"{self.path}: {error} {self._last_message()}") from error
-        except Exception as error:
+            raise
+        except Exception as error:  # whatever a damaged file or a foreign binary makes of it
             self._remove_folder()
-            raise (
-                error if isinstance(error, FmuError) else FmuError(f"{self.path}: cannot be loaded: {error}")
-            ) from error
+            raise FmuError(f"{self.path}: cannot be loaded: {error} {self._last_message()}") from error
 
     def _load(self, folder: str) -> None:
         self.description = read_model_description(str(self.path), validate=False)
@@ -164,7 +162,7 @@ class FmuUnit:
         unknown = [name for name in names if name not in self.variables]
         if unknown:
             raise CouplingError(
-                f"{self.path}: no variable {', '.join(unknown)}; it has {', '.join(sorted(self.variables))}"
+                f"{self.path}: no variable {', '.join(unknown)}; take an FMU exported with the ports that this needs"
             )
         groups = []
         for call, kind in dict.fromkeys(KINDS.values()):

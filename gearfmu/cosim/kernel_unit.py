@@ -14,7 +14,7 @@ from gearfmu.kernel import Kernel
 
 
 class KernelHandle(NamedTuple):
-    """Value references of resolved names, the buffer of their values and its numbers one by one, as the kernel fills it."""
+    """Value references of resolved names, the buffer of their values and its single numbers for the kernel to fill."""
 
     names: tuple[str, ...]
     references: tuple[int, ...]

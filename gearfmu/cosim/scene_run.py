@@ -96,19 +96,35 @@ def run_once(scene: SceneSpec, source: Source, progress: Progress | None = None)
 
 
 def verified(
-    scene: SceneSpec, source: Source, coarse: Result, progress: Progress | None = None
+    scene: SceneSpec, source: Source, result: Result, progress: Progress | None = None
 ) -> dict[str, ChannelError]:
-    """Coupling error of every real-valued channel, relative to its AC part: Richardson's estimate from a run with
-    half the communication step."""
-    halved = scene.model_copy(
-        update={"coupling": scene.coupling.model_copy(update={"step": 0.5 * scene.coupling.step})}
-    )
-    fine = run_once(halved, source, progress)
-    if fine.outcome != OK:
-        raise CouplingError(
-            f"the run with half the communication step stopped at {fine.trace.time[-1]:g} s: {fine.message}"
-        )
+    """Coupling error of every real-valued channel by Richardson, from a run with half the communication step.
+
+    Both runs take the same internal step, so that its error does not count as the coupling's: where the step of
+    `result` does not fit half the communication step, the scene is run twice with the next smaller one.
+    """
+    step, used = scene.coupling.step, result.facts["solver.h"]
+    count = round(step / used)
+    even, coarse = count + count % 2, result
+    if count % 2:
+        coarse = _verifying(scene, source, (step, step / even), _part(progress, 0.0, 1.0 / 3.0))
+    fine = _verifying(scene, source, (0.5 * step, step / even), _part(progress, 1.0 / 3.0 if count % 2 else 0.0, 1.0))
     return coupling_errors(coarse.trace, fine.trace, coarse.order, Window(scene.settle, steady=scene.settle > 0.0))
+
+
+def _verifying(scene: SceneSpec, source: Source, steps: tuple[float, float], progress: Progress | None) -> Result:
+    """A run with another communication and internal step; CouplingError when it does not reach the end."""
+    changed = {
+        "coupling": scene.coupling.model_copy(update={"step": steps[0]}),
+        "stage": scene.stage.model_copy(update={"h": steps[1]}),
+    }
+    result = run_once(scene.model_copy(update=changed), source, progress)
+    if result.outcome != OK:
+        raise CouplingError(
+            f"no coupling error: the run with a communication step of {steps[0]:g} s stopped at "
+            f"{result.trace.time[-1]:g} s: {result.message}; run without verification, or with other steps"
+        )
+    return result
 
 
 def _part(progress: Progress | None, start: float, end: float) -> Progress | None:

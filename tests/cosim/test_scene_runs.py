@@ -1,0 +1,144 @@
+"""Scenes on the shipped pair: FMU against kernel, chain inside against clutch outside, files, refusals."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from gearfmu import cosim, fmu
+from gearfmu.cosim.accuracy import Window, coupling_errors, rms
+from gearfmu.cosim.coupled import OK
+from gearfmu.cosim.scene_run import run_once, stage_model, verified
+from gearfmu.cosim.source import Source
+from gearfmu.errors import CouplingError, FmuError, ModelError
+from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.stage.trace import Trace
+
+
+def scene(name: str, duration: float, **stage) -> SceneSpec:
+    """A shipped scene, cut to `duration`, without settling, its stage changed."""
+    shipped = load_scene(name)
+    changed = {"duration": duration, "settle": 0.0, "stage": shipped.stage.model_copy(update=stage)}
+    return shipped.model_copy(update=changed)
+
+
+def with_step(given: SceneSpec, step: float) -> SceneSpec:
+    return given.model_copy(update={"coupling": given.coupling.model_copy(update={"step": step})})
+
+
+def test_fmu_and_kernel_give_the_same_bits(tmp_path):
+    """Every channel of the demo scene's first 5 ms, master and drivetrain included; names, units and types too."""
+    closure = scene("clutch_closure", 5e-3)
+    model = stage_model(closure)
+    through_fmu = run_once(closure, Source(model, fmu.export(model, tmp_path / "pair.fmu"))).trace
+    through_kernel = run_once(closure, Source(model)).trace
+    assert list(through_fmu.channels) == list(through_kernel.channels) and len(through_fmu.channels) > 40
+    for name, channel in through_fmu.channels.items():
+        other = through_kernel.channels[name]
+        assert np.array_equal(channel.values, other.values) and channel.values.dtype == other.values.dtype, name
+        assert (channel.unit, channel.description) == (other.unit, other.description)
+
+
+def test_a_run_leaves_trace_and_summary_with_the_promised_fields(tmp_path):
+    trace = cosim.run(scene("pair_loaded", 2e-3, level="fast"), tmp_path, unit="kernel", verify=True)
+    read, summary = Trace.load(tmp_path / "trace.h5"), json.loads((tmp_path / "summary.json").read_text())
+    assert np.array_equal(read["mesh.te"], trace["mesh.te"]) and read.meta == trace.meta == summary
+    promised = ("outcome", "simulated_s", "cpu_s", "realtime_factor", "coupling_error", "energy_residual", "level")
+    assert all(summary[key] is not None for key in (*promised, "n_dyn", "slices", "h", "hashes", "versions"))
+    assert summary["outcome"] == OK and summary["level"] == "fast" and summary["teeth"] == {"pinion": 16, "wheel": 24}
+    assert 0 < summary["stage_cpu_s"] <= summary["cpu_s"] and summary["coupling_error_of"] == "pinion.tau"
+    assert {"scene", "model", "body pinion", "body wheel"} <= set(summary["hashes"])
+
+
+def test_chain_in_the_stage_and_exact_clutch_outside_are_the_same_drivetrain():
+    """Two roads: the kernel's clutch in C against PyUnit's event-exact one, up to and past lock-up, rigid bodies.
+
+    Lock-up falls into the same communication step; shaft torque, pinion and engine speeds agree within their margins.
+    """
+    inside = scene("clutch_closure", 0.14, level="rigid", slices=1)
+    outside = inside.model_copy(
+        update={"passenger_car": inside.passenger_car.model_copy(update={"chain_in_fmu": False})}
+    )
+    a, b = cosim.run(inside, unit="kernel"), cosim.run(outside, unit="kernel")
+    lock_a, lock_b = (
+        trace.time[np.argmax(trace[name] > 0)]
+        for trace, name in ((a, "pinion.clutch.locked"), (b, "drive.clutch.locked"))
+    )
+    assert 0.11 < lock_a < 0.13 and abs(lock_a - lock_b) <= 1.001e-4
+    assert rms(a["pinion.shaft.tau"] + b["pinion.tau"]) < 2e-3 * np.ptp(a["pinion.shaft.tau"])
+    assert rms(a["drive.engine.w"] - b["drive.engine.w"]) < 2e-5 * np.ptp(a["drive.engine.w"])
+    assert rms(a["pinion.clutch.slip"] - b["drive.clutch.slip"]) < 2e-4 * 52.0
+
+
+def test_gs_mean_on_the_kernel_is_of_second_order():
+    """Same internal step, communication steps 80, 40, 20 µs."""
+    rig = scene("pair_light", 0.02, level="rigid", slices=1, h=2.5e-6)
+    source = Source(stage_model(rig))
+    results = [run_once(with_step(rig, step), source) for step in (8e-5, 4e-5, 2e-5, 1e-5)]
+    taus = [result.trace["pinion.tau"][:: 2**k] for k, result in enumerate(results)]
+    errors = np.array([rms(coarse - fine) for coarse, fine in zip(taus, taus[1:], strict=False)])
+    assert 0.5 * np.log2(errors[0] / errors[2]) > 1.7, errors
+
+
+def test_coupling_error_does_not_count_the_internal_step():
+    """20 µs holds 7 internal steps, half of it 3.5: a plain comparison would mostly see another internal step."""
+    rig = scene("pair_light", 0.02, level="fast")
+    source = Source(stage_model(rig))
+    own, halved = run_once(rig, source), run_once(with_step(rig, 0.5 * rig.coupling.step), source)
+    assert round(rig.coupling.step / own.facts["solver.h"]) % 2 == 1
+    plain = coupling_errors(own.trace, halved.trace, 2, Window(0.0, steady=False))["pinion.tau"].relative
+    estimate = verified(rig, source, own)["pinion.tau"].relative
+    assert estimate < 2e-3 and estimate < 0.1 * plain
+
+
+def test_an_fmu_with_other_ports_is_refused_by_name(tmp_path):
+    rig = scene("pair_loaded", 1e-3)
+    path = fmu.export(stage_model(rig), tmp_path / "rig.fmu")
+    with pytest.raises(CouplingError, match="no variable pinion.disc.w_start"):
+        cosim.run(scene("clutch_closure", 1e-3), fmu_path=path)
+
+
+@pytest.mark.parametrize("unit", ["kernel", "fmu"])
+def test_a_step_that_cannot_be_is_refused_before_the_run(unit, tmp_path):
+    with pytest.raises((ModelError, FmuError)):
+        cosim.run(scene("pair_loaded", 1e-3, h=5e-4), tmp_path / "out", unit=unit)
+    assert not (tmp_path / "out" / "trace.h5").exists()
+
+
+def test_unknown_unit():
+    with pytest.raises(CouplingError, match="choose fmu or kernel"):
+        cosim.run("pair_light", unit="simulink")
+
+
+@pytest.mark.full
+def test_clutch_closure_locks_once_and_rings_down():
+    trace = cosim.run("clutch_closure", unit="fmu")
+    locked = trace["pinion.clutch.locked"]
+    assert trace.meta["outcome"] == OK and abs(trace.meta["energy_residual"]) < 1e-6 and trace.meta["trouble"] == 0
+    assert np.count_nonzero(np.diff(locked)) == 1 and trace.time[np.argmax(locked)] == pytest.approx(0.12, abs=0.01)
+    ripple = [np.ptp(trace.window(start, start + 0.05)["pinion.shaft.tau"]) for start in (0.125, 0.35)]
+    assert ripple[1] < ripple[0] and trace["mesh.contact"][trace.time > 0.05].min() == 1
+
+
+@pytest.mark.full
+def test_clutch_dump_hammers_through_the_backlash():
+    """Drive and coast flanks both carry more than 4 kN, the gears meet and part many times, the run stays whole."""
+    trace = cosim.run("clutch_dump", unit="fmu")
+    assert trace.meta["outcome"] == OK and abs(trace.meta["energy_residual"]) < 1e-5
+    assert trace["mesh.force"].min() < -4e3 and trace["mesh.force"].max() > 4e3 and trace["mesh.impacts"][-1] > 10
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "torque"), [("pair_loaded", 302.0), ("pair_light", 80.0)])
+def test_pairs_reach_their_torque_and_speed_within_the_settling_time(name, torque):
+    trace = cosim.run(name, unit="fmu")
+    assert trace.meta["outcome"] == OK and abs(trace.meta["energy_residual"]) < 1e-7
+    steady, shipped = trace.window(trace.meta["settle"]), load_scene(name)
+    periods = math.floor((steady.time[-1] - steady.time[0]) * shipped.start.pinion_speed / (2 * math.pi) * 16)
+    assert periods >= 20
+    assert -steady["pinion.tau"].mean() == pytest.approx(torque, rel=1e-3)
+    assert steady["wheel.tau"].mean() == pytest.approx(-1.5 * torque, rel=1e-3)
+    assert steady["pinion.gear.w"].mean() == pytest.approx(shipped.start.pinion_speed, rel=1e-4)
