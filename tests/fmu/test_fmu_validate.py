@@ -8,10 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from gearfmu.body import load_body
 from gearfmu.errors import FmuError, Problem
-from gearfmu.fmu import validate
+from gearfmu.fmu import export, validate
 from gearfmu.fmu.package import write_archive
 from gearfmu.kernel.build import build_library, host_platform
+from gearfmu.spec.library import model_folder
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import assemble
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +42,12 @@ def edited(members: dict[str, bytes], old: str, new: str, name: str = "modelDesc
 
 def test_good_fmus_have_no_problems(native, python, other):
     assert [validate(fmu) for fmu in (native, python, other)] == [[], [], []]
+
+
+def test_shipped_stage_has_no_problems(tmp_path):
+    spec = load_stage("fzg_c/stage_relief")
+    bodies = [load_body(model_folder(spec) / f"{gear.name}.h5") for gear in spec.gears]
+    assert validate(export(assemble(spec, bodies), tmp_path / "shipped.fmu")) == []
 
 
 @pytest.mark.parametrize("old, new, expected", [
