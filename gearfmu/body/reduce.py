@@ -17,7 +17,7 @@ from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
-from gearfmu.femesh import gear_sector, mesh_report
+from gearfmu.femesh import FeMesh, gear_sector, mesh_report
 from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
@@ -26,12 +26,13 @@ from gearfmu.reduction.modal import Modes, elastic_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import Statics, static_tables
 from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.gear import GearSpec, MeshSpec
 from gearfmu.spec.stage import StageSpec
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
 _PICTURE_MODES = 12
 _PICTURE_LOADS = 5
+_DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1)
 
 Progress = Callable[[str, float], None]
 
@@ -96,8 +97,7 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
     except MeshError as error:
         raise MeshError(f"{spec.source}: gears.{gear.name}: {error}") from error
     modes = elastic_modes(full_order, gear.body.modes, report)
-    pictured = _pictured_loads(full_order)
-    statics = static_tables(full_order, pictured, report)
+    statics = static_tables(full_order, _pictured_loads(full_order), report)
     report("frequency response", 0.0)
     frf = frf_error(full_order, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
     inertia = full_order.inertia
@@ -127,7 +127,7 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=frf,
-        display=_display(full_order, modes, statics, pictured),
+        display=_display(gear_sector(geometry, gear.face_width, _DRAWN), full_order, modes, statics),
     )
 
 
@@ -164,9 +164,10 @@ def _pictured_loads(body: SectorBody) -> list[int]:
     return [roll * functions for roll in chosen]
 
 
-def _display(body: SectorBody, modes: Modes, statics: Statics, pictured: list[int]) -> Display:
-    sector = outline(body.mesh)
-    points, quads = whole_surface(body.mesh, sector)
+def _display(drawn: FeMesh, body: SectorBody, modes: Modes, statics: Statics) -> Display:
+    pictured = _pictured_loads(body)
+    sector = outline(drawn, body.mesh.nodes)
+    points, quads = whole_surface(sector, body.teeth)
     index = [k for k in sorted(modes.shapes) if k < _PICTURE_MODES]
     shapes = [unfold_mode(modes.shapes[k], int(modes.nodal_diameter[k]), sector, body.teeth) for k in index]
     loads = [unfold_sectors(picture, sector) for picture in statics.pictures]

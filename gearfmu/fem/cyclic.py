@@ -61,9 +61,9 @@ class SectorSpace:
         inside, border = slice(0, self.interior), slice(self.interior, None)
         inner = owner[interior] // 3
         self._factor = Factor(stiffness[inside, inside], _cells(sector.elements, mirror, inner), inner)
-        coupling = stiffness[inside, border].toarray()
-        self.influence = self._factor.solve(coupling)
-        self.schur = stiffness[border, border].toarray() - coupling.T @ self.influence
+        self.coupling = sp.csr_array(stiffness[inside, border])
+        self.influence = self._factor.solve(self.coupling.toarray())
+        self.schur = stiffness[border, border].toarray() - self.coupling.T @ self.influence
 
     def solve_held(self, loads: np.ndarray) -> np.ndarray:
         """K_II⁻¹ f for interior loads (interior, k): both cuts held."""
@@ -121,11 +121,6 @@ class Harmonic:
         return self.reduce(_real_times_any(self.space.mass_matrix, self.expand(vectors)))
 
     @cached_property
-    def _influence(self) -> np.ndarray:
-        cut = self.space.cut
-        return self.space.influence[:, :cut] + self.phase * self.space.influence[:, cut:]
-
-    @cached_property
     def _cut_solver(self) -> tuple[np.ndarray, np.ndarray]:
         """LU of S_ν; its rigid null space is filled up, which changes nothing for balanced loads."""
         cut, schur = self.space.cut, self.space.schur
@@ -150,15 +145,17 @@ class Harmonic:
 
     def flexibility(self, loads: np.ndarray, held: np.ndarray | None = None) -> np.ndarray:
         """C_ν f = P K_ν⁺ Pᴴ f. `held` = `space.solve_held` of the interior loads, where it is known already."""
-        interior = self.space.interior
+        space, interior, cut = self.space, self.space.interior, self.space.cut
         balanced = self.balance(loads)
+        carried = _real_times_any(space.influence.T, balanced[:interior])
+        on_cut = balanced[interior:] - carried[:cut] - np.conj(self.phase) * carried[cut:]
+        moved = sl.cho_solve(self._cut_solver, on_cut)
+        border = np.concatenate([moved, self.phase * moved])
         if held is None:
-            held = self.space.solve_held(balanced[:interior])
-        elif self.rigid.shape[1]:
-            held = held - self._held_inertia @ (self.rigid.conj().T @ loads)
-        on_cut = balanced[interior:] - self._influence.conj().T @ balanced[:interior]
-        cut = sl.cho_solve(self._cut_solver, on_cut)
-        return self.gauge(np.concatenate([held - self._influence @ cut, cut]))
+            inside = space.solve_held(balanced[:interior] - _real_times_any(space.coupling, border))
+        else:
+            inside = held - self._held_inertia @ (self.rigid.conj().T @ loads) - _real_times_any(space.influence, border)
+        return self.gauge(np.concatenate([inside, moved]))
 
 
 def sector_spaces(sector: Sector) -> list[SectorSpace]:
@@ -246,8 +243,8 @@ def _turn_plus(sector: Sector) -> sp.csr_array:
     return sp.csr_array(sp.diags(diagonal) + turn - turn.T)
 
 
-def _real_times_any(matrix: sp.csr_array, vectors: np.ndarray) -> np.ndarray:
-    """Real sparse times real or complex dense, without a complex copy of the matrix."""
+def _real_times_any(matrix: sp.csr_array | np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Real matrix times real or complex dense, without a complex copy of the matrix."""
     if not np.iscomplexobj(vectors):
         return matrix @ vectors
     return (matrix @ np.ascontiguousarray(vectors).view(float)).view(complex)

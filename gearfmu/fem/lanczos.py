@@ -38,12 +38,12 @@ def lowest_modes(body: Vibrating, count: int, tolerance: float = 1e-9, block: in
     count = min(count, body.elastic)
     space = _Krylov(body, min(block, body.elastic))
     while True:
-        values, vectors, residual = space.ritz()
-        wanted = slice(0, count)
-        if len(values) >= count and np.all(residual[wanted] <= tolerance * values[wanted]):
-            return 1 / values[wanted], space.basis() @ vectors[:, wanted]
+        if space.size >= count:
+            values, vectors, residual = (part[..., :count] for part in space.ritz())
+            if np.all(residual <= tolerance * values):
+                return 1 / values, space.basis() @ vectors
         if not space.grow():
-            raise ModesError(f"only {len(values)} of {count} modes found: the Krylov space is exhausted")
+            raise ModesError(f"not all of {count} modes found: the Krylov space ends at {space.size} vectors")
 
 
 class _Krylov:

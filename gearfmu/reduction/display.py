@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from gearfmu.fem import surface
 from gearfmu.fem.cyclic import mirror_nodes
@@ -26,54 +28,58 @@ class Display:
 
 @dataclass(frozen=True)
 class Outline:
-    """The drawn surface of one sector: nodes (P,) of the mesh that are drawn once a sector, quads (Q, 4) of mesh nodes,
-    `stand_in` (N,): the minus-cut node that stands for a plus-cut node one sector on, else −1."""
+    """The drawn surface of one sector: points (P, 3) drawn once a sector, quads (Q, 4) of their numbers, `ahead` (Q, 4):
+    true where the point meant is that of the next sector; sample (P, N): displacement of the points from that of the
+    finite-element nodes."""
 
-    nodes: np.ndarray
+    points: np.ndarray
     quads: np.ndarray
-    stand_in: np.ndarray
+    ahead: np.ndarray
+    sample: sp.csr_array
 
 
-def outline(mesh: Any) -> Outline:
-    """Both end faces of a sector and one quad across the width along its contour."""
-    end = _end_face(mesh)
-    mirror = mirror_nodes(mesh.nodes)
-    stand_in = np.full(len(mesh.nodes), -1)
-    stand_in[mesh.cut_plus] = mesh.cut_minus
-    if mirror is None:
-        quads = surface.boundary_faces(mesh.elements)[:, :4]
-        cut = [np.isin(quads, side).all(axis=1) for side in (mesh.cut_minus, mesh.cut_plus)]
-        quads = quads[~(cut[0] | cut[1])]
-    else:
-        edges = _contour(end, mesh)
-        side = np.stack([edges[:, 1], edges[:, 0], mirror[edges[:, 0]], mirror[edges[:, 1]]], axis=1)
-        quads = np.concatenate([end, mirror[end][:, ::-1], side])
-    used = np.unique(quads)
-    return Outline(used[stand_in[used] < 0], quads, stand_in)
+def outline(drawn: Any, nodes: np.ndarray) -> Outline:
+    """Surface of the coarse sector mesh `drawn`: both end faces, and one quad across the width along the contour.
+
+    nodes (N, 3): the finite-element mesh of the same sector, from whose four nearest nodes the points take their
+    displacement (inverse squares of the distance: good enough to look at).
+    """
+    end, mirror = _end_face(drawn), mirror_nodes(drawn.nodes)
+    edges = _contour(end, drawn)
+    side = np.stack([edges[:, 1], edges[:, 0], mirror[edges[:, 0]], mirror[edges[:, 1]]], axis=1)
+    quads = np.concatenate([end, mirror[end][:, ::-1], side])
+    stand_in = np.arange(len(drawn.nodes))
+    stand_in[drawn.cut_plus] = drawn.cut_minus
+    used, local = np.unique(stand_in[quads], return_inverse=True)
+    points = drawn.nodes[used]
+    return Outline(points, local.reshape(quads.shape), stand_in[quads] != quads, _sampling(points, nodes))
 
 
-def whole_surface(mesh: Any, sector: Outline) -> tuple[np.ndarray, np.ndarray]:
+def whole_surface(sector: Outline, teeth: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (z·P, 3) and quads (z·Q, 4) of all sectors."""
-    number = np.full(len(mesh.nodes), -1)
-    number[sector.nodes] = np.arange(len(sector.nodes))
-    ahead = sector.stand_in[sector.quads] >= 0
-    local = number[np.where(ahead, sector.stand_in[sector.quads], sector.quads)]
-    per_sector = len(sector.nodes)
-    quads = [((j + ahead) % mesh.teeth) * per_sector + local for j in range(mesh.teeth)]
-    points = _turned(np.broadcast_to(mesh.nodes[sector.nodes], (mesh.teeth, per_sector, 3)))
+    per_sector = len(sector.points)
+    quads = [((j + sector.ahead) % teeth) * per_sector + sector.quads for j in range(teeth)]
+    points = _turned(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
     return points.reshape(-1, 3), np.concatenate(quads)
 
 
 def unfold_mode(shape: np.ndarray, nodal_diameter: int, sector: Outline, teeth: int) -> np.ndarray:
     """Displacement (z·P, 3) of the first (real) part of a mode from its sector shape (3N,)."""
-    local = shape.reshape(-1, 3)[sector.nodes]
     turn = np.exp(2j * np.pi * nodal_diameter * np.arange(teeth) / teeth)
-    return _turned(np.multiply.outer(turn, local).real).reshape(-1, 3)
+    return _turned(np.multiply.outer(turn, sector.sample @ shape.reshape(-1, 3)).real).reshape(-1, 3)
 
 
 def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:
     """Displacement (z·P, 3) from that of every sector in its own frame, (z, 3N)."""
-    return _turned(shapes.reshape(len(shapes), -1, 3)[:, sector.nodes]).reshape(-1, 3)
+    return _turned(np.stack([sector.sample @ shape.reshape(-1, 3) for shape in shapes])).reshape(-1, 3)
+
+
+def _sampling(points: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
+    distance, nearest = cKDTree(nodes).query(points, k=4)
+    weight = 1 / (distance**2 + (1e-6 * np.ptp(nodes)) ** 2)
+    weight /= weight.sum(axis=1, keepdims=True)
+    rows = np.repeat(np.arange(len(points)), 4)
+    return sp.coo_array((weight.ravel(), (rows, nearest.ravel())), (len(points), len(nodes))).tocsr()
 
 
 def _turned(vectors: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
 The load of roll point s, width function a has the density (1/b) P_a(2z/b) across the face width and 1/L along the
 involute's arc length σ = s²/(2 r_b), over the strip |σ − σ(s)| ≤ w clipped at form circle and tip (L: the length that
 is left). It acts along the outward normal of the analytic involute. Integration runs over the quadratic surface
-elements, split exactly where the strip begins and ends, so that the rows are smooth in s.
+elements, split exactly where the strip begins and ends, so that the rows are smooth in s, and over the roll (dσ = s ds/r_b),
+in which positions and normals are smooth down to the base circle.
 """
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import surface
 from gearfmu.geometry import involute
 
-_GAUSS_ROLL = np.polynomial.legendre.leggauss(4)
+_GAUSS_ROLL = np.polynomial.legendre.leggauss(6)
 _GAUSS_WIDTH = np.polynomial.legendre.leggauss(6)
 
 
@@ -57,13 +58,14 @@ def flank_loads(nodes: np.ndarray, quads: np.ndarray, flank: ToothFlank, side: i
     patch = _Patch.of(nodes, quads, flank)
     patch.check_cover(flank)
     first, last = flank.strip(points.rolls)
-    low = patch.natural(np.maximum(first[:, None], patch.arc[:, 0]))
-    high = patch.natural(np.minimum(last[:, None], patch.arc[:, 2]))
-    xi = 0.5 * (low + high)[..., None] + 0.5 * (high - low)[..., None] * _GAUSS_ROLL[0]
-    length = np.maximum(high - low, 0.0)[..., None] * 0.5 * _GAUSS_ROLL[1]
-    arc, slope = patch.arc_at(xi)
-    along = length * slope / (last - first)[:, None, None]
-    normal = flank.normal(np.sqrt(2 * flank.r_b * arc), side)
+    low = np.maximum(first[:, None], patch.arc[:, 0])
+    high = np.maximum(np.minimum(last[:, None], patch.arc[:, 2]), low)
+    start, end = np.sqrt(2 * flank.r_b * low), np.sqrt(2 * flank.r_b * high)
+    half = 0.5 * (end - start)[..., None]
+    roll = 0.5 * (start + end)[..., None] + half * _GAUSS_ROLL[0]
+    xi = patch.natural(roll**2 / (2 * flank.r_b))
+    along = half * _GAUSS_ROLL[1] * roll / flank.r_b / (last - first)[:, None, None]
+    normal = flank.normal(roll, side)
     across = _width_weights(patch.width, flank.face_width, points.functions)
     grid = np.stack(np.broadcast_arrays(xi[..., None], _GAUSS_WIDTH[0]), axis=-1)
     values = surface.shape(grid.reshape(-1, 2)).reshape(*grid.shape[:-1], 8)
@@ -116,16 +118,10 @@ class _Patch:
         if not np.isclose(area, np.ptp(self.arc) * flank.face_width, rtol=1e-6):
             raise MeshError("flank elements leave holes, overlap, or do not span the face width")
 
-    def arc_at(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Arc length and its slope at natural coordinates (R, Q, G)."""
-        c, b, a = _quadratic(self.arc)
-        a, b, c = (k[None, :, None] for k in (a, b, c))
-        return c + xi * (b + a * xi), b + 2 * a * xi
-
     def natural(self, arc: np.ndarray) -> np.ndarray:
-        """Natural coordinate of an arc length (R, Q), clipped to the element."""
-        c, b, a = _quadratic(self.arc)
-        inside = np.clip(arc, self.arc[:, 0], self.arc[:, 2])
+        """Natural coordinate of an arc length (R, Q, G), clipped to the element."""
+        c, b, a = (k[:, None] for k in _quadratic(self.arc))
+        inside = np.clip(arc, self.arc[:, :1], self.arc[:, 2:])
         return np.clip(2 * (inside - c) / (b + np.sqrt(b * b + 4 * a * (inside - c))), -1.0, 1.0)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.reduction.sector import Family, SectorBody
+from gearfmu.reduction.sector import SectorBody
 
 _SHAPES = 4  # lowest shapes of each family kept for pictures
 
@@ -36,10 +36,10 @@ class Modes:
 
 @dataclass(frozen=True)
 class _FamilyModes:
-    """Sector modes of one family: ω² (k,), flank rows (2·R·A, k) and bore rows (6, k), complex for pairs."""
+    """Sector modes of one family: ω² (k,), flank rows (2·R·A, k) and bore rows (6, k), complex for pairs (weight 2)."""
 
-    family: Family
-    space_index: int
+    weight: int
+    complete: bool
     squared: np.ndarray
     flank_rows: np.ndarray
     bore_rows: np.ndarray
@@ -57,30 +57,22 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
     wanted = dict.fromkeys(families, share)
     found: dict[tuple[int, int], _FamilyModes] = {}
     while True:
-        open_families = [key for key in families if key not in found or _short(found[key], wanted[key])]
+        open_families = [key for key in families if key not in found or not found[key].complete and len(found[key].squared) < wanted[key]]
         for number, key in enumerate(open_families):
             if progress:
                 progress(f"modes, nodal diameter {key[1]}", number / len(open_families))
             found[key] = _solve(body, key, wanted[key])
         limit = _limit(found.values(), count)
-        again = [k for k in families if found[k].squared[-1] < limit and not _exhausted(found[k])]
+        again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
         if not again:
             return _assembled(body, found, count)
         for key in again:
             wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
 
 
-def _short(modes: _FamilyModes, wanted: int) -> bool:
-    return len(modes.squared) < wanted and not _exhausted(modes)
-
-
-def _exhausted(modes: _FamilyModes) -> bool:
-    return len(modes.squared) >= modes.family.harmonic.elastic
-
-
 def _limit(found, count: int) -> float:
     """ω² of the `count`-th real mode among those found."""
-    squared = np.sort(np.concatenate([np.repeat(m.squared, m.family.weight) for m in found]))
+    squared = np.sort(np.concatenate([np.repeat(m.squared, m.weight) for m in found]))
     return squared[min(count, len(squared)) - 1]
 
 
@@ -96,7 +88,7 @@ def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
     bore = body.teeth * (family.bore.conj().T @ shapes)
     space = body.spaces[key[0]]
     pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
-    return _FamilyModes(family, key[0], squared, flank, bore, pictures)
+    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures)
 
 
 def _gauge(rows: np.ndarray) -> np.ndarray:
@@ -118,7 +110,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
     shapes: dict[int, np.ndarray] = {}
     for squared, key, k in entries:
         modes = found[key]
-        pair = modes.family.weight == 2
+        pair = modes.weight == 2
         if len(columns["part"]) + (2 if pair else 1) > count:
             break
         if k < modes.shapes.shape[1]:

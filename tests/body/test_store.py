@@ -1,0 +1,194 @@
+"""The body file: round trip, refusals, and a kill while it is written."""
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from gearfmu.body import inspect_file, load_body, load_stage_bodies, reduce_stage
+from gearfmu.body.layout import ENTRIES
+from gearfmu.body.reduce import body_path
+from gearfmu.body.reduced import value_of
+from gearfmu.body.store import save_body
+from gearfmu.errors import BodyError
+from gearfmu.spec.gear import MeshSpec
+from gearfmu.spec.stage import StageSpec, load_stage
+
+TINY = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=2)
+
+
+def tiny_stage(folder: Path) -> StageSpec:
+    """The FZG pair on the coarsest mesh, its files in `folder`."""
+    spec = load_stage("fzg_c")
+    body = {"mesh": TINY, "modes": 31, "roll_points": 5, "width_functions": 3}
+    gears = tuple(gear.model_copy(update={"body": gear.body.model_copy(update=body)}) for gear in spec.gears)
+    return spec.model_copy(update={"gears": gears, "source": folder / "stage.toml"})
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stage")
+    spec = tiny_stage(folder)
+    return spec, reduce_stage(spec), folder
+
+
+def test_a_body_reads_back_as_it_was_written(made):
+    spec, bodies, _ = made
+    for index, body in enumerate(bodies):
+        again = load_body(body_path(spec, index))
+        for entry in ENTRIES:
+            assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
+        assert (again.name, again.input_hash, again.mesh, again.material) == (body.name, body.input_hash, body.mesh, body.material)
+
+
+def test_every_dataset_says_its_unit_and_meaning(made):
+    spec, _, _ = made
+    with h5py.File(body_path(spec, 0)) as file:
+        found = []
+        file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+        assert sorted(found) == sorted(entry.path for entry in ENTRIES)
+        assert all(file[name].attrs["meaning"] and "unit" in file[name].attrs for name in found)
+
+
+def test_a_stored_body_is_taken_when_its_hash_matches_and_made_again_when_not(made):
+    spec, bodies, folder = made
+    before = body_path(spec, 0).stat().st_mtime_ns
+    assert np.array_equal(reduce_stage(spec)[0].frequency, bodies[0].frequency)
+    assert body_path(spec, 0).stat().st_mtime_ns == before
+    assert [b.name for b in load_stage_bodies(spec)] == ["pinion", "wheel"]
+    softer = spec.gears[0].material.model_copy(update={"youngs_modulus": 103e9})
+    other = spec.model_copy(update={"gears": (spec.gears[0].model_copy(update={"material": softer}), spec.gears[1])})
+    with pytest.raises(BodyError, match="pinion.h5: stale.*gearfmu reduce"):
+        load_stage_bodies(other)
+    remade = reduce_stage(other, folder / "other")[0]
+    assert np.allclose(remade.frequency, bodies[0].frequency / np.sqrt(2), rtol=1e-7)
+    assert np.allclose(remade.static_ff, 2 * bodies[0].static_ff, rtol=0, atol=1e-9 * bodies[0].static_ff.max())
+
+
+def test_contact_ports_and_backlash_leave_the_body_alone(made):
+    spec, _, _ = made
+    pair = spec.pair.model_copy(update={"backlash": 3e-4})
+    contact = spec.contact.model_copy(update={"slices": 9})
+    assert len(load_stage_bodies(spec.model_copy(update={"pair": pair, "contact": contact}))) == 2
+
+
+def test_inspect_tells_what_the_file_holds(made):
+    spec, bodies, _ = made
+    report = inspect_file(body_path(spec, 1))
+    assert report["kind"] == "body"
+    assert report["facts"]["modes"] == len(bodies[1].frequency)
+    assert report["facts"]["mass_kg"] == pytest.approx(0.885, rel=2e-3)
+    assert {d["path"] for d in report["datasets"]} == {entry.path for entry in ENTRIES}
+
+
+def damaged(path: Path, change) -> Path:
+    copy = path.with_name("damaged.h5")
+    copy.write_bytes(path.read_bytes())
+    with h5py.File(copy, "r+") as file:
+        change(file)
+    return copy
+
+
+def _overwrite(name: str, index, value):
+    def change(file):
+        data = file[name][()]
+        data[index] = value
+        file[name][...] = data
+
+    return change
+
+
+def _drop(name: str):
+    return lambda file: file.__delitem__(name)
+
+
+def _attribute(name: str, value):
+    return lambda file: file.attrs.__setitem__(name, value)
+
+
+def _reshape(file):
+    data = file["modes/bore_rows"][()]
+    del file["modes/bore_rows"]
+    file["modes/bore_rows"] = data[:, :-1]
+
+
+DAMAGE = {
+    "modes/frequency holds a number that is not finite": _overwrite("modes/frequency", 3, np.nan),
+    "modes/frequency must be above 0 and ascending": _overwrite("modes/frequency", 3, 1.0),
+    "static/c_bb is missing": _drop("static/c_bb"),
+    "does not fit": _reshape,
+    "body format 99": _attribute("format_version", 99),
+    "not a gearfmu body": _attribute("format", "gearfmu-trace"),
+    "64 hex digits": _attribute("input_hash", "abc"),
+    "pair must follow": _overwrite("modes/part", slice(None), 1),
+    "flank/roll must ascend": _overwrite("flank/roll", 0, 1.0),
+    "names a point that is not there": _overwrite("display/quads", (0, 0), 10**6),
+    "damaged or no body file": _drop("modes"),
+}
+
+
+@pytest.mark.parametrize("message", [m for m in DAMAGE if m != "damaged or no body file"])
+def test_a_bad_file_is_refused_with_the_reason_and_the_remedy(made, message):
+    spec, _, _ = made
+    with pytest.raises(BodyError, match=message) as caught:
+        load_body(damaged(body_path(spec, 0), DAMAGE[message]))
+    assert "gearfmu reduce" in str(caught.value)
+    assert "damaged.h5" in str(caught.value)
+
+
+def test_missing_truncated_flipped_and_foreign_files_are_refused(made, tmp_path):
+    spec, _, _ = made
+    whole = body_path(spec, 0).read_bytes()
+    middle = len(whole) // 2
+    flipped = whole[:middle] + bytes(b ^ 255 for b in whole[middle : middle + 64]) + whole[middle + 64 :]
+    for name, content in {"cut.h5": whole[:middle], "text.h5": b"no hdf5", "flipped.h5": flipped}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(BodyError, match=name):
+            load_body(tmp_path / name)
+    with pytest.raises(BodyError, match="no such body file"):
+        load_body(tmp_path / "none.h5")
+
+
+def test_a_body_that_makes_no_sense_cannot_be_built(made):
+    _, bodies, _ = made
+    with pytest.raises(BodyError, match="damping_ratio must lie.*parity must be"):
+        replace(bodies[0], damping_ratio=bodies[0].damping_ratio - 1, parity=bodies[0].parity + 3)
+    with pytest.raises(BodyError, match="modes/frequency.*modes/part"):
+        replace(bodies[0], frequency=bodies[0].frequency.astype(int), part=bodies[0].part * 1.0)
+
+
+KILLED = """
+import sys, time
+import h5py
+from gearfmu.body import load_body
+from gearfmu.body.store import save_body
+
+create = h5py.Group.create_dataset
+def slow(self, name, *a, **k):
+    print("writing", flush=True)
+    time.sleep(0.05)
+    return create(self, name, *a, **k)
+h5py.Group.create_dataset = slow
+save_body(load_body(sys.argv[1]), sys.argv[1])
+"""
+
+
+def test_a_kill_while_writing_leaves_the_old_file(made, tmp_path):
+    _, bodies, _ = made
+    path = tmp_path / "pinion.h5"
+    save_body(bodies[0], path)
+    before = path.read_bytes()
+    writer = subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE)
+    assert writer.stdout.readline() == b"writing\n"
+    time.sleep(0.2)
+    writer.send_signal(signal.SIGKILL)
+    assert writer.wait() == -signal.SIGKILL
+    assert path.read_bytes() == before
+    assert load_body(path).input_hash == bodies[0].input_hash

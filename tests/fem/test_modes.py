@@ -1,0 +1,173 @@
+"""Eigenmodes against exact and published frequencies; convergence rates; one sector = the whole body."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from blocks import STEEL, box, grid_mesh, ring, ring_sector
+from scipy.optimize import brentq
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import hex20
+from gearfmu.fem.cyclic import Sector, sector_spaces
+from gearfmu.fem.free import FreeBody
+from gearfmu.fem.lanczos import lowest_modes
+
+REFERENCE = json.loads((Path(__file__).parents[1] / "reference" / "nafems_ring_test6.json").read_text())
+
+
+def free_body(nodes, elements, material=STEEL) -> FreeBody:
+    return FreeBody(*hex20.assemble(nodes, elements, material), nodes, elements)
+
+
+def frequencies(body, count: int) -> np.ndarray:
+    return np.sqrt(lowest_modes(body, count)[0]) / (2 * np.pi)
+
+
+def axial_eigenvalue(cells: int, length: float) -> float:
+    """ω² of the first axial mode of a free bar, found by its shape."""
+    nodes, elements = box((cells, 1, 1), (length, 0.3, 0.3))
+    body = free_body(nodes, elements, SimpleNamespace(youngs_modulus=4.0, poisson_ratio=0.0, density=1.0))
+    squared, shapes = lowest_modes(body, 12)
+    axial = np.zeros((len(nodes), 3))
+    axial[:, 0] = np.sin(np.pi * nodes[:, 0] / length)
+    return squared[np.abs(shapes.T @ body.mass(axial.ravel())).argmax()]
+
+
+def test_eigenvalues_of_a_bar_converge_with_the_fourth_power_of_the_element_size():
+    exact = 4.0 * (np.pi / 2.0) ** 2
+    cells = np.array([2, 3, 4, 6])
+    errors = np.array([axial_eigenvalue(n, 2.0) for n in cells]) / exact - 1
+    assert np.all(errors > 0)
+    slope = -np.polyfit(np.log(cells), np.log(errors), 1)[0]
+    assert 3.7 < slope < 4.3
+
+
+def timoshenko_free(length: float, side: float, material) -> float:
+    """First bending frequency (Hz) of a free square beam (Timoshenko; shear coefficient of Cowper 1966)."""
+    e, nu, rho = material.youngs_modulus, material.poisson_ratio, material.density
+    area, second = side**2, side**4 / 12
+    shear = 10 * (1 + nu) / (12 + 11 * nu) * e / (2 * (1 + nu)) * area
+
+    def residual(omega: float) -> float:
+        return _free_determinant(omega, length, SimpleNamespace(ei=e * second, ga=shear, ma=rho * area, mi=rho * second))
+
+    euler = (4.730040744862704 / length) ** 2 * np.sqrt(e * second / (rho * area))
+    return brentq(residual, 0.7 * euler, 1.0001 * euler) / (2 * np.pi)
+
+
+def _free_determinant(omega: float, length: float, beam) -> float:
+    """Determinant of the free–free conditions: state (w, ψ, M, Q) carried over the length by the matrix exponential."""
+    from scipy.linalg import expm
+
+    a = np.array(
+        [
+            [0, 1, 0, 1 / beam.ga],
+            [0, 0, 1 / beam.ei, 0],
+            [0, -beam.mi * omega**2, 0, -1],
+            [-beam.ma * omega**2, 0, 0, 0],
+        ]
+    )
+    return float(np.linalg.det(expm(a * length)[2:, :2]))
+
+
+@pytest.mark.parametrize(("length", "cells", "tolerance"), [(0.1, 10, 2e-3), (0.6, 24, 5e-4)])
+def test_free_beam_bends_as_timoshenko_says(length, cells, tolerance):
+    body = free_body(*box((cells, 2, 2), (length, 0.01, 0.01)))
+    first = frequencies(body, 2)
+    exact = timoshenko_free(length, 0.01, STEEL)
+    assert np.allclose(first, exact, rtol=tolerance)
+
+
+def test_slender_free_beam_reaches_the_euler_limit():
+    body = free_body(*box((24, 1, 1), (1.0, 0.005, 0.005)))
+    euler = 4.730040744862704**2 / (2 * np.pi) * np.sqrt(206e9 * 0.005**2 / 12 / 7850)
+    assert np.allclose(frequencies(body, 2), euler, rtol=1e-3)
+
+
+def nafems_ring(cells: int, sectors: int, across: int) -> Sector:
+    """One sector of the ring of round section: radius 1 m, diameter 0.1 m."""
+
+    def mapping(u: np.ndarray) -> np.ndarray:
+        x, y = 2 * u[:, 0] - 1, 2 * u[:, 2] - 1
+        radial = 1.0 + 0.05 * x * np.sqrt(1 - y**2 / 2)
+        phi = 2 * np.pi / sectors * (u[:, 1] - 0.5)
+        return np.stack([radial * np.cos(phi), radial * np.sin(phi), 0.05 * y * np.sqrt(1 - x**2 / 2)], axis=1)
+
+    p = REFERENCE["params"]
+    material = SimpleNamespace(youngs_modulus=p["E"], poisson_ratio=p["nu"], density=p["rho"])
+    nodes, elements = grid_mesh((across, cells, across), mapping)
+    phi, r = np.arctan2(nodes[:, 1], nodes[:, 0]), np.hypot(nodes[:, 0], nodes[:, 1])
+    order = np.lexsort((np.round(nodes[:, 2], 9), np.round(r, 9)))
+    minus, plus = (order[np.abs(phi[order] - s * np.pi / sectors) < 1e-9] for s in (-1, 1))
+    return Sector(nodes, elements, *hex20.assemble(nodes, elements, material), sectors, minus, plus)
+
+
+def test_nafems_ring_r0015_test_6():
+    """In-plane and out-of-plane modes ν = 2, 3, 4 of the free ring: own converged 3-D values to 1e-3."""
+    spaces = sector_spaces(nafems_ring(1, 96, 4))
+    found = [[frequencies(space.harmonic(nu), 1)[0] for nu in (2, 3, 4)] for space in spaces]
+    published = np.array(REFERENCE["own_3d"]).reshape(3, 2, 2)
+    assert np.allclose(found[0], published[:, 1, 0], rtol=1e-3)
+    assert np.allclose(found[1], published[:, 0, 0], rtol=1e-3)
+
+
+def test_one_sector_gives_the_modes_of_the_whole_ring():
+    teeth = 5
+    s = ring_sector((2, 2, 2), 0.02, 0.06, 0.02, teeth)
+    sector = Sector(s.nodes, s.elements, *hex20.assemble(s.nodes, s.elements, STEEL), teeth, s.cut_minus, s.cut_plus)
+    cyclic = []
+    for space in sector_spaces(sector):
+        for nu in range(teeth // 2 + 1):
+            cyclic += list(frequencies(space.harmonic(nu), 8)) * (1 if nu == 0 else 2)
+    whole = frequencies(free_body(*ring((2, 2 * teeth, 2), 0.02, 0.06, 0.02)), 30)
+    assert np.allclose(np.sort(cyclic)[:30], whole, rtol=1e-9)
+
+
+def test_a_sector_without_mid_width_mirror_is_one_space_with_the_same_modes():
+    s = ring_sector((1, 2, 3), 0.02, 0.06, 0.02, 6)
+    found = []
+    for shift in (0.0, 0.002):
+        nodes = s.nodes + shift * np.array([[0, 0, 1.0]])
+        sector = Sector(nodes, s.elements, *hex20.assemble(nodes, s.elements, STEEL), 6, s.cut_minus, s.cut_plus)
+        spaces = sector_spaces(sector)
+        assert [space.parity for space in spaces] == ([0] if shift else [1, -1])
+        found.append(np.sort(np.concatenate([frequencies(space.harmonic(2), 6) for space in spaces]))[:6])
+    assert np.allclose(found[0], found[1], rtol=1e-9)
+
+
+def test_cuts_that_do_not_match_are_refused():
+    s = ring_sector((1, 2, 1), 0.02, 0.06, 0.02, 6)
+    matrices = hex20.assemble(s.nodes, s.elements, STEEL)
+    with pytest.raises(MeshError, match="turn by 2π/6"):
+        sector_spaces(Sector(s.nodes, s.elements, *matrices, 6, s.cut_minus, s.cut_plus[::-1]))
+    with pytest.raises(MeshError, match="must match"):
+        sector_spaces(Sector(s.nodes, s.elements, *matrices, 6, s.cut_minus, s.cut_plus[1:]))
+
+
+def test_inertia_relief_is_a_projection_and_leaves_no_rigid_motion():
+    nodes, elements = ring((1, 8, 2), 0.02, 0.06, 0.02)
+    body = free_body(nodes, elements)
+    assert np.allclose(body.rigid.T @ body.mass(body.rigid), np.eye(6), atol=1e-12)
+    loads = np.random.default_rng(2).standard_normal((body.size, 4))
+    once = body.balance(loads)
+    assert np.allclose(body.balance(once), once, atol=1e-12)
+    assert np.abs(body.rigid.T @ once).max() < 1e-10
+    moved = body.flexibility(loads)
+    assert np.abs(body.rigid.T @ body.mass(moved)).max() < 1e-13 * np.abs(moved).max() * np.sqrt(body.size)
+    assert np.abs(body.flexibility(body.mass(body.rigid))).max() < 1e-9 * np.abs(moved).max()
+    assert np.allclose(loads.T @ moved, (loads.T @ moved).T, rtol=1e-9)
+    assert np.abs(body.stiffness @ moved - once).max() < 1e-8
+
+
+def test_all_modes_of_a_small_body_add_up_to_its_flexibility():
+    nodes, elements = box((2, 1, 1), (0.2, 0.1, 0.1))
+    body = free_body(nodes, elements)
+    squared, shapes = lowest_modes(body, 10**6)
+    assert len(squared) == body.elastic
+    loads = np.random.default_rng(3).standard_normal((body.size, 3))
+    static = body.flexibility(loads)
+    assert np.allclose(shapes @ ((shapes.T @ loads) / squared[:, None]), static, rtol=0, atol=1e-9 * np.abs(static).max())
