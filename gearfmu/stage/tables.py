@@ -22,6 +22,19 @@ def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS
     return BarycentricInterpolator(roll, np.eye(roll.size))(grid)
 
 
+def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
+    """`values` with `axis` (R,) replaced by (rolls,): Σ_r weights[:, r]·values[r], summed in the order of r.
+
+    Element by element on purpose: matrix products may sum in another order from call to call, and equal inputs must give an equal blob.
+    """
+    moved = np.moveaxis(values, axis, 0)
+    shape = (-1,) + (1,) * (moved.ndim - 1)
+    total = np.zeros((weights.shape[0], *moved.shape[1:]))
+    for weight, value in zip(weights.T, moved, strict=True):
+        total += weight.reshape(shape) * value
+    return np.moveaxis(total, 0, axis)
+
+
 def symmetric_functions(count: int) -> np.ndarray:
     """Degrees of the Legendre functions that a load symmetric about mid-width can excite, at most MOST_FUNCTIONS.
 
@@ -43,11 +56,11 @@ def body_sections(index: int, body: Any, s_form: float, s_tip: float, degrees: n
     """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/gk_model.c)."""
     to_grid = resampling(body.roll, s_form, s_tip)
     modes = excited_modes(body, degrees)
-    rows = np.einsum("ir,fran->fian", to_grid, body.flank_rows[:, :, degrees][..., modes])
+    rows = blend(to_grid, body.flank_rows[:, :, degrees][..., modes], 1)
     static = body.static_ff[..., degrees, :][..., degrees]
     static = np.stack([static[:, :, offset % body.teeth] for offset in OFFSETS], axis=2)
-    static = np.einsum("ir,fgmrsab,js->fgmijab", to_grid, static, to_grid, optimize=True)
-    flank_bore = np.einsum("ir,frak->fiak", to_grid, body.static_fb[:, :, degrees][..., BORE])
+    static = blend(to_grid, blend(to_grid, static, 3), 4)
+    flank_bore = blend(to_grid, body.static_fb[:, :, degrees][..., BORE], 1)
     return {
         f"size{index}": np.array([modes.size, ROLLS, degrees.size], np.int32),
         f"omega{index}": 2 * np.pi * body.frequency[modes],

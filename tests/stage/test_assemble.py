@@ -1,0 +1,40 @@
+"""The model blob: equal inputs give equal bytes, and the tables hold what the bodies say."""
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearfmu.body import load_stage_bodies
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import assemble
+from gearfmu.stage.blob import read_blob
+from gearfmu.stage.tables import ROLLS, blend, resampling
+
+
+@pytest.fixture(scope="module")
+def spec():
+    return load_stage("fzg_c")
+
+
+def test_equal_inputs_give_equal_bytes(spec):
+    hashes = {assemble(spec, load_stage_bodies(spec)).hash for _ in range(3)}
+    assert len(hashes) == 1
+
+
+def test_static_table_is_the_body_s_polynomial_on_an_even_grid(spec):
+    body = load_stage_bodies(spec)[0]
+    sections = read_blob(assemble(spec, [body, load_stage_bodies(spec)[1]]).blob)
+    R, A = ROLLS, sections["degrees"].size
+    table = sections["c_ff0"].reshape(2, 2, 7, R, R, A, A)
+    gear = sections["gear0"]
+    to_grid = resampling(body.roll, gear[2], gear[3])
+    expected = to_grid @ body.static_ff[0, 0, 1, :, :, 0, 0] @ to_grid.T
+    assert np.allclose(table[0, 0, 4, :, :, 0, 0], expected, rtol=1e-12, atol=1e-22)
+    block = table[0, 0, 3, :, :, 0, 0]
+    assert np.linalg.eigvalsh(0.5 * (block + block.T)).min() > -1e-14 * np.abs(block).max()
+
+
+def test_resampling_is_exact_for_polynomials():
+    roll = 0.5 + 0.5 * np.cos(np.pi * (np.arange(9)[::-1] + 0.5) / 9)
+    weights = resampling(roll, 0.0, 1.0, 33)
+    assert np.allclose(blend(weights, roll**8, 0), np.linspace(0, 1, 33) ** 8, atol=1e-13)
