@@ -14,7 +14,7 @@ from gearfmu.kernel import Kernel, Variable
 from gearfmu.spec.gear import GearSpec
 from gearfmu.spec.stage import PortSpec, StageSpec
 from gearfmu.stage.blob import blob_hash, write_blob
-from gearfmu.stage.tables import body_sections, symmetric_functions
+from gearfmu.stage.tables import ROLLS, body_sections, resampling, symmetric_functions
 
 MODEL_VERSION = 1
 PAIR, FLAT = 0, 1
@@ -22,6 +22,7 @@ PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 H_MAX = 7.5e-6
 FIXED_K = 1e7
 SHARPEST_EDGE = 1e-6
+BEARING_K = 16  # place of the bearing stiffness among the numbers of a gear
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class StageModel:
         return list(self.kernel().variables.values())
 
 
-def assemble(spec: StageSpec, bodies: Sequence[Any]) -> StageModel:
-    """The model of `spec` with the reduced bodies of its gears, pinion first.
+def assemble(spec: StageSpec, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
+    """The model of `spec` with the reduced bodies of its gears, pinion first. rolls: of the even grid that carries rows and compliances along a flank.
 
     ModelError when a body does not belong to its gear: other numbers of teeth, base radius, face width or roll range.
     """
@@ -73,7 +74,7 @@ def assemble(spec: StageSpec, bodies: Sequence[Any]) -> StageModel:
         phase = geometry.wheel_phase if i else 0.0
         sections[f"gear{i}"] = _gear_numbers(gear, shape, body, phase)
         sections[f"port{i}"] = _port_numbers(spec.ports[gear.name])
-        sections |= body_sections(i, body, shape.s_form, shape.s_tip, degrees)
+        sections |= body_sections(i, body, resampling(body.roll, shape.s_form, shape.s_tip, rolls), degrees)
     return StageModel(spec, write_blob(sections), tuple(body.input_hash for body in bodies))
 
 

@@ -57,9 +57,8 @@ def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
     return np.flatnonzero(seen)
 
 
-def body_sections(index: int, body: Any, s_form: float, s_tip: float, degrees: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/gk_model.c)."""
-    to_grid = resampling(body.roll, s_form, s_tip)
+def body_sections(index: int, body: Any, to_grid: np.ndarray, degrees: np.ndarray) -> Mapping[str, np.ndarray]:
+    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/gk_model.c); to_grid: of `resampling`."""
     modes = excited_modes(body, degrees)
     rows = blend(to_grid, body.flank_rows[:, :, degrees][..., modes], 1)
     static = body.static_ff[..., degrees, :][..., degrees]
@@ -67,7 +66,7 @@ def body_sections(index: int, body: Any, s_form: float, s_tip: float, degrees: n
     static = blend(to_grid, blend(to_grid, static, 3), 4)
     flank_bore = blend(to_grid, body.static_fb[:, :, degrees][..., BORE], 1)
     return {
-        f"size{index}": np.array([modes.size, ROLLS, degrees.size], np.int32),
+        f"size{index}": np.array([modes.size, len(to_grid), degrees.size], np.int32),
         f"omega{index}": 2 * np.pi * body.frequency[modes],
         f"zeta{index}": body.damping_ratio[modes],
         f"diameter{index}": body.nodal_diameter[modes].astype(np.int32),

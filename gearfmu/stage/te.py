@@ -3,15 +3,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearfmu.kernel import Kernel, TeState
-from gearfmu.stage.model import StageModel
+from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.model import BEARING_K, StageModel
 
 TANGENT = 1e-4
 SHARES = 4
+RIGID = 1e13  # N/m: 1 nm at 10 kN
 
 
 @dataclass(frozen=True)
@@ -31,13 +33,10 @@ class TeResult:
 def loaded_te(model: StageModel, torques: Sequence[float], positions: int = 41, rigid_bearings: bool = False, **parameters: float) -> TeResult:
     """te = r_b1 φ_1 + r_b2 φ_2 of the bore nodes at positions i/N of one pitch (no end point), wheel held at −position · 2π/z_2.
 
-    torques: N·m on the pinion; positive drives. rigid_bearings: the axes are held. parameters: of the kernel, e.g. slices=10.
+    torques: N·m on the pinion; positive drives. rigid_bearings: the bore nodes are held on their axes. parameters: of the kernel, e.g. slices=10.
     SimulationError(no_equilibrium) where there is none.
     """
-    chosen = {"level": 0.0, **parameters}
-    if rigid_bearings:
-        chosen["effect.bearings"] = 0.0
-    kernel = model.kernel(**chosen)
+    kernel = (on_rigid_bearings(model) if rigid_bearings else model).kernel(**{"level": 0.0, **parameters})
     kernel.prepare()
     pitch = 2 * math.pi / model.spec.gears[1].teeth
     base_radius = model.spec.pair.normal_module * model.spec.gears[0].teeth / 2 * math.cos(model.spec.pair.pressure_angle)
@@ -50,6 +49,19 @@ def loaded_te(model: StageModel, torques: Sequence[float], positions: int = 41, 
             stiffness[i, j] = _tangent(kernel, -part * pitch, torque) / base_radius
             shares[i, j] = _shares(state)
     return TeResult(np.asarray(torques, float), position, te, stiffness, shares)
+
+
+def on_rigid_bearings(model: StageModel) -> StageModel:
+    """The same stage with its bores held on their axes.
+
+    Not `effect.bearings` off: that holds the mean-axis frames, and their reaction is spread over the mass of the gear instead of acting on its bore.
+    """
+    sections = read_blob(model.blob)
+    for name in ("gear0", "gear1"):
+        numbers = np.array(sections[name])
+        numbers[BEARING_K] = RIGID
+        sections[name] = numbers
+    return replace(model, blob=write_blob(sections))
 
 
 def _tangent(kernel: Kernel, phi: float, torque: float) -> float:
