@@ -27,6 +27,7 @@ from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import Statics, static_tables
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.gear import GearSpec, MeshSpec
+from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import StageSpec
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
@@ -44,7 +45,7 @@ def expected_hash(spec: StageSpec, gear_index: int) -> str:
 
 def body_path(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] | None = None) -> Path:
     """Where the body of a gear lies: `<folder>/<gear name>.h5`, the folder of the stage file when None."""
-    home = Path(folder) if folder is not None else Path(spec.source).parent
+    home = Path(folder) if folder is not None else model_folder(spec)
     return home / f"{spec.gears[gear_index].name}.h5"
 
 
