@@ -1,0 +1,41 @@
+"""The shipped FZG stages, assembled once."""
+from __future__ import annotations
+
+import pytest
+
+from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.geometry import PairGeometry
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage import StageModel, assemble
+
+
+@pytest.fixture(scope="session")
+def spec() -> StageSpec:
+    return load_stage("fzg_c")
+
+
+@pytest.fixture(scope="session")
+def relief_spec() -> StageSpec:
+    return load_stage("fzg_c/stage_relief")
+
+
+@pytest.fixture(scope="session")
+def bodies(spec: StageSpec) -> list[ReducedBody]:
+    return load_stage_bodies(spec)
+
+
+@pytest.fixture(scope="session")
+def pair(spec: StageSpec) -> PairGeometry:
+    return PairGeometry.of(spec)
+
+
+@pytest.fixture(scope="session")
+def plain(spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+    """No profile modification."""
+    return assemble(spec, bodies)
+
+
+@pytest.fixture(scope="session")
+def relieved(relief_spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+    """Tip relief on both gears."""
+    return assemble(relief_spec, bodies)

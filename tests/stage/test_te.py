@@ -1,0 +1,172 @@
+"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two roads to one number, convergence, smoothness."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gearfmu.body import ReducedBody
+from gearfmu.geometry import PairGeometry
+from gearfmu.kernel import Kernel
+from gearfmu.spec.stage import StageSpec
+from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.te import on_rigid_bearings
+
+LOAD = 302.0  # N·m on the pinion
+PITCH = 2 * math.pi / 24  # rad, of the wheel
+POSITIONS = np.arange(16) / 16
+
+
+def ready(model: StageModel, **parameters: float) -> Kernel:
+    kernel = model.kernel(**{"level": 0.0, **parameters})
+    kernel.prepare()
+    return kernel
+
+
+def te(kernel: Kernel, torque: float, positions: np.ndarray = POSITIONS) -> np.ndarray:
+    return np.array([kernel.transmission(-p * PITCH, torque).te for p in positions])
+
+
+def above(values: np.ndarray, harmonic: int) -> float:
+    """rms of what lies above a mesh harmonic; values over one pitch."""
+    lines = np.fft.rfft(values)
+    lines[: harmonic + 1] = 0
+    return float(np.sqrt(np.mean(np.fft.irfft(lines, values.size) ** 2)))
+
+
+def test_vanishes_with_the_load_and_grows_with_it(plain: StageModel) -> None:
+    """The unmodified rigid pair just touches at zero: what is left is compliance × force, positive under load."""
+    kernel = ready(plain)
+    torques = [1e-6, 1e-3, 1.0, 10.0, 80.0, LOAD, 600.0]
+    values = np.array([te(kernel, torque) for torque in torques])
+    assert np.all(values > 0) and np.all(np.diff(values, axis=0) > 0)
+    assert values[0].max() < 1e-12
+    assert np.allclose(values[1] / values[0], 1e3, rtol=1e-2)  # the local law is linear at vanishing force
+
+
+def test_negative_torque_is_carried_by_the_coast_flanks_across_the_backlash(plain: StageModel, pair: PairGeometry) -> None:
+    values = te(ready(plain), -1e-3)
+    assert np.allclose(values, -pair.normal_backlash, atol=1e-8)
+
+
+def test_forces_hold_the_torque_and_shares_add_up(plain: StageModel, pair: PairGeometry) -> None:
+    kernel = ready(plain, **{"effect.tip_contact": 0.0})
+    for position in POSITIONS:
+        forces = kernel.transmission(-position * PITCH, LOAD).forces
+        assert sum(map(sum, forces.values())) * pair.gears[0].r_b == pytest.approx(LOAD, rel=1e-9)
+        assert all(force >= 0 for row in forces.values() for force in row)
+    shares = loaded_te(plain, [80.0, LOAD], 16).shares
+    assert np.allclose(shares.sum(axis=2), 1.0, atol=1e-12)
+
+
+def test_slices_symmetric_about_mid_width_carry_the_same(plain: StageModel) -> None:
+    for slices in (2, 5, 10):
+        for forces in ready(plain, slices=slices).transmission(-0.3 * PITCH, LOAD).forces.values():
+            assert np.allclose(forces, forces[::-1], rtol=1e-6, atol=1e-6)
+
+
+def test_repeats_after_one_pitch_and_after_a_turn(plain: StageModel) -> None:
+    kernel = ready(plain)
+    once = te(kernel, LOAD)
+    for pitches in (1, -1, 24, 240):
+        assert np.allclose(te(kernel, LOAD, POSITIONS + pitches), once, rtol=1e-9, atol=0)
+
+
+def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair: PairGeometry) -> None:
+    result = loaded_te(plain, [LOAD * 0.99, LOAD, LOAD * 1.01], 16)
+    slope = 0.02 * LOAD / pair.gears[0].r_b / (result.te[2] - result.te[0])
+    same_pairs = np.all((result.shares[0] > 0) == (result.shares[2] > 0), axis=1)
+    assert same_pairs.sum() > 8
+    assert np.allclose(result.stiffness[1][same_pairs], slope[same_pairs], rtol=1e-3)
+
+
+def test_bearings_add_their_compliance(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:
+    """Isotropic bearings: te grows by F(1/k₁ + 1/k₂); where the moved axes change which pairs carry, by up to a few percent more."""
+    expected = LOAD / pair.gears[0].r_b * sum(1 / gear.bearing.stiffness for gear in spec.gears)
+    soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid).te[0] for rigid in (False, True))
+    more = (soft - held) / expected
+    assert np.allclose(np.median(more), 1.0, atol=2e-3) and np.allclose(more, 1.0, atol=6e-2)
+    assert np.mean(np.abs(more - 1) < 0.02) > 0.8
+
+
+def test_level_does_not_change_the_static_te(plain: StageModel) -> None:
+    """What is dynamic at level full is residual at level rigid: the same static compliance."""
+    rigid = te(ready(plain, level=0.0), LOAD)
+    for level in (1.0, 2.0, 3.0):
+        assert np.allclose(te(ready(plain, level=level), LOAD), rigid, rtol=1e-6, atol=0)
+
+
+def test_converges_with_slices(plain: StageModel) -> None:
+    finest = te(ready(plain, slices=10), LOAD)
+    error = [np.abs(te(ready(plain, slices=slices), LOAD) / finest - 1).max() for slices in (1, 3, 5)]
+    assert error[0] < 1e-3 and error[2] < 1e-4
+
+
+def test_direction_of_approach_does_not_matter(relieved: StageModel) -> None:
+    """Equilibrium is one: continued forwards and backwards through the pitch, loading and unloading, as from scratch."""
+    kernel, fresh = ready(relieved), te(ready(relieved), LOAD)
+    kernel.transmission(0.0, 600.0)
+    forwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS]
+    kernel.transmission(0.0, 1.0)
+    backwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS[::-1]][::-1]
+    assert np.allclose(forwards, fresh, rtol=0, atol=1e-10) and np.allclose(backwards, fresh, rtol=0, atol=1e-10)
+
+
+def test_tip_relief_unloads_the_ends_of_contact(plain: StageModel, relieved: StageModel) -> None:
+    before, after = (loaded_te(model, [LOAD], 64) for model in (plain, relieved))
+    assert np.all(after.te > before.te - 1e-9) and np.all(after.te < before.te + 15e-6)
+    assert np.ptp(after.te) < np.ptp(before.te)
+    assert ready(relieved, **{"effect.tip_relief": 0.0}).transmission(0.0, LOAD).te == before.te[0, 0]
+
+
+@pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
+def test_smooth_over_the_pitch(name: str, torque: float, spec: StageSpec, relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """No filter anywhere: with tip relief at 80 N·m little is left above the 12th mesh harmonic; without relief the tip corners have
+    real harmonics, and the grid of rolls must not add to them."""
+    chosen = {"relieved": relief_spec, "plain": spec}[name]
+    grids = [assemble(chosen, bodies), assemble(chosen, bodies, rolls=64)]
+    once, twice = (te(ready(model), torque, np.arange(1024) / 1024) for model in grids)
+    print(f"{name} {torque:g} N·m: above 12th harmonic {1e6 * above(once, 12):.4f} µm rms, grid {1e6 * above(once - twice, 12):.4f} µm rms")
+    assert above(once - twice, 12) < 0.02e-6 and np.std(once - twice) < 0.05e-6
+    if name == "relieved":
+        assert above(once, 12) < 0.05e-6
+
+
+def theoretical_stiffness(spec: StageSpec) -> float:
+    """c'th of ISO 6336-1, eqs. for q′ (spur, solid), N/m²: 15.78 N/(mm µm) for FZG type C."""
+    (z1, x1), (z2, x2) = ((gear.teeth, gear.profile_shift) for gear in spec.gears)
+    flexibility = (0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2 - 0.24188 * x2 / z2
+                   + 0.00529 * x1**2 + 0.00182 * x2**2)
+    return 1e9 / flexibility
+
+
+def basic_rack_factor(spec: StageSpec) -> float:
+    """C_B of ISO 6336-1 for a dedendum other than 1.2 m: 0.975 for 1.25 m."""
+    return 1 + 0.5 * (1.2 - np.mean([gear.rack.dedendum for gear in spec.gears]))
+
+
+def disc_torsion(spec: StageSpec, pair: PairGeometry) -> float:
+    """Twist of plane discs between bore and root circle as displacement along the line of action per force and width, m²/N (exact, plane shear)."""
+    total = 0.0
+    for gear, shape in zip(spec.gears, pair.gears, strict=True):
+        shear = gear.material.youngs_modulus / (2 * (1 + gear.material.poisson_ratio))
+        total += shape.r_b**2 / (4 * math.pi * shear) * ((gear.bore_diameter / 2) ** -2 - shape.r_f**-2)
+    return total
+
+
+def test_stiffness_of_one_tooth_pair_at_the_pitch_point(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:
+    """Secant of one pair at 300 N/mm, bodies included, against ISO 6336 c'th with the factor of the rack, in series with the torsion of the
+    discs, which c'th (teeth on half planes) does not contain."""
+    width = spec.gears[0].face_width
+    force = 300e3 * width
+    kernel = ready(on_rigid_bearings(plain), **{"effect.tip_contact": 0.0})
+    ratio = pair.gears[0].r_b / pair.gears[1].r_b
+    turn = pair.path["C"] / pair.gears[0].r_b - pair.gears[0].psi_b - pair.alpha_wt  # of the pinion, to bring tooth 0 to the pitch point
+    state = kernel.transmission(-ratio * turn, force * pair.gears[0].r_b)
+    assert [tooth for tooth, forces in state.forces.items() if sum(forces) > 0] == [(0, 0)]
+    secant = force / width / state.te
+    expected = 1 / (1 / (theoretical_stiffness(spec) * basic_rack_factor(spec)) + disc_torsion(spec, pair))
+    print(f"c' = {1e-9 * secant:.2f} N/(mm µm); ISO 6336 c'th {1e-9 * theoretical_stiffness(spec):.2f}, with rack and discs {1e-9 * expected:.2f}")
+    assert theoretical_stiffness(spec) == pytest.approx(15.78e9, rel=1e-3)
+    assert secant == pytest.approx(expected, rel=0.10)
