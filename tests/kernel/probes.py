@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import shlex
 import shutil
 import subprocess
 import sys
@@ -51,7 +52,15 @@ def build(folder: Path, command: Sequence[str] = ("cc",), flags: Sequence[str] =
     """The whole kernel into `folder` with this compiler, the project's flags and then `flags`.
 
     libm is linked: without optimisation a compiler calls sqrt there, which is exact."""
-    return build_library(out=folder / "kernel.so", compiler=(*command, "-Wl,--no-as-needed", "-lm", *flags), **variant)
+    compiler = command[0] if len(command) == 1 else _one_word(folder / "cc", command)
+    return build_library(out=folder / "kernel.so", compiler=(compiler, "-Wl,--no-as-needed", "-lm", *flags), **variant)
+
+
+def _one_word(script: Path, command: Sequence[str]) -> str:
+    """A shell script that runs a command of several words."""
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(command)} "$@"\n')
+    script.chmod(0o755)
+    return str(script)
 
 
 class Probes:
