@@ -4,20 +4,25 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from gearfmu.errors import SimulationError
+from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.trace import Channel, Trace
+
+WINDING_POSITIONS = 16
 
 Inputs = Callable[[float], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
 class Steady:
-    """Inputs of a pair at constant speed and load: both shafts' outer ends turn at constant speed, wound up by the torque.
+    """Inputs of a pair at constant speed and load: both shafts' outer ends turn at constant speed, wound up so that shafts and mesh carry the
+    torque on average: τ/k on either shaft and the mean loaded transmission error between them.
 
     speed: of the pinion, rad/s; torque: on the pinion, N·m. For spring ports without a chain.
     """
@@ -26,13 +31,23 @@ class Steady:
     speed: float
     torque: float
 
+    @cached_property
+    def winding(self) -> float:
+        """Angle of the pinion (rad) that the mesh takes up under the torque, mean over a pitch."""
+        kernel = self.model.kernel(level=0.0)
+        kernel.prepare()
+        pitch = 2 * np.pi / self.model.spec.gears[1].teeth
+        mean = np.mean([kernel.transmission(-pitch * i / WINDING_POSITIONS, self.torque).te for i in range(WINDING_POSITIONS)])
+        return float(mean / PairGeometry.of(self.model.spec).gears[0].r_b)
+
     def __call__(self, time: float) -> Mapping[str, float]:
         spec = self.model.spec
         values = {}
         for gear, sign in zip(spec.gears, (1, -1), strict=True):
             ratio = spec.gears[0].teeth / gear.teeth
             w = sign * self.speed * ratio
-            values[f"{gear.name}.phi"] = self.torque / ratio / spec.ports[gear.name].k + w * time
+            wound = self.torque / ratio / spec.ports[gear.name].k + (self.winding if sign > 0 else 0.0)
+            values[f"{gear.name}.phi"] = wound + w * time
             values[f"{gear.name}.w"] = w
         return values
 
