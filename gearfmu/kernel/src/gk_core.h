@@ -22,7 +22,7 @@ enum {
     MAX_PAIRS = 8,    /* tooth pairs looked at in one step, both flanks */
     MAX_SLICES = 10,
     MAX_FUNCTIONS = 6,
-    MAX_MODES = 8000,
+    MAX_MODES = 6000, /* MAX_FUNCTIONS rows of so many fit the scratch matrices */
     OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual table */
     MAX_CONTACTS = MAX_PAIRS * MAX_SLICES,
     CACHE = 4         /* coefficient sets kept */
@@ -37,7 +37,7 @@ enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_C
 /* rigid coordinates */
 enum { XA, YA, PHIA, XB, YB, PHIB, INERTIA_0, INERTIA_1, DISC_0, DISC_1, RIGID };
 enum { BORE_X, BORE_Y, BORE_RZ, BORE_ROWS };
-enum { MAX_ROWS = MAX_CONTACTS + LINKS, MAX_BASIS = MAX_PAIRS * MAX_FUNCTIONS + BORE_ROWS };
+enum { MAX_ROWS = MAX_CONTACTS + LINKS, MAX_BASIS = MAX_CONTACTS + BORE_ROWS };
 
 enum {
 #define GK_VAR(S, ID, ...) V_##S##_##ID,
@@ -89,13 +89,13 @@ typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | 
     int n, pairs, count;
     double *omega, *zeta; /* (n) */
     gk_real *omega2;
-    gk_real *rows;        /* (2 flanks, rolls, functions, n) tooth 0 */
+    gk_real *rows;        /* (2 flanks, rolls, strips, n) tooth 0 */
     gk_real *bore;        /* (3, n) */
     gk_real *cosine, *sine; /* (z, pairs) */
-    gk_real *c_ff;        /* (2, 2, OFFSETS, rolls, rolls, block) residual */
-    double *c_fb;         /* (2, rolls, functions, 3) */
+    gk_real *c_ff;        /* (2, 2, OFFSETS, rolls, rolls, block) residual between strips */
+    double *c_fb;         /* (2, rolls, strips, 3) */
     double c_bb[9];
-    int block; /* functions² padded to 4 */
+    int block; /* strips² padded to 4 */
 } gk_modal;
 
 typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
@@ -123,11 +123,10 @@ struct gk_setup {
     gk_level level;
     gk_integrator integrator;
     gk_effects on;
-    int slices, functions;
+    int slices;
     int strips;                  /* contact rows of a place: slices, or half of them where both halves of the face width do the same */
     double h, gamma, allowance, damping, width; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal; width: common face width */
     double strip_width[MAX_SLICES], strip_term;
-    double strip_row[2][MAX_SLICES][MAX_FUNCTIONS]; /* strip ← width functions, per gear */
     double inverse_mass[RIGID];
     int link[LINKS];             /* live bilateral rows */
     int given_torque[2];         /* the port's row carries a given torque */
@@ -194,6 +193,7 @@ typedef struct gk_system { /* unknown forces of one step: contacts, then links *
     gk_row_kind kind[MAX_ROWS];
     int link_of[MAX_ROWS];            /* −1 for contacts */
     int place_of[MAX_CONTACTS];
+    int bore[2][BORE_ROWS];           /* rows that pull at the bores, −1: none */
     double g[MAX_ROWS], g0[MAX_ROWS], force0[MAX_ROWS];
     double force[MAX_ROWS], eta[MAX_ROWS], z[MAX_ROWS];
     double damping[MAX_ROWS];         /* 2c/h of the row's dashpot */
@@ -224,11 +224,11 @@ struct gk_work {
     const gk_real *y[2];                      /* displacement that the rows read: qp, reading, or zero at rest */
     gk_real *stage[2][7], *trial[2];          /* rk45: derivatives (v, a) and trial state (q, v) */
     double stage_rigid[7][2 * RIGID], trial_rigid[2 * RIGID];
-    gk_real *basis[2];                        /* (MAX_BASIS, n): rows of places × functions, then bore rows in inertial axes */
+    gk_real *basis[2];                        /* (MAX_BASIS, n): rows of the contacts, then bore rows in inertial axes */
     double frame[RIGID], speed[RIGID];        /* predicted */
     double moved[RIGID];
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
-    double gram_d[2][MAX_BASIS * MAX_BASIS], gram_c[2][MAX_BASIS * MAX_BASIS], gram_k[2][MAX_BASIS * MAX_BASIS], read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
+    double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
     double matrix[5 * MAX_ROWS * MAX_ROWS];       /* D, C′, K, J and the gathered C″ */
@@ -246,8 +246,7 @@ int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *fr
 void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work);
 /* gk_system.c */
 void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work);
-void gk_system_rates(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_real *const modal_speed[2], const double *speed, double *rate);
-int gk_system_basis(const gk_model *model, const gk_setup *setup, const gk_work *work, int row, int g, int *first, const double **c);
+void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const modal_speed[2], const double *speed, double *rate);
 /* gk_law.c */
 void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);
 double gk_law_approach(const gk_local *law, double force, double *slope);
@@ -266,7 +265,7 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);
 void gk_step_remember(const gk_setup *setup, gk_data *data);
-void gk_step_scatter(const gk_model *model, const gk_setup *setup, int g, const double *x, gk_real *out);
+void gk_step_scatter(const gk_setup *setup, int g, const double *x, gk_real *out);
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
 /* gk_static.c */
 typedef struct gk_boundary { gk_port_kind kind; double torque, phi, k; } gk_boundary;

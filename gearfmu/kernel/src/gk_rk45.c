@@ -37,7 +37,7 @@ static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data 
     for (int r = 0; r < s->n; r++)
         if (s->kind[r] == ROW_SPRING) s->clip[r] = 2;
     gk_solve_plain(s);
-    gk_system_rates(model, setup, work, speed, work->speed, rate);
+    gk_system_rates(setup, work, speed, work->speed, rate);
     for (int r = 0; r < s->n; r++) { /* dashpots parallel to the massless path; contacts never pull */
         if (s->kind[r] == ROW_TORQUE || s->kind[r] == ROW_CLUTCH) continue;
         const int contact = s->kind[r] == ROW_CONTACT;
@@ -56,7 +56,7 @@ static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data 
     for (int g = 0; g < 2; g++) {
         const gk_modal *m = &setup->modal[g];
         gk_real *v = work->stage[g][i], *a = v + m->n;
-        if (m->n) gk_step_scatter(model, setup, g, s->z, work->force[g]);
+        if (m->n) gk_step_scatter(setup, g, s->z, work->force[g]);
         for (int j = 0; j < m->n; j++) {
             const gk_real zeta = setup->on.modal_damping ? (gk_real)(2.0 * m->zeta[j] * m->omega[j]) : 0;
             v[j] = speed[g][j];

@@ -5,12 +5,12 @@
 static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, gk_real *out)
 {
     const gk_modal *modal = &setup->modal[g];
-    const int n = modal->n, P = modal->pairs, functions = setup->functions;
-    const gk_real *table = modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * functions * n;
+    const int n = modal->n, P = modal->pairs, strips = setup->strips;
+    const gk_real *table = modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * strips * n;
     const gk_real w0 = (gk_real)p->weight[g][0], w1 = (gk_real)p->weight[g][1], w2 = (gk_real)p->weight[g][2], w3 = (gk_real)p->weight[g][3];
     const gk_real *c = modal->cosine + (size_t)p->tooth[g] * P, *s = modal->sine + (size_t)p->tooth[g] * P;
-    const size_t next = (size_t)functions * n;
-    for (int a = 0; a < functions; a++, table += n, out += n) {
+    const size_t next = (size_t)strips * n;
+    for (int strip = 0; strip < strips; strip++, table += n, out += n) {
         const gk_real *t0 = table, *t1 = t0 + next, *t2 = t1 + next, *t3 = t2 + next;
         for (int k = 0; k < P; k++) {
             gk_real first = (w0 * t0[k] + w1 * t1[k]) + (w2 * t2[k] + w3 * t3[k]);
@@ -34,13 +34,13 @@ static void bore_rows(const gk_modal *modal, double attitude, gk_real *out)
     }
 }
 
-/* fills work->basis of both gears for the places found: places × functions rows, then the three bore rows in inertial axes */
+/* fills work->basis of both gears for the places found: a row a strip and place, then the three bore rows in inertial axes */
 void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work)
 {
     for (int g = 0; g < 2; g++) {
         const gk_modal *modal = &setup->modal[g];
         if (!modal->n) continue;
-        size_t row = (size_t)setup->functions * modal->n;
+        size_t row = (size_t)setup->strips * modal->n;
         for (int p = 0; p < work->places; p++) place_rows(setup, &model->gear[g], g, &work->place[p], work->basis[g] + p * row);
         bore_rows(modal, frame[g ? PHIB : PHIA] + model->gear[g].phase, work->basis[g] + work->places * row);
     }

@@ -26,11 +26,11 @@ static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g,
 {
     const gk_gear *gear = &model->gear[g];
     gk_modal *m = &setup->modal[g];
-    size_t n, R = (size_t)gear->rolls, A = (size_t)gear->functions;
+    size_t n, R = (size_t)gear->rolls, A = (size_t)setup->strips;
     m->count = modes;
     m->pairs = padded(lanes_of(gear, modes));
     m->n = 2 * m->pairs;
-    m->block = (gear->functions * gear->functions + 3) / 4 * 4;
+    m->block = (setup->strips * setup->strips + 3) / 4 * 4;
     n = (size_t)m->n;
     m->omega = take(b, n * sizeof(double));
     m->zeta = take(b, n * sizeof(double));
@@ -71,7 +71,7 @@ static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const 
         work->reading[g] = take(&b, n * sizeof(gk_real));
         for (int i = 0; i < 7; i++) work->stage[g][i] = take(&b, 2 * n * sizeof(gk_real));
         work->trial[g] = take(&b, 2 * n * sizeof(gk_real));
-        work->basis[g] = take(&b, (size_t)(MAX_PAIRS * model->gear[g].functions + BORE_ROWS) * n * sizeof(gk_real));
+        work->basis[g] = take(&b, (size_t)(MAX_PAIRS * setup->strips + BORE_ROWS) * n * sizeof(gk_real));
         if (setup->modal[g].n > widest) widest = setup->modal[g].n;
     }
     work->scaled = take(&b, (size_t)widest * sizeof(gk_real));
@@ -80,6 +80,16 @@ static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const 
     lay_out_flow(&b, setup, &work->explicit_rows);
     return b.used;
 }
+
+/* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row of twice the length. */
+static int mirrored(const gk_model *model)
+{
+    for (int a = 0; a < model->gear[0].functions; a++)
+        if (model->degree[a] % 2) return 0;
+    return 1;
+}
+
+static int strips_of(const gk_model *model, int slices) { return mirrored(model) ? (slices + 1) / 2 : slices; }
 
 static const int *all_modes(const gk_model *model, int modes[2])
 {
@@ -92,6 +102,7 @@ size_t gk_setup_size(const gk_model *model)
     gk_setup probe;
     int modes[2];
     memset(&probe, 0, sizeof probe);
+    probe.strips = strips_of(model, MAX_SLICES);
     return 128 + sizeof(gk_setup) + lay_out(model, &probe, NULL, all_modes(model, modes));
 }
 
@@ -131,26 +142,70 @@ static int modes_at_level(const gk_model *model, gk_level level, int g)
     }
 }
 
-/* dynamic modes into lanes */
-static void fill_modes(const gk_gear *gear, gk_modal *m)
+/* strip ← width functions: (2a + 1) × mean of P_a over the strip; strips share the common face width */
+static double legendre_integral(int degree, double x)
+{ /* ∫ P_a = (P_{a+1} − P_{a−1})/(2a + 1) */
+    double before = 1.0, now = x, minus = 0.0;
+    if (degree == 0) return x;
+    for (int k = 1; k <= degree; k++) {
+        double next = ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0);
+        minus = before, before = now, now = next;
+    }
+    return (now - minus) / (2.0 * degree + 1.0);
+}
+
+typedef double strip_weights[MAX_SLICES][MAX_FUNCTIONS];
+
+static void strip_rows(const gk_model *model, const gk_setup *setup, int g, strip_weights out)
 {
-    const int P = m->pairs, n = m->n, R = gear->rolls, A = gear->functions;
+    const double edge = setup->width / model->gear[g].width;
+    for (int s = 0; s < setup->strips; s++)
+        for (int a = 0; a < model->gear[g].functions; a++) {
+            const double from = edge * (2.0 * s / setup->slices - 1.0), to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
+            const int d = model->degree[a];
+            out[s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+        }
+}
+
+static void fill_strips(const gk_model *model, gk_setup *setup)
+{
+    setup->width = gk_min(model->gear[0].width, model->gear[1].width);
+    setup->strip_term = 0.0;
+    for (int s = 0; s < setup->strips; s++) setup->strip_width[s] = setup->width / setup->slices * (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
+    for (int g = 0; g < 2; g++) setup->strip_term += model->gear[g].local * (gk_log(4.0 * model->gear[g].strip) - 1.0);
+}
+
+/* flank rows of one mode into its lane */
+static void fill_lane(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight, int mode, int lane)
+{
+    const int A = gear->functions;
+    for (int point = 0; point < 2 * gear->rolls; point++)
+        for (int s = 0; s < strips; s++) {
+            double sum = 0.0;
+            for (int a = 0; a < A; a++) sum += weight[s][a] * gear->rows[((size_t)point * A + a) * gear->modes + mode];
+            m->rows[((size_t)point * strips + s) * m->n + lane] = (gk_real)sum;
+        }
+    for (int i = 0; i < BORE_ROWS; i++) m->bore[i * m->n + lane] = (gk_real)gear->bore[(size_t)i * gear->modes + mode];
+    m->omega[lane] = gear->omega[mode];
+    m->omega2[lane] = (gk_real)(gear->omega[mode] * gear->omega[mode]);
+    m->zeta[lane] = gear->zeta[mode];
+}
+
+/* dynamic modes into lanes */
+static void fill_modes(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight)
+{
+    const int P = m->pairs, n = m->n;
     memset(m->omega, 0, (size_t)n * sizeof(double));
     memset(m->zeta, 0, (size_t)n * sizeof(double));
     memset(m->omega2, 0, (size_t)n * sizeof(gk_real));
-    memset(m->rows, 0, 2 * (size_t)R * A * n * sizeof(gk_real));
+    memset(m->rows, 0, 2 * (size_t)gear->rolls * strips * n * sizeof(gk_real));
     memset(m->bore, 0, (size_t)BORE_ROWS * n * sizeof(gk_real));
     memset(m->cosine, 0, (size_t)gear->z * P * sizeof(gk_real));
     memset(m->sine, 0, (size_t)gear->z * P * sizeof(gk_real));
     int lane = -1;
     for (int k = 0; k < m->count; k++) {
         if (gear->part[k] != 2) lane++;
-        const int at = gear->part[k] == 2 ? P + lane : lane;
-        m->omega[at] = gear->omega[k];
-        m->zeta[at] = gear->zeta[k];
-        for (int i = 0; i < 2 * R * A; i++) m->rows[(size_t)i * n + at] = (gk_real)gear->rows[(size_t)i * gear->modes + k];
-        for (int i = 0; i < BORE_ROWS; i++) m->bore[i * n + at] = (gk_real)gear->bore[(size_t)i * gear->modes + k];
-        m->omega2[at] = (gk_real)(gear->omega[k] * gear->omega[k]);
+        fill_lane(gear, m, strips, weight, k, gear->part[k] == 2 ? P + lane : lane);
         if (gear->part[k] == 2) continue;
         for (int j = 0; j < gear->z; j++) {
             double sine, cosine;
@@ -188,64 +243,56 @@ static double dot(const double *a, const double *b, int n)
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 
-/* residual flank–flank: C_static − Σ N Nᵀ/ω² on the grid points */
-static void fill_flank_residual(const gk_gear *gear, gk_modal *m, double *row)
+/* weightᵀ · cell · weight into the lanes of one table cell; cell (A, A) in double */
+static void store_cell(const double *cell, int A, int strips, strip_weights weight, gk_real *out)
 {
-    const size_t R = (size_t)gear->rolls, A = (size_t)gear->functions, points = R * A, N = (size_t)gear->modes;
+    for (int s = 0; s < strips; s++)
+        for (int t = 0; t < strips; t++) {
+            double sum = 0.0;
+            for (int a = 0; a < A; a++)
+                for (int b = 0; b < A; b++) sum += weight[s][a] * weight[t][b] * cell[a * A + b];
+            out[s * strips + t] = (gk_real)sum;
+        }
+}
+
+/* residual flank–flank: C_static − Σ N Nᵀ/ω² on the grid points, then between strips */
+static void fill_flank_residual(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight, double *scratch)
+{
+    const size_t R = (size_t)gear->rolls, N = (size_t)gear->modes;
+    const int A = gear->functions;
+    double cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
     memset(m->c_ff, 0, 4 * OFFSETS * R * R * (size_t)m->block * sizeof(gk_real));
     for (int to = 0; to < 2; to++)
         for (int o = 0; o < OFFSETS; o++)
-            for (size_t j = 0; j < points; j++) {
-                turned_row(gear, m->count, gear->rows + ((size_t)to * points + j) * N, o - 3, row);
+            for (size_t j = 0; j < R; j++) {
+                for (int b = 0; b < A; b++) turned_row(gear, m->count, gear->rows + (((size_t)to * R + j) * A + b) * N, o - 3, scratch + (size_t)b * m->count);
                 for (int from = 0; from < 2; from++)
-                    for (size_t i = 0; i < points; i++) {
-                        const size_t cell = (((size_t)(from * 2 + to) * OFFSETS + (size_t)o) * R + i / A) * R + j / A, ab = i % A * A + j % A;
-                        m->c_ff[cell * (size_t)m->block + ab] =
-                            (gk_real)(gear->c_ff[cell * A * A + ab] - dot(gear->rows + ((size_t)from * points + i) * N, row, m->count));
+                    for (size_t i = 0; i < R; i++) {
+                        const size_t at = (((size_t)(from * 2 + to) * OFFSETS + (size_t)o) * R + i) * R + j;
+                        for (int a = 0; a < A; a++)
+                            for (int b = 0; b < A; b++)
+                                cell[a * A + b] = gear->c_ff[at * A * A + a * A + b] - dot(gear->rows + (((size_t)from * R + i) * A + a) * N, scratch + (size_t)b * m->count, m->count);
+                        store_cell(cell, A, strips, weight, m->c_ff + at * (size_t)m->block);
                     }
             }
 }
 
-static void fill_bore_residual(const gk_gear *gear, gk_modal *m, double *row)
+static void fill_bore_residual(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight, double *scratch)
 {
-    const size_t points = 2 * (size_t)gear->rolls * (size_t)gear->functions, N = (size_t)gear->modes;
+    const int A = gear->functions;
+    const size_t N = (size_t)gear->modes;
     for (int c = 0; c < BORE_ROWS; c++) {
-        turned_row(gear, m->count, gear->bore + (size_t)c * N, 0, row);
-        for (size_t i = 0; i < points; i++) m->c_fb[3 * i + (size_t)c] = gear->c_fb[3 * i + (size_t)c] - dot(gear->rows + i * N, row, m->count);
-        for (int d = 0; d < BORE_ROWS; d++) m->c_bb[3 * d + c] = gear->c_bb[3 * d + c] - dot(gear->bore + (size_t)d * N, row, m->count);
-    }
-}
-
-/* slice ← width functions: (2a + 1) × mean of P_a over the slice; slices share the common face width */
-static double legendre_integral(int degree, double x)
-{ /* ∫ P_a = (P_{a+1} − P_{a−1})/(2a + 1) */
-    double before = 1.0, now = x, minus = 0.0;
-    if (degree == 0) return x;
-    for (int k = 1; k <= degree; k++) {
-        double next = ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0);
-        minus = before, before = now, now = next;
-    }
-    return (now - minus) / (2.0 * degree + 1.0);
-}
-
-/* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row of twice the length. */
-static void fill_strips(const gk_model *model, gk_setup *setup)
-{
-    int mirrored = 1;
-    for (int a = 0; a < setup->functions; a++) mirrored &= model->degree[a] % 2 == 0;
-    setup->strips = mirrored ? (setup->slices + 1) / 2 : setup->slices;
-    setup->width = gk_min(model->gear[0].width, model->gear[1].width);
-    setup->strip_term = 0.0;
-    for (int s = 0; s < setup->strips; s++) setup->strip_width[s] = setup->width / setup->slices * (mirrored && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
-    for (int g = 0; g < 2; g++) {
-        setup->strip_term += model->gear[g].local * (gk_log(4.0 * model->gear[g].strip) - 1.0);
-        const double edge = setup->width / model->gear[g].width;
-        for (int s = 0; s < setup->strips; s++)
-            for (int a = 0; a < setup->functions; a++) {
-                const double from = edge * (2.0 * s / setup->slices - 1.0), to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
-                const int d = model->degree[a];
-                setup->strip_row[g][s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+        turned_row(gear, m->count, gear->bore + (size_t)c * N, 0, scratch);
+        for (int point = 0; point < 2 * gear->rolls; point++)
+            for (int s = 0; s < strips; s++) {
+                double sum = 0.0;
+                for (int a = 0; a < A; a++) {
+                    const size_t row = (size_t)point * A + a;
+                    sum += weight[s][a] * (gear->c_fb[3 * row + (size_t)c] - dot(gear->rows + row * N, scratch, m->count));
+                }
+                m->c_fb[3 * ((size_t)point * strips + s) + (size_t)c] = sum;
             }
+        for (int d = 0; d < BORE_ROWS; d++) m->c_bb[3 * d + c] = gear->c_bb[3 * d + c] - dot(gear->bore + (size_t)d * N, scratch, m->count);
     }
 }
 
@@ -300,7 +347,7 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     setup->integrator = (gk_integrator)(int)data->value[V_M_INTEGRATOR];
     setup->on = gk_effects_of(data);
     setup->slices = (int)data->value[V_M_SLICES];
-    setup->functions = model->gear[0].functions;
+    setup->strips = strips_of(model, setup->slices);
     setup->damping = data->value[V_M_DAMPING];
     if (model->kind == KIND_PAIR)
         setup->allowance = (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance;
@@ -337,13 +384,15 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;
     memset(work->cycles, 0, sizeof work->cycles);
     setup->state_size = sizeof(gk_data);
+    fill_strips(model, setup);
     for (int g = 0; g < 2; g++) {
-        fill_modes(&model->gear[g], &setup->modal[g]);
-        if (setup->on.residual) fill_flank_residual(&model->gear[g], &setup->modal[g], work->matrix);
-        if (setup->on.residual) fill_bore_residual(&model->gear[g], &setup->modal[g], work->matrix);
+        strip_weights weight;
+        strip_rows(model, setup, g, weight);
+        fill_modes(&model->gear[g], &setup->modal[g], setup->strips, weight);
+        if (setup->on.residual) fill_flank_residual(&model->gear[g], &setup->modal[g], setup->strips, weight, work->matrix);
+        if (setup->on.residual) fill_bore_residual(&model->gear[g], &setup->modal[g], setup->strips, weight, work->matrix);
         setup->state_size += 3 * (size_t)setup->modal[g].n * sizeof(gk_real);
     }
-    fill_strips(model, setup);
     fill_links(model, setup);
     fill_timeless(setup);
     outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);

@@ -77,14 +77,14 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
 }
 
 /* modes take the static share of the forces that hold the equilibrium */
-static void spread(const gk_model *model, const gk_setup *setup, gk_data *data)
+static void spread(const gk_setup *setup, gk_data *data)
 {
     const gk_system *s = &setup->work->system;
     gk_real *q = data->modal;
     data->state_h = data->state_gamma = 0.0;
     for (int g = 0; g < 2; g++) {
         const int n = setup->modal[g].n;
-        if (n) gk_step_scatter(model, setup, g, s->force, q + 2 * n);
+        if (n) gk_step_scatter(setup, g, s->force, q + 2 * n);
         for (int i = 0; i < n; i++) {
             q[i] = setup->modal[g].omega2[i] > 0 ? q[2 * n + i] / setup->modal[g].omega2[i] : 0;
             q[n + i] = 0;
@@ -128,7 +128,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
     int rounds = 0;
     while (rounds++ < REST_ROUNDS && moved > 1e-14) moved = relax(model, &rest, data, given);
     if (!(moved <= 1e-11)) return GK_NO_EQUILIBRIUM;
-    spread(model, &rest, data);
+    spread(&rest, data);
     return GK_OK;
 }
 

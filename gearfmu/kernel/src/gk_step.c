@@ -103,21 +103,16 @@ static int all_finite(const gk_system *s)
 }
 
 /* Σ rows·x into lanes: modal force of the row forces x on gear g */
-void gk_step_scatter(const gk_model *model, const gk_setup *setup, int g, const double *x, gk_real *out)
+void gk_step_scatter(const gk_setup *setup, int g, const double *x, gk_real *out)
 {
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
-    const int n = setup->modal[g].n, rows = work->places * setup->functions + BORE_ROWS;
-    double weight[MAX_BASIS] = {0};
-    for (int i = 0; i < s->n; i++) {
-        const double *c;
-        int first, count = gk_system_basis(model, setup, work, i, g, &first, &c);
-        for (int a = 0; a < count; a++) weight[first + a] += (i < s->contacts ? -1.0 : 1.0) * c[a] * x[i];
-    }
+    const int n = setup->modal[g].n;
     memset(out, 0, (size_t)n * sizeof *out);
-    for (int r = 0; r < rows; r++) {
-        if (weight[r] == 0.0) continue;
-        const gk_real w = (gk_real)weight[r], *b = work->basis[g] + (size_t)r * n;
+    for (int r = 0; r < s->contacts + BORE_ROWS; r++) {
+        const int row = r < s->contacts ? r : s->bore[g][r - s->contacts];
+        if (row < 0 || x[row] == 0.0) continue;
+        const gk_real w = (gk_real)(r < s->contacts ? -x[row] : x[row]), *b = work->basis[g] + (size_t)r * n;
         for (int i = 0; i < n; i++) out[i] += w * b[i];
     }
 }
@@ -144,7 +139,7 @@ static double correct_modes(const gk_setup *setup, const gk_coefficients *k, int
     return sum;
 }
 
-static void correct(const gk_model *model, const gk_setup *setup, gk_data *data, const gk_coefficients *k)
+static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
 {
     gk_work *work = setup->work;
     const gk_system *s = &work->system;
@@ -152,10 +147,10 @@ static void correct(const gk_model *model, const gk_setup *setup, gk_data *data,
     for (int g = 0; g < 2; g++) {
         const int n = setup->modal[g].n;
         if (n) {
-            gk_step_scatter(model, setup, g, s->z, work->force[g]);
+            gk_step_scatter(setup, g, s->z, work->force[g]);
             double lost = correct_modes(setup, k, g, q);
             if (setup->on.modal_damping) data->ledger.dissipated += lost;
-            gk_step_scatter(model, setup, g, s->force, q + 2 * n);
+            gk_step_scatter(setup, g, s->force, q + 2 * n);
         }
         q += 3 * n;
     }
@@ -246,7 +241,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     else gk_solve_energy(s);
     if (!all_finite(s)) return GK_DIVERGED;
     GK_LAP(work, PHASE_SOLVE);
-    correct(model, setup, data, k);
+    correct(setup, data, k);
     GK_LAP(work, PHASE_CORRECT);
     account(setup, data);
     gk_step_remember(setup, data);
