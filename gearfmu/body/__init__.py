@@ -1,4 +1,5 @@
 """Reduced bodies: what a gear is to the kernel, their HDF5 files, and how they are made from a stage."""
+
 from __future__ import annotations
 
 from gearfmu.body.inspect import inspect_file

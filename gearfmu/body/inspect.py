@@ -1,4 +1,5 @@
 """What a file of ours holds, as plain data for `gearfmu inspect`."""
+
 from __future__ import annotations
 
 import os
@@ -27,7 +28,8 @@ def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
         "mesh": body.mesh,
         "provenance": body.provenance,
         "datasets": [
-            {"path": e.path, "shape": list(np.shape(value_of(body, e.field))), "unit": e.unit, "meaning": e.meaning} for e in ENTRIES
+            {"path": e.path, "shape": list(np.shape(value_of(body, e.field))), "unit": e.unit, "meaning": e.meaning}
+            for e in ENTRIES
         ],
     }
 

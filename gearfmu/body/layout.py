@@ -1,4 +1,5 @@
 """The layout of a body file: one table from which it is written, read, checked and documented."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -24,53 +25,110 @@ class Entry:
 
 
 def _entries() -> tuple[Entry, ...]:
+    return (*_body_entries(), *_mode_entries(), *_static_entries(), *_frf_entries(), *_display_entries())
+
+
+def _body_entries() -> tuple[Entry, ...]:
     return (
         Entry("body/teeth", "teeth", (), "", "number of teeth z, equal sectors of the body", "i8"),
         Entry("body/base_radius", "r_b", (), "m", "base radius r_b"),
-        Entry("body/base_half_angle", "psi_b", (), "rad", "half tooth-thickness angle at the base circle, nominal tooth"),
+        Entry("body/base_half_angle", "psi_b", (), "rad", "half tooth-thickness angle at the base circle, nominal"),
         Entry("body/face_width", "face_width", (), "m", "face width b; z runs from −b/2 to b/2"),
         Entry("body/mass", "mass", (), "kg", "mass of the whole body"),
         Entry("body/inertia", "inertia", (3, 3), "kg.m2", "inertia about the origin: on the axis at mid-width"),
-        Entry("modes/frequency", "frequency", ("n",), "Hz", "natural frequencies of the free body, ascending, rigid modes not among them"),
+        Entry("flank/roll_range", "roll_range", (2,), "m", "roll of form and tip point: the Chebyshev interval"),
+        Entry("flank/roll", "roll", ("R",), "m", "roll points: Chebyshev points of the first kind, ascending"),
+        Entry(
+            "flank/strip_half_width",
+            "strip_half_width",
+            (),
+            "m",
+            "half-width of the load strip in arc length along the flank",
+        ),
+    )
+
+
+def _mode_entries() -> tuple[Entry, ...]:
+    return (
+        Entry(
+            "modes/frequency", "frequency", ("n",), "Hz", "natural frequencies of the free body, ascending, none rigid"
+        ),
         Entry("modes/damping_ratio", "damping_ratio", ("n",), "", "modal damping ratio"),
         Entry("modes/nodal_diameter", "nodal_diameter", ("n",), "", "nodal diameter ν", "i8"),
-        Entry("modes/part", "part", ("n",), "", "0 single mode, 1 first (real part) and 2 second (imaginary part) of a pair", "i8"),
+        Entry(
+            "modes/part", "part", ("n",), "", "0 single, 1 first (real) and 2 second (imaginary) part of a pair", "i8"
+        ),
         Entry("modes/parity", "parity", ("n",), "", "+1 symmetric about mid-width, −1 antisymmetric, 0 neither", "i8"),
         Entry(
-            "modes/flank_rows", "flank_rows", (2, "R", "A", "n"), "kg-1/2",
-            "tooth 0: load-weighted mean displacement along the outward normal; flank side (0: sg = +1), roll point, width function, mode",
+            "modes/flank_rows",
+            "flank_rows",
+            (2, "R", "A", "n"),
+            "kg-1/2",
+            "tooth 0: load-weighted mean displacement along the outward normal; "
+            "flank (0: sg = +1), roll point, width function, mode",
         ),
-        Entry("modes/bore_rows", "bore_rows", (6, "n"), "kg-1/2, m-1.kg-1/2", "averaging node of the bore: mean ux, uy, uz, rotation rx, ry, rz"),
-        Entry("flank/roll_range", "roll_range", (2,), "m", "roll of form and tip point: the interval of the Chebyshev points"),
-        Entry("flank/roll", "roll", ("R",), "m", "roll points: Chebyshev points of the first kind, ascending"),
-        Entry("flank/strip_half_width", "strip_half_width", (), "m", "half-width of the load strip in arc length along the involute"),
         Entry(
-            "static/c_ff", "static_ff", (2, 2, "z", "R", "R", "A", "A"), "m/N",
-            "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, flank g, roll j, function b; "
-            "inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2, the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+            "modes/bore_rows",
+            "bore_rows",
+            (6, "n"),
+            "kg-1/2, m-1.kg-1/2",
+            "averaging node of the bore: mean ux, uy, uz, rotation rx, ry, rz",
         ),
-        Entry("static/c_fb", "static_fb", (2, "R", "A", 6), "m/N, 1/N", "flank rows of tooth 0 per unit force x, y, z and moment x, y, z on the bore node"),
+    )
+
+
+def _static_entries() -> tuple[Entry, ...]:
+    return (
+        Entry(
+            "static/c_ff",
+            "static_ff",
+            (2, 2, "z", "R", "R", "A", "A"),
+            "m/N",
+            "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, "
+            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2, "
+            "the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+        ),
+        Entry(
+            "static/c_fb",
+            "static_fb",
+            (2, "R", "A", 6),
+            "m/N, 1/N",
+            "flank rows of tooth 0 per unit force x, y, z and moment x, y, z on the bore node",
+        ),
         Entry("static/c_bb", "static_bb", (6, 6), "m/N, 1/N, 1/(N.m)", "bore node per unit load on the bore node"),
+    )
+
+
+def _frf_entries() -> tuple[Entry, ...]:
+    return (
         Entry("frf/frequency", "frf.frequency", ("F",), "Hz", "frequency lines"),
         Entry("frf/error", "frf.error", ("F",), "", "relative Frobenius error with the bore node held (paper eq. 3)"),
-        Entry("frf/error_free", "frf.error_free", ("F",), "", "the same of the free body's elastic part, bore among the ports"),
+        Entry(
+            "frf/error_free", "frf.error_free", ("F",), "", "the same of the free body's elastic part, with bore ports"
+        ),
         Entry("frf/band", "frf.band", (2,), "Hz", "band of max_error"),
         Entry("frf/max_error", "frf.max_error", (), "", "largest error (bore held) in the band"),
         Entry("frf/trusted_to", "frf.trusted_to", (), "Hz", "the error stays below 1 % up to this frequency"),
         Entry("frf/cut", "frf.cut", (), "Hz", "modes below this were dynamic in the comparison, the others static"),
         Entry("frf/size", "frf.size", (), "", "number of modes below the cut", "i8"),
         Entry("frf/length", "frf.length", (), "m", "length by which rotations are multiplied"),
+    )
+
+
+def _display_entries() -> tuple[Entry, ...]:
+    return (
         Entry("display/points", "display.points", ("P", 3), "m", "surface points of the whole gear", "f4"),
         Entry("display/quads", "display.quads", ("Q", 4), "", "quadrilaterals of the surface, point numbers", "i8"),
-        Entry("display/modes", "display.modes", ("D", "P", 3), "kg-1/2", "displacement of the points in the lowest modes", "f4"),
+        Entry("display/modes", "display.modes", ("D", "P", 3), "kg-1/2", "displacement in the lowest modes", "f4"),
         Entry("display/mode_index", "display.mode_index", ("D",), "", "which modes these are", "i8"),
-        Entry("display/loads", "display.loads", ("L", "P", 3), "m/N", "displacement under a unit load on flank 0 of tooth 0", "f4"),
+        Entry(
+            "display/loads", "display.loads", ("L", "P", 3), "m/N", "displacement, unit load on flank 0, tooth 0", "f4"
+        ),
         Entry("display/load_roll", "display.load_roll", ("L",), "m", "roll point of these loads"),
-    )  # fmt: skip
+    )
 
 
 ENTRIES = _entries()
-EXACT = {entry.path for entry in ENTRIES if entry.path.startswith(("body/", "flank/"))}
 TEXTS = {
     "material": "material: youngs_modulus (Pa), poisson_ratio, density (kg/m³)",
     "mesh": "finite-element mesh: element counts, degrees of freedom, quality",

@@ -1,4 +1,6 @@
-"""From a stage's numbers to its reduced bodies: mesh, finite elements, reduction, file; skipped when the hash matches."""
+"""From a stage's numbers to its reduced bodies: mesh, finite elements, reduction, file; skipped when the hash
+matches."""
+
 from __future__ import annotations
 
 import os
@@ -185,7 +187,12 @@ def _display(drawn: FeMesh, body: SectorBody, modes: Modes, statics: Statics) ->
 def _mesh_facts(body: SectorBody, gear: GearSpec) -> dict[str, Any]:
     facts = mesh_report(body.mesh, body.flank.r_b, gear.body.strip_half_width)
     sector_dofs = 3 * (len(body.mesh.nodes) - len(body.mesh.cut_plus))
-    return {**facts, "counts": gear.body.mesh.model_dump(), "dof_sector": sector_dofs, "dof_body": body.teeth * sector_dofs}
+    return {
+        **facts,
+        "counts": gear.body.mesh.model_dump(),
+        "dof_sector": sector_dofs,
+        "dof_body": body.teeth * sector_dofs,
+    }
 
 
 def _provenance(seconds: float) -> dict[str, Any]:

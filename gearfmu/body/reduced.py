@@ -1,4 +1,5 @@
 """ReducedBody: a gear as the kernel sees it. Conventions: docs/architecture.md."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -18,8 +19,9 @@ _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 class ReducedBody:
     """A free gear body, reduced: rigid body + n real elastic modes + static compliance, with its evidence.
 
-    Shapes, units and meaning of every field stand in `layout.ENTRIES` and docs/file-formats.md. In short: frequency (n,)
-    Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, z, R, R, A, A), m/N; static_fb (2, R, A, 6); static_bb (6, 6).
+    Shapes, units and meaning of every field stand in `layout.ENTRIES` and docs/file-formats.md. In short: frequency
+    (n,) Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, z, R, R, A, A), m/N; static_fb (2, R, A, 6);
+    static_bb (6, 6).
     input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits.
     Raises BodyError naming every field that cannot be.
     """
@@ -93,7 +95,9 @@ def _array_problems(entry, value: np.ndarray, sizes: dict[str, int]) -> list[str
     for length, wanted in zip(value.shape, entry.shape, strict=True):
         expected = wanted if isinstance(wanted, int) else sizes.setdefault(wanted, length)
         if length != expected:
-            return [f"{entry.path} has shape {value.shape}, which does not fit {entry.shape} with {wanted} = {expected}"]
+            return [
+                f"{entry.path} has shape {value.shape}, which does not fit {entry.shape} with {wanted} = {expected}"
+            ]
     if not np.all(np.isfinite(value)):
         return [f"{entry.path} holds a number that is not finite"]
     return []
@@ -101,7 +105,8 @@ def _array_problems(entry, value: np.ndarray, sizes: dict[str, int]) -> list[str
 
 def _meaning_problems(body: ReducedBody) -> list[str]:
     checks = {
-        "input_hash is not 64 hex digits": len(body.input_hash) == 64 and set(body.input_hash) <= set("0123456789abcdef"),
+        "input_hash is not 64 hex digits": len(body.input_hash) == 64
+        and set(body.input_hash) <= set("0123456789abcdef"),
         "body/teeth must be 3 or more": body.teeth >= 3,
         "body/base_radius, face_width, mass and flank/strip_half_width must be above 0": min(
             body.r_b, body.face_width, body.mass, body.strip_half_width
@@ -110,7 +115,9 @@ def _meaning_problems(body: ReducedBody) -> list[str]:
         "there must be a mode, a roll point and a width function": min(body.flank_rows.shape) > 0,
         "modes/frequency must be above 0 and ascending": body.modes == 0
         or (body.frequency[0] > 0 and bool(np.all(np.diff(body.frequency) >= 0))),
-        "modes/damping_ratio must lie between 0 and 1": bool(np.all((body.damping_ratio >= 0) & (body.damping_ratio < 1))),
+        "modes/damping_ratio must lie between 0 and 1": bool(
+            np.all((body.damping_ratio >= 0) & (body.damping_ratio < 1))
+        ),
         "modes/part: the two modes of a pair must follow each other": _pairs_sound(body),
         "modes/nodal_diameter must lie between 0 and z/2": bool(
             np.all((body.nodal_diameter >= 0) & (2 * body.nodal_diameter <= body.teeth))
@@ -130,4 +137,6 @@ def _pairs_sound(body: ReducedBody) -> bool:
     first, second = body.part == 1, body.part == 2
     follows = np.concatenate([[False], first[:-1]])
     same = np.concatenate([[True], np.diff(body.nodal_diameter) == 0])
-    return bool(np.all((body.part >= 0) & (body.part <= 2))) and bool(np.all(second == follows) and np.all(same[second]))
+    return bool(np.all((body.part >= 0) & (body.part <= 2))) and bool(
+        np.all(second == follows) and np.all(same[second])
+    )

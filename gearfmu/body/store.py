@@ -1,4 +1,5 @@
 """The HDF5 file of a reduced body (docs/file-formats.md)."""
+
 from __future__ import annotations
 
 import json
@@ -77,7 +78,8 @@ def _read(file: h5py.File, entry: Entry) -> Any:
 
 
 def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
-    """Compliance for every tooth offset from that of 0 … z/2: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a] (reciprocity)."""
+    """Compliance for every tooth offset from that of 0 … z/2: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]
+    (reciprocity)."""
     if half.ndim != 7 or half.shape[2] != teeth // 2 + 1:
         raise BodyError(f"static/c_ff has shape {half.shape}, expected offsets 0 … {teeth // 2} in its third place")
     mirrored = half[:, :, 1 : (teeth + 1) // 2].transpose(1, 0, 2, 4, 3, 6, 5)

@@ -1,4 +1,5 @@
 """Rigid-body fields and averaging couplings (RBE3): the mean motion of a surface as six rows over the nodes."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,13 +1,14 @@
 """Free bodies with z equal sectors, one sector at a time: every nodal diameter ν is a small system on the cut faces.
 
-Displacements are written in the frame of each sector; those of harmonic ν are u_j = U exp(2πiνj/z) in sector j. With the
-dofs of the plus cut turned by −2π/z into the frame of the minus cut, u_plus = exp(iθ) u_minus, θ = 2πν/z.
+Displacements are written in the frame of each sector; those of harmonic ν are u_j = U exp(2πiνj/z) in sector j. With
+the dofs of the plus cut turned by −2π/z into the frame of the minus cut, u_plus = exp(iθ) u_minus, θ = 2πν/z.
 The interior is factorised once, real, with both cuts held, and condensed onto the cuts:
     S = K_BB − K_BI K_II⁻¹ K_IB,   S_ν = S_mm + S_pp + e^{iθ} S_mp + e^{−iθ} S_pm,
 so that each harmonic costs a dense system of the size of one cut. S_ν is singular only for ν = 0 and 1, by the rigid
 motions, which are known. A sector that is its own mirror image about mid-width (z → −z) splits once more, exactly,
 into symmetric and antisymmetric fields. Source: Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81 (cyclic symmetry).
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -29,7 +30,8 @@ _MATCH = 1e-7  # of the mesh's size: nodes that should coincide
 class Sector:
     """Finite-element model of one sector, in its own frame.
 
-    nodes (N, 3), m; elements (E, 20); stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired nodes.
+    nodes (N, 3), m; elements (E, 20); stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired
+    nodes.
     """
 
     nodes: np.ndarray
@@ -44,7 +46,8 @@ class Sector:
 class SectorSpace:
     """The fields of one mirror parity on a sector, condensed onto the cuts (see the head of this file).
 
-    parity : +1 symmetric about mid-width (u_x, u_y even, u_z odd in z), −1 antisymmetric, 0 for a sector without that symmetry.
+    parity : +1 symmetric about mid-width (u_x, u_y even, u_z odd in z), −1 antisymmetric, 0 for a sector without that
+    symmetry.
     to_nodes : (3N, n) sparse with orthonormal columns; columns ordered interior, minus cut, plus cut.
     """
 
@@ -124,7 +127,12 @@ class Harmonic:
     def _cut_solver(self) -> tuple[np.ndarray, np.ndarray]:
         """LU of S_ν; its rigid null space is filled up, which changes nothing for balanced loads."""
         cut, schur = self.space.cut, self.space.schur
-        s = schur[:cut, :cut] + schur[cut:, cut:] + self.phase * schur[:cut, cut:] + np.conj(self.phase) * schur[cut:, :cut]
+        s = (
+            schur[:cut, :cut]
+            + schur[cut:, cut:]
+            + self.phase * schur[:cut, cut:]
+            + np.conj(self.phase) * schur[cut:, :cut]
+        )
         rigid = self.rigid[self.space.interior :]
         if rigid.shape[1]:
             rigid = np.linalg.qr(rigid)[0]
@@ -154,12 +162,15 @@ class Harmonic:
         if held is None:
             inside = space.solve_held(balanced[:interior] - _real_times_any(space.coupling, border))
         else:
-            inside = held - self._held_inertia @ (self.rigid.conj().T @ loads) - _real_times_any(space.influence, border)
+            inside = (
+                held - self._held_inertia @ (self.rigid.conj().T @ loads) - _real_times_any(space.influence, border)
+            )
         return self.gauge(np.concatenate([inside, moved]))
 
 
 def sector_spaces(sector: Sector) -> list[SectorSpace]:
-    """The sector's field spaces: symmetric and antisymmetric about mid-width, or one space (parity 0) if it has no mirror.
+    """The sector's field spaces: symmetric and antisymmetric about mid-width, or one space (parity 0) if it has no
+    mirror.
 
     Raises MeshError when the cut faces do not match.
     """

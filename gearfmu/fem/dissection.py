@@ -4,6 +4,7 @@ The elements are split in two halves again and again along the Fiedler vector of
 common to both halves separate them and are eliminated after both. Source: George, SIAM J. Numer. Anal. 10 (1973) 345;
 spectral bisection: Pothen, Simon & Liou, SIAM J. Matrix Anal. 11 (1990) 430.
 """
+
 from __future__ import annotations
 
 import numpy as np

@@ -5,6 +5,7 @@ descendants left, and leaves its own. Nearly all work is dense matrix products, 
 solution: on solid gear sectors some ten times faster per right-hand side than general sparse LU (SuperLU).
 Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; Liu, SIAM Review 34 (1992) 82.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -126,7 +127,9 @@ def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> t
     try:
         triangle = sl.cholesky(dense[:own, :own], lower=True, check_finite=False)
     except np.linalg.LinAlgError as error:
-        raise FactorError("the stiffness matrix is not positive definite: is the body held, are all elements sound?") from error
+        raise FactorError(
+            "the stiffness matrix is not positive definite: is the body held, are all elements sound?"
+        ) from error
     rest = dtrsm(1.0, triangle, dense[own:, :own], side=1, lower=1, trans_a=1)
     update = dense[own:, own:] - rest @ rest.T
     return _Front(start, stop, below, np.asfortranarray(triangle), rest), update

@@ -1,8 +1,10 @@
-"""A free body as one finite-element model: rigid modes explicit, flexibility with inertia relief in the mean-axis gauge.
+"""A free body as one finite-element model: rigid modes explicit, flexibility with inertia relief in the mean-axis
+gauge.
 
 C = P K⁺ Pᵀ with P = I − R Rᵀ M, R the mass-normalised rigid modes: loads are first balanced by the inertia forces of
 the rigid motion they cause, the displacement is then freed of rigid motion (M-orthogonal: mean-axis frame).
 """
+
 from __future__ import annotations
 
 from functools import cached_property

@@ -5,6 +5,7 @@ direction, three points integrate degree five), and of the order of the interpol
 Node order is VTK's (VTK_QUADRATIC_HEXAHEDRON). Degrees of freedom: 3·node + component.
 Source of the shape functions: Zienkiewicz & Taylor, The Finite Element Method, vol. 1, serendipity family.
 """
+
 from __future__ import annotations
 
 from typing import Protocol
@@ -17,9 +18,7 @@ from gearfmu.errors import MeshError
 CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], float
 )
-EDGES = np.array(
-    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
-)
+EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
 NATURAL = np.vstack([CORNERS, 0.5 * (CORNERS[EDGES[:, 0]] + CORNERS[EDGES[:, 1]])])
 # The six faces as VTK quadratic quads, normal pointing out of the element.
 FACES = np.array(

@@ -3,6 +3,7 @@
 Eigenpairs of K φ = ω² M φ are those of C M φ = φ/ω² with C the flexibility of the body without its rigid motion, so
 that a free body has no zero eigenvalues left. Source: Grimes, Lewis & Simon, SIAM J. Matrix Anal. 15 (1994).
 """
+
 from __future__ import annotations
 
 from typing import Protocol

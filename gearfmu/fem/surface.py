@@ -1,4 +1,5 @@
 """Surface integrals over 8-node serendipity quadrilaterals (VTK_QUADRATIC_QUAD): faces of 20-node hexahedra."""
+
 from __future__ import annotations
 
 import numpy as np

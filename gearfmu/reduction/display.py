@@ -1,4 +1,5 @@
 """A small surface of the whole gear for pictures, and how it moves in the lowest modes and under tooth loads."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -14,9 +15,9 @@ from gearfmu.fem.cyclic import mirror_nodes
 
 @dataclass(frozen=True)
 class Display:
-    """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; modes (k, P, 3): displacement
-    of mode k, kg^-½, `mode_index` (k,) its number in the body; loads (p, P, 3): displacement under a unit load on flank
-    0 of tooth 0, m/N, at roll `load_roll` (p,), m."""
+    """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; modes (k, P, 3):
+    displacement of mode k, kg^-½, `mode_index` (k,) its number in the body; loads (p, P, 3): displacement under a
+    unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m."""
 
     points: np.ndarray
     quads: np.ndarray
@@ -28,9 +29,9 @@ class Display:
 
 @dataclass(frozen=True)
 class Outline:
-    """The drawn surface of one sector: points (P, 3) drawn once a sector, quads (Q, 4) of their numbers, `ahead` (Q, 4):
-    true where the point meant is that of the next sector; sample (P, N): displacement of the points from that of the
-    finite-element nodes."""
+    """The drawn surface of one sector: points (P, 3) drawn once a sector, quads (Q, 4) of their numbers, `ahead` (Q,
+    4): true where the point meant is that of the next sector; sample (P, N): displacement of the points from that of
+    the finite-element nodes."""
 
     points: np.ndarray
     quads: np.ndarray

@@ -3,9 +3,10 @@
 The load of roll point s, width function a has the density (1/b) P_a(2z/b) across the face width and 1/L along the
 involute's arc length σ = s²/(2 r_b), over the strip |σ − σ(s)| ≤ w clipped at form circle and tip (L: the length that
 is left). It acts along the outward normal of the analytic involute. Integration runs over the quadratic surface
-elements, split exactly where the strip begins and ends, so that the rows are smooth in s, and over the roll (dσ = s ds/r_b),
-in which positions and normals are smooth down to the base circle.
+elements, split exactly where the strip begins and ends, so that the rows are smooth in s, and over the roll (dσ = s
+ds/r_b), in which positions and normals are smooth down to the base circle.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass

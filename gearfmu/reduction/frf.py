@@ -11,6 +11,7 @@ Both have structural damping, K (1 + 2iζ), which is modal damping ζ at resonan
 `error` is with the bore node held (all six), because free rigid motion hides errors; `error_free` is that of the free
 body's elastic part.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -56,7 +57,8 @@ class FrfCase:
 
 
 def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase) -> FrfError:
-    """Relative error of modes below the cut + static residual against the finite elements (see the head of this file)."""
+    """Relative error of modes below the cut + static residual against the finite elements (see the head of this
+    file)."""
     inputs = _inputs(body)
     scale = np.concatenate([np.ones(len(inputs)), [1, 1, 1, case.length, case.length, case.length]])
     static = _static_matrix(body, statics, inputs)
@@ -79,7 +81,15 @@ def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase) -
     bad = np.flatnonzero(error > TRUSTED_ERROR)
     trusted = frequency[-1] if len(bad) == 0 else frequency[max(bad[0] - 1, 0)]
     return FrfError(
-        frequency, error, np.array(free), BAND, float(error[in_band].max()), float(trusted), cut, int(kept.sum()), case.length
+        frequency,
+        error,
+        np.array(free),
+        BAND,
+        float(error[in_band].max()),
+        float(trusted),
+        cut,
+        int(kept.sum()),
+        case.length,
     )
 
 

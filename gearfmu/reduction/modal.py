@@ -2,6 +2,7 @@
 
 A complex mode U e^{iθj} of 0 < ν < z/2 gives two real ones of the same frequency, its real and its imaginary part.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -57,7 +58,11 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
     wanted = dict.fromkeys(families, share)
     found: dict[tuple[int, int], _FamilyModes] = {}
     while True:
-        open_families = [key for key in families if key not in found or not found[key].complete and len(found[key].squared) < wanted[key]]
+        open_families = [
+            key
+            for key in families
+            if key not in found or not found[key].complete and len(found[key].squared) < wanted[key]
+        ]
         for number, key in enumerate(open_families):
             if progress:
                 progress(f"modes, nodal diameter {key[1]}", number / len(open_families))

@@ -1,4 +1,5 @@
 """The full-order gear body on one sector, with everything that loads it: tooth flanks and bore."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -51,7 +52,9 @@ class SectorBody:
         self.mesh, self.flank, self.points, self.teeth = mesh, flank, points, mesh.teeth
         stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
         self.stiffness = stiffness
-        sector = Sector(mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus)
+        sector = Sector(
+            mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus
+        )
         self.spaces = sector_spaces(sector)
         self._inputs = [self._space_inputs(space) for space in self.spaces]
 

@@ -3,6 +3,7 @@
 Each harmonic contributes Fᴴ C_ν F; tooth offset m is their Fourier sum. For a body that is its own mirror image about
 mid-width, loads of even and odd width functions do not see each other: those entries are zero exactly.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass

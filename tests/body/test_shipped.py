@@ -1,4 +1,5 @@
 """The bodies that ship: not stale, small, physically right, and remade by the program as they are."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -33,11 +34,17 @@ def bore_held(body, offset: int = 0) -> np.ndarray:
     other = fb.copy()
     other[:, 0], other[:, 1] = c * fb[:, 0] - s * fb[:, 1], s * fb[:, 0] + c * fb[:, 1]
     bb = body.static_bb[np.ix_(planar, planar)]
-    return body.static_ff[0, 0, offset, :, :, 0, 0] - normal @ other[:, planar].T - fb[:, planar] @ turned.T + normal @ bb @ turned.T
+    return (
+        body.static_ff[0, 0, offset, :, :, 0, 0]
+        - normal @ other[:, planar].T
+        - fb[:, planar] @ turned.T
+        + normal @ bb @ turned.T
+    )
 
 
 def _uniform_resultant(body) -> np.ndarray:
-    """Force x, y and moment z (R, 3) of the uniform unit load at each roll point: mean normal over the strip, and r_b."""
+    """Force x, y and moment z (R, 3) of the uniform unit load at each roll point: mean normal over the strip, and
+    r_b."""
     arc = body.roll**2 / (2 * body.r_b)
     low, high = body.roll_range**2 / (2 * body.r_b)
     first, last = np.clip(arc - body.strip_half_width, low, high), np.clip(arc + body.strip_half_width, low, high)
@@ -53,10 +60,13 @@ def at_roll(body, matrix: np.ndarray, roll: float) -> float:
 
 
 def pair_stiffness(bodies, spec, twist: bool) -> float:
-    """Secant stiffness of one tooth pair at the pitch point per face width, N/(mm µm): 300 N/mm, bores held, neighbours off.
+    """Secant stiffness of one tooth pair at the pitch point per face width, N/(mm µm): 300 N/mm, bores held,
+    neighbours off.
 
-    Elastic displacement relative to the bores plus the line-contact law of the strip, C_loc = 2(1−ν²)/(πEL)(ln(4w/b) − 1).
-    Without `twist`, that of a plain disc from the bore to the root circle is taken off: r_b²/(4πGb)·(1/r_bore² − 1/r_f²).
+    Elastic displacement relative to the bores plus the line-contact law of the strip, C_loc = 2(1−ν²)/(πEL)(ln(4w/b)
+    − 1).
+    Without `twist`, that of a plain disc from the bore to the root circle is taken off: r_b²/(4πGb)·(1/r_bore² −
+    1/r_f²).
     """
     pair, width = spec.pair, spec.gears[0].face_width
     r_b = [body.r_b for body in bodies]
@@ -75,9 +85,9 @@ def pair_stiffness(bodies, spec, twist: bool) -> float:
 
 
 def test_stiffness_of_one_tooth_pair_against_iso_6336():
-    """ISO 6336-1: c'th = 15.78 N/(mm µm) for tooth, foundation and contact of a pair of solid discs. It does not know the bores:
-    without the twist of the discs down to them the finite elements lie within 15 % of it. With it they are softer, near the
-    c' = 0.8 c'th that ISO takes from measurements."""
+    """ISO 6336-1: c'th = 15.78 N/(mm µm) for tooth, foundation and contact of a pair of solid discs. It does not know
+    the bores: without the twist of the discs down to them the finite elements lie within 15 % of it. With it they are
+    softer, near the c' = 0.8 c'th that ISO takes from measurements."""
     spec = load_stage("fzg_c")
     bodies = load_stage_bodies(spec)
     assert pair_stiffness(bodies, spec, twist=False) == pytest.approx(15.78, rel=0.15)

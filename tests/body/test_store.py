@@ -1,4 +1,5 @@
 """The body file: round trip, refusals, and a kill while it is written."""
+
 from __future__ import annotations
 
 import signal
@@ -45,7 +46,12 @@ def test_a_body_reads_back_as_it_was_written(made):
         again = load_body(body_path(spec, index))
         for entry in ENTRIES:
             assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
-        assert (again.name, again.input_hash, again.mesh, again.material) == (body.name, body.input_hash, body.mesh, body.material)
+        assert (again.name, again.input_hash, again.mesh, again.material) == (
+            body.name,
+            body.input_hash,
+            body.mesh,
+            body.material,
+        )
 
 
 def test_every_dataset_says_its_unit_and_meaning(made):
@@ -192,3 +198,10 @@ def test_a_kill_while_writing_leaves_the_old_file(made, tmp_path):
     assert writer.wait() == -signal.SIGKILL
     assert path.read_bytes() == before
     assert load_body(path).input_hash == bodies[0].input_hash
+
+
+def test_the_layout_is_documented():
+    text = (Path(__file__).parents[2] / "docs" / "file-formats.md").read_text(encoding="utf-8")
+    for entry in ENTRIES:
+        assert f"`/{entry.path}`" in text
+        assert entry.meaning in text

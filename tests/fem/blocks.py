@@ -1,4 +1,5 @@
 """Structured hex20 meshes for tests: boxes and rings, from a mapped grid."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -17,9 +18,7 @@ def grid_mesh(cells: tuple[int, int, int], mapping: Callable[[np.ndarray], np.nd
     keys = 2 * lattice[:, None, :] + (hex20.NATURAL[None] + 1).astype(int)
     positions = mapping(keys.reshape(-1, 3) / (2 * np.array(cells)))
     scale = np.ptp(positions, axis=0).max()
-    _, index, inverse = np.unique(
-        np.round(positions / scale, 9) + 0.0, axis=0, return_index=True, return_inverse=True
-    )
+    _, index, inverse = np.unique(np.round(positions / scale, 9) + 0.0, axis=0, return_index=True, return_inverse=True)
     return positions[index], inverse.reshape(-1, 20)
 
 

@@ -1,4 +1,5 @@
 """Nested dissection and multifrontal Cholesky against a general sparse solver."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -29,7 +30,9 @@ def test_solution_is_that_of_a_general_solver(kind):
         rhs += 1j * rng.standard_normal(rhs.shape)
     solution = Factor(matrix, elements, free // 3).solve(rhs)
     assert np.abs(matrix @ solution - rhs).max() < 1e-9 * np.abs(matrix.data).max() * np.abs(solution).max()
-    assert np.allclose(solution[:, :3], spl.spsolve(matrix.tocsc(), rhs[:, :3]), rtol=0, atol=1e-9 * np.abs(solution).max())
+    assert np.allclose(
+        solution[:, :3], spl.spsolve(matrix.tocsc(), rhs[:, :3]), rtol=0, atol=1e-9 * np.abs(solution).max()
+    )
 
 
 @settings(max_examples=15, deadline=None)

@@ -1,4 +1,5 @@
 """Elements: shape functions, patch test, rigid motion, mass; surfaces and averaging couplings."""
+
 from __future__ import annotations
 
 import numpy as np

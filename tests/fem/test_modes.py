@@ -1,4 +1,5 @@
 """Eigenmodes against exact and published frequencies; convergence rates; one sector = the whole body."""
+
 from __future__ import annotations
 
 import json
@@ -53,7 +54,9 @@ def timoshenko_free(length: float, side: float, material) -> float:
     shear = 10 * (1 + nu) / (12 + 11 * nu) * e / (2 * (1 + nu)) * area
 
     def residual(omega: float) -> float:
-        return _free_determinant(omega, length, SimpleNamespace(ei=e * second, ga=shear, ma=rho * area, mi=rho * second))
+        return _free_determinant(
+            omega, length, SimpleNamespace(ei=e * second, ga=shear, ma=rho * area, mi=rho * second)
+        )
 
     euler = (4.730040744862704 / length) ** 2 * np.sqrt(e * second / (rho * area))
     return brentq(residual, 0.7 * euler, 1.0001 * euler) / (2 * np.pi)
@@ -170,4 +173,6 @@ def test_all_modes_of_a_small_body_add_up_to_its_flexibility():
     assert len(squared) == body.elastic
     loads = np.random.default_rng(3).standard_normal((body.size, 3))
     static = body.flexibility(loads)
-    assert np.allclose(shapes @ ((shapes.T @ loads) / squared[:, None]), static, rtol=0, atol=1e-9 * np.abs(static).max())
+    assert np.allclose(
+        shapes @ ((shapes.T @ loads) / squared[:, None]), static, rtol=0, atol=1e-9 * np.abs(static).max()
+    )

@@ -1,4 +1,5 @@
 """A small gear (z = 12, m = 2.5 mm) on a coarse mesh, and the same gear as one whole finite-element model."""
+
 from __future__ import annotations
 
 import math
@@ -20,7 +21,15 @@ STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
 WIDTH = 8e-3
 MODULE = 2.5e-3
 GEAR = GearGeometry(
-    z=12, m=MODULE, alpha=math.radians(20), x=0.35, r_a=18.2e-3, r_bore=5e-3, tip_edge=2e-4, h_fp=1.25 * MODULE, rho_fp=0.38 * MODULE
+    z=12,
+    m=MODULE,
+    alpha=math.radians(20),
+    x=0.35,
+    r_a=18.2e-3,
+    r_bore=5e-3,
+    tip_edge=2e-4,
+    h_fp=1.25 * MODULE,
+    rho_fp=0.38 * MODULE,
 )
 COARSE = MeshSpec(flank=4, thickness=1, root=2, rim=1, width=2)
 FINER = MeshSpec(flank=16, thickness=3, root=4, rim=2, width=4)

@@ -1,4 +1,5 @@
 """Compliance between the Chebyshev roll points: interpolated on both sides against loads placed there."""
+
 from __future__ import annotations
 
 import numpy as np

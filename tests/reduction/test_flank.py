@@ -1,4 +1,5 @@
 """Flank loads: resultant, exactness of the strip integral, smoothness in the roll, width functions, refusals."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -44,12 +45,15 @@ def test_a_narrow_strip_pushes_along_the_normal_at_its_roll():
 
 
 def test_strip_mean_of_a_field_agrees_with_dense_sampling_of_the_flank():
-    """A smooth field on the nodes, read back by the rows = its mean over the clipped strip along the analytic involute."""
+    """A smooth field on the nodes, read back by the rows = its mean over the clipped strip along the analytic
+    involute."""
     rolls = np.array([GEAR.s_form + 1e-5, 0.4 * GEAR.s_form + 0.6 * GEAR.s_tip, GEAR.s_tip - 1e-5])
     first, last = flank().strip(rolls)
 
     def field(points: np.ndarray) -> np.ndarray:
-        return np.stack([points[..., 0] ** 2 / 0.018, points[..., 1] * points[..., 0] / 0.018, 0 * points[..., 0]], axis=-1)
+        return np.stack(
+            [points[..., 0] ** 2 / 0.018, points[..., 1] * points[..., 0] / 0.018, 0 * points[..., 0]], axis=-1
+        )
 
     read = rows(0, rolls, 1)[:, 0] @ field(MESH.nodes).ravel()
     for value, a, b in zip(read, first, last, strict=True):
@@ -59,7 +63,8 @@ def test_strip_mean_of_a_field_agrees_with_dense_sampling_of_the_flank():
 
 
 def test_rows_are_smooth_in_the_roll():
-    """Moving the strip across element borders changes the rows continuously, with a continuous slope inside the flank."""
+    """Moving the strip across element borders changes the rows continuously, with a continuous slope inside the
+    flank."""
     rolls = np.linspace(0.6 * GEAR.s_form + 0.4 * GEAR.s_tip, 0.4 * GEAR.s_form + 0.6 * GEAR.s_tip, 401)
     values = rows(0, rolls, 1)[:, 0]
     slopes = np.diff(values, axis=0)

@@ -1,4 +1,5 @@
 """Two roads, one answer: the reduction on one sector against the whole gear without any symmetry."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -43,7 +44,8 @@ def test_frequencies_of_one_sector_are_those_of_the_whole_gear(modes):
 
 
 def test_rows_of_flanks_and_bore_are_those_of_the_whole_gear(modes):
-    """Sums of N Nᵀ over each frequency cluster do not depend on how pairs are turned: tooth 0, bore, and teeth by formula."""
+    """Sums of N Nᵀ over each frequency cluster do not depend on how pairs are turned: tooth 0, bore, and teeth by
+    formula."""
     squared, shapes = lowest_modes(whole().free, len(modes.frequency) + 6, block=12)
     reduced_0 = np.vstack([modes.flank_rows, modes.bore_rows])
     full_0 = np.vstack([whole().flank_rows[0], whole().bore_rows]) @ shapes
@@ -146,7 +148,8 @@ def test_inertia_is_that_of_the_whole_gear():
 
 
 def test_frf_error_is_that_of_a_direct_solution_of_the_whole_gear(modes, statics):
-    """Reference by Taylor series = reference by a direct solution of all equations, at the end of the band and beyond."""
+    """Reference by Taylor series = reference by a direct solution of all equations, at the end of the band and
+    beyond."""
     import scipy.sparse as sp
     import scipy.sparse.linalg as spl
 
