@@ -1,11 +1,15 @@
-"""The price list of the fidelity levels: error and processor time of each, on the loaded and on the lightly loaded pair.
+"""The price list of the fidelity levels: error and processor time of each, on the loaded and on the lightly loaded
+pair.
 
     python benchmarks/levels.py [pair_loaded pair_light]
 
-Every level runs with its default step. The reference is level `full` with a fifth of its own default step. Error: rms of the difference over rms of the
-alternating part, after settling, means compared apart. Time: processor seconds in the stage per simulated second, as measured on this machine now.
+Every level runs with its default step. The reference is level `full` with a fifth of its own default step. Error:
+rms of the difference over rms of the
+alternating part, after settling, means compared apart. Time: processor seconds in the stage per simulated second, as
+measured on this machine now.
 Writes levels.csv beside the stage file, where the report looks for it.
 """
+
 from __future__ import annotations
 
 import sys
@@ -32,7 +36,13 @@ def at(scene: SceneSpec, level: str, h: float = 0.0) -> Trace:
 def row(scene: SceneSpec, trace: Trace, reference: Trace) -> dict[str, object]:
     """One line of the list."""
     meta = trace.meta
-    found: dict[str, object] = {"scene": scene.name, "level": meta["level"], "n_dyn": meta["n_dyn"], "slices": meta["slices"], "h_us": 1e6 * meta["h"]}
+    found: dict[str, object] = {
+        "scene": scene.name,
+        "level": meta["level"],
+        "n_dyn": meta["n_dyn"],
+        "slices": meta["slices"],
+        "h_us": 1e6 * meta["h"],
+    }
     for name, channel in SIGNALS.items():
         wanted, got = reference[channel], trace[channel]
         found[f"{name}_error"] = float(np.std(got - wanted) / np.std(wanted))
@@ -54,7 +64,13 @@ def main(scenes: list[str]) -> None:
         table = kept + rows
         write_columns(path, {column: np.array([line[column] for line in table]) for column in COLUMNS})
         for line in rows:
-            print("  ".join(f"{line[column]:.3g}" if isinstance(line[column], float) else str(line[column]) for column in COLUMNS), flush=True)
+            print(
+                "  ".join(
+                    f"{line[column]:.3g}" if isinstance(line[column], float) else str(line[column])
+                    for column in COLUMNS
+                ),
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 The pinion winds up against the held wheel and rings; with its damping it settles at the static transmission error.
 Run: python examples/drive_with_fmpy.py [fzg_c.fmu]
 """
+
 from __future__ import annotations
 
 import subprocess

@@ -2,6 +2,7 @@
 
 Run: python examples/loaded_te.py
 """
+
 from __future__ import annotations
 
 import numpy as np
@@ -17,5 +18,7 @@ for name in ("fzg_c", "fzg_c/stage_relief"):
     model = assemble(spec, reduce_stage(spec))
     te = 1e6 * loaded_te(model, torques=[TORQUE], positions=64).te[0]
     harmonics = np.abs(np.fft.rfft(te)[1:4]) * np.sqrt(2) / te.size
-    print(f"{spec.name}: mean {te.mean():.2f} µm, peak to peak {np.ptp(te):.2f} µm, "
-          f"first three mesh harmonics, rms: {', '.join(f'{h:.3f}' for h in harmonics)} µm")  # fmt: skip
+    print(
+        f"{spec.name}: mean {te.mean():.2f} µm, peak to peak {np.ptp(te):.2f} µm, "
+        f"first three mesh harmonics, rms: {', '.join(f'{h:.3f}' for h in harmonics)} µm"
+    )

@@ -3,6 +3,7 @@
 Run: gearfmu simulate fzg_c --torque "302 N*m" --speed "2000 rpm" --set level=fast --out out/steady
      python examples/read_a_trace.py out/steady/trace.h5
 """
+
 from __future__ import annotations
 
 import sys
@@ -21,4 +22,6 @@ print(f"highest line: {level(spectrum.amplitude[top]):.1f} dB re 1 N at {spectru
 angle = mesh_angle(settled.time, settled["pinion.gear.w"], trace.meta["teeth"]["pinion"])
 cuts = order_cuts(settled.time, force, angle, orders=5)
 for order, amplitude in zip(cuts.orders, cuts.amplitude, strict=True):
-    print(f"mesh order {order}: {level(amplitude.mean()):6.1f} dB re 1 N at {cuts.mesh_frequency.mean() * order:.0f} Hz")
+    print(
+        f"mesh order {order}: {level(amplitude.mean()):6.1f} dB re 1 N at {cuts.mesh_frequency.mean() * order:.0f} Hz"
+    )

@@ -1,4 +1,5 @@
 """The command line. Verbs are loaded when they are called, so that help and errors come at once."""
+
 from __future__ import annotations
 
 import importlib
@@ -13,7 +14,10 @@ USAGE_ERROR = 100
 VERBS = {
     "new": ("gearfmu.commands.stages:new", "Write a commented stage.toml of your own, from a shipped one."),
     "mesh": ("gearfmu.commands.stages:mesh", "Mesh the gears of a stage, print the quality, write .vtu files."),
-    "reduce": ("gearfmu.commands.stages:reduce", "Reduce the gears of a stage to .h5 bodies (skipped when up to date)."),
+    "reduce": (
+        "gearfmu.commands.stages:reduce",
+        "Reduce the gears of a stage to .h5 bodies (skipped when up to date).",
+    ),
     "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),
     "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
@@ -62,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def outcome(arguments: list[str]) -> int:
     """Run the command line `arguments` and return the exit code: 0 success, 100 wrong usage, 1 any other error,
-    130 interrupted; counting verbs return their count, at most 99. Errors go to standard error, one clear message each."""
+    130 interrupted; counting verbs return their count, at most 99. Errors go to standard error, one clear message
+    each."""
     try:
         code = gearfmu.main(args=arguments, prog_name="gearfmu", standalone_mode=False)
     except click.UsageError as error:
@@ -93,7 +98,10 @@ def _failed(error: Exception, debug: bool) -> int:
         place = f"{error.filename}: " if error.filename else ""
         click.echo(f"gearfmu: {place}{error.strerror or error}", err=True)
     else:
-        click.echo(f"gearfmu: internal error, {type(error).__name__}: {error}; please report it with the output of --debug", err=True)
+        click.echo(
+            f"gearfmu: internal error, {type(error).__name__}: {error}; please report it with the output of --debug",
+            err=True,
+        )
     return 1
 
 

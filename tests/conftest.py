@@ -1,4 +1,5 @@
 """What all tests share: needs of a test that a machine may lack, with one message for each."""
+
 from __future__ import annotations
 
 import importlib.util

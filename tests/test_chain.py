@@ -1,4 +1,6 @@
-"""From numbers to report through the command line, on the shipped bodies; slow ones: demo, a second pair from its numbers, the wheel."""
+"""From numbers to report through the command line, on the shipped bodies; slow ones: demo, a second pair from its
+numbers, the wheel."""
+
 from __future__ import annotations
 
 import csv
@@ -37,14 +39,18 @@ chain_in_fmu = true
 def gearfmu(*arguments: object, cwd: Path | None = None, expect: int = 0) -> str:
     """Standard output of the verb."""
     command = [sys.executable, "-m", "gearfmu.cli", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False)
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False
+    )
     assert done.returncode == expect, done.stderr + done.stdout
     return done.stdout
 
 
 def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
     out = tmp_path / "te.csv"
-    gearfmu("te", "fzg_c", "--torque", "302 N*m", "--torque", "100 N*m", "--positions", 8, "--rigid-bearings", "--out", out)
+    gearfmu(
+        "te", "fzg_c", "--torque", "302 N*m", "--torque", "100 N*m", "--positions", 8, "--rigid-bearings", "--out", out
+    )
     rows = list(csv.reader(out.open(encoding="utf-8")))
     assert rows[0][:5] == ["torque_Nm", "position", "te_um", "mesh_stiffness_N_per_um", "share_1"]
     data = np.array(rows[1:], dtype=float)
@@ -66,7 +72,9 @@ def test_run_through_the_fmu_equals_the_kernel_bit_for_bit(tmp_path: Path) -> No
     (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
     for unit in ("fmu", "kernel"):
         gearfmu("run", "short.toml", "--unit", unit, "--out", unit, cwd=tmp_path)
-        assert {"trace.h5", "summary.json", "report.html", "data"} <= {path.name for path in (tmp_path / unit).iterdir()}
+        assert {"trace.h5", "summary.json", "report.html", "data"} <= {
+            path.name for path in (tmp_path / unit).iterdir()
+        }
     fmu, kernel = (Trace.load(tmp_path / unit / "trace.h5") for unit in ("fmu", "kernel"))
     assert list(fmu.channels) == list(kernel.channels)
     assert all(fmu[name].tobytes() == kernel[name].tobytes() for name in fmu.channels)
@@ -76,14 +84,43 @@ def test_summary_has_the_promised_fields(tmp_path: Path) -> None:
     (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
     gearfmu("run", "short.toml", "--unit", "kernel", "--verify", "--out", "out", cwd=tmp_path)
     found = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    wanted = {"outcome", "simulated_s", "cpu_s", "realtime_factor", "coupling_error", "energy_residual", "level", "n_dyn", "slices", "h", "hashes", "versions"}
+    wanted = {
+        "outcome",
+        "simulated_s",
+        "cpu_s",
+        "realtime_factor",
+        "coupling_error",
+        "energy_residual",
+        "level",
+        "n_dyn",
+        "slices",
+        "h",
+        "hashes",
+        "versions",
+    }
     assert wanted <= set(found) and found["outcome"] == "ok" and found["simulated_s"] == pytest.approx(6e-3)
     assert 0 <= found["coupling_error"] < 0.05 and found["hashes"]["model"]
 
 
 def test_simulate_writes_the_same_kind_of_trace(tmp_path: Path) -> None:
-    gearfmu("simulate", "fzg_c/stage_relief", "--torque", "302 N*m", "--speed", "2000 rpm", "--duration", "5 ms", "--settle", "1 ms",
-            "--set", "level=rigid", "--set", "effect.tip_relief=false", "--out", tmp_path)  # fmt: skip
+    gearfmu(
+        "simulate",
+        "fzg_c/stage_relief",
+        "--torque",
+        "302 N*m",
+        "--speed",
+        "2000 rpm",
+        "--duration",
+        "5 ms",
+        "--settle",
+        "1 ms",
+        "--set",
+        "level=rigid",
+        "--set",
+        "effect.tip_relief=false",
+        "--out",
+        tmp_path,
+    )
     trace = Trace.load(tmp_path / "trace.h5")
     assert trace.meta["level"] == "rigid" and trace.meta["n_dyn"] == 0 and trace.time[-1] == pytest.approx(5e-3)
 
@@ -93,15 +130,31 @@ def test_demo_ends_with_a_report(tmp_path: Path) -> None:
     out = gearfmu("demo", "--out", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert str(tmp_path / "report.html") in out
-    assert (summary["scene"], summary["level"], summary["slices"], summary["master"], summary["H"], summary["unit"]) == (
-        "clutch_closure", "standard", 5, "gs_mean", 1e-4, "fmu")  # fmt: skip
+    assert (
+        summary["scene"],
+        summary["level"],
+        summary["slices"],
+        summary["master"],
+        summary["H"],
+        summary["unit"],
+    ) == ("clutch_closure", "standard", 5, "gs_mean", 1e-4, "fmu")
     assert 0.05 < summary["results"]["lock_time_s"] < 0.3 and summary["chain_in_fmu"]
 
 
 SECOND_PAIR = {
-    '"91.5 mm"': '"69.6 mm"', '"4.5 mm"': '"2.5 mm"', "teeth = 16": "teeth = 21", "teeth = 24": "teeth = 34", "0.1817": "0.25", "0.1715": "0.10",
-    '"82.46 mm"': '"58.6 mm"', '"118.36 mm"': '"90.3 mm"', '"14 mm"': '"18 mm"', '"30 mm"': '"25 mm"', '"40 mm"': '"35 mm"', '"600 N*m"': '"120 N*m"',
-}  # fmt: skip
+    '"91.5 mm"': '"69.6 mm"',
+    '"4.5 mm"': '"2.5 mm"',
+    "teeth = 16": "teeth = 21",
+    "teeth = 24": "teeth = 34",
+    "0.1817": "0.25",
+    "0.1715": "0.10",
+    '"82.46 mm"': '"58.6 mm"',
+    '"118.36 mm"': '"90.3 mm"',
+    '"14 mm"': '"18 mm"',
+    '"30 mm"': '"25 mm"',
+    '"40 mm"': '"35 mm"',
+    '"600 N*m"': '"120 N*m"',
+}
 
 
 @pytest.mark.full

@@ -1,4 +1,5 @@
 """The command line: exit codes, one clear message, nothing half-written; verbs that need no long work are run."""
+
 from __future__ import annotations
 
 import importlib
@@ -43,10 +44,18 @@ def test_help_names_every_verb_and_comes_at_once() -> None:
 
 
 def test_help_imports_nothing_heavy() -> None:
-    code = "import sys; from gearfmu.cli import outcome; outcome(['--help']); print(sorted(m for m in sys.modules if '.' not in m))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    code = "import sys; from gearfmu.cli import outcome; outcome(['--help']); print(sorted(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
     loaded = done.stdout.splitlines()[-1]
-    assert not [name for name in ("numpy", "h5py", "matplotlib", "pydantic", "pint", "rich", "scipy") if f"'{name}'" in loaded]
+    assert not [
+        name for name in ("numpy", "h5py", "matplotlib", "pydantic", "pint", "rich", "scipy") if f"'{name}'" in loaded
+    ]
 
 
 @pytest.mark.parametrize("verb", cli.VERBS)
@@ -60,12 +69,23 @@ def test_every_verb_loads_and_explains_itself(verb: str, capsys: pytest.CaptureF
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["nonsense"], ["new"], ["te", "fzg_c"], ["te", "fzg_c", "--torque", "302"], ["te", "fzg_c", "--torque", "302 mm"],
-     ["te", "fzg_c", "--torque", "300 N*m", "--positions", "1"], ["run", "clutch_closure", "--unit", "guess"],
-     ["export", "fzg_c", "--port", "pinion"], ["export", "fzg_c", "--port", "pinion=glue"], ["mesh", "fzg_c", "--gear", "sun"],
-     ["schema", "stage", "extra"], ["inspect"]],
+    [
+        [],
+        ["nonsense"],
+        ["new"],
+        ["te", "fzg_c"],
+        ["te", "fzg_c", "--torque", "302"],
+        ["te", "fzg_c", "--torque", "302 mm"],
+        ["te", "fzg_c", "--torque", "300 N*m", "--positions", "1"],
+        ["run", "clutch_closure", "--unit", "guess"],
+        ["export", "fzg_c", "--port", "pinion"],
+        ["export", "fzg_c", "--port", "pinion=glue"],
+        ["mesh", "fzg_c", "--gear", "sun"],
+        ["schema", "stage", "extra"],
+        ["inspect"],
+    ],
     ids=" ".join,
-)  # fmt: skip
+)
 def test_wrong_usage_is_100(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code, _, err = call(*arguments, capsys=capsys)
     assert code == cli.USAGE_ERROR and err.strip()
@@ -73,11 +93,19 @@ def test_wrong_usage_is_100(arguments: list[str], capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [(["inspect", "no/such.h5"], "no such file"), (["inspect", "fzg_x"], "fzg_c"), (["new", "mine", "--like", "fzg_k"], "fzg_c"),
-     (["run", "clutch_closur"], "clutch_closure"), (["report", "no/such"], "no such file"), (["te", "fzg_k", "--torque", "1 N*m"], "fzg_c")],
+    [
+        (["inspect", "no/such.h5"], "no such file"),
+        (["inspect", "fzg_x"], "fzg_c"),
+        (["new", "mine", "--like", "fzg_k"], "fzg_c"),
+        (["run", "clutch_closur"], "clutch_closure"),
+        (["report", "no/such"], "no such file"),
+        (["te", "fzg_k", "--torque", "1 N*m"], "fzg_c"),
+    ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)  # fmt: skip
-def test_errors_are_one_message_with_the_remedy(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+)
+def test_errors_are_one_message_with_the_remedy(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, out, err = call(*arguments, capsys=capsys)
     assert code == 1 and words in err and "Traceback" not in err and out == ""
     assert len(err.strip().splitlines()) == 1
@@ -129,7 +157,9 @@ def test_variables_page_in_docs_is_the_kernels_table(capsys: pytest.CaptureFixtu
 def test_every_row_of_the_table_is_read() -> None:
     source = (ROOT / "gearfmu" / "kernel" / "src" / "gk_variables.inc").read_text(encoding="utf-8")
     found = variables.rows()
-    assert len(found) == source.count('GK_REAL, GK_') + source.count('GK_INTEGER, GK_') + source.count('GK_BOOLEAN, GK_') + source.count('GK_ENUM, GK_')
+    assert len(found) == source.count("GK_REAL, GK_") + source.count("GK_INTEGER, GK_") + source.count(
+        "GK_BOOLEAN, GK_"
+    ) + source.count("GK_ENUM, GK_")
     assert all(row.description and row.exists in variables.WHEN for row in found)
 
 

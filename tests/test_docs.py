@@ -1,4 +1,5 @@
 """The documentation keeps its word: links lead somewhere, tests it names exist, commands it shows are real."""
+
 from __future__ import annotations
 
 import re

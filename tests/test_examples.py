@@ -1,4 +1,5 @@
 """Every example runs as it stands, and one number of it is right."""
+
 from __future__ import annotations
 
 import os
@@ -44,8 +45,23 @@ def test_loaded_te(tmp_path: Path) -> None:
 
 def test_read_a_trace(tmp_path: Path) -> None:
     """Mesh orders of a pair at 2000 rpm are multiples of 16 · 2000/60 Hz."""
-    command = [sys.executable, "-m", "gearfmu.cli", "simulate", "fzg_c", "--torque", "302 N*m", "--speed", "2000 rpm",
-               "--duration", "0.05 s", "--set", "level=fast", "--out", str(tmp_path)]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "gearfmu.cli",
+        "simulate",
+        "fzg_c",
+        "--torque",
+        "302 N*m",
+        "--speed",
+        "2000 rpm",
+        "--duration",
+        "0.05 s",
+        "--set",
+        "level=fast",
+        "--out",
+        str(tmp_path),
+    ]
     subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
     text = example("read_a_trace.py", tmp_path / "trace.h5", cwd=tmp_path)
     first = re.search(r"mesh order 1: +(-?[\d.]+) dB re 1 N at (\d+) Hz", text)

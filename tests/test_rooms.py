@@ -1,4 +1,5 @@
 """The shape of the code: who may import whom, how long files and functions are, what no file may say."""
+
 from __future__ import annotations
 
 import ast

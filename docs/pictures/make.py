@@ -1,4 +1,5 @@
 """Pictures of the README, from the trace of the demo: python docs/pictures/make.py [out/demo/trace.h5]"""
+
 from __future__ import annotations
 
 import base64

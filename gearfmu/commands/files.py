@@ -1,4 +1,5 @@
 """Verbs about files: inspect, schema."""
+
 from __future__ import annotations
 
 import json
@@ -70,7 +71,12 @@ def _shipped(name: Path) -> Path:
     stages, scenes = shipped_stages(), shipped_scenes()
     if str(name) in scenes:
         return SHIPPED / f"{name}.toml"
-    found = [path for root in library_roots() for path in (root / name / "stage.toml", root / f"{name}.toml") if path.is_file()]
+    found = [
+        path
+        for root in library_roots()
+        for path in (root / name / "stage.toml", root / f"{name}.toml")
+        if path.is_file()
+    ]
     if not found:
         raise GearfmuError(f"{name}: no such file; shipped are {', '.join([*stages, *scenes])}")
     return found[0]
@@ -89,9 +95,19 @@ def _hdf5(path: Path) -> dict[str, Any]:
 
             return inspect_file(path)
     trace = Trace.load(path)
-    channels = {name: {"unit": c.unit, "min": float(c.values.min()), "max": float(c.values.max())} for name, c in trace.channels.items()}
+    channels = {
+        name: {"unit": c.unit, "min": float(c.values.min()), "max": float(c.values.max())}
+        for name, c in trace.channels.items()
+    }
     span = [float(trace.time[0]), float(trace.time[-1])]
-    return {"file": str(path), "kind": "trace", "samples": trace.time.size, "time_s": span, "channels": channels, "meta": trace.meta}
+    return {
+        "file": str(path),
+        "kind": "trace",
+        "samples": trace.time.size,
+        "time_s": span,
+        "channels": channels,
+        "meta": trace.meta,
+    }
 
 
 def _toml(path: Path) -> dict[str, Any]:
@@ -102,7 +118,12 @@ def _toml(path: Path) -> dict[str, Any]:
     if path.is_file() and "coupling" in read_toml(path):
         return {"file": str(path), "kind": "scene", **load_scene(path).model_dump(mode="json")}
     spec = load_stage(path)
-    return {"file": str(path), "kind": "stage", **spec.model_dump(mode="json", exclude={"kind"}), "derived": _derived(spec)}
+    return {
+        "file": str(path),
+        "kind": "stage",
+        **spec.model_dump(mode="json", exclude={"kind"}),
+        "derived": _derived(spec),
+    }
 
 
 def _derived(spec: Any) -> dict[str, Any]:
@@ -112,8 +133,16 @@ def _derived(spec: Any) -> dict[str, Any]:
     from gearfmu.geometry import PairGeometry
 
     pair = PairGeometry.of(spec)
-    radii = {gear.name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a} for gear, shape in zip(spec.gears, pair.gears, strict=True)}
-    return {"working_pressure_angle_deg": math.degrees(pair.alpha_wt), "contact_ratio": pair.contact_ratio, "base_pitch": pair.base_pitch, **radii}
+    radii = {
+        gear.name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a}
+        for gear, shape in zip(spec.gears, pair.gears, strict=True)
+    }
+    return {
+        "working_pressure_angle_deg": math.degrees(pair.alpha_wt),
+        "contact_ratio": pair.contact_ratio,
+        "base_pitch": pair.base_pitch,
+        **radii,
+    }
 
 
 def _fmu(path: Path) -> dict[str, Any]:
@@ -126,5 +155,12 @@ def _fmu(path: Path) -> dict[str, Any]:
     except Exception as error:  # fmpy lets errors of zipfile, lxml and its own through
         raise FmuError(f"{path}: not an FMU ({error}); 'gearfmu validate' says more") from error
     variables = {v.name: f"{v.causality}, {v.unit or '-'}: {v.description or ''}" for v in description.modelVariables}
-    return {"file": str(path), "kind": "fmu", "model": description.modelName, "fmi": description.fmiVersion, "guid": description.guid,
-            "platforms": list(fmpy.supported_platforms(str(path))), "variables": variables}  # fmt: skip
+    return {
+        "file": str(path),
+        "kind": "fmu",
+        "model": description.modelName,
+        "fmi": description.fmiVersion,
+        "guid": description.guid,
+        "platforms": list(fmpy.supported_platforms(str(path))),
+        "variables": variables,
+    }

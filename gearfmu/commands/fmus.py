@@ -1,4 +1,5 @@
 """Verbs of the FMU: export, validate."""
+
 from __future__ import annotations
 
 import json
@@ -13,11 +14,24 @@ PORT_KINDS = ("spring", "torque", "fixed")
 @click.command()
 @click.argument("stage")
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; <stage>.fmu when not given.")
-@click.option("--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat.")
-@click.option("--runtime", type=click.Choice(["native", "python"]), default="native", show_default=True,
-              help="native: compiled, needs nothing; python: pythonfmu, for hosts that are Python.")  # fmt: skip
-@click.option("--platform", "platforms", multiple=True, type=click.Choice(["host", "linux64", "win64"]), default=("host",),
-              help="Platforms to put in; others than the host's need the [cross] extra; may repeat.")  # fmt: skip
+@click.option(
+    "--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat."
+)
+@click.option(
+    "--runtime",
+    type=click.Choice(["native", "python"]),
+    default="native",
+    show_default=True,
+    help="native: compiled, needs nothing; python: pythonfmu, for hosts that are Python.",
+)
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    type=click.Choice(["host", "linux64", "win64"]),
+    default=("host",),
+    help="Platforms to put in; others than the host's need the [cross] extra; may repeat.",
+)
 def export(stage: str, out: Path | None, ports: tuple[str, ...], runtime: str, platforms: tuple[str, ...]) -> None:
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
@@ -52,6 +66,8 @@ def port_kinds(texts: tuple[str, ...]) -> dict[str, str]:
     for text in texts:
         shaft, sign, kind = text.partition("=")
         if not sign or not shaft or kind not in PORT_KINDS:
-            raise click.BadParameter(f"'{text}' is not SHAFT=KIND with a kind of {', '.join(PORT_KINDS)}", param_hint="--port")
+            raise click.BadParameter(
+                f"'{text}' is not SHAFT=KIND with a kind of {', '.join(PORT_KINDS)}", param_hint="--port"
+            )
         found[shaft] = kind
     return found

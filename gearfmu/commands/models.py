@@ -1,4 +1,5 @@
 """From a stage's name to its bodies and its model: load, reduce what is missing, assemble."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -18,7 +19,8 @@ def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> Any:
 
 
 def bodies_of(stage: str) -> tuple[Any, list[Any]]:
-    """StageSpec and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first, with a progress bar."""
+    """StageSpec and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first, with a
+    progress bar."""
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -34,14 +36,19 @@ def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
 
 
 def with_ports(spec: Any, kinds: Mapping[str, str]) -> Any:
-    """The StageSpec with the ports' kinds replaced; a usage error for a shaft it does not have or a spring without k and c."""
+    """The StageSpec with the ports' kinds replaced; a usage error for a shaft it does not have or a spring without k
+    and c."""
     unknown = set(kinds) - set(spec.ports)
     if unknown:
-        raise click.BadParameter(f"no shaft '{min(unknown)}'; the stage has {', '.join(spec.ports)}", param_hint="--port")
+        raise click.BadParameter(
+            f"no shaft '{min(unknown)}'; the stage has {', '.join(spec.ports)}", param_hint="--port"
+        )
     ports = dict(spec.ports)
     for shaft, kind in kinds.items():
         if kind == "spring" and ports[shaft].k is None:
-            raise click.BadParameter(f"{shaft}=spring needs k and c in [ports.{shaft}] of {spec.source}", param_hint="--port")
+            raise click.BadParameter(
+                f"{shaft}=spring needs k and c in [ports.{shaft}] of {spec.source}", param_hint="--port"
+            )
         chain = ports[shaft].chain if kind == "spring" else None
         ports[shaft] = ports[shaft].model_copy(update={"kind": kind, "chain": chain})
     return spec.model_copy(update={"ports": ports})

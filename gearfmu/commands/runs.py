@@ -1,4 +1,5 @@
 """Verbs that simulate and report: run, simulate, report, demo."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -14,8 +15,16 @@ OUT = click.Path(path_type=Path, file_okay=False)
 @click.command()
 @click.argument("scene")
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
-@click.option("--unit", type=click.Choice(["fmu", "kernel"]), default="fmu", show_default=True, help="Through the exported FMU or the same kernel without it.")
-@click.option("--fmu", "fmu_path", type=click.Path(path_type=Path), help="An FMU exported earlier; exported anew when not given.")
+@click.option(
+    "--unit",
+    type=click.Choice(["fmu", "kernel"]),
+    default="fmu",
+    show_default=True,
+    help="Through the exported FMU or the same kernel without it.",
+)
+@click.option(
+    "--fmu", "fmu_path", type=click.Path(path_type=Path), help="An FMU exported earlier; exported anew when not given."
+)
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
@@ -31,8 +40,20 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
 @click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the pinion, "2000 rpm".')
 @click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
 @click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
-@click.option("--settle", type=Quantity("s"), default="0.02 s", show_default=True, help="From here on results and spectra are taken.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.")
+@click.option(
+    "--settle",
+    type=Quantity("s"),
+    default="0.02 s",
+    show_default=True,
+    help="From here on results and spectra are taken.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
+)
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:
     """Run STAGE alone: both shafts' outer ends turn at constant speed, wound up by the torque."""
@@ -65,7 +86,9 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
     source = path / "trace.h5" if path.is_dir() else path
     trace = Trace.load(source)
-    click.echo(write_report(trace, out or source.parent, stage or trace.meta.get("stage_path") or trace.meta.get("stage")))
+    click.echo(
+        write_report(trace, out or source.parent, stage or trace.meta.get("stage_path") or trace.meta.get("stage"))
+    )
 
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
@@ -80,14 +103,17 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
 
 
 def finish(trace: Any, out: Path, stage: str | None) -> int:
-    """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end, else 1."""
+    """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
+    else 1."""
     from gearfmu.report.page import REACHED_THE_END
 
     trace.save(out / "trace.h5")
     page = write_report(trace, out, stage)
     meta = trace.meta
-    click.echo(f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
-               f"({meta['realtime_factor']:.3g} per simulated second)")  # fmt: skip
+    click.echo(
+        f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
+        f"({meta['realtime_factor']:.3g} per simulated second)"
+    )
     click.echo(page)
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 

@@ -1,4 +1,5 @@
 """What several verbs share: quantities with units as options, progress bars, printing of name–value lists."""
+
 from __future__ import annotations
 
 import sys
@@ -44,7 +45,9 @@ def progress_bar(title: str) -> Iterator[Progress | None]:
     from rich.progress import BarColumn, Progress as Bar, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    with Bar(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console, transient=True) as bar:
+    with Bar(
+        TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console, transient=True
+    ) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda fraction, text="": bar.update(task, completed=fraction, description=f"{title} {text}".strip())
 

@@ -1,4 +1,5 @@
 """Verbs from numbers to reduced bodies: new, mesh, reduce."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -23,7 +24,9 @@ def new(name: str, like: str) -> None:
 @click.command()
 @click.argument("stage")
 @click.option("--gear", "only", metavar="NAME", help="Only this gear (pinion or wheel).")
-@click.option("--scale", type=click.FloatRange(0.2, 4), default=1.0, show_default=True, help="Factor on all element counts.")
+@click.option(
+    "--scale", type=click.FloatRange(0.2, 4), default=1.0, show_default=True, help="Factor on all element counts."
+)
 @click.option("--full", is_flag=True, help="All teeth instead of one sector.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the .vtu files.")
 def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> None:
@@ -45,7 +48,9 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> N
 
 @click.command()
 @click.argument("stage")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder of the .h5 files; beside the stage file when not given.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder of the .h5 files; beside the stage file when not given."
+)
 @click.option("--force", is_flag=True, help="Reduce again even where a body is up to date.")
 def reduce(stage: str, out: Path | None, force: bool) -> None:
     """Reduce the gears of STAGE to <gear>.h5; a body whose input hash matches is left as it is."""
@@ -56,12 +61,17 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
     with progress_bar("reducing") as progress:
         bodies = reduce_stage(spec, out_dir=out, force=force, progress=by_text(progress))
     for body in bodies:
-        click.echo(f"{body.name}: {body.modes} modes to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, "
-                   f"frequency response within {body.frf.max_error:.1e} to {body.frf.band[1] / 1e3:.0f} kHz, input {body.input_hash[:12]}")  # fmt: skip
+        click.echo(
+            f"{body.name}: {body.modes} modes to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, "
+            f"frequency response within {body.frf.max_error:.1e} to {body.frf.band[1] / 1e3:.0f} kHz, input "
+            f"{body.input_hash[:12]}"
+        )
 
 
 def _chosen(gears: tuple, only: str | None) -> list:
     chosen = [gear for gear in gears if only in (None, gear.name)]
     if not chosen:
-        raise click.BadParameter(f"no gear '{only}'; the stage has {', '.join(gear.name for gear in gears)}", param_hint="--gear")
+        raise click.BadParameter(
+            f"no gear '{only}'; the stage has {', '.join(gear.name for gear in gears)}", param_hint="--gear"
+        )
     return chosen

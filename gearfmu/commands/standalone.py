@@ -1,4 +1,5 @@
 """The standalone solver behind the verb simulate: settings of the kernel, a run at constant speed and load."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -10,7 +11,8 @@ from gearfmu.commands.shared import Progress
 
 
 def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
-    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for a name or value the model does not know."""
+    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for a name or value the model does
+    not know."""
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     found = {}
     for text in settings:
@@ -27,18 +29,32 @@ def steady_run(model: Any, drive: Mapping[str, float], settings: Mapping[str, fl
 
     soft = [name for name, port in model.spec.ports.items() if port.kind != "spring" or port.chain is not None]
     if soft:
-        raise click.UsageError(f"'simulate' turns spring ports without a chain; {', '.join(soft)} of {model.spec.source} is another: use 'run' with a scene")
+        raise click.UsageError(
+            f"'simulate' turns spring ports without a chain; {', '.join(soft)} of {model.spec.source} is another: "
+            "use 'run' with a scene"
+        )
     inputs = Steady(model, drive["speed"], drive["torque"])
     trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
     exchanged = abs(trace["energy.work"]).max() + trace["energy.stored"].max()
-    trace.meta.update(energy_residual=float(trace["energy.residual"][-1] / exchanged), H=drive["step"], settle=drive["settle"], scene="constant speed and load",
-                      teeth={gear.name: gear.teeth for gear in model.spec.gears}, torque=drive["torque"], speed=drive["speed"])  # fmt: skip
+    trace.meta.update(
+        energy_residual=float(trace["energy.residual"][-1] / exchanged),
+        H=drive["step"],
+        settle=drive["settle"],
+        scene="constant speed and load",
+        teeth={gear.name: gear.teeth for gear in model.spec.gears},
+        torque=drive["torque"],
+        speed=drive["speed"],
+    )
     return trace
 
 
 def _number(variable: Any, text: str) -> float:
     """Value of an enumeration by its item, of a boolean by true or false, else a number in SI."""
-    words = {"true": 1.0, "false": 0.0} if variable.type == "Boolean" else {item: float(i) for i, item in enumerate(variable.items)}
+    words = (
+        {"true": 1.0, "false": 0.0}
+        if variable.type == "Boolean"
+        else {item: float(i) for i, item in enumerate(variable.items)}
+    )
     if text in words:
         return words[text]
     try:

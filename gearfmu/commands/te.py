@@ -1,4 +1,5 @@
 """The verb te: loaded transmission error as a table and a picture."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -13,10 +14,29 @@ from gearfmu.commands.shared import Quantity
 
 @click.command()
 @click.argument("stage")
-@click.option("--torque", "torques", multiple=True, required=True, type=Quantity("N*m"), help='Torque on the pinion, "302 N*m"; may repeat.')
-@click.option("--positions", type=click.IntRange(2, 100_000), default=41, show_default=True, help="Positions over one pitch, end point left out.")
+@click.option(
+    "--torque",
+    "torques",
+    multiple=True,
+    required=True,
+    type=Quantity("N*m"),
+    help='Torque on the pinion, "302 N*m"; may repeat.',
+)
+@click.option(
+    "--positions",
+    type=click.IntRange(2, 100_000),
+    default=41,
+    show_default=True,
+    help="Positions over one pitch, end point left out.",
+)
 @click.option("--rigid-bearings", is_flag=True, help="Hold the axes.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("te.csv"), show_default=True, help="Table; the plot has the same name.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("te.csv"),
+    show_default=True,
+    help="Table; the plot has the same name.",
+)
 def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, out: Path) -> None:
     """Loaded transmission error of STAGE over one pitch, wheel held: te_um = 1e6·(r_b1 φ_1 + r_b2 φ_2)."""
     model = model_of(stage)
@@ -29,8 +49,10 @@ def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: b
     picture = out.with_suffix(".png")
     write_plot(result, picture)
     for torque, row, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):
-        click.echo(f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
-                   f"mesh stiffness {1e-6 * stiffness.mean():.1f} N/µm")  # fmt: skip
+        click.echo(
+            f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
+            f"mesh stiffness {1e-6 * stiffness.mean():.1f} N/µm"
+        )
     click.echo(f"{out}, {picture}")
 
 

@@ -1,4 +1,5 @@
 """The report of one run: report.html, the data of every plot as CSV, summary.json."""
+
 from __future__ import annotations
 
 import json
@@ -17,7 +18,6 @@ from gearfmu.report.plots import Plot
 from gearfmu.report.results import key_results, strict
 from gearfmu.report.signals import SETTLED, angle_of_mesh, teeth, window_of_interest
 from gearfmu.stage.trace import Trace, write_columns
-
 
 NVH = ("spectrum", "orders", "spectrogram")
 
@@ -76,7 +76,8 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
 
 
 def detail_window(trace: Trace, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
-    """About `periods` mesh periods (s) around the largest mesh force, or a twentieth of the run where the mesh angle is missing."""
+    """About `periods` mesh periods (s) around the largest mesh force, or a twentieth of the run where the mesh angle
+    is missing."""
     start, end = float(trace.time[0]), float(trace.time[-1])
     force = np.abs(trace["mesh.force"]) if "mesh.force" in trace else np.zeros(1)
     centre = float(trace.time[int(np.argmax(force))])
@@ -88,7 +89,13 @@ def detail_window(trace: Trace, angle: np.ndarray | None, periods: float = 6) ->
     return centre - half, centre + half
 
 
-def _document(trace: Trace, summary: Mapping[str, Any], plots_and_gaps: tuple[list[Plot], list[str]], spec: Any, bodies: Sequence[Any] | None) -> str:
+def _document(
+    trace: Trace,
+    summary: Mapping[str, Any],
+    plots_and_gaps: tuple[list[Plot], list[str]],
+    spec: Any,
+    bodies: Sequence[Any] | None,
+) -> str:
     made, missing = plots_and_gaps
     title = str(summary.get("scene") or trace.meta.get("scene") or "simulation")
     stage = str(summary.get("stage") or trace.meta.get("stage") or "stage not named")
@@ -140,11 +147,15 @@ def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = ""
 
 
 NAMES = {
-    "mesh_force_mean_N": "mesh force, mean, N", "mesh_force_rms_ac_N": "mesh force, rms of the alternating part, N",
-    "te_mean_um": "transmission error, mean, µm", "te_rms_ac_um": "transmission error, rms of the alternating part, µm",
-    "contact_loss_percent": "teeth apart, % of the samples, whole run", "coast_contact_percent": "coast flanks carry, % of the samples, whole run",
-    "impacts": "impacts, whole run", "lock_time_s": "clutch locked from, s",
-}  # fmt: skip
+    "mesh_force_mean_N": "mesh force, mean, N",
+    "mesh_force_rms_ac_N": "mesh force, rms of the alternating part, N",
+    "te_mean_um": "transmission error, mean, µm",
+    "te_rms_ac_um": "transmission error, rms of the alternating part, µm",
+    "contact_loss_percent": "teeth apart, % of the samples, whole run",
+    "coast_contact_percent": "coast flanks carry, % of the samples, whole run",
+    "impacts": "impacts, whole run",
+    "lock_time_s": "clutch locked from, s",
+}
 
 
 def _results(trace: Trace) -> str:
@@ -152,10 +163,20 @@ def _results(trace: Trace) -> str:
     rows = []
     for key, value in key_results(trace).items():
         bearing = key.removeprefix("bearing_").removesuffix("_rms_ac_N")
-        rows.append((NAMES.get(key, f"bearing {bearing}, rms of the alternating part, both directions, N"), f"{value:.4g}"))
+        rows.append(
+            (NAMES.get(key, f"bearing {bearing}, rms of the alternating part, both directions, N"), f"{value:.4g}")
+        )
     where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise. "
-    where += "Alternating: without the mean." if window.reason == SETTLED else "Alternating: without a moving average of 10 ms."
-    return page.table(("", "value"), rows) + page.note(where) if rows else page.note("The trace holds no mesh or bearing channel.")
+    where += (
+        "Alternating: without the mean."
+        if window.reason == SETTLED
+        else "Alternating: without a moving average of 10 ms."
+    )
+    return (
+        page.table(("", "value"), rows) + page.note(where)
+        if rows
+        else page.note("The trace holds no mesh or bearing channel.")
+    )
 
 
 def _octaves(trace: Trace) -> str:
@@ -167,7 +188,9 @@ def _octaves(trace: Trace) -> str:
     if not bands:
         return ""
     rows = [(name, *(f"{row[band]:.1f}" for band in bands)) for name, row in levels.items()]
-    return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
+    return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(
+        ("Hz", *(f"{band:g}" for band in bands)), rows
+    )
 
 
 def _accuracy(summary: Mapping[str, Any], spec: Any, bodies: Sequence[Any] | None) -> list[str]:
@@ -177,29 +200,60 @@ def _accuracy(summary: Mapping[str, Any], spec: Any, bodies: Sequence[Any] | Non
         "CPU time per simulated second, stage alone": _text(summary, "stage_realtime_factor"),
         "CPU time per simulated second, whole run": _text(summary, "realtime_factor"),
     }
-    parts = [page.pairs_table({name: "not measured in this run" if text == "not given" else text for name, text in rows.items()})]
+    parts = [
+        page.pairs_table(
+            {name: "not measured in this run" if text == "not given" else text for name, text in rows.items()}
+        )
+    ]
     made_with = fingerprint(body.input_hash for body in bodies or ())
     prices = [row for row in read_levels(levels_path(spec)) if row["bodies"] == made_with] if spec is not None else []
     if prices:
-        parts += ["<h3>What the fidelity levels of this stage cost and how far they are off</h3>",
-                  page.table(HEADER, shown_rows(prices, str(summary.get("level")))), page.note(PRICES)]  # fmt: skip
+        parts += [
+            "<h3>What the fidelity levels of this stage cost and how far they are off</h3>",
+            page.table(HEADER, shown_rows(prices, str(summary.get("level")))),
+            page.note(PRICES),
+        ]
     else:
-        parts.append(page.note("The error of the fidelity levels of this stage with these bodies has not been measured (benchmarks/levels.py does it)."))
+        parts.append(
+            page.note(
+                "The error of the fidelity levels of this stage with these bodies has not been measured "
+                "(benchmarks/levels.py does it)."
+            )
+        )
     return parts + [page.note(_frf_words(body)) for body in bodies or ()]
 
 
-PRICES = ("Errors of the alternating part against level full at a fifth of its step, after settling, each level at its default step; "
-          "CPU time of the stage as measured when the list was made.")  # fmt: skip
+PRICES = (
+    "Errors of the alternating part against level full at a fifth of its step, after settling, each level at its "
+    "default step; "
+    "CPU time of the stage as measured when the list was made."
+)
 
 
 def _frf_words(body: Any) -> str:
     frf = body.frf
-    return (f"Body {body.name}: frequency response of the modes below {frf.cut / 1e3:g} kHz with their static residual against the finite elements: "
-            f"largest relative error {frf.max_error:.1e} from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be trusted up to {frf.trusted_to / 1e3:.3g} kHz.")  # fmt: skip
+    return (
+        f"Body {body.name}: frequency response of the modes below {frf.cut / 1e3:g} kHz with their static "
+        "residual against the finite elements: "
+        f"largest relative error {frf.max_error:.1e} from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be trusted up "
+        f"to {frf.trusted_to / 1e3:.3g} kHz."
+    )
 
 
 def _provenance(summary: Mapping[str, Any]) -> dict[str, str]:
-    shown = {"scene", "stage", "outcome", "level", "n_dyn", "slices", "h", "H", "simulated_s", "cpu_s", "realtime_factor"}
+    shown = {
+        "scene",
+        "stage",
+        "outcome",
+        "level",
+        "n_dyn",
+        "slices",
+        "h",
+        "H",
+        "simulated_s",
+        "cpu_s",
+        "realtime_factor",
+    }
     flat: dict[str, str] = {}
     for key, value in summary.items():
         if isinstance(value, Mapping) and key not in shown:

@@ -1,4 +1,6 @@
-"""The price list of a stage's fidelity levels, as benchmarks/levels.py measured it: levels.csv beside the stage file."""
+"""The price list of a stage's fidelity levels, as benchmarks/levels.py measured it: levels.csv beside the stage
+file."""
+
 from __future__ import annotations
 
 import csv
@@ -8,8 +10,30 @@ from typing import Any
 
 from gearfmu.spec.library import model_folder
 
-COLUMNS = ("scene", "level", "n_dyn", "slices", "h_us", "te_error", "force_error", "bearing_error", "te_mean_error_um", "time_per_second", "bodies")
-HEADER = ("scene, level", "dynamic modes", "slices", "step, µs", "TE", "mesh force", "bearing force", "mean TE, µm", "CPU time per second")
+COLUMNS = (
+    "scene",
+    "level",
+    "n_dyn",
+    "slices",
+    "h_us",
+    "te_error",
+    "force_error",
+    "bearing_error",
+    "te_mean_error_um",
+    "time_per_second",
+    "bodies",
+)
+HEADER = (
+    "scene, level",
+    "dynamic modes",
+    "slices",
+    "step, µs",
+    "TE",
+    "mesh force",
+    "bearing force",
+    "mean TE, µm",
+    "CPU time per second",
+)
 TEXT, WHOLE = ("scene", "level", "bodies"), ("n_dyn", "slices")
 
 
@@ -37,10 +61,17 @@ def fingerprint(hashes: Iterable[str]) -> str:
 def shown_rows(rows: list[dict[str, Any]], level: str) -> list[tuple[str, ...]]:
     """Rows as text for a page; the level in use is marked."""
     return [
-        (f"{row['scene']}, {row['level']}{' ←' if row['level'] == level else ''}", str(row["n_dyn"]), str(row["slices"]), f"{row['h_us']:.3g}",
-         *(f"{100 * row[f'{name}_error']:.2g} %" for name in ("te", "force", "bearing")), f"{row['te_mean_error_um']:.2g}", f"{row['time_per_second']:.3g}")
+        (
+            f"{row['scene']}, {row['level']}{' ←' if row['level'] == level else ''}",
+            str(row["n_dyn"]),
+            str(row["slices"]),
+            f"{row['h_us']:.3g}",
+            *(f"{100 * row[f'{name}_error']:.2g} %" for name in ("te", "force", "bearing")),
+            f"{row['te_mean_error_um']:.2g}",
+            f"{row['time_per_second']:.3g}",
+        )
         for row in rows
-    ]  # fmt: skip
+    ]
 
 
 def _value(key: str, text: str) -> Any:

@@ -5,6 +5,7 @@ reference 1 N for forces: a sine of peak value 1 N has −3.01 dB. Windows are H
 bandwidth (3/2 lines) are taken out. Source: Bendat, Piersol, Random Data, 4th ed., ch. 11; Brandt, Noise and Vibration
 Analysis, ch. 9–10 (spectra) and 12 (order tracking).
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -105,7 +106,8 @@ def band_rms(spectrum: Spectrum, low: float, high: float) -> float:
 
 
 def octave_levels(spectrum: Spectrum, reference: float = 1.0) -> dict[float, float]:
-    """Level in dB of each octave band (IEC 61260 centres, 63 Hz … 16 kHz) that lies in the spectrum and holds ≥ 3 lines."""
+    """Level in dB of each octave band (IEC 61260 centres, 63 Hz … 16 kHz) that lies in the spectrum and holds ≥ 3
+    lines."""
     top = spectrum.frequency[-1]
     return {
         float(centre): float(level(band_rms(spectrum, low, high), reference))
@@ -156,7 +158,9 @@ def _coefficients(angle: np.ndarray, values: np.ndarray, orders: np.ndarray, wid
 
 def _frames(values: np.ndarray, size: int, hop: int) -> np.ndarray:
     if size < 16 or values.size < size:
-        raise MetricsError(f"{values.size} samples are too few for a window of {size} (at least 16); record a longer run")
+        raise MetricsError(
+            f"{values.size} samples are too few for a window of {size} (at least 16); record a longer run"
+        )
     return np.lib.stride_tricks.sliding_window_view(values.astype(float), size)[::hop]
 
 

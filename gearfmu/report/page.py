@@ -1,4 +1,5 @@
 """The page itself: one HTML file that carries its own style and pictures and refers to nothing outside."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -25,9 +26,11 @@ border:1px solid var(--line);border-radius:6px;overflow:hidden;margin:0 0 16px}
 .facts div{background:#fff;padding:9px 14px}
 .facts b{display:block;font-size:18px;font-weight:600;letter-spacing:-.01em;overflow-wrap:anywhere}
 .facts span{color:var(--muted);font-size:12.5px}
-.ok,.bad{display:inline-block;border-radius:4px;padding:1px 9px;font-size:13px;font-weight:600;vertical-align:5px;margin-left:8px}
+.ok,.bad{display:inline-block;border-radius:4px;padding:1px
+9px;font-size:13px;font-weight:600;vertical-align:5px;margin-left:8px}
 .ok{background:#dff0e4;color:#20623a}.bad{background:#f8dcd9;color:#8f2018}
-.warning{border-left:4px solid #c8642b;background:#fdf4ec;border-radius:4px;padding:10px 16px;margin:0 0 16px;font-size:14px}
+.warning{border-left:4px solid #c8642b;background:#fdf4ec;border-radius:4px;padding:10px 16px;margin:0 0
+16px;font-size:14px}
 table{border-collapse:collapse;font-size:13.5px;min-width:min(560px,100%)}
 th,td{text-align:left;padding:4px 22px 4px 0;border-bottom:1px solid var(--line);vertical-align:top}
 th{color:var(--muted);font-weight:500}
@@ -44,14 +47,16 @@ REACHED_THE_END = ("completed", "ok")
 
 def page(title: str, body: Sequence[str]) -> str:
     """The whole document around the given parts."""
-    return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-            f"<title>{escape(title)}</title><style>{CSS}</style></head><body><main>\n{chr(10).join(body)}\n</main></body></html>\n")  # fmt: skip
+    meta = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    top = f'<!DOCTYPE html>\n<html lang="en"><head>{meta}<title>{escape(title)}</title><style>{CSS}</style></head>'
+    return top + "<body><main>\n" + "\n".join(body) + "\n</main></body></html>\n"
 
 
 def head(title: str, outcome: str, subtitle: str) -> str:
     """Title with the outcome as a badge."""
     kind = "ok" if outcome in REACHED_THE_END else "bad"
-    return f'<header><h1>{escape(title)}<span class="{kind}">{escape(outcome)}</span></h1><p>{escape(subtitle)}</p></header>'
+    badge = f'<span class="{kind}">{escape(outcome)}</span>'
+    return f"<header><h1>{escape(title)}{badge}</h1><p>{escape(subtitle)}</p></header>"
 
 
 def facts(pairs: Mapping[str, str]) -> str:
@@ -63,8 +68,10 @@ def facts(pairs: Mapping[str, str]) -> str:
 def figure(plot: Plot) -> str:
     """A section with one plot, its caption and the link to its data."""
     link = f'<a href="data/{plot.name}.csv">data/{plot.name}.csv</a>'
-    return (f"<section><h2>{escape(plot.title)}</h2><figure>{plot.picture}"
-            f"<figcaption>{escape(plot.caption)} {link}</figcaption></figure></section>")  # fmt: skip
+    return (
+        f"<section><h2>{escape(plot.title)}</h2><figure>{plot.picture}"
+        f"<figcaption>{escape(plot.caption)} {link}</figcaption></figure></section>"
+    )
 
 
 def section(title: str, *parts: str) -> str:
@@ -82,14 +89,17 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     marks = ["", *[' class="n"'] * (len(header) - 1)]
     top = "".join(f"<th{mark}>{escape(cell)}</th>" for mark, cell in zip(marks, header, strict=True))
     body = "".join(
-        "<tr>" + "".join(f"<td{mark}>{escape(cell)}</td>" for mark, cell in zip(marks, row, strict=True)) + "</tr>" for row in rows
+        "<tr>" + "".join(f"<td{mark}>{escape(cell)}</td>" for mark, cell in zip(marks, row, strict=True)) + "</tr>"
+        for row in rows
     )
     return f"<table><tr>{top}</tr>{body}</table>"
 
 
 def pairs_table(pairs: Mapping[str, str]) -> str:
     """A table of name and text."""
-    rows = "".join(f"<tr><th>{escape(name)}</th><td><code>{escape(value)}</code></td></tr>" for name, value in pairs.items())
+    rows = "".join(
+        f"<tr><th>{escape(name)}</th><td><code>{escape(value)}</code></td></tr>" for name, value in pairs.items()
+    )
     return f"<table>{rows}</table>"
 
 

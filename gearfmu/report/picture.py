@@ -1,4 +1,5 @@
 """The deformed pair at the instant of the largest mesh force, drawn from the bodies' display surfaces."""
+
 from __future__ import annotations
 
 import math
@@ -43,7 +44,9 @@ def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None
     contacts = contacts_at(pair, angles, sg)
     if not contacts or force == 0:
         return None
-    moved = [_displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)]
+    moved = [
+        _displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)
+    ]
     scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
     placed = [_placed(bodies[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
     world = [u @ _rotation(angle).T for u, angle in zip(moved, angles, strict=True)]
@@ -51,12 +54,19 @@ def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None
     drawn = [points + scale * u for points, u in zip(placed, world, strict=True)]
     drawn[0] = drawn[0] @ _rotation(sg * scale * approach / pair.gears[0].r_b).T
     shapes = [_shape(bodies[g].display, drawn[g], moved[g]) for g in (0, 1)]
-    caption = (f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the {'drive' if sg > 0 else 'coast'} flanks, tooth pairs in contact: "
-               f"{len(contacts)}. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, under that force applied statically and split "
-               "evenly over the pairs in contact; the pinion is turned on until the loaded flanks meet again. Local flattening is left out.")  # fmt: skip
+    caption = (
+        f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the "
+        f"{'drive' if sg > 0 else 'coast'} flanks, tooth pairs in contact: "
+        f"{len(contacts)}. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, "
+        "under that force applied statically and split "
+        "evenly over the pairs in contact; the pinion is turned on until the loaded flanks meet again. Local "
+        "flattening is left out."
+    )
     pitch_point = np.array([pair.r_w[0], 0, 0])
     image = draw(shapes, pitch_point, 3.2 * pair.gears[0].m, "elastic displacement in µm")
-    return Plot("deformed_pair", "The deformed pair at the largest mesh force", caption, image, _columns(shapes, moved, spec))
+    return Plot(
+        "deformed_pair", "The deformed pair at the largest mesh force", caption, image, _columns(shapes, moved, spec)
+    )
 
 
 def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
@@ -93,7 +103,8 @@ def _wrapped(angle: float) -> float:
 
 
 def _displacement(body: Any, teeth: int, loads: Sequence[tuple[int, float]], force: float) -> np.ndarray:
-    """Displacement (P, 3) m in the body frame under `force` (N, negative: on flank 1) split evenly over `loads` (tooth, roll)."""
+    """Displacement (P, 3) m in the body frame under `force` (N, negative: on flank 1) split evenly over `loads`
+    (tooth, roll)."""
     display = body.display
     total = np.zeros((len(display.points), 3))
     for tooth, roll in loads:
@@ -135,7 +146,9 @@ def _placed(points: np.ndarray, angle: float, x: float) -> np.ndarray:
     return np.asarray(points, dtype=float) @ _rotation(angle).T + np.array([x, 0, 0])
 
 
-def _approach(pair: PairGeometry, contacts: Sequence[Contact], sg: int, placed: Sequence[np.ndarray], moved: Sequence[np.ndarray]) -> float:
+def _approach(
+    pair: PairGeometry, contacts: Sequence[Contact], sg: int, placed: Sequence[np.ndarray], moved: Sequence[np.ndarray]
+) -> float:
     """How far (m) the flanks recede from each other along the line of action, mean over the pairs in contact."""
     t = _action_angle(pair, sg)
     normal = sg * np.array([-math.sin(t), math.cos(t), 0])

@@ -1,4 +1,5 @@
 """Figures over time: torque and slip, speeds, mesh force and transmission error, bearing forces."""
+
 from __future__ import annotations
 
 from collections.abc import Iterable
@@ -27,11 +28,16 @@ class Plot:
 
 
 def torque_and_slip(trace: Trace) -> Plot | None:
-    """Torques around the clutch, the other torques, and the slip of every clutch with its lock-up; None without torques."""
+    """Torques around the clutch, the other torques, and the slip of every clutch with its lock-up; None without
+    torques."""
     clutch = [name for suffix in CLUTCH_TORQUES for name in trace.channels if name.endswith(suffix)]
     others = [name for name in distinct(trace, [n for n in trace.channels if n.endswith(".tau")]) if name not in clutch]
     slips = [name for name in trace.channels if name.endswith(".slip")]
-    rows = [(names, label) for names, label in ((clutch, "torque in N·m"), (others, "torque in N·m"), (slips, "slip in rad/s")) if names]
+    rows = [
+        (names, label)
+        for names, label in ((clutch, "torque in N·m"), (others, "torque in N·m"), (slips, "slip in rad/s"))
+        if names
+    ]
     if not clutch and not others:
         return None
     with styled():
@@ -50,7 +56,9 @@ def torque_and_slip(trace: Trace) -> Plot | None:
 
 def speeds(trace: Trace) -> Plot | None:
     """Speed of everything that turns, in rpm, without sign, each once; None when nothing does."""
-    names = distinct(trace, [name for name in trace.channels if name.endswith(".w") and trace.channels[name].unit == "rad/s"])
+    names = distinct(
+        trace, [name for name in trace.channels if name.endswith(".w") and trace.channels[name].unit == "rad/s"]
+    )
     if not names:
         return None
     with styled():
@@ -88,7 +96,9 @@ def mesh_force_and_error(trace: Trace, window: tuple[float, float] | None = None
 
 def bearing_forces(trace: Trace) -> Plot | None:
     """Bearing forces x and y of every shaft over time; None without them."""
-    bearings = [found for shaft in shafts(trace) if (found := [n for d in "xy" if (n := f"bearing.{shaft}.f{d}") in trace])]
+    bearings = [
+        found for shaft in shafts(trace) if (found := [n for d in "xy" if (n := f"bearing.{shaft}.f{d}") in trace])
+    ]
     if not bearings:
         return None
     with styled():
@@ -135,8 +145,16 @@ def _mark_lock(trace: Trace, axes: list[Axes]) -> None:
             for start, end in spans(trace.time, trace[name].astype(bool)):
                 for axis in axes:
                     axis.axvspan(start, end, color=COAST, alpha=0.45, lw=0)
-                axes[-1].annotate("locked", (start, 1), (4, -4), xycoords=("data", "axes fraction"), color=INK,
-                                  textcoords="offset points", va="top", fontsize=8.5)  # fmt: skip
+                axes[-1].annotate(
+                    "locked",
+                    (start, 1),
+                    (4, -4),
+                    xycoords=("data", "axes fraction"),
+                    color=INK,
+                    textcoords="offset points",
+                    va="top",
+                    fontsize=8.5,
+                )
 
 
 def _shade_contact(trace: Trace, axes: list[Axes]) -> None:
@@ -155,6 +173,14 @@ def _contact_words(trace: Trace) -> str:
     if "mesh.contact" not in trace:
         return ""
     state = trace["mesh.contact"]
-    shares = [(0, "the teeth are apart", "orange"), (-1, "coast flanks carry", "blue"), (2, "both flanks touch", "grey")]
-    words = [f"{text} in {np.mean(state == code):.1%} of the samples ({shade})" for code, text, shade in shares if np.any(state == code)]
+    shares = [
+        (0, "the teeth are apart", "orange"),
+        (-1, "coast flanks carry", "blue"),
+        (2, "both flanks touch", "grey"),
+    ]
+    words = [
+        f"{text} in {np.mean(state == code):.1%} of the samples ({shade})"
+        for code, text, shade in shares
+        if np.any(state == code)
+    ]
     return "; ".join(words).capitalize() + "." if words else "The drive flanks carry at every sample."

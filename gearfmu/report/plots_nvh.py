@@ -1,4 +1,5 @@
 """Figures over frequency: spectra of the bearing and mesh forces, cuts along mesh orders, spectrogram."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -19,7 +20,8 @@ SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 
 def force_channels(trace: Trace) -> list[str]:
-    """The channels whose sound matters: bearing forces, then the mesh force. Where the mean over the communication step was
+    """The channels whose sound matters: bearing forces, then the mesh force. Where the mean over the communication
+    step was
     recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back."""
     names = [f"bearing.{shaft}.{direction}" for shaft in shafts(trace) for direction in ("fx", "fy")] + ["mesh.force"]
     best = [next((n for n in (f"{name}_mean", name) if n in trace), None) for name in names]
@@ -47,8 +49,10 @@ def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) 
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
-    caption = (f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
-               f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). Dotted: mesh orders.")  # fmt: skip
+    caption = (
+        f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
+        f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). Dotted: mesh orders."
+    )
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
 
 
@@ -71,17 +75,24 @@ def order_cuts(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
         picture = svg(figure, "orders")
     first = next(iter(cuts.values()))
     low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
-    caption = (f"Mesh order k = k × mesh frequency, which runs from {low:.0f} to {high:.0f} Hz; Hann window of 8 mesh periods in "
-               "angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate are left out.")  # fmt: skip
+    caption = (
+        f"Mesh order k = k × mesh frequency, which runs from {low:.0f} to {high:.0f} Hz; Hann window of 8 mesh "
+        "periods in "
+        "angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate are "
+        "left out."
+    )
     return Plot("orders", "Mesh orders along the run", caption, picture, _order_columns(cuts))
 
 
 def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
-    """Level of one force over time and frequency with the mesh orders on top; None without forces."""
+    """Level of one force over time and frequency with the mesh orders on top: a bearing force, or in a coarsely
+    sampled trace
+    a mean over the step, which folds less; None without forces."""
     names = force_channels(trace)
     if not names:
         return None
-    name = next((n for n in names if ".fy" in n), names[0])
+    preferred = "_mean" if sampling_warning(trace) else ".fy"
+    name = next((n for n in names if preferred in n), names[0])
     step = metrics.sample_step(trace.time)
     segment = _segment(trace.time.size, windows=14)
     picture_data = metrics.spectrogram(trace[name], step, segment, max(segment // 16, 1))
@@ -92,16 +103,28 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
     with styled():
         figure, (axis,) = panels((3.3,))
         time = picture_data.time + trace.time[0]
-        image = axis.pcolormesh(time, picture_data.frequency / 1e3, values.T, vmin=top - RANGE_DB, vmax=top, shading="nearest")
+        image = axis.pcolormesh(
+            time, picture_data.frequency / 1e3, values.T, vmin=top - RANGE_DB, vmax=top, shading="nearest"
+        )
         figure.colorbar(image, ax=axis, label="level in dB re 1 N", pad=0.01, aspect=30)
         axis.grid(False)
-        axis.set(xlabel="time in s", ylabel="frequency in kHz", xlim=(time[0], time[-1]), ylim=(0, 1e-3 * min(SHOWN_TO, 0.5 / step)))
+        axis.set(
+            xlabel="time in s",
+            ylabel="frequency in kHz",
+            xlim=(time[0], time[-1]),
+            ylim=(0, 1e-3 * min(SHOWN_TO, 0.5 / step)),
+        )
         _overlay_orders(axis, trace, mesh_angle, min(SHOWN_TO, 0.5 / step))
         picture = png(figure)
-    caption = (f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
-               f"Dashed: mesh orders from the instantaneous speed.")  # fmt: skip
-    data = {"time_[s]": np.repeat(time, picture_data.frequency.size),
-            "frequency_[Hz]": np.tile(picture_data.frequency, time.size), "level_[dB re 1 N]": values.ravel()}  # fmt: skip
+    caption = (
+        f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
+        f"Dashed: mesh orders from the instantaneous speed."
+    )
+    data = {
+        "time_[s]": np.repeat(time, picture_data.frequency.size),
+        "frequency_[Hz]": np.tile(picture_data.frequency, time.size),
+        "level_[dB re 1 N]": values.ravel(),
+    }
     return Plot("spectrogram", "Spectrogram", caption, picture, data)
 
 
@@ -121,13 +144,15 @@ def _by_part(names: list[str]) -> list[list[str]]:
 
 
 def _segment(samples: int, windows: int = 3) -> int:
-    """Samples a Hann window for about `windows` windows in the record: a power of two, at least 64 where there are as many."""
+    """Samples a Hann window for about `windows` windows in the record: a power of two, at least 64 where there are
+    as many."""
     wanted = max(64, 2 ** int(np.round(np.log2(max(samples / windows, 1)))))
     return min(wanted, samples)
 
 
 def sampling_warning(trace: Trace) -> str | None:
-    """What the sampling does to spectra, in words, where it ends below TRUSTED_FROM; None where it does not or there are none."""
+    """What the sampling does to spectra, in words, where it ends below TRUSTED_FROM; None where it does not or there
+    are none."""
     if not force_channels(trace) or trace.time.size < 16:
         return None
     limit = 0.5 / metrics.sample_step(trace.time)
@@ -135,8 +160,12 @@ def sampling_warning(trace: Trace) -> str | None:
         return None
     means = [name for name in force_channels(trace) if name.endswith("_mean")]
     weaker = f" ({', '.join(means)}: weakened, being means over the step)" if means else ""
-    return (f"Sampled every {0.5e6 / limit:.3g} µs without a filter: vibration above {limit / 1e3:.3g} kHz, where the mesh resonance of most pairs lies, folds back "
-            f"into the spectra, orders and bands below{weaker}. For levels to rely on, run with a communication step of 20 µs.")  # fmt: skip
+    return (
+        f"Sampled every {0.5e6 / limit:.3g} µs without a filter: vibration above {limit / 1e3:.3g} kHz, where the "
+        "mesh resonance of most pairs lies, folds back "
+        f"into the spectra, orders and bands below{weaker}. For levels to rely on, run with a communication step "
+        "of 20 µs."
+    )
 
 
 def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:
@@ -163,8 +192,15 @@ def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndar
         return
     for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 24) + 1):
         axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
-        axis.annotate(str(order), (order * middle / 1e3, 1), (3, -9), xycoords=("data", "axes fraction"),
-                      textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
+        axis.annotate(
+            str(order),
+            (order * middle / 1e3, 1),
+            (3, -9),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            fontsize=8,
+            color=MUTED,
+        )
 
 
 def _overlay_orders(axis: Axes, trace: Trace, mesh_angle: np.ndarray | None, limit: float) -> None:
@@ -177,7 +213,9 @@ def _overlay_orders(axis: Axes, trace: Trace, mesh_angle: np.ndarray | None, lim
             axis.plot(trace.time, curve / 1e3, color="white", lw=0.8, ls=(0, (4, 4)), alpha=0.75)
             last = np.flatnonzero(np.isfinite(curve))[-1]
             x = min(trace.time[last], axis.get_xlim()[1])
-            axis.annotate(f"{order}", (x, curve[last] / 1e3), (-9, 3), textcoords="offset points", color="white", fontsize=8.5)
+            axis.annotate(
+                f"{order}", (x, curve[last] / 1e3), (-9, 3), textcoords="offset points", color="white", fontsize=8.5
+            )
 
 
 def _spectrum_columns(spectra: Mapping[str, metrics.Spectrum]) -> dict[str, np.ndarray]:

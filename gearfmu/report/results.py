@@ -1,4 +1,5 @@
 """The numbers to compare runs by, and their strict JSON."""
+
 from __future__ import annotations
 
 import math
@@ -13,18 +14,26 @@ from gearfmu.stage.trace import Trace
 
 
 def key_results(trace: Trace) -> dict[str, float]:
-    """The numbers to compare runs by, over the window of interest; names carry the unit. Peaks are left out: they do not repeat.
+    """The numbers to compare runs by, over the window of interest; names carry the unit. Peaks are left out: they do
+    not repeat.
 
-    "ac" is the signal minus its mean where the scene has a settling time (steady running), else minus a 10 ms moving average.
+    "ac" is the signal minus its mean where the scene has a settling time (steady running), else minus a 10 ms moving
+    average.
     """
     window = window_of_interest(trace)
     part = trace.window(window.start, window.end)
     steady = window.reason == SETTLED
     found: dict[str, float] = {}
     if "mesh.force" in part:
-        found |= {"mesh_force_mean_N": float(np.mean(part["mesh.force"])), "mesh_force_rms_ac_N": _rms_ac(part, "mesh.force", steady)}
+        found |= {
+            "mesh_force_mean_N": float(np.mean(part["mesh.force"])),
+            "mesh_force_rms_ac_N": _rms_ac(part, "mesh.force", steady),
+        }
     if "mesh.te" in part:
-        found |= {"te_mean_um": 1e6 * float(np.mean(part["mesh.te"])), "te_rms_ac_um": 1e6 * _rms_ac(part, "mesh.te", steady)}
+        found |= {
+            "te_mean_um": 1e6 * float(np.mean(part["mesh.te"])),
+            "te_rms_ac_um": 1e6 * _rms_ac(part, "mesh.te", steady),
+        }
     for shaft in shafts(part):
         forces = [name for d in "xy" if (name := f"bearing.{shaft}.f{d}") in part]
         if len(forces) == 2:

@@ -1,4 +1,5 @@
 """Surfaces seen in parallel projection: painter's order, colour by value, light from above left."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -29,7 +30,8 @@ class Shape:
 
 
 def draw(shapes: Sequence[Shape], centre: np.ndarray, radius: float, label: str) -> str:
-    """The shapes obliquely as a whole, and beside it along the axis within `radius` (m) of `centre` (3,); an <img> element."""
+    """The shapes obliquely as a whole, and beside it along the axis within `radius` (m) of `centre` (3,); an <img>
+    element."""
     norm = Normalize(0, max(float(shape.value.max()) for shape in shapes))
     with styled():
         figure = Figure(figsize=(WIDTH, 0.4 * WIDTH), layout="constrained")
@@ -53,7 +55,11 @@ def _paint(axis: Axes, shapes: Sequence[Shape], view: np.ndarray, norm: Normaliz
     edges[:, :3] *= 0.82
     polygons = corners[order][:, :, :2]
     axis.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors=edges, linewidths=line))
-    axis.set(xlim=(polygons[..., 0].min(), polygons[..., 0].max()), ylim=(polygons[..., 1].min(), polygons[..., 1].max()), aspect="equal")
+    axis.set(
+        xlim=(polygons[..., 0].min(), polygons[..., 0].max()),
+        ylim=(polygons[..., 1].min(), polygons[..., 1].max()),
+        aspect="equal",
+    )
     axis.axis("off")
 
 

@@ -1,4 +1,5 @@
 """What a trace tells about itself: which shafts it has, where it is in steady operation, how fast the teeth mesh."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -55,7 +56,8 @@ def lock_time(trace: Trace) -> float | None:
 
 
 def window_of_interest(trace: Trace) -> Window:
-    """After lock-up where a clutch locks in the first three quarters, else after the scene's settling time, else all."""
+    """After lock-up where a clutch locks in the first three quarters, else after the scene's settling time, else
+    all."""
     start, end = float(trace.time[0]), float(trace.time[-1])
     locked = lock_time(trace)
     if locked is not None and start < locked < start + 0.75 * (end - start):

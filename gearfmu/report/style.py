@@ -1,4 +1,5 @@
 """One calm look for every figure, and how a figure becomes part of a page."""
+
 from __future__ import annotations
 
 import base64
@@ -15,13 +16,33 @@ COLOURS = ("#1f5a92", "#c8642b", "#3f8f5f", "#8a5a9e", "#9a8a2f", "#4c4f56", "#b
 INK, MUTED, GRID, OPEN, COAST = "#23262b", "#6a7079", "#e3e6ea", "#f3d9c8", "#d8e4f2"
 WIDTH = 9.6
 RC = {
-    "font.family": "sans-serif", "font.sans-serif": ["Helvetica Neue", "Arial", "Liberation Sans", "DejaVu Sans"],
-    "font.size": 9.5, "axes.titlesize": 9.5, "axes.labelsize": 9.5, "axes.edgecolor": MUTED, "axes.labelcolor": INK,
-    "axes.linewidth": 0.7, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": GRID,
-    "grid.linewidth": 0.7, "axes.axisbelow": True, "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK, "lines.linewidth": 1.1, "legend.frameon": False, "legend.fontsize": 8.8,
-    "legend.handlelength": 1.6, "svg.fonttype": "none", "text.parse_math": False, "axes.unicode_minus": True, "image.cmap": "magma",
-}  # fmt: skip
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Helvetica Neue", "Arial", "Liberation Sans", "DejaVu Sans"],
+    "font.size": 9.5,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.5,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "legend.fontsize": 8.8,
+    "legend.handlelength": 1.6,
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+    "axes.unicode_minus": True,
+    "image.cmap": "magma",
+}
 
 
 def styled() -> AbstractContextManager[None]:
@@ -52,7 +73,9 @@ def png(figure: Figure) -> str:
     """`figure` as an <img> element that holds its PNG (256 colours), for pictures of many cells."""
     raw, packed = io.BytesIO(), io.BytesIO()
     figure.savefig(raw, format="png", dpi=170)
-    Image.open(raw).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(packed, "PNG", optimize=True)
+    Image.open(raw).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+        packed, "PNG", optimize=True
+    )
     return f'<img alt="" src="data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}">'
 
 

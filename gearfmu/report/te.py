@@ -1,4 +1,5 @@
 """Picture of a loaded transmission error: one curve a torque (Harris map), and the mesh stiffness below."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -9,7 +10,8 @@ from gearfmu.report.style import panels, styled
 
 
 def write_plot(result: Any, path: Path) -> None:
-    """Write a TeResult, te (T, P) m and stiffness (T, P) N/m over position (P,) in pitches, as PNG or what the suffix says."""
+    """Write a TeResult, te (T, P) m and stiffness (T, P) N/m over position (P,) in pitches, as PNG or what the
+    suffix says."""
     with styled():
         figure, (upper, lower) = panels((2.6, 1.9))
         for torque, error, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):

@@ -1,4 +1,5 @@
 """Trace: sampled signals of one run, the same type for the solver, the FMU and coupled runs, and its HDF5 file."""
+
 from __future__ import annotations
 
 import csv

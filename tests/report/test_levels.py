@@ -1,4 +1,5 @@
 """The price list: read back as written, shown only with the bodies it was measured with."""
+
 from __future__ import annotations
 
 from pathlib import Path

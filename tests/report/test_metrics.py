@@ -1,4 +1,5 @@
 """Metrics against exact sines, Parseval and run-ups of known order content."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -65,7 +66,9 @@ def test_order_keeps_its_level_in_a_run_up(start: float, end: float) -> None:
     assert np.allclose(cuts.amplitude[0], 80 / np.sqrt(2), rtol=1e-3)
     assert np.allclose(cuts.amplitude[2], 8 / np.sqrt(2), rtol=1e-2)
     assert np.nanmax(cuts.amplitude[[1, 3]]) < 0.05
-    assert cuts.mesh_frequency[0] == pytest.approx(abs(np.interp(cuts.time[0], time, np.linspace(start, end, time.size))) * 16 / (2 * np.pi), rel=1e-3)
+    assert cuts.mesh_frequency[0] == pytest.approx(
+        abs(np.interp(cuts.time[0], time, np.linspace(start, end, time.size))) * 16 / (2 * np.pi), rel=1e-3
+    )
 
 
 def test_orders_above_the_sampling_limit_are_not_invented() -> None:

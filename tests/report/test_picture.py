@@ -1,4 +1,5 @@
 """The deformed pair: where teeth touch, which way they bend, and that a picture comes out of the shipped bodies."""
+
 from __future__ import annotations
 
 import math
@@ -40,14 +41,18 @@ def test_teeth_touch_where_both_flanks_are(stage: tuple[Any, list[Any]], sg: int
 
 
 def test_flanks_recede_under_load_on_either_side(stage: tuple[Any, list[Any]]) -> None:
-    """A contact force presses the flanks apart: the approach that closes them is positive, and the same for drive and coast by symmetry."""
+    """A contact force presses the flanks apart: the approach that closes them is positive, and the same for drive
+    and coast by symmetry."""
     spec, bodies = stage
     pair = PairGeometry.of(spec)
     found = {}
     for sg in (1, -1):
         angles = picture.meshing_angles(pair, sg * 0.3, sg)
         contacts = picture.contacts_at(pair, angles, sg)
-        moved = [picture._displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], sg * 5000.0) for g in (0, 1)]
+        moved = [
+            picture._displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], sg * 5000.0)
+            for g in (0, 1)
+        ]
         placed = [picture._placed(bodies[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
         world = [u @ picture._rotation(angle).T for u, angle in zip(moved, angles, strict=True)]
         found[sg] = picture._approach(pair, contacts, sg, placed, world)
@@ -67,7 +72,9 @@ def test_a_load_on_another_tooth_is_the_same_field_turned(stage: tuple[Any, list
 @pytest.mark.parametrize("force", [4000.0, -4000.0])
 def test_picture_of_the_largest_force(stage: tuple[Any, list[Any]], force: float) -> None:
     t = np.arange(5) * 1e-3
-    trace = Trace(t, {"mesh.force": Channel(np.array([0, 1, force, 1, 0.0]), "N"), "pinion.gear.phi": Channel(t * 200, "rad")}, {})
+    trace = Trace(
+        t, {"mesh.force": Channel(np.array([0, 1, force, 1, 0.0]), "N"), "pinion.gear.phi": Channel(t * 200, "rad")}, {}
+    )
     plot = picture.deformed_pair(trace, *stage)
     assert plot is not None and plot.picture.startswith("<img") and "t = 0.00200 s" in plot.caption
     assert ("coast" in plot.caption) == (force < 0)
@@ -84,7 +91,9 @@ def test_no_force_no_picture(stage: tuple[Any, list[Any]]) -> None:
 def test_near_faces_hide_far_ones() -> None:
     """Two squares one behind the other: the picture shows the value of the near one only."""
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    shapes = [Shape(square + [0, 0, z], np.array([[0, 1, 2, 3]]), np.full(4, value)) for z, value in ((1.0, 0.0), (0.0, 1.0))]
+    shapes = [
+        Shape(square + [0, 0, z], np.array([[0, 1, 2, 3]]), np.full(4, value)) for z, value in ((1.0, 0.0), (0.0, 1.0))
+    ]
     near_first, far_first = draw(shapes, np.full(3, 0.5), 0.4, "x"), draw(shapes[::-1], np.full(3, 0.5), 0.4, "x")
     assert near_first == far_first
 

@@ -1,4 +1,5 @@
 """The page: complete, self-contained, the same every time, and honest about what a trace does not hold."""
+
 from __future__ import annotations
 
 import csv
@@ -33,19 +34,36 @@ def coupled_run() -> Trace:
         "pinion.clutch.tau": Channel(np.full(SAMPLES, 120.0), "N.m"),
         "pinion.clutch.slip": Channel(np.where(locked, 0, 200 - speed), "rad/s"),
         "pinion.clutch.locked": Channel(locked, ""),
-        "pinion.gear.w": Channel(speed, "rad/s"), "wheel.gear.w": Channel(-speed / 1.5, "rad/s"),
-        "mesh.force": Channel(force, "N"), "mesh.te": Channel(force / 2e8, "m"),
-        "mesh.contact": Channel((force > 0).astype(int), ""), "mesh.impacts": Channel((force > 0).astype(int), ""),
-    }  # fmt: skip
+        "pinion.gear.w": Channel(speed, "rad/s"),
+        "wheel.gear.w": Channel(-speed / 1.5, "rad/s"),
+        "mesh.force": Channel(force, "N"),
+        "mesh.te": Channel(force / 2e8, "m"),
+        "mesh.contact": Channel((force > 0).astype(int), ""),
+        "mesh.impacts": Channel((force > 0).astype(int), ""),
+    }
     for shaft, sign in (("pinion", 1), ("wheel", -1)):
         channels[f"bearing.{shaft}.fx"] = Channel(sign * 0.38 * force, "N")
         channels[f"bearing.{shaft}.fy"] = Channel(sign * 0.92 * force, "N")
     return Trace(t, channels, {"scene": "closure", "stage": "pair", "teeth": {"pinion": 16, "wheel": 24}})
 
 
-SUMMARY = {"scene": "closure", "stage": "pair", "outcome": "ok", "level": "standard", "n_dyn": 56, "slices": 5, "h": 5e-6,
-           "H": 1e-4, "simulated_s": 0.3, "cpu_s": 0.06, "realtime_factor": 0.2, "coupling_error": 2e-4, "energy_residual": 1e-6,
-           "hashes": {"model": "ab" * 32}, "versions": {"gearfmu": "0.1.0"}}  # fmt: skip
+SUMMARY = {
+    "scene": "closure",
+    "stage": "pair",
+    "outcome": "ok",
+    "level": "standard",
+    "n_dyn": 56,
+    "slices": 5,
+    "h": 5e-6,
+    "H": 1e-4,
+    "simulated_s": 0.3,
+    "cpu_s": 0.06,
+    "realtime_factor": 0.2,
+    "coupling_error": 2e-4,
+    "energy_residual": 1e-6,
+    "hashes": {"model": "ab" * 32},
+    "versions": {"gearfmu": "0.1.0"},
+}
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +82,9 @@ class Links(HTMLParser):
         self.addresses: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.addresses += [value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "action", "data")]
+        self.addresses += [
+            value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "action", "data")
+        ]
         if tag not in ("meta", "img", "br"):
             self.open.append(tag)
 
@@ -117,7 +137,9 @@ def test_order_data_are_the_amplitudes(folder: Path) -> None:
 
 
 def test_summary_is_strict_json_with_results(folder: Path) -> None:
-    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name))
+    found = json.loads(
+        (folder / "summary.json").read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name)
+    )
     assert {**SUMMARY, "results": found["results"]} == found
     assert found["results"]["mesh_force_mean_N"] == pytest.approx(3000, rel=1e-3)
     assert found["results"]["lock_time_s"] == pytest.approx(0.1)
@@ -150,7 +172,11 @@ def test_uneven_sampling_is_said_and_the_rest_is_shown(tmp_path: Path) -> None:
     whole = coupled_run()
     t = whole.time + 2e-5 * np.sin(np.arange(SAMPLES))
     page = report.write(Trace(t, whole.channels, whole.meta), SUMMARY, tmp_path).read_text(encoding="utf-8")
-    assert "not evenly spaced" in page and (tmp_path / "data" / "mesh.csv").is_file() and not (tmp_path / "data" / "spectrum.csv").exists()
+    assert (
+        "not evenly spaced" in page
+        and (tmp_path / "data" / "mesh.csv").is_file()
+        and not (tmp_path / "data" / "spectrum.csv").exists()
+    )
 
 
 def test_named_failure_is_shown_as_such(tmp_path: Path) -> None:
@@ -161,7 +187,9 @@ def test_named_failure_is_shown_as_such(tmp_path: Path) -> None:
 def test_text_from_outside_cannot_become_markup(tmp_path: Path) -> None:
     nasty = "<script>alert(1)</script>"
     trace = Trace(np.arange(3.0), {f"{nasty[:8]}.w": Channel(np.zeros(3), "rad/s", nasty)}, {})
-    page = report.write(trace, {"scene": nasty, "stage": nasty, "outcome": nasty, "hashes": {nasty: nasty}}, tmp_path).read_text(encoding="utf-8")
+    page = report.write(
+        trace, {"scene": nasty, "stage": nasty, "outcome": nasty, "hashes": {nasty: nasty}}, tmp_path
+    ).read_text(encoding="utf-8")
     assert "<script" not in page
 
 
@@ -189,7 +217,11 @@ def test_a_clutch_that_slips_at_the_end_has_not_locked() -> None:
 
 
 def test_strict_json_has_no_nan() -> None:
-    assert strict({"a": np.float64("nan"), "b": [np.int32(3), np.inf], 4: np.array([1.5])}) == {"a": None, "b": [3, None], "4": [1.5]}
+    assert strict({"a": np.float64("nan"), "b": [np.int32(3), np.inf], 4: np.array([1.5])}) == {
+        "a": None,
+        "b": [3, None],
+        "4": [1.5],
+    }
 
 
 @pytest.mark.full
@@ -198,9 +230,22 @@ def test_headless_chromium_draws_the_page(folder: Path, tmp_path: Path) -> None:
     """The page as a browser shows it: of full length, not blank, with the accent colour of the plots on it."""
     image = pytest.importorskip("matplotlib.image")
     shot = tmp_path / "shot.png"
-    subprocess.run(["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
-                    f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1100,4000", f"--screenshot={shot}",
-                    (folder / "report.html").as_uri()], check=True, capture_output=True, timeout=120)  # fmt: skip
+    subprocess.run(
+        [
+            "chromium",
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-background-networking",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--window-size=1100,4000",
+            f"--screenshot={shot}",
+            (folder / "report.html").as_uri(),
+        ],
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
     pixels = image.imread(shot)[..., :3]
     assert pixels.shape[:2] == (4000, 1100)
     blue = np.all(np.abs(pixels - np.array([0x1F, 0x5A, 0x92]) / 255) < 0.08, axis=-1)
@@ -209,7 +254,14 @@ def test_headless_chromium_draws_the_page(folder: Path, tmp_path: Path) -> None:
 
 def force_at(interval: float) -> Trace:
     t = np.arange(4000) * interval
-    return Trace(t, {"mesh.force": Channel(1000 + np.sin(2 * np.pi * 800 * t), "N"), "mesh.force_mean": Channel(1000 + np.cos(t), "N")}, {})
+    return Trace(
+        t,
+        {
+            "mesh.force": Channel(1000 + np.sin(2 * np.pi * 800 * t), "N"),
+            "mesh.force_mean": Channel(1000 + np.cos(t), "N"),
+        },
+        {},
+    )
 
 
 def test_coarse_sampling_warns_where_spectra_are_read(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 """Trace: round trip, checks, whole-or-nothing writing."""
+
 from __future__ import annotations
 
 import csv
@@ -30,7 +31,10 @@ def example(n: int = 50) -> Trace:
 
 
 @settings(max_examples=20, deadline=None)
-@given(values=hnp.arrays(np.float64, 7, elements=FINITE), unit=st.text(min_size=0, max_size=5).filter(lambda s: "\0" not in s))
+@given(
+    values=hnp.arrays(np.float64, 7, elements=FINITE),
+    unit=st.text(min_size=0, max_size=5).filter(lambda s: "\0" not in s),
+)
 def test_file_round_trip_is_bitwise(tmp_path_factory: pytest.TempPathFactory, values: np.ndarray, unit: str) -> None:
     path = tmp_path_factory.mktemp("t") / "trace.h5"
     trace = Trace(np.arange(7.0), {"a.b": Channel(values, unit, "µm ± 1")}, {"k": [1, 2.5, "ü", None]})
