@@ -128,7 +128,7 @@ static int balance(const gk_model *model, const gk_setup *setup, gk_data *data, 
     }
     v[V_M_ENERGY] = stored;
     v[V_M_RESIDUAL] = stored - data->ledger.baseline - data->ledger.work + data->ledger.dissipated;
-    return !(fabs(v[V_M_RESIDUAL]) > BROKEN * (stored + fabs(data->ledger.work) + data->ledger.dissipated) + 1e-6);
+    return gk_finite(stored) && !(fabs(v[V_M_RESIDUAL]) > BROKEN * (stored + fabs(data->ledger.work) + data->ledger.dissipated) + 1e-6);
 }
 
 /* ---- start ------------------------------------------------------------------------------------------------------------------------------------------- */
@@ -307,11 +307,23 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     return GK_ENERGY;
 }
 
+static int all_small(const double *v, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!(fabs(v[i]) < 1e100)) return 0;
+    return 1;
+}
+
+/* size, kind, counters and numbers of a state that comes from outside; that it belongs to this model the bearer must know (the FMI face keeps the hash) */
 gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const void *bytes, size_t size)
 {
     gk_data head;
     if (setup->magic != GK_SETUP_MAGIC || size != setup->state_size || size > gk_data_size(model) || size < sizeof head) return GK_BAD_VALUE;
     memcpy(&head, bytes, sizeof head);
-    if (head.magic != GK_DATA_MAGIC || head.phase < PHASE_NEW || head.phase > PHASE_FAILED || head.pairs < 0 || head.pairs > MAX_PAIRS) return GK_BAD_VALUE;
-    return GK_OK;
+    int good = head.magic == GK_DATA_MAGIC && head.phase >= PHASE_NEW && head.phase <= PHASE_FAILED && head.pairs >= 0 && head.pairs <= MAX_PAIRS && head.count >= 0 &&
+               all_small(head.value, GK_VARS) && all_small(head.x, RIGID) && all_small(head.v, RIGID) && all_small(head.f, RIGID) && all_small(head.link, LINKS) &&
+               gk_finite(head.time_base) && gk_finite(head.step_H) && gk_finite(head.reach);
+    for (int p = 0; good && p < head.pairs; p++)
+        good = (head.memory[p].key.flank == 0 || head.memory[p].key.flank == 1) && all_small(head.memory[p].force, MAX_SLICES) && all_small(head.memory[p].gap, MAX_SLICES);
+    return good ? GK_OK : GK_BAD_VALUE;
 }

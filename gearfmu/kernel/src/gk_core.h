@@ -198,6 +198,7 @@ typedef struct gk_system { /* unknown forces of one step: contacts, then links *
     double force[MAX_ROWS], eta[MAX_ROWS], z[MAX_ROWS];
     double damping[MAX_ROWS];         /* 2c/h of the row's dashpot */
     double bound[MAX_ROWS];           /* clutch: |z| ≤ bound */
+    double weight[MAX_ROWS];          /* slices that a row stands for: η is shared out per slice */
     gk_local local[MAX_CONTACTS];
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */

@@ -36,6 +36,14 @@ static const int32_t *gear_integers(const gk_blob *blob, const char *stem, int g
 
 static int between(double x, double low, double high) { return x >= low && x <= high; }
 
+/* rows of mass-normalised modes are of order 1/√m, compliances of tooth and bore far below 1 */
+static int bounded(const double *v, uint64_t count, double limit)
+{
+    for (uint64_t i = 0; i < count; i++)
+        if (!between(v[i], -limit, limit)) return 0;
+    return 1;
+}
+
 static int plausible_gear(const gk_gear *g)
 {
     return between(g->teeth, 1, 1000) && g->teeth == gk_floor(g->teeth) && between(g->r_b, 1e-4, 10) && between(g->s_form, 0, 10) && g->s_tip > g->s_form + 1e-6 &&
@@ -70,6 +78,9 @@ static gk_outcome open_gear(gk_model *model, int i, char message[GK_MESSAGE])
     g->part = gear_integers(&model->blob, "part", i, n);
     if (!g->omega || !g->zeta || !g->rows || !g->bore || !g->c_ff || !g->c_fb || !g->c_bb || !g->diameter || !g->part)
         return refuse(message, "mode or compliance tables", "are missing or of the wrong length");
+    if (!bounded(g->rows, 2 * R * A * n, 1e6) || !bounded(g->bore, BORE_ROWS * n, 1e6) || !bounded(g->c_ff, 4 * OFFSETS * R * R * A * A, 1e3) ||
+        !bounded(g->c_fb, 2 * R * A * 3, 1e3) || !bounded(g->c_bb, 9, 1e3))
+        return refuse(message, "mode or compliance tables", "are out of range");
     for (uint64_t k = 0; k < n; k++) {
         if (!between(g->omega[k], 1e-3, 1e12) || !between(g->zeta[k], 0, 0.9)) return refuse(message, "frequencies or damping ratios", "are out of range");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) return refuse(message, "frequencies", "are not sorted");

@@ -257,7 +257,9 @@ double gk_solve_stored(const gk_system *s, const double *force)
     return sum;
 }
 
-typedef struct balance { double defect, c1, c2, scale; } balance;
+typedef struct balance { double defect, c1, c2, scale, rounding; } balance;
+
+static int open_balance(const balance *b, double tolerance) { return !(fabs(b->defect) <= tolerance * b->scale + b->rounding); }
 
 /* change of the gap over the step as the energy balance sees it: what a given torque does to the massless part is work from outside and counts with its massless displacement alone */
 static double gap_change(const gk_system *s, int i)
@@ -271,7 +273,7 @@ static double share(const gk_system *s, int i) { return 0.5 * (s->force0[i] + s-
 /* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀) */
 static balance defect(const gk_system *s)
 {
-    balance b = {-s->stored0, 0.0, 0.0, fabs(s->stored0)};
+    balance b = {-s->stored0, 0.0, 0.0, fabs(s->stored0), 0.0};
     for (int i = 0; i < s->n; i++) {
         if (is_clutch(s, i) || (s->force[i] == 0.0 && s->force0[i] == 0.0 && s->direction[i] == 0.0)) continue;
         if (s->force[i] != 0.0) {
@@ -280,7 +282,9 @@ static balance defect(const gk_system *s)
             b.defect += energy;
             b.scale += fabs(energy);
         }
-        b.defect += share(s, i) * gap_change(s, i);
+        const double change = gap_change(s, i);
+        b.defect += share(s, i) * change;
+        b.rounding += 4e-16 * (fabs(s->force0[i]) + fabs(s->force[i])) * fabs(change); /* a contact that only grazes */
     }
     return b;
 }
@@ -337,9 +341,9 @@ void gk_solve_energy(gk_system *s)
     const int changed = status_changed(s);
     if (!changed && !s->curved) return;
     balance b = defect(s);
-    if (!(fabs(b.defect) > (changed ? BALANCE : STEADY_BALANCE) * b.scale)) return;
+    if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) return;
     for (int i = 0; i < s->n; i++)
-        if (s->kind[i] != ROW_TORQUE && !is_clutch(s, i) && (s->force0[i] != 0.0 || s->force[i] != 0.0)) s->direction[i] = gap_change(s, i);
+        if (s->kind[i] != ROW_TORQUE && !is_clutch(s, i) && (s->force0[i] != 0.0 || s->force[i] != 0.0)) s->direction[i] = s->weight[i] * gap_change(s, i);
     for (int round = 0; round < ENERGY_LIMIT; round++) {
         list_columns(s);
         sensitivity(s, p, w);
@@ -351,7 +355,7 @@ void gk_solve_energy(gk_system *s)
         for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
         gk_solve_contacts(s);
         b = defect(s);
-        if (!(fabs(b.defect) > BALANCE * b.scale)) return;
+        if (!open_balance(&b, BALANCE)) return;
     }
     s->limit_reached = 1;
 }

@@ -111,6 +111,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->force0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].force[i];
             s->damping[s->n] = setup->on.damping ? 2.0 * setup->damping * setup->strip_width[i] / h : 0.0;
             s->bound[s->n] = 0.0;
+            s->weight[s->n] = setup->strip_width[i] * setup->slices / setup->width;
             if (i == 0) gk_law_set(model, setup, place->curvature, &s->local[s->n]);
             else s->local[s->n] = s->local[s->n - i];
             s->local[s->n].width = setup->strip_width[i];
@@ -131,6 +132,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
         const int torque = (link == PORT_0 || link == PORT_1) && setup->given_torque[link - PORT_0];
         s->kind[s->n] = link >= CLUTCH_0 ? ROW_CLUTCH : torque ? ROW_TORQUE : ROW_SPRING;
         s->link_of[s->n] = link;
+        s->weight[s->n] = 1.0;
         if (link <= BEARING_1Y) s->bore[link / 2][link % 2] = s->n;
         else if (link <= PORT_1 ? !model->port[link - PORT_0].chain : link <= SHAFT_1) s->bore[(link - PORT_0) % 2][BORE_RZ] = s->n;
         s->force0[s->n] = link >= CLUTCH_0 ? 0.0 : data->link[link];
