@@ -170,7 +170,6 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
         const gk_system *s = &setup->work->system;
         for (int i = s->contacts; i < s->n; i++)
             if (s->link_of[i] == PORT_0 + g && s->kind[i] == ROW_TORQUE) data->angle[g] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-        data->value[GK_OF_SHAFT(TAU_MEAN, g)] = 0.0;
     }
     data->apart = 0;
     data->phase = PHASE_RUNNING;
@@ -178,9 +177,11 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
     data->step_H = 0.0;
     data->count = 0;
     outputs(model, setup, data, 0.0);
-    if (model->kind == KIND_PAIR)
-        for (int g = 0; g < 2; g++)
-            if (!setup->given_torque[g]) data->value[GK_OF_SHAFT(TAU_MEAN, g)] = data->value[GK_OF_SHAFT(TAU, g)];
+    for (int g = 0; g < 2; g++) {
+        data->value[GK_OF_SHAFT(TAU_MEAN, g)] = data->value[GK_OF_SHAFT(TAU, g)];
+        data->value[GK_OF_SHAFT(FX_MEAN, g)] = data->value[GK_OF_SHAFT(FX, g)];
+        data->value[GK_OF_SHAFT(FY_MEAN, g)] = data->value[GK_OF_SHAFT(FY, g)];
+    }
     data->value[V_M_FORCE_MEAN] = data->value[V_M_MESH_FORCE];
     data->value[V_M_FORCE_MAX] = gk_max(data->value[V_M_FORCE_DRIVE], data->value[V_M_FORCE_COAST]);
     data->apart = data->value[V_M_CONTACT] == 0.0;
@@ -220,7 +221,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
     return outcome;
 }
 
-typedef struct tally { double force, port[2], highest; } tally;
+typedef struct tally { double force, port[2], bearing[4], highest; } tally;
 
 static void count_step(const gk_setup *setup, gk_data *data, double h, tally *t)
 {
@@ -235,6 +236,8 @@ static void count_step(const gk_setup *setup, gk_data *data, double h, tally *t)
             touches |= s->force[i] > 0.0;
         } else if (s->link_of[i] == PORT_0 || s->link_of[i] == PORT_1) {
             t->port[s->link_of[i] - PORT_0] -= mean * h;
+        } else if (s->link_of[i] <= BEARING_1Y) {
+            t->bearing[s->link_of[i]] -= mean * h;
         }
     }
     t->force += (side[0] - side[1]) * h;
@@ -280,7 +283,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
         work->outer[g] = was.phi;
         data->input[g] = next;
     }
-    tally t = {0, {0, 0}, 0};
+    tally t = {0, {0, 0}, {0, 0, 0, 0}, 0};
     for (int64_t i = 0; i < steps; i++) {
         outcome = advance(model, setup, data, &c, (double)i * h, h, 0);
         if (outcome) { /* stands at the last good time; the outside may restore or stop */
@@ -297,6 +300,8 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
         const gk_motion none = {0, 0, 0};
         data->input[g] = carried(data->input[g], none, c.H, c.H);
         if (!setup->given_torque[g]) data->value[GK_OF_SHAFT(TAU_MEAN, g)] = t.port[g] / c.H;
+        data->value[GK_OF_SHAFT(FX_MEAN, g)] = t.bearing[BEARING_0X + 2 * g] / c.H;
+        data->value[GK_OF_SHAFT(FY_MEAN, g)] = t.bearing[BEARING_0Y + 2 * g] / c.H;
     }
     data->value[V_M_FORCE_MEAN] = t.force / c.H;
     data->value[V_M_FORCE_MAX] = t.highest;
