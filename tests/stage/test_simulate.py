@@ -1,0 +1,130 @@
+"""Standalone runs of the shipped pair: mean values, work, agreement and order of the integrators, restart."""
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu.geometry import PairGeometry
+from gearfmu.kernel import Kernel
+from gearfmu.stage import StageModel, Steady, Trace, loaded_te, simulate
+
+LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
+H = 60e-6  # s, communication step: 8, 16, 32 … internal steps of 7.5, 3.75, 1.875 … µs
+SETTLED = 0.02
+DG4, MIX4, EM, RK45 = range(4)
+RIGID, FAST = 0, 1
+
+
+def run(model: StageModel, duration: float, **parameters: float) -> Trace:
+    return simulate(model, Steady(model, SPEED, LOAD), duration, H, {"level": FAST, **parameters})
+
+
+def error(trace: Trace, reference: Trace, channel: str) -> float:
+    """rms of the difference over the rms of the alternating part, second half of the run."""
+    half = trace.time.size // 2
+    wanted = reference[channel][half:]
+    return float(np.sqrt(np.mean((trace[channel][half:] - wanted) ** 2)) / wanted.std())
+
+
+@pytest.fixture(scope="module")
+def steady(relieved: StageModel) -> Trace:
+    return run(relieved, 0.08)
+
+
+@pytest.fixture(scope="module")
+def fine(relieved: StageModel) -> dict[int, Trace]:
+    """Reference solutions at two levels, step 0.47 µs."""
+    return {level: run(relieved, 0.03, level=level, h=H / 128) for level in (RIGID, FAST)}
+
+
+def test_mean_values_are_those_of_the_load(steady: Trace, relieved: StageModel, pair: PairGeometry) -> None:
+    """Over whole mesh periods the mesh carries the torque, and te is on average the quasi-static one."""
+    assert steady.meta["outcome"] == "completed" and steady["solver.trouble"][-1] == 0 and steady["solver.status"][-1] == 0
+    samples = steady.time > SETTLED
+    force = pair.gears[0].r_b * steady["mesh.force_mean"][samples].mean()
+    te, static = steady["mesh.te"][samples].mean(), loaded_te(relieved, [LOAD], 64).te.mean()
+    print(f"mean torque {force:.2f} N·m, te {1e6 * te:.3f} µm, quasi-static {1e6 * static:.3f} µm")
+    assert force == pytest.approx(LOAD, rel=5e-3) and te == pytest.approx(static, rel=5e-3)
+    assert steady["wheel.tau_mean"][samples].mean() == pytest.approx(-LOAD * 24 / 16, rel=5e-3)
+
+
+def test_work_is_accounted_for(steady: Trace) -> None:
+    through = float(np.trapezoid(np.abs(steady["pinion.tau"] * steady["pinion.gear.w"]), steady.time))
+    left = np.abs(steady["energy.residual"]).max() / through
+    print(f"{through:.0f} J passed through, {left:.1e} of them unaccounted for")
+    assert left < 1e-5
+    stored, work, lost = (steady[f"energy.{name}"] for name in ("stored", "work", "dissipated"))
+    assert np.all(np.diff(lost) >= 0)
+    change = (stored - work + lost - steady["energy.residual"])[1:]
+    assert np.ptp(change) < 1e-9 * stored.max()
+
+
+def test_integrators_agree_at_small_steps(relieved: StageModel, fine: dict[int, Trace]) -> None:
+    for scheme, name in ((DG4, "dg4"), (MIX4, "mix4"), (EM, "em"), (RK45, "rk45")):
+        trace = run(relieved, 0.03, integrator=scheme, h=H / 64)
+        te, force = error(trace, fine[FAST], "mesh.te"), error(trace, fine[FAST], "mesh.force")
+        print(f"{name}: te {te:.2%}, force {force:.2%} of the alternating part")
+        assert te < 5e-3 and force < 2e-2
+
+
+@pytest.mark.parametrize("level", [RIGID, FAST])
+def test_dg4_is_of_second_order_in_a_turning_mesh(relieved: StageModel, fine: dict[int, Trace], level: int) -> None:
+    steps = H / np.array([8, 16, 32, 64])
+    errors = [error(run(relieved, 0.03, level=level, h=h), fine[level], "mesh.te") for h in steps]
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    print(f"level {level}: te errors {', '.join(f'{e:.2%}' for e in errors)} at 7.5 … 0.94 µs, order {order:.2f}")
+    assert order > 1.7 and errors[0] < 6e-2
+
+
+def test_saved_state_goes_on_with_the_same_bits(relieved: StageModel) -> None:
+    inputs = Steady(relieved, SPEED, LOAD)
+
+    def go_on(kernel: Kernel, first: int, last: int) -> list[float]:
+        for step in range(first, last):
+            for name, value in inputs(step * H).items():
+                kernel.set(name, value)
+            kernel.step(step * H, H)
+        return [kernel.get(name) for name, variable in kernel.variables.items() if variable.causality == "output"]
+
+    straight, other = relieved.kernel(level=FAST), relieved.kernel(level=FAST)
+    for kernel in (straight, other):
+        for name, value in inputs(0.0).items():
+            kernel.set(name, value)
+        kernel.initialize()
+    go_on(straight, 0, 40)
+    state = straight.save()
+    wanted = go_on(straight, 40, 90)
+    end = straight.save()
+    go_on(other, 0, 7)
+    for kernel in (other, straight):
+        kernel.restore(state)
+        assert go_on(kernel, 40, 90) == wanted and kernel.save() == end
+
+
+@pytest.mark.parametrize("level, drift", [(RIGID, 1e-9), (FAST, 2e-5)])
+def test_standstill_under_load_stays_at_rest(relieved: StageModel, level: int, drift: float) -> None:
+    """The static start is the equilibrium of the step; modal states of single precision hold it to their rounding."""
+    trace = simulate(relieved, Steady(relieved, 0.0, LOAD), 0.01, H, {"level": level})
+    for channel in ("mesh.force", "mesh.te", "bearing.pinion.fy", "bearing.wheel.fy", "pinion.tau", "wheel.tau"):
+        values = trace[channel]
+        assert np.ptp(values) < drift * np.abs(values).max(), channel
+    assert trace["mesh.force"][0] > 8000 and trace["solver.trouble"][-1] == 0
+
+
+def test_a_run_that_stops_keeps_its_samples(relieved: StageModel, tmp_path: Path) -> None:
+    """From 3 ms on the pinion's shaft end is turned by 100 rad per step: a named outcome, and the good part of the run."""
+    calm = Steady(relieved, SPEED, LOAD)
+
+    def inputs(time: float) -> dict[str, float]:
+        values = dict(calm(time))
+        return values if time < 3e-3 else values | {"pinion.phi": 100.0 * time / H}
+
+    trace = simulate(relieved, inputs, 0.01, H, {"level": FAST})
+    assert trace.meta["outcome"] in {"penetration", "diverged", "energy"}
+    assert 3e-3 <= trace.meta["simulated_s"] == trace.time[-1] < 0.01
+    assert all(np.all(np.isfinite(trace[name])) for name in trace.channels)
+    trace.save(tmp_path / "trace.h5")
+    assert Trace.load(tmp_path / "trace.h5").meta["outcome"] == trace.meta["outcome"]
