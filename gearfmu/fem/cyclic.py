@@ -141,10 +141,14 @@ class Harmonic:
 
     def balance(self, loads: np.ndarray) -> np.ndarray:
         """Pᴴ f: loads together with the inertia forces of the rigid motion they cause."""
+        if not self.rigid.shape[1]:
+            return loads
         return loads - self._mass_rigid @ (self.rigid.conj().T @ loads)
 
     def gauge(self, vectors: np.ndarray) -> np.ndarray:
         """P u: displacement without its rigid part."""
+        if not self.rigid.shape[1]:
+            return vectors
         return vectors - self.rigid @ (self._mass_rigid.conj().T @ vectors)
 
     @cached_property
