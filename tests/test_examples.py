@@ -37,10 +37,34 @@ def test_drive_with_fmpy(tmp_path: Path) -> None:
 
 def test_loaded_te(tmp_path: Path) -> None:
     """Tip relief of 15 µm removes material: more mean transmission error at the same load."""
-    plain, relieved = example("loaded_te.py", cwd=tmp_path).splitlines()
+    plain, relieved = example("loaded_te.py", tmp_path, cwd=tmp_path).splitlines()
     assert "fzg_c:" in plain and "fzg_c_relief:" in relieved
     mean = [float(re.search(r"mean ([\d.]+)", line)[1]) for line in (plain, relieved)]
     assert mean[0] < mean[1] < mean[0] + 15
+    assert all((tmp_path / f"harris_{name}.png").read_bytes().startswith(b"\x89PNG") for name in ("fzg_c", "fzg_c_relief"))
+
+
+def test_fmu_with_fmpy(tmp_path: Path) -> None:
+    """The clutch locks, and the load then turns with the engine, over the ratio of the teeth, the other way round."""
+    lock, speed = numbers(example("fmu_with_fmpy.py", tmp_path, cwd=tmp_path).splitlines()[-1])
+    assert 20 < lock < 200 and speed == pytest.approx(-100 * 16 / 24, rel=0.05)
+    assert (tmp_path / "clutch.png").stat().st_size > 10_000
+
+
+def test_standalone_run_up(tmp_path: Path) -> None:
+    """On average the mesh carries the torque all the way up; inertia of the gears takes less than a percent of it."""
+    force, swing, rpm = numbers(example("standalone_run_up.py", tmp_path, cwd=tmp_path).splitlines()[-1])
+    assert force == pytest.approx(150 / BASE_RADIUS, rel=2e-2)
+    assert 100 < swing < force and 300 < rpm < 6000
+    assert (tmp_path / "run_up.png").stat().st_size > 10_000
+
+
+@pytest.mark.full
+def test_own_stage(tmp_path: Path) -> None:
+    """One tooth more at the wheel: more contact ratio, nearly the same transmission error."""
+    before, after = example("own_stage.py", tmp_path, cwd=tmp_path).splitlines()[-2:]
+    ratio, mean = ([float(re.search(pattern, line)[1]) for line in (before, after)] for pattern in (r"ratio ([\d.]+)", r"mean ([\d.]+)"))
+    assert 0 < ratio[1] - ratio[0] < 0.02 and mean[1] == pytest.approx(mean[0], rel=0.05)
 
 
 def test_read_a_trace(tmp_path: Path) -> None:
