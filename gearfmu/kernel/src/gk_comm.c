@@ -131,6 +131,16 @@ static int balance(const gk_model *model, const gk_setup *setup, gk_data *data, 
     return gk_finite(stored) && !(fabs(v[V_M_RESIDUAL]) > BROKEN * (stored + fabs(data->ledger.work) + data->ledger.dissipated) + 1e-6);
 }
 
+/* Phase profile: names and cycles since gk_prepare (zero unless built with GK_PROFILE) */
+int gk_profile(const gk_setup *setup, int phase, const char **name, uint64_t *cycles)
+{
+    static const char *const names[PHASES] = {"predict", "find", "rows", "system", "solve", "correct", "remember"};
+    if (phase < 0 || phase >= PHASES) return 0;
+    *name = names[phase];
+    *cycles = setup->work->cycles[phase];
+    return 1;
+}
+
 /* ---- start ------------------------------------------------------------------------------------------------------------------------------------------- */
 static void start_speeds(const gk_model *model, gk_data *data)
 {
@@ -206,7 +216,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
     gk_work *work = setup->work;
     const double before[2] = {work->outer[0], work->outer[1]};
     ports_at(data, work, c, model, tau + h);
-    gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : gk_step_once(model, setup, data, h, setup->gamma);
+    gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : setup->step(model, setup, data, h, setup->gamma);
     if (outcome == GK_OK || setup->integrator == RK45) return outcome;
     data->trouble++;
     work->outer[0] = before[0], work->outer[1] = before[1];
@@ -216,7 +226,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
     }
     data->status |= 2;
     ports_at(data, work, c, model, tau + h);
-    outcome = gk_step_once(model, setup, data, h, 0.0);
+    outcome = setup->step(model, setup, data, h, 0.0);
     if (outcome) work->outer[0] = before[0], work->outer[1] = before[1];
     return outcome;
 }

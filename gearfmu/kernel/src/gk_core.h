@@ -117,6 +117,7 @@ typedef struct gk_effects {
 } gk_effects;
 
 typedef struct gk_work gk_work;
+typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
 
 struct gk_setup {
     uint64_t magic;
@@ -133,6 +134,7 @@ struct gk_setup {
     double link_c[LINKS];        /* compliance 1/k */
     double link_d[LINKS];        /* dashpot */
     gk_modal modal[2];
+    gk_step_function *step;      /* gk_step_once in the widest vectors of this processor */
     gk_work *work; /* scratch and coefficient cache: neither model nor state */
     size_t state_size;
 };
@@ -262,6 +264,8 @@ double gk_solve_stored(const gk_system *s, const double *force);
 /* gk_limit.c */
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);
+/* gk_wide.c */
+gk_step_function *gk_wide_step(int widest);
 /* gk_step.c */
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);
@@ -292,14 +296,18 @@ static inline double gk_floor(double x)
 }
 static inline int gk_finite(double x) { return x - x == 0.0; }
 
-/* Σ a_k b_k in fixed lanes: the same bits at every vector width; n is a multiple of LANES */
+/* Σ a_k b_k in LANES fixed lanes, added up as a tree: the same bits at every vector width. n is a multiple of LANES, rows are aligned. */
+typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias));
+
 static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
 {
-    gk_real lane[LANES] = {0};
-    for (int k = 0; k < n; k += LANES)
-        for (int l = 0; l < LANES; l++) lane[l] += a[k + l] * b[k + l];
-    for (int half = LANES / 2; half > 0; half /= 2)
-        for (int l = 0; l < half; l++) lane[l] += lane[l + half];
-    return lane[0];
+    gk_half low = {0}, high = {0};
+    const gk_half *x = (const gk_half *)a, *y = (const gk_half *)b;
+    for (int k = 0; k < 2 * n / LANES; k += 2) {
+        low += x[k] * y[k];
+        high += x[k + 1] * y[k + 1];
+    }
+    low += high;
+    return ((low[0] + low[4]) + (low[2] + low[6])) + ((low[1] + low[5]) + (low[3] + low[7]));
 }
 #endif

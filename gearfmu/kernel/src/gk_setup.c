@@ -379,6 +379,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     const int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
     const uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
     lay_out(model, setup, (char *)base, modes);
+    setup->step = gk_wide_step(1);
     gk_work *work = setup->work;
     work->clock = 0;
     for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;

@@ -11,7 +11,7 @@ enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, ENERGY_LIMIT = 12 };
 #ifdef GK_DOUBLE_MODES
 static const double SOLVED = 1e-11, STEADY_BALANCE = 1e-9;
 #else
-static const double SOLVED = 1e-9, STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
+static const double SOLVED = 1e-7, STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
 #endif
 static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
 

@@ -252,16 +252,6 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     return GK_OK;
 }
 
-/* Phase profile: names and cycles since gk_prepare (zero unless built with GK_PROFILE) */
-int gk_profile(const gk_setup *setup, int phase, const char **name, uint64_t *cycles)
-{
-    static const char *const names[PHASES] = {"predict", "find", "rows", "system", "solve", "correct", "remember"};
-    if (phase < 0 || phase >= PHASES) return 0;
-    *name = names[phase];
-    *cycles = setup->work->cycles[phase];
-    return 1;
-}
-
 /* The scheme's invariant: ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step */
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {

@@ -1,0 +1,72 @@
+/* The step in wider vectors: the same sources once more, compiled for AVX2, chosen by our own cpuid (the compilers' dispatch does not link everywhere).
+ * Sums have fixed lanes and nothing is contracted, so both give the same bits. */
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <cpuid.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#ifdef GK_PROFILE
+#include <x86intrin.h>
+#endif
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#endif
+#define gk_flow_for gk_flow_for_avx2
+#define gk_flank_find gk_flank_find_avx2
+#define gk_rows_form gk_rows_form_avx2
+#define gk_system_form gk_system_form_avx2
+#define gk_system_rates gk_system_rates_avx2
+#define gk_law_set gk_law_set_avx2
+#define gk_law_approach gk_law_approach_avx2
+#define gk_law_energy gk_law_energy_avx2
+#define gk_solve_contacts gk_solve_contacts_avx2
+#define gk_solve_plain gk_solve_plain_avx2
+#define gk_solve_energy gk_solve_energy_avx2
+#define gk_solve_end_gap gk_solve_end_gap_avx2
+#define gk_solve_massless gk_solve_massless_avx2
+#define gk_solve_stored gk_solve_stored_avx2
+#define gk_step_once gk_step_once_avx2
+#define gk_step_recall gk_step_recall_avx2
+#define gk_step_remember gk_step_remember_avx2
+#define gk_step_scatter gk_step_scatter_avx2
+#define gk_step_energy gk_step_energy_avx2
+#include "gk_law.c"
+#include "gk_flow.c"
+#include "gk_flank.c"
+#include "gk_rows.c"
+#include "gk_system.c"
+#include "gk_solve.c"
+#include "gk_step.c"
+#undef gk_step_once
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
+
+/* AVX2 in the processor, and its registers kept by the system over a task switch */
+static int has_avx2(void)
+{
+    unsigned a, b, c, d, low, high;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & (1u << 27))) return 0;
+    __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & (1u << 5));
+}
+
+/* gk_step_once in the widest vectors of this processor; widest = 0: the baseline */
+gk_step_function *gk_wide_step(int widest) { return widest > 0 && has_avx2() ? gk_step_once_avx2 : gk_step_once; }
+#else
+#include "gk_core.h"
+gk_step_function *gk_wide_step(int widest)
+{
+    (void)widest;
+    return gk_step_once;
+}
+#endif
