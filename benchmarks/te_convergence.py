@@ -1,9 +1,11 @@
-"""Convergence of the loaded transmission error of a stage's stored bodies in what the kernel makes of them: slices across the face width and
-rolls of the grid along the flank. (Convergence in the finite-element mesh: body_convergence.py, which makes the bodies anew.)
+"""Convergence of the loaded transmission error of a stage's stored bodies in what the kernel makes of them: slices
+across the face width and rolls of the grid along the flank. (Convergence in the finite-element mesh:
+body_convergence.py, which makes the bodies anew.)
 
     python benchmarks/te_convergence.py [STAGE] [--torque 302 --torque 80] [--out te_convergence.csv]
 
-One row a setting: mean and peak to peak over one pitch, and the largest difference to the finest setting. Axes with their bearings.
+One row a setting: mean and peak to peak over one pitch, and the largest difference to the finest setting. Axes with
+their bearings.
 """
 
 from __future__ import annotations

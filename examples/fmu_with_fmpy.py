@@ -1,7 +1,8 @@
 """A clutch closes: the FMU stepped by hand with fmpy, nothing of gearfmu in the loop.
 
-Engine at constant speed – [clutch, compiled into the FMU's pinion port] – gear pair – port spring – load inertia, integrated here.
-The host gives the load's motion and takes the mean torque of the step back. Run: python examples/fmu_with_fmpy.py [FOLDER]
+Engine at constant speed – [clutch, compiled into the FMU's pinion port] – gear pair – port spring – load inertia,
+integrated here. The host gives the load's motion and takes the mean torque of the step back. Run: python
+examples/fmu_with_fmpy.py [FOLDER]
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 ENGINE, LOAD_INERTIA = 100.0, 0.2  # rad/s, kg·m²
 H, END = 1e-4, 0.2  # s
 CLUTCH = ChainSpec(inertia=0.15, disc_inertia=2e-3, shaft_k=15e3, shaft_c=1.0)
+INPUTS = ("pinion.phi", "pinion.w", "pinion.clutch.capacity", "wheel.phi", "wheel.w")
 SHOWN = ("pinion.clutch.tau", "pinion.clutch.slip", "mesh.force", "wheel.tau_mean", "pinion.clutch.locked")
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/examples")
@@ -50,8 +52,7 @@ angle, speed, rows = 0.0, 0.0, []
 for n in range(round(END / H)):
     time = n * H
     capacity = 120.0 * min(1.0, max(0.0, time - 0.01) / 0.05)  # N·m, closes within 50 ms
-    slave.setReal([reference[name + " in"] for name in ("pinion.phi", "pinion.w", "pinion.clutch.capacity", "wheel.phi", "wheel.w")],
-                  [ENGINE * time, ENGINE, capacity, angle, speed])  # fmt: skip
+    slave.setReal([reference[name + " in"] for name in INPUTS], [ENGINE * time, ENGINE, capacity, angle, speed])
     slave.doStep(currentCommunicationPoint=time, communicationStepSize=H)
     values = [slave.getReal([reference[name]])[0] for name in SHOWN[:-1]] + slave.getBoolean([reference[SHOWN[-1]]])
     speed += values[3] / LOAD_INERTIA * H
@@ -62,7 +63,9 @@ slave.freeInstance()
 
 table = np.array(rows, dtype=float)
 figure, axes = plt.subplots(3, 1, sharex=True, figsize=(8, 7), layout="constrained")
-for axis, column, label in zip(axes, (1, 2, 3), ("clutch torque in N·m", "slip in rad/s", "mesh force in N"), strict=True):
+for axis, column, label in zip(
+    axes, (1, 2, 3), ("clutch torque in N·m", "slip in rad/s", "mesh force in N"), strict=True
+):
     axis.plot(1e3 * table[:, 0], table[:, column], lw=0.8)
     axis.set_ylabel(label)
 axes[-1].set_xlabel("time in ms")

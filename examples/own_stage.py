@@ -1,6 +1,7 @@
 """One tooth more: a commented stage file, three numbers changed, bodies made anew, transmission error of both pairs.
 
-The mesh is coarse so that this takes a minute; leave `scale` away for real work. Run: python examples/own_stage.py [FOLDER]
+The mesh is coarse so that this takes a minute; leave `scale` away for real work. Run: python examples/own_stage.py
+[FOLDER]
 """
 
 from __future__ import annotations
@@ -37,4 +38,7 @@ for stage in ("fzg_c", path):
     model = assemble(spec, reduce_stage(spec))
     te = 1e6 * loaded_te(model, [TORQUE], 32).te[0]
     ratio = PairGeometry.of(spec).tip_circle_contact_ratio
-    print(f"{spec.name}: contact ratio {ratio:.3f}, transmission error mean {te.mean():.2f} µm, peak to peak {te.max() - te.min():.2f} µm")
+    print(
+        f"{spec.name}: contact ratio {ratio:.3f}, transmission error mean {te.mean():.2f} µm, "
+        f"peak to peak {te.max() - te.min():.2f} µm"
+    )

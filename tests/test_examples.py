@@ -41,7 +41,9 @@ def test_loaded_te(tmp_path: Path) -> None:
     assert "fzg_c:" in plain and "fzg_c_relief:" in relieved
     mean = [float(re.search(r"mean ([\d.]+)", line)[1]) for line in (plain, relieved)]
     assert mean[0] < mean[1] < mean[0] + 15
-    assert all((tmp_path / f"harris_{name}.png").read_bytes().startswith(b"\x89PNG") for name in ("fzg_c", "fzg_c_relief"))
+    assert all(
+        (tmp_path / f"harris_{name}.png").read_bytes().startswith(b"\x89PNG") for name in ("fzg_c", "fzg_c_relief")
+    )
 
 
 def test_fmu_with_fmpy(tmp_path: Path) -> None:
@@ -63,7 +65,10 @@ def test_standalone_run_up(tmp_path: Path) -> None:
 def test_own_stage(tmp_path: Path) -> None:
     """One tooth more at the wheel: more contact ratio, nearly the same transmission error."""
     before, after = example("own_stage.py", tmp_path, cwd=tmp_path).splitlines()[-2:]
-    ratio, mean = ([float(re.search(pattern, line)[1]) for line in (before, after)] for pattern in (r"ratio ([\d.]+)", r"mean ([\d.]+)"))
+    ratio, mean = (
+        [float(re.search(pattern, line)[1]) for line in (before, after)]
+        for pattern in (r"ratio ([\d.]+)", r"mean ([\d.]+)")
+    )
     assert 0 < ratio[1] - ratio[0] < 0.02 and mean[1] == pytest.approx(mean[0], rel=0.05)
 
 

@@ -1,4 +1,5 @@
-"""Another pair, in one go: commented stage.toml, other numbers, finite elements, transmission error, FMU, a run under fmpy."""
+"""Another pair, in one go: commented stage.toml, other numbers, finite elements, transmission error, FMU, a run under
+fmpy."""
 
 from __future__ import annotations
 
@@ -61,7 +62,10 @@ def test_a_second_pair_from_its_numbers_to_a_running_fmu(tmp_path: Path) -> None
     result = loaded_te(model, [LOAD], 32, rigid_bearings=True)
     force = LOAD / pair.gears[0].r_b
     pairs = (result.shares[0] > 1e-6).sum(axis=1).mean()
-    print(f"te {1e6 * result.te.mean():.1f} µm, stiffness {1e-6 * result.stiffness.mean():.0f} N/µm, {pairs:.2f} pairs carry")
+    print(
+        f"te {1e6 * result.te.mean():.1f} µm, stiffness {1e-6 * result.stiffness.mean():.0f} N/µm, "
+        f"{pairs:.2f} pairs carry"
+    )
     assert 9e9 < force / result.te.max() / 18e-3 < 18e9  # N/m², secant of one pair about 14 N/(mm µm)
     assert pair.contact_ratio - 0.05 < pairs < pair.contact_ratio + 0.6  # tip corners carry beyond the path of contact
 

@@ -1,4 +1,6 @@
-"""StageSpec and reduced bodies → StageModel: the constant blob that the kernel runs. From here on no finite elements, no HDF5."""
+"""StageSpec and reduced bodies → StageModel: the constant blob that the kernel runs. From here on no finite elements,
+no HDF5."""
+
 from __future__ import annotations
 
 import math
@@ -52,7 +54,8 @@ class StageModel:
 
 
 def assemble(spec: StageSpec, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
-    """The model of `spec` with the reduced bodies of its gears, pinion first. rolls: of the even grid that carries rows and compliances along a flank.
+    """The model of `spec` with the reduced bodies of its gears, pinion first. rolls: of the even grid that carries
+    rows and compliances along a flank.
 
     ModelError when a body does not belong to its gear: other numbers of teeth, base radius, face width or roll range.
     """
@@ -66,8 +69,19 @@ def assemble(spec: StageSpec, bodies: Sequence[Any], rolls: int = ROLLS) -> Stag
         "name": spec.name,
         "shafts": "|".join(gear.name for gear in spec.gears),
         "degrees": degrees.astype(np.int32),
-        "pair": np.array([geometry.a, geometry.backlash, spec.contact.damping, spec.torque_max, spec.speed_max, spec.levels.fast_cut,
-                          spec.levels.standard_cut, H_MAX, geometry.nominal_backlash]),
+        "pair": np.array(
+            [
+                geometry.a,
+                geometry.backlash,
+                spec.contact.damping,
+                spec.torque_max,
+                spec.speed_max,
+                spec.levels.fast_cut,
+                spec.levels.standard_cut,
+                H_MAX,
+                geometry.nominal_backlash,
+            ]
+        ),
     }
     for i in (0, 1):
         gear, shape, body = spec.gears[i], geometry.gears[i], bodies[i]
@@ -79,11 +93,22 @@ def assemble(spec: StageSpec, bodies: Sequence[Any], rolls: int = ROLLS) -> Stag
 
 
 def _mismatches(gear: GearSpec, shape: GearGeometry, body: Any) -> list[str]:
-    pairs = {"teeth": (gear.teeth, body.teeth), "base radius": (shape.r_b, body.r_b), "face width": (gear.face_width, body.face_width),
-             "load strip": (gear.body.strip_half_width, body.strip_half_width)}
-    found = [f"body of {gear.name}: {what} {have:g} instead of {want:g}" for what, (want, have) in pairs.items() if not math.isclose(want, have, rel_tol=1e-9)]
+    pairs = {
+        "teeth": (gear.teeth, body.teeth),
+        "base radius": (shape.r_b, body.r_b),
+        "face width": (gear.face_width, body.face_width),
+        "load strip": (gear.body.strip_half_width, body.strip_half_width),
+    }
+    found = [
+        f"body of {gear.name}: {what} {have:g} instead of {want:g}"
+        for what, (want, have) in pairs.items()
+        if not math.isclose(want, have, rel_tol=1e-9)
+    ]
     if not shape.s_form - 1e-9 <= body.roll.min() <= body.roll.max() <= shape.s_tip + 1e-9:
-        found.append(f"body of {gear.name}: its rolls {body.roll.min():g} … {body.roll.max():g} m leave the flank {shape.s_form:g} … {shape.s_tip:g} m")
+        found.append(
+            f"body of {gear.name}: its rolls {body.roll.min():g} … {body.roll.max():g} m "
+            f"leave the flank {shape.s_form:g} … {shape.s_tip:g} m"
+        )
     return found
 
 
@@ -95,21 +120,48 @@ def _gear_numbers(gear: GearSpec, shape: GearGeometry, body: Any, phase: float) 
     inner = shape.s_tip - edge
     mass, inertia = body.mass, body.inertia[2, 2]
     damping = 2 * gear.bearing.damping_ratio * math.sqrt(gear.bearing.stiffness * mass)
-    return np.array([gear.teeth, shape.r_b, shape.s_form, shape.s_tip, shape.psi_b, phase, mass, inertia, gear.face_width, local, gear.body.strip_half_width,
-                     curve, start, edge, math.hypot(shape.r_b, inner), shape.s_tip / shape.r_b - math.atan2(inner, shape.r_b), gear.bearing.stiffness, damping])
+    return np.array(
+        [
+            gear.teeth,
+            shape.r_b,
+            shape.s_form,
+            shape.s_tip,
+            shape.psi_b,
+            phase,
+            mass,
+            inertia,
+            gear.face_width,
+            local,
+            gear.body.strip_half_width,
+            curve,
+            start,
+            edge,
+            math.hypot(shape.r_b, inner),
+            shape.s_tip / shape.r_b - math.atan2(inner, shape.r_b),
+            gear.bearing.stiffness,
+            damping,
+        ]
+    )
 
 
 def _port_numbers(port: PortSpec) -> np.ndarray:
     chain = port.chain
     k = port.k if port.k is not None else FIXED_K if port.kind == "fixed" else 1.0
     numbers = [PORT_KINDS[port.kind], float(chain is not None), k, port.c or 0.0]
-    return np.array(numbers + ([chain.inertia, chain.disc_inertia, chain.shaft_k, chain.shaft_c] if chain else [1.0, 1.0, 1.0, 0.0]))
+    return np.array(
+        numbers + ([chain.inertia, chain.disc_inertia, chain.shaft_k, chain.shaft_c] if chain else [1.0, 1.0, 1.0, 0.0])
+    )
 
 
 def _coast_shift(geometry: PairGeometry) -> int:
-    """The wheel's tooth number that faces the coast flank of the pinion's tooth 0: the one whose gap is the nominal backlash."""
+    """The wheel's tooth number that faces the coast flank of the pinion's tooth 0: the one whose gap is the nominal
+    backlash."""
     a, b = geometry.gears
     t = geometry.alpha_wt
-    gaps = {shift: geometry.length + a.r_b * (-a.psi_b - t) + b.r_b * (geometry.wheel_phase + shift * 2 * math.pi / b.z - b.psi_b - t - math.pi)
-            for shift in (-1, 0, 1)}
+    gaps = {
+        shift: geometry.length
+        + a.r_b * (-a.psi_b - t)
+        + b.r_b * (geometry.wheel_phase + shift * 2 * math.pi / b.z - b.psi_b - t - math.pi)
+        for shift in (-1, 0, 1)
+    }
     return min(gaps, key=lambda shift: abs(gaps[shift]))

@@ -1,4 +1,5 @@
 """The standalone solver: a stage model driven by given inputs, recorded into a Trace like every other run."""
+
 from __future__ import annotations
 
 import time as clock
@@ -21,8 +22,9 @@ Inputs = Callable[[float], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Steady:
-    """Inputs of a pair at constant speed and load: both shafts' outer ends turn at constant speed, wound up so that shafts and mesh carry the
-    torque on average: τ/k on either shaft and the mean loaded transmission error between them.
+    """Inputs of a pair at constant speed and load: both shafts' outer ends turn at constant speed, wound up so that
+    shafts and mesh carry the torque on average: τ/k on either shaft and the mean loaded transmission error between
+    them.
 
     speed: of the pinion, rad/s; torque: on the pinion, N·m. For spring ports without a chain.
     """
@@ -37,7 +39,9 @@ class Steady:
         kernel = self.model.kernel(level=0.0)
         kernel.prepare()
         pitch = 2 * np.pi / self.model.spec.gears[1].teeth
-        mean = np.mean([kernel.transmission(-pitch * i / WINDING_POSITIONS, self.torque).te for i in range(WINDING_POSITIONS)])
+        mean = np.mean(
+            [kernel.transmission(-pitch * i / WINDING_POSITIONS, self.torque).te for i in range(WINDING_POSITIONS)]
+        )
         return float(mean / PairGeometry.of(self.model.spec).gears[0].r_b)
 
     def __call__(self, time: float) -> Mapping[str, float]:
@@ -52,12 +56,19 @@ class Steady:
         return values
 
 
-def simulate(model: StageModel, inputs: Inputs, duration: float, step: float, parameters: Mapping[str, float] | None = None,
-             progress: Callable[[float], None] | None = None) -> Trace:
-    """Run from static equilibrium at t = 0 for `duration` (s) with communication steps `step` (s); every output is recorded at every step.
+def simulate(
+    model: StageModel,
+    inputs: Inputs,
+    duration: float,
+    step: float,
+    parameters: Mapping[str, float] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Trace:
+    """Run from static equilibrium at t = 0 for `duration` (s) with communication steps `step` (s); every output is
+    recorded at every step.
 
-    inputs: time (s) → values by input name, asked at the start of each step. progress: called with the part done, 0 … 1.
-    A run that stops early keeps its samples; the trace's meta says the outcome and the last good time.
+    inputs: time (s) → values by input name, asked at the start of each step. progress: called with the part done, 0 …
+    1. A run that stops early keeps its samples; the trace's meta says the outcome and the last good time.
     """
     kernel = Kernel(model.blob, parameters)
     names = [v.name for v in kernel.variables.values() if v.causality == "output"]
@@ -78,7 +89,11 @@ def simulate(model: StageModel, inputs: Inputs, duration: float, step: float, pa
     except SimulationError as error:
         outcome = error.outcome
     cpu = clock.process_time() - started
-    return Trace(np.arange(done + 1) * step, _channels(kernel, names, samples[: done + 1]), _meta(model, kernel, outcome, cpu, done * step))
+    return Trace(
+        np.arange(done + 1) * step,
+        _channels(kernel, names, samples[: done + 1]),
+        _meta(model, kernel, outcome, cpu, done * step),
+    )
 
 
 def _set(kernel: Kernel, values: Mapping[str, float]) -> None:
@@ -98,8 +113,17 @@ def _channels(kernel: Kernel, names: Sequence[str], samples: np.ndarray) -> dict
 def _meta(model: StageModel, kernel: Kernel, outcome: str, cpu: float, simulated: float) -> dict:
     level = kernel.variables["level"].items[int(kernel.get("level"))]
     return {
-        "stage": model.name, "outcome": outcome, "simulated_s": simulated, "cpu_s": cpu, "realtime_factor": cpu / simulated if simulated else None,
-        "coupling_error": None, "energy_residual": kernel.get("energy.residual"), "level": level, "n_dyn": int(kernel.get("solver.n_dyn")),
-        "slices": int(kernel.get("slices")), "h": kernel.get("solver.h"), "hashes": {"model": model.hash, "bodies": list(model.body_hashes)},
+        "stage": model.name,
+        "outcome": outcome,
+        "simulated_s": simulated,
+        "cpu_s": cpu,
+        "realtime_factor": cpu / simulated if simulated else None,
+        "coupling_error": None,
+        "energy_residual": kernel.get("energy.residual"),
+        "level": level,
+        "n_dyn": int(kernel.get("solver.n_dyn")),
+        "slices": int(kernel.get("slices")),
+        "h": kernel.get("solver.h"),
+        "hashes": {"model": model.hash, "bodies": list(model.body_hashes)},
         "warning": kernel.warning,
     }

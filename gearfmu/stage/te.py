@@ -1,4 +1,6 @@
-"""Quasi-static loaded transmission error over one pitch: wheel held, torque on the pinion, by the contact routine of the step."""
+"""Quasi-static loaded transmission error over one pitch: wheel held, torque on the pinion, by the contact routine of
+the step."""
+
 from __future__ import annotations
 
 import math
@@ -18,9 +20,10 @@ RIGID = 1e13  # N/m: 1 nm at 10 kN
 
 @dataclass(frozen=True)
 class TeResult:
-    """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · stiffness (T, P) N/m, tangent dF/dte with F along the line of action
-    · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come into mesh: a pair keeps
-    its column through the pitch, sorted by tooth number.
+    """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · stiffness (T, P) N/m, tangent
+    dF/dte with F along the line of action
+    · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come
+    into mesh: a pair keeps its column through the pitch, sorted by tooth number.
     """
 
     torque: np.ndarray
@@ -30,18 +33,27 @@ class TeResult:
     shares: np.ndarray
 
 
-def loaded_te(model: StageModel, torques: Sequence[float], positions: int = 41, rigid_bearings: bool = False, **parameters: float) -> TeResult:
-    """te = r_b1 φ_1 + r_b2 φ_2 of the bore nodes at positions i/N of one pitch (no end point), wheel held at −position · 2π/z_2.
+def loaded_te(
+    model: StageModel, torques: Sequence[float], positions: int = 41, rigid_bearings: bool = False, **parameters: float
+) -> TeResult:
+    """te = r_b1 φ_1 + r_b2 φ_2 of the bore nodes at positions i/N of one pitch (no end point), wheel held at
+    −position · 2π/z_2.
 
-    torques: N·m on the pinion; positive drives. rigid_bearings: the bore nodes are held on their axes. parameters: of the kernel, e.g. slices=10.
-    SimulationError(no_equilibrium) where there is none.
+    torques: N·m on the pinion; positive drives. rigid_bearings: the bore nodes are held on their axes. parameters: of
+    the kernel, e.g. slices=10. SimulationError(no_equilibrium) where there is none.
     """
     kernel = (on_rigid_bearings(model) if rigid_bearings else model).kernel(**{"level": 0.0, **parameters})
     kernel.prepare()
     pitch = 2 * math.pi / model.spec.gears[1].teeth
-    base_radius = model.spec.pair.normal_module * model.spec.gears[0].teeth / 2 * math.cos(model.spec.pair.pressure_angle)
+    base_radius = (
+        model.spec.pair.normal_module * model.spec.gears[0].teeth / 2 * math.cos(model.spec.pair.pressure_angle)
+    )
     position = np.arange(positions) / positions
-    te, stiffness, shares = np.empty((len(torques), positions)), np.empty((len(torques), positions)), np.zeros((len(torques), positions, SHARES))
+    te, stiffness, shares = (
+        np.empty((len(torques), positions)),
+        np.empty((len(torques), positions)),
+        np.zeros((len(torques), positions, SHARES)),
+    )
     for i, torque in enumerate(torques):
         for j, part in enumerate(position):
             state = kernel.transmission(-part * pitch, torque)
@@ -54,7 +66,8 @@ def loaded_te(model: StageModel, torques: Sequence[float], positions: int = 41, 
 def on_rigid_bearings(model: StageModel) -> StageModel:
     """The same stage with its bores held on their axes.
 
-    Not `effect.bearings` off: that holds the mean-axis frames, and their reaction is spread over the mass of the gear instead of acting on its bore.
+    Not `effect.bearings` off: that holds the mean-axis frames, and their reaction is spread over the mass of the gear
+    instead of acting on its bore.
     """
     sections = read_blob(model.blob)
     for name in ("gear0", "gear1"):
@@ -71,7 +84,8 @@ def _tangent(kernel: Kernel, phi: float, torque: float) -> float:
 
 
 def _shares(state: TeState) -> np.ndarray:
-    """Shares by tooth number of the pinion: pair k of the path is tooth k − 2 …, counted from the tooth that leaves the mesh."""
+    """Shares by tooth number of the pinion: pair k of the path is tooth k − 2 …, counted from the tooth that leaves
+    the mesh."""
     total = sum(sum(forces) for forces in state.forces.values()) or 1.0
     shares = np.zeros(SHARES)
     for (_, tooth), forces in state.forces.items():

@@ -1,4 +1,5 @@
 """The shipped FZG stages, assembled once."""
+
 from __future__ import annotations
 
 import pytest

@@ -1,9 +1,12 @@
-"""Stiffness of one tooth pair at the pitch point, by finite elements with the bores clamped and by the transmission error, against ISO 6336.
+"""Stiffness of one tooth pair at the pitch point, by finite elements with the bores clamped and by the transmission
+error, against ISO 6336.
 
-c'th of ISO 6336-1 is that of teeth on half planes (Weber and Banaschek) with a dedendum of 1.2 m. Ours sit on discs with a bore, so the torsion of
-a plane disc between bore and root circle is put in series, and the standard's own factor for the basic rack is used. The bare c'th (15.78 N/(mm µm) for
-FZG type C) lies some 20 % higher than a pair with these bores.
+c'th of ISO 6336-1 is that of teeth on half planes (Weber and Banaschek) with a dedendum of 1.2 m. Ours sit on discs
+with a bore, so the torsion of a plane disc between bore and root circle is put in series, and the standard's own
+factor for the basic rack is used. The bare c'th (15.78 N/(mm µm) for FZG type C) lies some 20 % higher than a pair
+with these bores.
 """
+
 from __future__ import annotations
 
 import math
@@ -28,8 +31,17 @@ LINE_LOAD = 300e3  # N/m
 def theoretical_stiffness(spec: StageSpec) -> float:
     """c'th of ISO 6336-1 for solid spur gears, N/m²."""
     (z1, x1), (z2, x2) = ((gear.teeth, gear.profile_shift) for gear in spec.gears)
-    flexibility = (0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2 - 0.24188 * x2 / z2
-                   + 0.00529 * x1**2 + 0.00182 * x2**2)
+    flexibility = (
+        0.04723
+        + 0.15551 / z1
+        + 0.25791 / z2
+        - 0.00635 * x1
+        - 0.11654 * x1 / z1
+        - 0.00193 * x2
+        - 0.24188 * x2 / z2
+        + 0.00529 * x1**2
+        + 0.00182 * x2**2
+    )
     return 1e9 / flexibility
 
 
@@ -39,7 +51,8 @@ def rack_factor(spec: StageSpec) -> float:
 
 
 def disc_torsion(spec: StageSpec, pair: PairGeometry) -> float:
-    """Twist of plane discs between bore and root circle as displacement along the line of action, m per N/m (exact, plane shear)."""
+    """Twist of plane discs between bore and root circle as displacement along the line of action, m per N/m (exact,
+    plane shear)."""
     total = 0.0
     for gear, shape in zip(spec.gears, pair.gears, strict=True):
         shear = gear.material.youngs_modulus / (2 * (1 + gear.material.poisson_ratio))
@@ -61,7 +74,8 @@ def local_compliance(spec: StageSpec, pair: PairGeometry) -> float:
 
 
 def clamped_compliance(gear: GearSpec, shape: GearGeometry, roll: float, scale: float) -> float:
-    """Displacement of the load strip at `roll` per uniform load on it, all nodes of the bore held, m/N: cyclic symmetry, one nodal diameter at a time."""
+    """Displacement of the load strip at `roll` per uniform load on it, all nodes of the bore held, m/N: cyclic
+    symmetry, one nodal diameter at a time."""
     flank = ToothFlank(shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, gear.face_width, gear.body.strip_half_width)
     mesh = gear_sector(shape, gear.face_width, gear.body.mesh.model_copy(update={"scale": scale}))
     body = SectorBody(mesh, gear.material, flank, Points(np.array([roll]), 1))
@@ -78,7 +92,9 @@ def clamped_compliance(gear: GearSpec, shape: GearGeometry, roll: float, scale: 
         expand = sp.csc_array(sp.vstack([sp.eye_array(size), cut]))[:, keep]
         load = family.flank[keep, 0]
         system = sp.csc_matrix(expand.conj().T @ stiffness @ expand)
-        solution = sla.splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(load)
+        solution = sla.splu(
+            system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        ).solve(load)
         total += family.weight / mesh.teeth * (load.conj() @ solution).real
     return total
 
@@ -92,12 +108,17 @@ def test_secant_from_the_transmission_error(plain: StageModel, spec: StageSpec, 
     width = spec.gears[0].face_width
     kernel = on_rigid_bearings(plain).kernel(**{"level": 0.0, "effect.tip_contact": 0.0})
     kernel.prepare()
-    turn = pair.path["C"] / pair.gears[0].r_b - pair.gears[0].psi_b - pair.alpha_wt  # of the pinion, to bring tooth 0 to the pitch point
+    turn = (
+        pair.path["C"] / pair.gears[0].r_b - pair.gears[0].psi_b - pair.alpha_wt
+    )  # of the pinion, to bring tooth 0 to the pitch point
     torque = LINE_LOAD * width * pair.gears[0].r_b
     state = kernel.transmission(-turn * pair.gears[0].r_b / pair.gears[1].r_b, torque)
     assert [tooth for tooth, forces in state.forces.items() if sum(forces) > 0] == [(0, 0)]
     secant = LINE_LOAD / state.te
-    print(f"c' = {1e-9 * secant:.2f} N/(mm µm); c'th {1e-9 * theoretical_stiffness(spec):.2f}, with rack and discs {1e-9 * expected(spec, pair):.2f}")
+    print(
+        f"c' = {1e-9 * secant:.2f} N/(mm µm); "
+        f"c'th {1e-9 * theoretical_stiffness(spec):.2f}, with rack and discs {1e-9 * expected(spec, pair):.2f}"
+    )
     assert secant == pytest.approx(expected(spec, pair), rel=0.10)
 
 
@@ -106,6 +127,8 @@ def test_secant_from_finite_elements_with_clamped_bores(spec: StageSpec, pair: P
     rolls = (pair.path["C"], pair.length - pair.path["C"])
     bodies = [clamped_compliance(*parts, scale=0.6) for parts in zip(spec.gears, pair.gears, rolls, strict=True)]
     secant = 1 / (spec.gears[0].face_width * (sum(bodies) + local_compliance(spec, pair)))
-    print(f"c' = {1e-9 * secant:.2f} N/(mm µm), bores clamped; c'th {1e-9 * theoretical_stiffness(spec):.2f}, "
-          f"with rack and discs {1e-9 * expected(spec, pair):.2f}")
+    print(
+        f"c' = {1e-9 * secant:.2f} N/(mm µm), bores clamped; c'th {1e-9 * theoretical_stiffness(spec):.2f}, "
+        f"with rack and discs {1e-9 * expected(spec, pair):.2f}"
+    )
     assert secant == pytest.approx(expected(spec, pair), rel=0.06)

@@ -1,4 +1,6 @@
-"""Physics of the shipped pair: free rattle keeps its energy and its backlash, every effect does what its name says, bad values are refused."""
+"""Physics of the shipped pair: free rattle keeps its energy and its backlash, every effect does what its name says,
+bad values are refused."""
+
 from __future__ import annotations
 
 import math
@@ -22,13 +24,17 @@ UNDAMPED = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 
 def free(spec: StageSpec, bodies: list[ReducedBody], bearing_damping: float) -> StageModel:
     """Both shafts free, torque ports; bearings with the damping ratio given."""
-    gears = tuple(gear.model_copy(update={"bearing": gear.bearing.model_copy(update={"damping_ratio": bearing_damping})}) for gear in spec.gears)
+    gears = tuple(
+        gear.model_copy(update={"bearing": gear.bearing.model_copy(update={"damping_ratio": bearing_damping})})
+        for gear in spec.gears
+    )
     ports = {gear.name: PortSpec(kind="torque") for gear in spec.gears}
     return assemble(spec.model_copy(update={"gears": gears, "ports": ports}), bodies)
 
 
 def rattle(model: StageModel, bodies: list[ReducedBody], duration: float = 0.03, **parameters: float) -> Trace:
-    """Gears thrown together so that they bounce between drive and coast flanks where they are: their momenta along the mesh cancel."""
+    """Gears thrown together so that they bounce between drive and coast flanks where they are: their momenta along
+    the mesh cancel."""
     pinion, wheel = ((body.inertia[2, 2], body.r_b) for body in bodies)
     speed = 15.0
     start = {"pinion.w_start": speed, "wheel.w_start": speed * pinion[0] / pinion[1] * wheel[1] / wheel[0]}
@@ -48,13 +54,19 @@ def compliance(model: StageModel, positions: float | np.ndarray, torque: float, 
 
 
 @pytest.mark.parametrize("level, h", [(0, 7.5e-6), (1, 5e-6), (1, 7.5e-6), (2, 5e-6)])
-def test_free_rattle_keeps_its_energy_and_its_backlash(spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry, level: int, h: float) -> None:
-    """Some 80 impacts without damping. The energy goes up and down with the place on the flanks where the gears meet, by the same at every step
-    size: rows depend on the roll, and the slope of elastic displacement along the flank does no work in the model. It does not run away."""
+def test_free_rattle_keeps_its_energy_and_its_backlash(
+    spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry, level: int, h: float
+) -> None:
+    """Some 80 impacts without damping. The energy goes up and down with the place on the flanks where the gears meet,
+    by the same at every step size: rows depend on the roll, and the slope of elastic displacement along the flank
+    does no work in the model. It does not run away."""
     trace = rattle(free(spec, bodies, 0.0), bodies, level=level, h=h, **UNDAMPED)
     stored, te = trace["energy.stored"][1:], trace["mesh.te"]
     drift = np.ptp(stored) / stored[0]
-    print(f"{trace['mesh.impacts'][-1]} impacts, energy within {drift:.1e}, te from {1e6 * te.min():.1f} to {1e6 * te.max():.1f} µm")
+    print(
+        f"{trace['mesh.impacts'][-1]} impacts, energy within {drift:.1e}, "
+        f"te from {1e6 * te.min():.1f} to {1e6 * te.max():.1f} µm"
+    )
     assert trace.meta["outcome"] == "completed" and trace["mesh.impacts"][-1] > 40 and trace["solver.trouble"][-1] == 0
     assert drift < 1e-3
     assert trace["mesh.force_drive"].max() > 100 and trace["mesh.force_coast"].max() > 100
@@ -65,7 +77,7 @@ def test_free_rattle_keeps_its_energy_and_its_backlash(spec: StageSpec, bodies: 
 def test_energy_of_free_rattle_does_not_run_away(spec: StageSpec, bodies: list[ReducedBody]) -> None:
     """Five times as long: the same bounds, no trend."""
     stored = rattle(free(spec, bodies, 0.0), bodies, duration=0.15, **UNDAMPED)["energy.stored"][1:]
-    first, last = np.array_split(stored / stored[0], 5)[:: 4]
+    first, last = np.array_split(stored / stored[0], 5)[::4]
     print(f"mean of the first fifth {first.mean() - 1:+.1e}, of the last {last.mean() - 1:+.1e}")
     assert np.ptp(stored) < 2e-3 * stored[0] and abs(last.mean() - first.mean()) < 5e-4
 
@@ -75,7 +87,9 @@ def test_damping_only_ever_takes_energy(spec: StageSpec, bodies: list[ReducedBod
     stored = trace["energy.stored"][1:]
     assert np.diff(stored).max() < 1e-6 * stored[0] and stored[-1] < 0.9 * stored[0]
     assert trace["energy.work"][-1] == 0.0
-    assert np.allclose(stored[0] - stored, trace["energy.dissipated"][1:] - trace["energy.dissipated"][1], atol=1e-3 * stored[0])
+    assert np.allclose(
+        stored[0] - stored, trace["energy.dissipated"][1:] - trace["energy.dissipated"][1], atol=1e-3 * stored[0]
+    )
 
 
 def test_coast_flank_off(spec: StageSpec, bodies: list[ReducedBody]) -> None:
@@ -84,7 +98,8 @@ def test_coast_flank_off(spec: StageSpec, bodies: list[ReducedBody]) -> None:
 
 
 def test_tip_contact_off(plain: StageModel) -> None:
-    """Without modification the loaded tip corners take over from the flanks: without them fewer pairs carry, never more."""
+    """Without modification the loaded tip corners take over from the flanks: without them fewer pairs carry, never
+    more."""
     on, off = (compliance(plain, np.arange(64) / 64, LOAD, **{"effect.tip_contact": flag}) for flag in (1.0, 0.0))
     assert np.all(off > on - 1e-15) and np.sum(off > on * 1.001) > 4 and np.sum(np.isclose(off, on, rtol=1e-9)) > 20
 
@@ -102,7 +117,8 @@ def test_bearings_off(plain: StageModel) -> None:
 
 
 def test_residual_off_is_for_level_paper_only(plain: StageModel) -> None:
-    """Leaving out the static share of all higher modes makes the teeth too stiff: refused by name, except where the paper does so."""
+    """Leaving out the static share of all higher modes makes the teeth too stiff: refused by name, except where the
+    paper does so."""
     for level in range(4):
         with pytest.raises(ModelError, match=r"effect\.residual"):
             ready(plain, level=level, **{"effect.residual": 0.0})
@@ -111,20 +127,27 @@ def test_residual_off_is_for_level_paper_only(plain: StageModel) -> None:
 
 
 def test_hertz_off_makes_the_local_law_linear(plain: StageModel, spec: StageSpec) -> None:
-    """One pair in contact, axes held: te is proportional to the torque, and the secant is that of the full law at torque_max."""
+    """One pair in contact, axes held: te is proportional to the torque, and the secant is that of the full law at
+    torque_max."""
     off, on = ({"effect.bearings": 0.0, "effect.hertz": flag} for flag in (0.0, 1.0))
     torques = np.array([1.0, 80.0, LOAD, spec.torque_max])
-    straight, curved = (np.concatenate([compliance(plain, 0.75, torque, **flags) for torque in torques]) for flags in (off, on))
+    straight, curved = (
+        np.concatenate([compliance(plain, 0.75, torque, **flags) for torque in torques]) for flags in (off, on)
+    )
     assert np.allclose(straight, straight[0], rtol=2e-4)  # what is left: te moves the pair along the path
     assert np.all(np.diff(curved) < 0) and curved[0] > 1.05 * straight[0]
     assert curved[-1] == pytest.approx(straight[-1], rel=1e-4)
 
 
-@pytest.mark.parametrize("off, none", [("effect.contact_damping", {"contact_damping": 0.0}), ("effect.modal_damping", {})])
+@pytest.mark.parametrize(
+    "off, none", [("effect.contact_damping", {"contact_damping": 0.0}), ("effect.modal_damping", {})]
+)
 def test_damping_off(plain: StageModel, off: str, none: dict[str, float]) -> None:
     """Off is the same bits as a coefficient of zero, and a different motion than on."""
-    run = {key: simulate(plain, Steady(plain, 200.0, LOAD), 3e-3, H, {"level": FAST, **values})["mesh.force"]
-           for key, values in {"on": {}, "off": {off: 0.0}, "none": none}.items()}
+    run = {
+        key: simulate(plain, Steady(plain, 200.0, LOAD), 3e-3, H, {"level": FAST, **values})["mesh.force"]
+        for key, values in {"on": {}, "off": {off: 0.0}, "none": none}.items()
+    }
     assert np.abs(run["on"] - run["off"]).max() > 1.0
     assert not none or np.array_equal(run["off"], run["none"])
 
@@ -141,7 +164,13 @@ def test_bad_values_are_refused_and_named(plain: StageModel) -> None:
         if variable.causality == "output":
             continue
         before = kernel.get(variable.name)
-        for value in (math.nan, math.inf, -math.inf, variable.maximum + max(1.0, abs(variable.maximum)), variable.minimum - max(1.0, abs(variable.minimum))):
+        for value in (
+            math.nan,
+            math.inf,
+            -math.inf,
+            variable.maximum + max(1.0, abs(variable.maximum)),
+            variable.minimum - max(1.0, abs(variable.minimum)),
+        ):
             with pytest.raises(ModelError, match=variable.name.replace(".", r"\.")):
                 kernel.set(variable.name, value)
             assert kernel.get(variable.name) == before
@@ -153,12 +182,15 @@ def test_bad_values_are_refused_and_named(plain: StageModel) -> None:
         kernel.set("no.such", 0.0)
 
 
-TUNNEL = pytest.mark.xfail(strict=True, reason="teeth that pass each other within one internal step are not noticed: outcome ok, mesh force 0")
+TUNNEL = pytest.mark.xfail(
+    strict=True, reason="teeth that pass each other within one internal step are not noticed: outcome ok, mesh force 0"
+)
 
 
 @pytest.mark.parametrize("angle", [1.0, -1.0, 50.0, 1e3, pytest.param(1e6, marks=TUNNEL), 1e7, -1e9])
 def test_absurd_angles_have_a_named_outcome(plain: StageModel, angle: float) -> None:
-    """A shaft end turned by this much within 60 µs: either the springs' answer, finite, or a named end with finite outputs; never garbage."""
+    """A shaft end turned by this much within 60 µs: either the springs' answer, finite, or a named end with finite
+    outputs; never garbage."""
     kernel = plain.kernel(level=float(FAST))
     kernel.initialize()
     kernel.set("pinion.phi", angle)

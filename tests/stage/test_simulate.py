@@ -1,4 +1,5 @@
 """Standalone runs of the shipped pair: mean values, work, agreement and order of the integrators, restart."""
+
 from __future__ import annotations
 
 import math
@@ -42,7 +43,9 @@ def fine(relieved: StageModel) -> dict[int, Trace]:
 
 def test_mean_values_are_those_of_the_load(steady: Trace, relieved: StageModel, pair: PairGeometry) -> None:
     """Over whole mesh periods the mesh carries the torque, and te is on average the quasi-static one."""
-    assert steady.meta["outcome"] == "completed" and steady["solver.trouble"][-1] == 0 and steady["solver.status"][-1] == 0
+    assert (
+        steady.meta["outcome"] == "completed" and steady["solver.trouble"][-1] == 0 and steady["solver.status"][-1] == 0
+    )
     samples = steady.time > SETTLED
     force = pair.gears[0].r_b * steady["mesh.force_mean"][samples].mean()
     te, static = steady["mesh.te"][samples].mean(), loaded_te(relieved, [LOAD], 64).te.mean()
@@ -115,7 +118,8 @@ def test_standstill_under_load_stays_at_rest(relieved: StageModel, level: int, d
 
 
 def test_a_run_that_stops_keeps_its_samples(relieved: StageModel, tmp_path: Path) -> None:
-    """From 3 ms on the pinion's shaft end is turned by 100 rad per step: a named outcome, and the good part of the run."""
+    """From 3 ms on the pinion's shaft end is turned by 100 rad per step: a named outcome, and the good part of the
+    run."""
     calm = Steady(relieved, SPEED, LOAD)
 
     def inputs(time: float) -> dict[str, float]:

@@ -1,4 +1,6 @@
-"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two roads to one number, convergence, smoothness."""
+"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two roads to one number, convergence,
+smoothness."""
+
 from __future__ import annotations
 
 import math
@@ -44,7 +46,9 @@ def test_vanishes_with_the_load_and_grows_with_it(plain: StageModel) -> None:
     assert np.allclose(values[1] / values[0], 1e3, rtol=1e-2)  # the local law is linear at vanishing force
 
 
-def test_negative_torque_is_carried_by_the_coast_flanks_across_the_backlash(plain: StageModel, pair: PairGeometry) -> None:
+def test_negative_torque_is_carried_by_the_coast_flanks_across_the_backlash(
+    plain: StageModel, pair: PairGeometry
+) -> None:
     values = te(ready(plain), -1e-3)
     assert np.allclose(values, -pair.normal_backlash, atol=1e-8)
 
@@ -81,7 +85,8 @@ def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair
 
 
 def test_bearings_add_their_compliance(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:
-    """Isotropic bearings: te grows by F(1/k₁ + 1/k₂); where the moved axes change which pairs carry, by up to a few percent more."""
+    """Isotropic bearings: te grows by F(1/k₁ + 1/k₂); where the moved axes change which pairs carry, by up to a few
+    percent more."""
     expected = LOAD / pair.gears[0].r_b * sum(1 / gear.bearing.stiffness for gear in spec.gears)
     soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid).te[0] for rigid in (False, True))
     more = (soft - held) / expected
@@ -103,7 +108,8 @@ def test_converges_with_slices(plain: StageModel) -> None:
 
 
 def test_direction_of_approach_does_not_matter(relieved: StageModel) -> None:
-    """Equilibrium is one: continued forwards and backwards through the pitch, loading and unloading, as from scratch."""
+    """Equilibrium is one: continued forwards and backwards through the pitch, loading and unloading, as from
+    scratch."""
     kernel, fresh = ready(relieved), te(ready(relieved), LOAD)
     kernel.transmission(0.0, 600.0)
     forwards = [kernel.transmission(-p * PITCH, LOAD, keep=True).te for p in POSITIONS]
@@ -120,13 +126,18 @@ def test_tip_relief_unloads_the_ends_of_contact(plain: StageModel, relieved: Sta
 
 
 @pytest.mark.parametrize("name, torque", [("relieved", 80.0), ("plain", LOAD)])
-def test_smooth_over_the_pitch(name: str, torque: float, spec: StageSpec, relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:
-    """No filter anywhere: with tip relief at 80 N·m little is left above the 12th mesh harmonic; without relief the tip corners have
-    real harmonics, and the grid of rolls must not add to them."""
+def test_smooth_over_the_pitch(
+    name: str, torque: float, spec: StageSpec, relief_spec: StageSpec, bodies: list[ReducedBody]
+) -> None:
+    """No filter anywhere: with tip relief at 80 N·m little is left above the 12th mesh harmonic; without relief the
+    tip corners have real harmonics, and the grid of rolls must not add to them."""
     chosen = {"relieved": relief_spec, "plain": spec}[name]
     grids = [assemble(chosen, bodies), assemble(chosen, bodies, rolls=64)]
     once, twice = (te(ready(model), torque, np.arange(1024) / 1024) for model in grids)
-    print(f"{name} {torque:g} N·m: above 12th harmonic {1e6 * above(once, 12):.4f} µm rms, grid {1e6 * above(once - twice, 12):.4f} µm rms")
+    print(
+        f"{name} {torque:g} N·m: above 12th harmonic {1e6 * above(once, 12):.4f} µm rms, "
+        f"grid {1e6 * above(once - twice, 12):.4f} µm rms"
+    )
     assert above(once - twice, 12) < 0.02e-6 and np.std(once - twice) < 0.05e-6
     if name == "relieved":
         assert above(once, 12) < 0.05e-6
