@@ -30,10 +30,8 @@ bench: $(STAMP)
 
 ## make wheel       dist/*.whl with the linux64 and win64 kernels
 wheel: $(STAMP)
-	$(RUN) -m pip install --quiet build "ziglang==0.16.0"
-	$(RUN) -m gearfmu.kernel.build --platform linux64
-	$(RUN) -m gearfmu.kernel.build --platform win64
-	$(RUN) -m build --wheel --outdir dist
+	$(RUN) -m pip install --quiet build
+	GEARFMU_PLATFORMS="linux64 win64" $(RUN) -m build --wheel --outdir dist
 
 ## make models      reduce the bodies of the model library again from its stage files
 models: $(STAMP)

@@ -185,8 +185,8 @@ def test_the_wheel_runs_the_demo_in_an_empty_environment(tmp_path: Path) -> None
     wheel = max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
     venv.create(tmp_path / "venv", with_pip=True)
     python = tmp_path / "venv" / "bin" / "python"
-    subprocess.run([python, "-m", "pip", "install", "--quiet", wheel], check=True, capture_output=True)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    subprocess.run([python, "-m", "pip", "install", "--quiet", wheel], check=True, capture_output=True, env=environment)
     command = [tmp_path / "venv" / "bin" / "gearfmu", "demo", "--out", tmp_path / "out"]
     subprocess.run(command, check=True, cwd=tmp_path, env={**environment, "CC": "false"}, capture_output=True)
     assert (tmp_path / "out" / "report.html").is_file()
