@@ -1,4 +1,4 @@
-/* Communication steps: start from equilibrium, inputs carried through the step, guards around the internal step, outputs at its end. */
+/* Communication steps: start from equilibrium, inputs carried through the step (docs/theory.md, 5), guards around the internal step, outputs at its end. */
 #include "gk_core.h"
 
 static const double ULP = 2.220446049250313e-16;

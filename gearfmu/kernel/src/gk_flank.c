@@ -1,4 +1,5 @@
-/* Where teeth may touch: gaps of involute flanks at the actual centre distance, closed form (docs/theory: line contact), and of tip corners off the line of action.
+/* Where teeth may touch: gaps of involute flanks at the actual centre distance, closed form (docs/theory.md, eq. 4), with tip relief (eq. 5),
+ * and of tip corners off the line of action (eq. 6).
  *
  * External pair, side sg = ±1, R = r_bA + r_bB, d = C_B − C_A, a = |d|, L = √(a² − R²), t = arg d − sg·arccos(R/a), n = sg·(−sin t, cos t):
  *     roll of A  s_A = r_bA sg (β_A − t),   roll of B  s_B = r_bB sg (β_B − t − π),   g = L − s_A − s_B + δ_A(s_A) + δ_B(s_B)
@@ -65,7 +66,7 @@ static void flank_contact(const gk_model *model, const gk_setup *setup, const li
     }
 }
 
-/* Tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l = line of action. Returns 0 when the edge's centre lies inside the base
+/* Eq. 6: tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l = line of action. Returns 0 when the edge's centre lies inside the base
  * circle of o: no involute there. All formulas for c = 0; for c = 1 the roles and the direction of n swap, which the signs below say. */
 static int corner_contact(const gk_model *model, const gk_setup *setup, const double *frame, const line *l, int c, const double beta[2], gk_place *p)
 {

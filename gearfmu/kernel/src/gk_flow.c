@@ -1,4 +1,4 @@
-/* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory: the step).
+/* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory.md, 3.1 and eq. 9).
  *
  *   exponential where ωh < 1.2: exact flow; trapezoidal above. Force constant in the step, ½(f_n + f_{n+1}) with equal coefficients bq, bv at both ends.
  *   σ = sin(ωh)/(ωh), s = σ^(−γ/2), κ = (σ^(−γ) − 1)/ω² (rigid: s = 1, κ = γh²/6): the sampled system then has the exact pole, residue and static value.

@@ -1,5 +1,5 @@
 /* Local line contact: approach of two bodies under the line load f = λ/L of one slice, beyond what the rows over a strip of half-width w already carry
- * (docs/theory: local law).  With b² = β f the Hertz half-width, every body gives 2(1−ν²)/(πE)·[ln(4w/b) − 1]:
+ * (docs/theory.md, eqs. 7 and 8).  With b² = β f the Hertz half-width, every body gives 2(1−ν²)/(πE)·[ln(4w/b) − 1]:
  *     δ = f (c − ½ a ln βf)      for  b_low < b < w/1.5
  * Below b_low a parabola with the same value and slope at b_low (δ(0) = 0, finite slope), above w/1.5 the tangent. δ′ > 0 everywhere, δ continuously differentiable. */
 #include "gk_core.h"

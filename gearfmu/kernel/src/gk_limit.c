@@ -1,4 +1,4 @@
-/* Which internal step: μ′ = 1 − λ_min(C^−½ C′ C^−½) over the roll positions (docs/theory: limits). Energy is conserved while C′ > 0, accuracy wants μ′ ≤ ½.
+/* Which internal step: μ′ = 1 − λ_min(C^−½ C′ C^−½) over the roll positions (docs/theory.md, 3.5). Energy is conserved while C′ > 0, accuracy wants μ′ ≤ ½.
  * Default h: the largest with μ′(h′) ≤ ½ for all h′ ≤ h, at most h_max of the stage and 1/40 of the mesh period at speed_max. A larger h lowers γ; above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "gk_core.h"

@@ -1,5 +1,5 @@
 /* Displacement rows of the dynamic modes at the places of contact and at the bore, in body-fixed lanes.
- * A place's row is the tooth-0 table at its roll (four grid rolls), turned to its tooth: (a, b) → (a cos θ − b sin θ, a sin θ + b cos θ), θ = 2πνj/z. */
+ * A place's row is the tooth-0 table at its roll (four grid rolls), turned to its tooth (docs/theory.md, eq. 3): (a, b) → (a cos θ − b sin θ, a sin θ + b cos θ), θ = 2πνj/z. */
 #include "gk_core.h"
 
 static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, gk_real *out)

@@ -1,4 +1,4 @@
-/* Level, effects, slices and step → gk_setup: which modes are dynamic, their tables in lanes, and the static residual of all others. */
+/* Level, effects, slices and step → gk_setup: which modes are dynamic, their tables in lanes, and the static residual of all others (docs/theory.md, eq. 2). */
 #include <stdio.h>
 #include "gk_core.h"
 

@@ -1,4 +1,4 @@
-/* The complementarity problem of a step and the one scalar that keeps its energy (docs/theory: the step; discrete gradient after Gonzalez 1996).
+/* The complementarity problem of a step and the one scalar that keeps its energy (docs/theory.md, eqs. 10 and 12; discrete gradient after Gonzalez 1996).
  *
  *   closed contact, bilateral row, sticking clutch:   g + D z + C′λ + δ(λ) = 0,   z = λ + η;   open contact: λ = 0 and g + D z + C′λ ≥ 0;   slipping clutch: z = ±bound.
  *   η = α·direction + dashpot; the dashpot on the massless path of a row that is closed at both ends is 2c/h times the change of the path's deflection (C′ + K)λ + δ

@@ -1,4 +1,4 @@
-/* Static equilibrium by the same contact routine as the step: proximal points. Every rigid coordinate may move by mobility × force (an implicit "step" of a viscous body), everything elastic is
+/* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): proximal points. Every rigid coordinate may move by mobility × force (an implicit "step" of a viscous body), everything elastic is
  * compliance; repeated until nothing moves. The mobility is large against all compliances, so a few rounds suffice; each round is a monotone complementarity problem. */
 #include "gk_core.h"
 
@@ -132,7 +132,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
     return GK_OK;
 }
 
-/* Quasi-static transmission: torque on the pinion's bore, the wheel's bore held at phi_wheel. out: te (m), then for every place {flank, tooth of the pinion, force of each slice};
+/* Quasi-static transmission (eq. 13): torque on the pinion's bore, the wheel's bore held at phi_wheel. out: te (m), then for every place {flank, tooth of the pinion, force of each slice};
  * room for 1 + MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque, int keep, double *out, int *places)
 {

@@ -1,4 +1,4 @@
-/* One internal step of dg4 (docs/theory: the step). It reads like its description: predict, find, form, recall, solve, and only if all is finite: correct and remember.
+/* One internal step of dg4 (docs/theory.md, 3). It reads like its description: predict, find, form, recall, solve, and only if all is finite: correct and remember.
  * Until `correct` nothing of gk_data changes but its expression for another h, so a step that fails can be repeated with another h or scheme. */
 #include "gk_core.h"
 
@@ -252,7 +252,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     return GK_OK;
 }
 
-/* The scheme's invariant: ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step */
+/* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step */
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {
     const gk_system *s = &setup->work->system;

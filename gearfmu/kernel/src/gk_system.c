@@ -1,4 +1,4 @@
-/* The small system of a step: which forces are unknown, what they do to the gaps within the step (D) and at once through what is massless (C′), and the gaps without them.
+/* The small system of a step (docs/theory.md, eq. 10): which forces are unknown, what they do to the gaps within the step (D) and at once through what is massless (C′), and the gaps without them.
  * Rows: slices of all places, then the live bilateral rows (bearings, port springs, shafts, clutches). Contact forces press inward, rows measure outward: a contact row is −(flank row). */
 #include "gk_core.h"
 
