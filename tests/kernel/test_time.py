@@ -1,0 +1,51 @@
+"""Communication times as tools hand them over: n·H, or accumulated with rounding noise in time and step, give the same bits."""
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_model import pair_blob
+
+from gearfmu.errors import SimulationError
+from gearfmu.kernel import Kernel
+
+H, STEPS = 1e-4, 600
+
+
+def forces(start: float, times: np.ndarray) -> list[bytes]:
+    """Mesh force and state time after every step from times[i] to times[i + 1]; inputs depend on the number of the step alone."""
+    kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1})
+    kernel.set("pinion.w", 100.0)
+    kernel.set("wheel.w", -100.0 * 16 / 24)
+    kernel.initialize(start)
+    found = []
+    for i in range(times.size - 1):
+        kernel.set("pinion.phi", 5e-3 + 100.0 * i * H)
+        kernel.set("wheel.phi", 4e-3 - 100.0 * 16 / 24 * i * H)
+        kernel.step(times[i], times[i + 1] - times[i])
+        found.append(np.array([kernel.get("mesh.force"), kernel.get("mesh.te"), kernel.get("solver.steps")]).tobytes())
+    return found
+
+
+@pytest.mark.parametrize("start", [0.0, 3.7, 1000.0])
+def test_accumulated_times_give_the_bits_of_counted_ones(start: float) -> None:
+    counted = start + H * np.arange(STEPS + 1)
+    accumulated = np.empty(STEPS + 1)
+    time = start
+    for i in range(STEPS + 1):
+        accumulated[i] = time
+        time += H
+    assert start == 0.0 or not np.array_equal(np.diff(accumulated), np.full(STEPS, H))
+    first = accumulated[1] - accumulated[0]
+    counted[1:] = counted[0] + first * np.arange(1, STEPS + 1)
+    assert forces(start, counted) == forces(start, accumulated)
+
+
+def test_a_step_that_is_not_at_the_present_time_is_refused_and_changes_nothing() -> None:
+    kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1})
+    kernel.initialize(0.0)
+    kernel.step(0.0, H)
+    before = kernel.save()
+    for time, step in ((0.0, H), (3 * H, H), (H, -H), (H, 0.0), (H, float("nan")), (float("inf"), H)):
+        with pytest.raises(SimulationError) as caught:
+            kernel.step(time, step)
+        assert caught.value.outcome == "bad_step" and kernel.save() == before
