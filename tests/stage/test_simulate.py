@@ -77,9 +77,9 @@ def test_integrators_agree_at_small_steps(relieved: StageModel, fine: dict[int, 
 def test_dg4_is_of_second_order_in_a_turning_mesh(relieved: StageModel, fine: dict[int, Trace], level: int) -> None:
     steps = H / np.array([8, 16, 32, 64])
     errors = [error(run(relieved, 0.03, level=level, h=h), fine[level], "mesh.te") for h in steps]
-    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    order = np.polyfit(np.log(steps[1:]), np.log(errors[1:]), 1)[0]  # at 7.5 µs two errors cancel in part
     print(f"level {level}: te errors {', '.join(f'{e:.2%}' for e in errors)} at 7.5 … 0.94 µs, order {order:.2f}")
-    assert order > 1.7 and errors[0] < 6e-2
+    assert order > 1.7 and errors[0] < 2e-2
 
 
 def test_saved_state_goes_on_with_the_same_bits(relieved: StageModel) -> None:

@@ -80,18 +80,25 @@ static void shaft_outputs(const gk_model *model, const gk_setup *setup, gk_data 
     }
 }
 
+/* speed of the bore's averaging node: frame and dynamic modes */
+static double bore_speed(const gk_setup *setup, const gk_data *data, int g)
+{
+    const int n = setup->modal[g].n;
+    const gk_real *v = data->modal + (g ? 3 * setup->modal[0].n : 0) + n;
+    return data->v[3 * g + 2] + (n ? gk_dot(v, setup->modal[g].bore + BORE_RZ * n, n) : 0.0);
+}
+
 static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
 {
-    double *v = data->value, before[2] = {data->v_bore[0], data->v_bore[1]};
+    double *v = data->value;
     mesh_outputs(setup, data);
     shaft_outputs(model, setup, data);
     for (int g = 0; g < 2; g++) {
         v[GK_OF_SHAFT(GEAR_W, g)] = data->v[3 * g + 2];
-        data->v_bore[g] = data->v[3 * g + 2];
         if (setup->given_torque[g]) {
             v[GK_OF_SHAFT(PHI, g)] = data->angle[g];
-            v[GK_OF_SHAFT(W, g)] = data->v_bore[g];
-            v[GK_OF_SHAFT(A, g)] = h > 0.0 ? (data->v_bore[g] - before[g]) / h : 0.0;
+            v[GK_OF_SHAFT(W, g)] = bore_speed(setup, data, g);
+            v[GK_OF_SHAFT(A, g)] = h > 0.0 ? (v[GK_OF_SHAFT(W, g)] - data->v_bore[g]) / h : 0.0;
         }
         if (model->port[g].chain) {
             v[GK_OF_SHAFT(CLUTCH_LOCKED, g)] = data->locked[g];
@@ -114,10 +121,10 @@ static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data,
 }
 
 /* stored energy and what the balance does not close; 0 when that is more than the model can mean; a new h is a new invariant: the balance goes on from there */
-static int balance(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
+static int balance(const gk_setup *setup, gk_data *data, double h)
 {
     const gk_coefficients *k = setup->integrator == RK45 ? &setup->work->explicit_rows : gk_flow_for(setup, h, setup->gamma);
-    double *v = data->value, stored = gk_step_energy(model, setup, data, k);
+    double *v = data->value, stored = gk_step_energy(setup, data, k);
     if (setup->integrator == RK45) { /* keeps no account of works: no balance */
         v[V_M_ENERGY] = stored;
         return 1;
@@ -155,7 +162,6 @@ static void start_speeds(const gk_model *model, gk_data *data)
             data->locked[g] = data->v[INERTIA_0 + g] == w && v[GK_OF_SHAFT(CAPACITY, g)] > 0.0;
         }
         data->v[model->kind == KIND_FLAT ? 3 * g : 3 * g + 2] = w;
-        data->v_bore[g] = w;
     }
 }
 
@@ -193,6 +199,9 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
         data->value[GK_OF_SHAFT(FY_MEAN, g)] = data->value[GK_OF_SHAFT(FY, g)];
     }
     data->value[V_M_FORCE_MEAN] = data->value[V_M_MESH_FORCE];
+    data->value[V_M_ENERGY] = gk_solve_stored(&setup->work->system, setup->work->system.force); /* elastic: at rest C′ holds all of it */
+    for (int d = 0; d < RIGID; d++)
+        if (setup->inverse_mass[d] > 0.0) data->value[V_M_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
     data->value[V_M_FORCE_MAX] = gk_max(data->value[V_M_FORCE_DRIVE], data->value[V_M_FORCE_COAST]);
     data->apart = data->value[V_M_CONTACT] == 0.0;
     return GK_OK;
@@ -295,6 +304,8 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     }
     tally t = {0, {0, 0}, {0, 0, 0, 0}, 0};
     for (int64_t i = 0; i < steps; i++) {
+        if (i + 1 == steps)
+            for (int g = 0; g < 2; g++) data->v_bore[g] = bore_speed(setup, data, g);
         outcome = advance(model, setup, data, &c, (double)i * h, h, 0);
         if (outcome) { /* stands at the last good time; the outside may restore or stop */
             data->time_base = c.start + (double)i * h;
@@ -303,7 +314,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
             return outcome;
         }
         count_step(setup, data, h, &t);
-        if (data->steps == 1) balance(model, setup, data, h);
+        if (data->steps == 1) balance(setup, data, h);
     }
     data->count++;
     for (int g = 0; g < 2; g++) {
@@ -316,7 +327,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     data->value[V_M_FORCE_MEAN] = t.force / c.H;
     data->value[V_M_FORCE_MAX] = t.highest;
     outputs(model, setup, data, h);
-    if (balance(model, setup, data, h)) return GK_OK;
+    if (balance(setup, data, h)) return GK_OK;
     data->phase = PHASE_FAILED; /* no state to go on from: only a restored one */
     data->time_base = c.start, data->count = 0, data->step_H = 0.0;
     return GK_ENERGY;

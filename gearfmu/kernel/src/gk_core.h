@@ -161,7 +161,8 @@ struct gk_data {
     int64_t count;
     gk_motion input[2], blend[2]; /* outer ends at the start of the communication step; jump that is blended away */
     double hold[2];              /* angle a port is referred to */
-    double v_bore[2], balance_h, rk_h;
+    double v_bore[2];            /* speed of the bore nodes before the last internal step */
+    double balance_h, rk_h;
     double state_h, state_gamma; /* the step for which x and q are expressed; 0: physical */
     double angle[2];             /* bore angle at a torque port, massless part included */
     double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
@@ -271,7 +272,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);
 void gk_step_remember(const gk_setup *setup, gk_data *data);
 void gk_step_scatter(const gk_setup *setup, int g, const double *x, gk_real *out);
-double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
+double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
 /* gk_static.c */
 typedef struct gk_boundary { gk_port_kind kind; double torque, phi, k; } gk_boundary;
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data *data, const gk_boundary boundary[2], int keep);
@@ -296,8 +297,8 @@ static inline double gk_floor(double x)
 }
 static inline int gk_finite(double x) { return x - x == 0.0; }
 
-/* Σ a_k b_k in LANES fixed lanes, added up as a tree: the same bits at every vector width. n is a multiple of LANES, rows are aligned. */
-typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias));
+/* Σ a_k b_k in LANES fixed lanes, added up as a tree: the same bits at every vector width. n is a multiple of LANES. */
+typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias, aligned(sizeof(gk_real)))); /* states start anywhere */
 
 static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
 {

@@ -11,7 +11,7 @@ enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, ENERGY_LIMIT = 12 };
 #ifdef GK_DOUBLE_MODES
 static const double SOLVED = 1e-11, STEADY_BALANCE = 1e-9;
 #else
-static const double SOLVED = 1e-7, STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
+static const double SOLVED = 1e-9, STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
 #endif
 static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
 
@@ -333,29 +333,46 @@ static int status_changed(const gk_system *s)
     return 0;
 }
 
-/* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the massless part's energy change equal its work. */
-void gk_solve_energy(gk_system *s)
+/* the rows that share η: the contacts that are closed at either end; bearings, shafts and ports only where that finds no balance, because η on them rings their modes */
+static void choose_direction(gk_system *s, int all_rows)
+{
+    for (int i = 0; i < s->n; i++) {
+        const int may = is_contact(s, i) || (all_rows && s->kind[i] == ROW_SPRING);
+        s->direction[i] = may && (s->force0[i] != 0.0 || s->force[i] != 0.0) ? s->weight[i] * gap_change(s, i) : 0.0;
+    }
+}
+
+/* α by Newton on the quadratic; 0 when the limit of rounds is reached or no direction is left */
+static int find_alpha(gk_system *s, balance b)
 {
     double p[MAX_ROWS] = {0}, w[MAX_ROWS] = {0};
-    gk_solve_plain(s);
-    const int changed = status_changed(s);
-    if (!changed && !s->curved) return;
-    balance b = defect(s);
-    if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) return;
-    for (int i = 0; i < s->n; i++)
-        if (s->kind[i] != ROW_TORQUE && !is_clutch(s, i) && (s->force0[i] != 0.0 || s->force[i] != 0.0)) s->direction[i] = s->weight[i] * gap_change(s, i);
     for (int round = 0; round < ENERGY_LIMIT; round++) {
         list_columns(s);
         sensitivity(s, p, w);
         expand(s, p, w, &b);
-        double root = sqrt(gk_max(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)), divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
-        if (!(fabs(divisor) > 0.0)) break;
-        double a = -2.0 * b.defect / divisor;
+        const double root = sqrt(gk_max(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)), divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
+        if (!(fabs(divisor) > 0.0)) return 0;
+        const double a = -2.0 * b.defect / divisor;
         s->alpha += a;
         for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
         gk_solve_contacts(s);
         b = defect(s);
-        if (!open_balance(&b, BALANCE)) return;
+        if (!open_balance(&b, BALANCE)) return 1;
+    }
+    return 0;
+}
+
+/* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the massless part's energy change equal its work. */
+void gk_solve_energy(gk_system *s)
+{
+    for (int all_rows = 0; all_rows < 2; all_rows++) {
+        gk_solve_plain(s);
+        const int changed = status_changed(s);
+        if (!changed && !s->curved) return;
+        const balance b = defect(s);
+        if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) return;
+        choose_direction(s, all_rows);
+        if (find_alpha(s, b)) return;
     }
     s->limit_reached = 1;
 }

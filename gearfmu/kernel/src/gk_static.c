@@ -4,7 +4,8 @@
 
 static const double MOBILITY = 1e-4; /* s²: divided by the mass of a coordinate, m/N */
 static const double SEE = 3e-3;      /* m: look this far for flanks */
-enum { REST_ROUNDS = 200 };
+static const double AT_REST = 1e-11; /* m: movement at MOBILITY that counts as none: some 1e-8 N are left */
+enum { REST_ROUNDS = 150 };
 
 static int grounded(const gk_boundary *b) { return b->kind != PORT_TORQUE; }
 
@@ -22,23 +23,33 @@ static void begin(const gk_model *model, gk_data *data, const gk_boundary b[2])
     }
 }
 
-/* when nothing holds the rotation of the train: the inertial forces of its uniform acceleration */
-static void free_rotation(const gk_model *model, const gk_setup *setup, const gk_boundary b[2], const double *torque, double *inertial)
+static int floats(const gk_model *model, const gk_setup *setup, const gk_boundary b[2])
 {
+    if (model->kind == KIND_FLAT) return 0;
+    for (int g = 0; g < 2; g++)
+        if (grounded(&b[g]) && !(model->port[g].chain && !setup->link[CLUTCH_0 + g])) return 0;
+    return 1;
+}
+
+/* when nothing holds the rotation of the train: take the net force along it (given torques and, after a first solution, that of all rows) as inertial forces of a uniform acceleration */
+static void balance_rotation(const gk_model *model, const gk_setup *setup, const gk_boundary b[2], double *given)
+{
+    const gk_system *s = &setup->work->system;
     const double turn[2] = {1.0, -model->gear[0].r_b / model->gear[1].r_b};
     double net = 0.0, inertia = 0.0;
-    memset(inertial, 0, RIGID * sizeof *inertial);
-    if (model->kind == KIND_FLAT) return;
-    for (int g = 0; g < 2; g++)
-        if (grounded(&b[g]) && !(model->port[g].chain && !setup->link[CLUTCH_0 + g])) return;
+    if (!floats(model, setup, b)) return;
     for (int g = 0; g < 2; g++) {
-        const int disc = DISC_0 + g;
-        net += turn[g] * ((model->port[g].chain ? 0.0 : b[g].torque) + torque[disc]);
-        inertia += turn[g] * turn[g] * (model->gear[g].inertia + (model->port[g].chain ? model->port[g].disc : 0.0));
+        const int coordinate[2] = {3 * g + 2, DISC_0 + g};
+        for (int c = 0; c <= model->port[g].chain; c++) {
+            double force = given[coordinate[c]] + (s->n == 0 && c == 0 && !model->port[g].chain ? b[g].torque : 0.0);
+            for (int i = 0; i < s->n; i++) force += s->rigid[i][coordinate[c]] * s->z[i];
+            net += turn[g] * force;
+            inertia += turn[g] * turn[g] / setup->inverse_mass[coordinate[c]];
+        }
     }
     for (int g = 0; g < 2; g++) {
-        inertial[3 * g + 2] = -turn[g] * model->gear[g].inertia * net / inertia;
-        if (model->port[g].chain) inertial[DISC_0 + g] = -turn[g] * model->port[g].disc * net / inertia;
+        given[3 * g + 2] -= turn[g] * net / (inertia * setup->inverse_mass[3 * g + 2]);
+        if (model->port[g].chain) given[DISC_0 + g] -= turn[g] * net / (inertia * setup->inverse_mass[DISC_0 + g]);
     }
 }
 
@@ -104,9 +115,8 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
 {
     gk_setup rest = *setup;
     gk_work *work = setup->work;
-    double given[RIGID] = {0}, inertial[RIGID];
+    double given[RIGID] = {0};
     rest.on.damping = 0;
-    work->at_rest.rigid_mobility = MOBILITY;
     for (int g = 0; g < 2; g++) {
         rest.given_torque[g] = !grounded(&b[g]);
         rest.link_c[PORT_0 + g] = b[g].kind == PORT_SPRING ? 1.0 / b[g].k : 0.0;
@@ -122,14 +132,23 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
     }
     if (!keep) begin(model, data, b);
     if (!keep) data->pairs = 0;
-    free_rotation(model, &rest, b, given, inertial);
-    for (int d = 0; d < RIGID; d++) given[d] += inertial[d];
-    double moved = INFINITY;
-    int rounds = 0;
-    while (rounds++ < REST_ROUNDS && moved > 1e-14) moved = relax(model, &rest, data, given);
-    if (!(moved <= 1e-11)) return GK_NO_EQUILIBRIUM;
-    spread(&rest, data);
-    return GK_OK;
+    work->system.n = 0; /* nothing solved yet */
+    balance_rotation(model, &rest, b, given);
+    /* where the linearised gaps lead in circles, once more with smaller moves */
+    for (double mobility = MOBILITY; mobility > 1e-4 * MOBILITY; mobility *= 0.01) {
+        work->at_rest.rigid_mobility = mobility;
+        double moved = INFINITY;
+        for (int round = 0; round < REST_ROUNDS && moved > 1e-14; round++) {
+            moved = relax(model, &rest, data, given);
+            balance_rotation(model, &rest, b, given);
+        }
+        if (moved * (MOBILITY / mobility) <= AT_REST) {
+            spread(&rest, data);
+            return GK_OK;
+        }
+        if (!gk_finite(moved)) break;
+    }
+    return GK_NO_EQUILIBRIUM;
 }
 
 /* Quasi-static transmission (eq. 13): torque on the pinion's bore, the wheel's bore held at phi_wheel. out: te (m), then for every place {flank, tooth of the pinion, force of each slice};

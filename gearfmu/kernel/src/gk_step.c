@@ -3,6 +3,7 @@
 #include "gk_core.h"
 
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
+static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
 /* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays. At rest κ = 0. */
 static void express(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
@@ -45,6 +46,15 @@ static void predict(const gk_setup *setup, const gk_data *data, const gk_coeffic
         work->frame[d] = data->x[d] + k->h * data->v[d] + k->rigid_b0 * acceleration;
         work->speed[d] = data->v[d] + 0.5 * k->h * acceleration;
     }
+}
+
+/* a step may not carry a gear past its teeth: contact would not see it */
+static int passable(const gk_model *model, const gk_data *data, const gk_work *work)
+{
+    if (model->kind == KIND_FLAT) return 1;
+    for (int g = 0; g < 2; g++)
+        if (!(fabs(work->frame[3 * g + 2] - data->x[3 * g + 2]) * model->gear[g].teeth < FARTHEST)) return 0;
+    return 1;
 }
 
 static int remembered(const gk_data *data, gk_key key)
@@ -224,6 +234,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     GK_MARK(work);
     express(setup, data, k);
     predict(setup, data, k);
+    if (!passable(model, data, work)) return GK_DIVERGED;
     GK_LAP(work, PHASE_PREDICT);
     work->places = gk_flank_find(model, setup, work->frame, data->reach, work->place);
     if (work->places < 0) return work->places = 0, GK_DIVERGED;
@@ -253,12 +264,11 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
 }
 
 /* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step */
-double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
+double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {
     const gk_system *s = &setup->work->system;
     const gk_real *q = data->modal;
     double sum = ENERGY_SMALL;
-    (void)model;
     for (int d = 0; d < RIGID; d++)
         if (setup->inverse_mass[d] > 0.0) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
     for (int g = 0; g < 2; g++) {
