@@ -11,6 +11,10 @@ from collections.abc import Sequence
 import click
 
 USAGE_ERROR = 100
+# Matrices here are many and small: BLAS threads slow a reduction down, on a busy machine from 15 s to minutes. What the
+# caller sets wins.
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
 VERBS = {
     "new": ("gearfmu.commands.stages:new", "Write a commented stage.toml of your own, from a shipped one."),
     "mesh": ("gearfmu.commands.stages:mesh", "Mesh the gears of a stage, print the quality, write .vtu files."),
