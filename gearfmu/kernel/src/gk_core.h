@@ -1,5 +1,6 @@
 /* Inside of the kernel: what model, setup and data are made of. One reading direction:
  *   gk_model.c  blob → gk_model          gk_setup.c  level, effects, h → gk_setup      gk_vars.c   variables by reference
+ *   gk_strips.c slices → contact rows    gk_limit.c  which h, which γ                  gk_flow.c   modal coefficients of h
  *   gk_flank.c  where teeth may touch    gk_rows.c   displacement rows at those places gk_system.c the small system of a step
  *   gk_law.c    local line contact       gk_solve.c  its solution                       gk_step.c   one step; gk_comm.c many; gk_static.c none */
 #ifndef GK_CORE_H
@@ -262,6 +263,11 @@ void gk_solve_energy(gk_system *s);
 double gk_solve_end_gap(const gk_system *s, int row);
 double gk_solve_massless(const gk_system *s, int row);
 double gk_solve_stored(const gk_system *s, const double *force);
+/* gk_strips.c */
+typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
+int gk_strips_count(const gk_model *model, int slices);
+void gk_strips_fill(const gk_model *model, gk_setup *setup);
+void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out);
 /* gk_limit.c */
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);

@@ -81,16 +81,6 @@ static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const 
     return b.used;
 }
 
-/* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row of twice the length. */
-static int mirrored(const gk_model *model)
-{
-    for (int a = 0; a < model->gear[0].functions; a++)
-        if (model->degree[a] % 2) return 0;
-    return 1;
-}
-
-static int strips_of(const gk_model *model, int slices) { return mirrored(model) ? (slices + 1) / 2 : slices; }
-
 static const int *all_modes(const gk_model *model, int modes[2])
 {
     modes[0] = model->gear[0].modes, modes[1] = model->gear[1].modes;
@@ -102,7 +92,7 @@ size_t gk_setup_size(const gk_model *model)
     gk_setup probe;
     int modes[2];
     memset(&probe, 0, sizeof probe);
-    probe.strips = strips_of(model, MAX_SLICES);
+    probe.strips = gk_strips_count(model, MAX_SLICES);
     return 128 + sizeof(gk_setup) + lay_out(model, &probe, NULL, all_modes(model, modes));
 }
 
@@ -142,41 +132,8 @@ static int modes_at_level(const gk_model *model, gk_level level, int g)
     }
 }
 
-/* strip ← width functions: (2a + 1) × mean of P_a over the strip; strips share the common face width */
-static double legendre_integral(int degree, double x)
-{ /* ∫ P_a = (P_{a+1} − P_{a−1})/(2a + 1) */
-    double before = 1.0, now = x, minus = 0.0;
-    if (degree == 0) return x;
-    for (int k = 1; k <= degree; k++) {
-        double next = ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0);
-        minus = before, before = now, now = next;
-    }
-    return (now - minus) / (2.0 * degree + 1.0);
-}
-
-typedef double strip_weights[MAX_SLICES][MAX_FUNCTIONS];
-
-static void strip_rows(const gk_model *model, const gk_setup *setup, int g, strip_weights out)
-{
-    const double edge = setup->width / model->gear[g].width;
-    for (int s = 0; s < setup->strips; s++)
-        for (int a = 0; a < model->gear[g].functions; a++) {
-            const double from = edge * (2.0 * s / setup->slices - 1.0), to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
-            const int d = model->degree[a];
-            out[s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
-        }
-}
-
-static void fill_strips(const gk_model *model, gk_setup *setup)
-{
-    setup->width = gk_min(model->gear[0].width, model->gear[1].width);
-    setup->strip_term = 0.0;
-    for (int s = 0; s < setup->strips; s++) setup->strip_width[s] = setup->width / setup->slices * (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
-    for (int g = 0; g < 2; g++) setup->strip_term += model->gear[g].local * (gk_log(4.0 * model->gear[g].strip) - 1.0);
-}
-
 /* flank rows of one mode into its lane */
-static void fill_lane(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight, int mode, int lane)
+static void fill_lane(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight, int mode, int lane)
 {
     const int A = gear->functions;
     for (int point = 0; point < 2 * gear->rolls; point++)
@@ -192,7 +149,7 @@ static void fill_lane(const gk_gear *gear, gk_modal *m, int strips, strip_weight
 }
 
 /* dynamic modes into lanes */
-static void fill_modes(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight)
+static void fill_modes(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight)
 {
     const int P = m->pairs, n = m->n;
     memset(m->omega, 0, (size_t)n * sizeof(double));
@@ -244,7 +201,7 @@ static double dot(const double *a, const double *b, int n)
 }
 
 /* weightᵀ · cell · weight into the lanes of one table cell; cell (A, A) in double */
-static void store_cell(const double *cell, int A, int strips, strip_weights weight, gk_real *out)
+static void store_cell(const double *cell, int A, int strips, gk_strip_weights weight, gk_real *out)
 {
     for (int s = 0; s < strips; s++)
         for (int t = 0; t < strips; t++) {
@@ -256,7 +213,7 @@ static void store_cell(const double *cell, int A, int strips, strip_weights weig
 }
 
 /* residual flank–flank: C_static − Σ N Nᵀ/ω² on the grid points, then between strips */
-static void fill_flank_residual(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight, double *scratch)
+static void fill_flank_residual(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight, double *scratch)
 {
     const size_t R = (size_t)gear->rolls, N = (size_t)gear->modes;
     const int A = gear->functions;
@@ -277,7 +234,7 @@ static void fill_flank_residual(const gk_gear *gear, gk_modal *m, int strips, st
             }
 }
 
-static void fill_bore_residual(const gk_gear *gear, gk_modal *m, int strips, strip_weights weight, double *scratch)
+static void fill_bore_residual(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight, double *scratch)
 {
     const int A = gear->functions;
     const size_t N = (size_t)gear->modes;
@@ -347,7 +304,7 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     setup->integrator = (gk_integrator)(int)data->value[V_M_INTEGRATOR];
     setup->on = gk_effects_of(data);
     setup->slices = (int)data->value[V_M_SLICES];
-    setup->strips = strips_of(model, setup->slices);
+    setup->strips = gk_strips_count(model, setup->slices);
     setup->damping = data->value[V_M_DAMPING];
     if (model->kind == KIND_PAIR)
         setup->allowance = (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance;
@@ -385,10 +342,10 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;
     memset(work->cycles, 0, sizeof work->cycles);
     setup->state_size = sizeof(gk_data);
-    fill_strips(model, setup);
+    gk_strips_fill(model, setup);
     for (int g = 0; g < 2; g++) {
-        strip_weights weight;
-        strip_rows(model, setup, g, weight);
+        gk_strip_weights weight;
+        gk_strips_rows(model, setup, g, weight);
         fill_modes(&model->gear[g], &setup->modal[g], setup->strips, weight);
         if (setup->on.residual) fill_flank_residual(&model->gear[g], &setup->modal[g], setup->strips, weight, work->matrix);
         if (setup->on.residual) fill_bore_residual(&model->gear[g], &setup->modal[g], setup->strips, weight, work->matrix);
