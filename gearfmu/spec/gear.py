@@ -13,6 +13,7 @@ Length = Annotated[float, Quantity("m", above=0)]
 Size = Annotated[float, Quantity("m", at_least=0)]
 Angle = Annotated[float, Quantity("rad")]
 Factor = Annotated[float, Quantity(above=0)]
+Deviation = Annotated[float, Quantity("m")]
 Ratio = Annotated[float, Quantity(at_least=0, below=1)]
 Grading = Annotated[float, Quantity(at_least=0.2, at_most=5)]
 
@@ -133,5 +134,10 @@ class GearSpec(Spec):
     material: Material = Field(description="material")
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
     tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
+    index_deviation: dict[Annotated[int, Field(ge=0)], Deviation] = Field(
+        default={},
+        description="pitch errors: individual index deviation F_pi (ISO 1328-1) by tooth number, arc on the reference "
+        "circle, both flanks, positive counter-clockwise",
+    )
     bearing: Bearing = Field(description="bearing")
     body: BodySpec = Field(description="mesh and reduction")
