@@ -23,9 +23,10 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
 {
     gk_local law;
     gk_law_set(model, setup, curvature, &law);
-    law.width = setup->width / setup->slices;
-    out[0] = gk_law_approach(&law, force, &out[1]);
-    out[2] = gk_law_energy(&law, force);
+    const gk_approach at = gk_law_at(&law, setup->width / setup->slices, force);
+    out[0] = at.delta;
+    out[1] = at.slope;
+    out[2] = at.energy;
 }
 
 GK_API double probe_mu(const gk_model *model, const gk_setup *setup, double h, double gamma) { return gk_limit_mu(model, setup, h, gamma); }

@@ -30,7 +30,8 @@ class Problem:
     """Modes and unknown forces; n modes, m forces.
 
     omega (n,) rad/s, 0 for rigid · zeta (n,) · rows (m, n): gap per modal coordinate · compliance (m, m), m/N ·
-    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, of the contacts' massless path ·
+    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, parallel to `path` (m, m), m/N, the part of
+    the compliance that is each contact's own (all of it where not said) ·
     weight (m,): share of a row in η, proportional to the length it stands for.
     """
 
@@ -41,11 +42,13 @@ class Problem:
     offset: np.ndarray
     bilateral: np.ndarray = field(default=None)
     dashpot: np.ndarray = field(default=None)
+    path: np.ndarray = field(default=None)
     weight: np.ndarray = field(default=None)
 
     def __post_init__(self) -> None:
         m = len(self.offset)
-        for name, default in (("bilateral", np.zeros(m, bool)), ("dashpot", np.zeros(m)), ("weight", np.ones(m))):
+        for name, default in (("bilateral", np.zeros(m, bool)), ("dashpot", np.zeros(m)), ("path", self.compliance),
+                              ("weight", np.ones(m))):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default)
 
@@ -64,7 +67,8 @@ class Scheme:
 
 @dataclass
 class State:
-    """y, v (n,): scaled modal state · f (n,): scaled modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀."""
+    """y, v (n,): scaled modal state · f (n,): scaled modal force · force, gap (m,): λ₀, s₀ = g + C′λ₀ · eta, dash (m,):
+    η of the last step, the dashpots' part of it, and their force at its end."""
 
     y: np.ndarray
     v: np.ndarray
@@ -72,6 +76,8 @@ class State:
     force: np.ndarray
     gap: np.ndarray
     eta: np.ndarray
+    dash: np.ndarray
+    late: np.ndarray
 
     @property
     def reported(self) -> np.ndarray:
@@ -112,13 +118,13 @@ def _last(flags: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Step:
-    """What one step starts from: gap (m,) at the predicted state, gap before (m,), force0 (m,), lag (m, m):
-    η = lag Δλ."""
+    """What one step starts from: gap (m,) at the predicted state, gap before (m,), force0 (m,), lagged (m, m): what the
+    end forces do to the gaps within the step, through the dashpots too."""
 
     gap: np.ndarray
     before: np.ndarray
     force0: np.ndarray
-    lag: np.ndarray
+    lagged: np.ndarray
 
 
 class Reference:
@@ -131,6 +137,7 @@ class Reference:
         self.w = problem.rows * self.scale
         self.d = (self.w * self.bq) @ self.w.T
         self.c = problem.compliance - (self.w * self.kappa) @ self.w.T
+        self.a = self.c - problem.path
         self.rounds = self.changes = self.failures = 0
 
     def mu(self) -> float:
@@ -148,7 +155,7 @@ class Reference:
         y = q / self.scale + self.kappa * f
         at_gap = self._gap(y, external)
         closed = (force > 0) | p.bilateral
-        return State(y, v / self.scale, f, force, np.where(closed, 0.0, at_gap + self.c @ force), np.zeros_like(force))
+        return State(y, v / self.scale, f, force, np.where(closed, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force))))
 
     def step(self, state: State, external: np.ndarray) -> State:
         """The state h later; `external` (n,): unscaled external modal forces at the end of the step."""
@@ -158,15 +165,18 @@ class Reference:
         y = a11 * state.y + a12 * state.v + self.bq * f
         v = a21 * state.y + a22 * state.v + self.bv * f
         gap = self._gap(y, external)
-        force, eta = self._forces(gap, state)
+        force, eta, dash, late = self._forces(gap, state)
         y = y + self.bq * (self.w.T @ (force + eta))
         v = v + self.bv * (self.w.T @ (force + eta))
-        return State(y, v, outer + self.w.T @ force, force, gap + self.d @ (force + eta) + self.c @ force, eta)
+        reached = gap + self.d @ (force + eta) + self.c @ force + self.a @ late
+        return State(y, v, outer + self.w.T @ force, force, reached, eta, dash, late)
 
     def energy(self, state: State) -> float:
-        """The invariant of the undamped step without external work: ½v² + ½ω²y² + ½λᵀC′λ, J."""
+        """The invariant of the undamped step without external work: ½v² + ½ω²y² + ½λᵀC′λ, J, and what the dashpots'
+        force holds in the compliance outside their paths."""
         modal = 0.5 * state.v @ state.v + 0.5 * (self.problem.omega * state.y) @ (self.problem.omega * state.y)
-        return float(modal + 0.5 * state.force @ self.c @ state.force)
+        held = state.late @ self.a @ (state.force + 0.5 * state.late)
+        return float(modal + 0.5 * state.force @ self.c @ state.force + held)
 
     def displacement(self, state: State) -> np.ndarray:
         """Physical modal displacements (n,)."""
@@ -179,45 +189,54 @@ class Reference:
     def _gap(self, y: np.ndarray, external: np.ndarray) -> np.ndarray:
         return self.problem.offset + self.w @ (y - self.kappa * self.scale * external)
 
-    def _forces(self, gap: np.ndarray, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """λ₁ and η of a step: complementarity, then energy where a contact changed, or dissipation where none did."""
+    def _forces(self, gap: np.ndarray, state: State) -> tuple[np.ndarray, ...]:
+        """λ₁, η, η_d and the dashpots' force at the end: complementarity, then energy where a contact changed, or
+        dissipation where none did."""
         p, s = self.problem, self.scheme
         was = (state.force > 0) | p.bilateral
         before = state.gap - self.c @ state.force
+        none = np.zeros_like(gap)
         if not was.any() and np.all(gap >= 0):
-            return np.zeros_like(gap), np.zeros_like(gap)
-        force, active, rate = self._with_dashpot(gap, state.force, was)
+            return none, none, none, none
+        force, active, lag, early = self._with_dashpot(gap, state, was)
         changed = bool(np.any(active != was))
         self.changes += changed
-        eta = np.zeros_like(force)
+        eta = none
         if changed and s.energy:
-            step = Step(gap, before, state.force, rate[:, None] * p.compliance)
+            late = self.d + self.a * _beta(state)
+            step = Step(gap - late @ lag @ state.force + self.a @ early, before, state.force, self.d + late @ lag)
             force, eta = self._conserve(step, force, active, was)
         elif not changed and s.epsilon:
-            lag = rate[:, None] * p.compliance + 2 * s.epsilon * np.eye(len(gap))
-            force, active = self._closed(gap, state.force, lag, was)
+            force, active = self._closed(gap, state, lag, early, was, 2 * s.epsilon)
             eta = 2 * s.epsilon * (force - state.force)
-        return force, eta + rate * (p.compliance @ (force - state.force))
+        dash = lag @ (force - state.force)
+        return force, eta + dash, dash, _beta(state) * dash + early
 
-    def _closed(self, gap: np.ndarray, force0: np.ndarray, lag: np.ndarray,
-                start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ₁ and active set for η = lag (λ₁ − λ₀)."""
-        matrix = self.d + self.d @ lag + self.c
-        return solve_lcp(matrix, gap - self.d @ lag @ force0, self.problem.bilateral, start)
+    def _closed(self, gap: np.ndarray, state: State, lag: np.ndarray, early: np.ndarray,
+                start: np.ndarray, slow: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """λ₁ and active set for η = (lag + slow)(λ₁ − λ₀); what is outside the paths carries β lag Δλ + early too."""
+        lagged = (self.d + self.a * _beta(state)) @ lag + slow * self.d
+        shifted = gap - lagged @ state.force + self.a @ early
+        return solve_lcp(self.d + lagged + self.c, shifted, self.problem.bilateral, start)
 
-    def _with_dashpot(self, gap: np.ndarray, force0: np.ndarray, was: np.ndarray) -> tuple:
-        """λ₁, active set and rate 2c/h of the dashpots, η_d = (2c/h) C (λ₁ − λ₀): on the massless path's deflection.
+    def _with_dashpot(self, gap: np.ndarray, state: State, was: np.ndarray) -> tuple:
+        """λ₁, active set, lag (m, m) of the dashpots, η_d = (2c/h) P (λ₁ − λ₀), and what the last step's adds at the end.
 
-        A dashpot acts on a contact closed at both ends and at most doubles or cancels its elastic force λ₀ + λ₁."""
-        p = self.problem
+        A dashpot acts on a contact closed at both ends and at most doubles or cancels its elastic force λ₀ + λ₁. Its
+        force at the end of the step is ½η_d + ¼(η_d − η_d0) where the last step had one, else ½η_d."""
+        p, force0 = self.problem, state.force
         rate = np.where(was, 2 * p.dashpot / self.scheme.h, 0.0)
+        acts = rate > 0
         for _ in range(200):
-            force, active = self._closed(gap, force0, rate[:, None] * p.compliance, was)
-            wished = np.abs(rate * (p.compliance @ (force - force0)))
+            early = np.where(acts, (0.5 - _beta(state)) * state.dash, 0.0)
+            lag = rate[:, None] * p.path
+            force, active = self._closed(gap, state, lag, early, was)
+            wished = np.abs(lag @ (force - force0))
             limit = np.where(p.bilateral, np.inf, force0 + force) * active
             over = wished > limit * (1 + 1e-13)
-            if not over.any():
-                return force, active, rate
+            if not over.any() and np.array_equal(acts, acts & active):
+                return force, active, lag, early
+            acts = acts & active
             rate = np.where(over, rate * limit / np.where(over, wished, 1.0), rate)
         raise AssertionError("the limit of the dashpots was not found")
 
@@ -225,8 +244,7 @@ class Reference:
                   was: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """λ₁ and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
         c, d, bilateral, before, force0 = self.c, self.d, self.problem.bilateral, step.before, step.force0
-        lagged = d + d @ step.lag
-        g = step.gap - d @ step.lag @ force0
+        lagged, g = step.lagged, step.gap
         stored = 0.5 * force0 @ c @ force0
         direction = np.where(active | was, self.problem.weight * (g + lagged @ force - before), 0.0)
         alpha = 0.0
@@ -251,6 +269,11 @@ class Reference:
                 force, active = solve_lcp(lagged + c, shifted, bilateral, active)
         self.failures += 1
         return force, alpha * direction
+
+
+def _beta(state: State) -> np.ndarray:
+    """Weight of η_d in the dashpot's force at the end of the step: extrapolated where there was one in the last step."""
+    return np.where(state.dash != 0.0, 0.75, 0.5)
 
 
 def _corrections(omega: np.ndarray, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:

@@ -117,5 +117,6 @@ def test_slices_step_by_step(double_library: Path, slices: int, integrator: int,
     np.testing.assert_allclose(got[:, 0], expected[:, 0], rtol=0, atol=1e-11 * expected[:, 0].max())  # measured: 6e-15
     np.testing.assert_allclose(got[:, 1], expected[:, 1], rtol=1e-11)
     loss = np.diff(got[:, 2])
-    assert loss.min() >= -1e-12 * got[0, 1]
+    assert loss.min() >= (-2e-5 if damping else -1e-12) * got[0, 1]  # dashpots balance to second order
+    assert -loss[loss < 0].sum() <= 1e-3 * max(got[-1, 2], 1e-9 * got[0, 1])
     assert (got[-1, 2] > 0.01 * got[0, 1]) == (zeta > 0 or damping > 0)

@@ -112,8 +112,11 @@ def test_damping_never_adds_energy(damping: str, load: float) -> None:
         state = reference.step(state, external)
         totals.append(reference.energy(state) - reference.scale * external @ state.y)
     assert reference.changes >= 10 and reference.failures == 0
-    assert np.diff(totals).max() <= 1e-9 * kinetic
+    growth = np.maximum(np.diff(totals), 0.0)
+    # a dashpot's force at the end of a step is extrapolated: its energy balances to second order (theory, 3.4)
+    assert growth.max() <= (2e-6 if "dashpot" in on else 1e-9) * kinetic
     assert totals[0] - totals[-1] > 0.01 * kinetic  # and it does dissipate
+    assert growth.sum() <= 1e-3 * (totals[0] - totals[-1])
 
 
 def test_dashpot_neither_pulls_nor_more_than_doubles_the_force() -> None:

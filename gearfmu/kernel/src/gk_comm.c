@@ -199,7 +199,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
         data->value[GK_OF_SHAFT(FY_MEAN, g)] = data->value[GK_OF_SHAFT(FY, g)];
     }
     data->value[V_M_FORCE_MEAN] = data->value[V_M_MESH_FORCE];
-    data->value[V_M_ENERGY] = gk_solve_stored(&setup->work->system, setup->work->system.force); /* elastic: at rest C′ holds all of it */
+    data->value[V_M_ENERGY] = gk_solve_stored(&setup->work->system); /* elastic: at rest C′ holds all of it */
     for (int d = 0; d < RIGID; d++)
         if (setup->inverse_mass[d] > 0.0) data->value[V_M_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
     data->value[V_M_FORCE_MAX] = gk_max(data->value[V_M_FORCE_DRIVE], data->value[V_M_FORCE_COAST]);
@@ -303,6 +303,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
         data->input[g] = next;
     }
     tally t = {0, {0, 0}, {0, 0, 0, 0}, 0};
+    if (!(data->table_h > 0.0)) data->table_h = h;
     for (int64_t i = 0; i < steps; i++) {
         if (i + 1 == steps)
             for (int g = 0; g < 2; g++) data->v_bore[g] = bore_speed(setup, data, g);
@@ -348,8 +349,9 @@ gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const vo
     memcpy(&head, bytes, sizeof head);
     int good = head.magic == GK_DATA_MAGIC && head.phase >= PHASE_NEW && head.phase <= PHASE_FAILED && head.pairs >= 0 && head.pairs <= MAX_PAIRS && head.count >= 0 &&
                all_small(head.value, GK_VARS) && all_small(head.x, RIGID) && all_small(head.v, RIGID) && all_small(head.f, RIGID) && all_small(head.link, LINKS) &&
-               gk_finite(head.time_base) && gk_finite(head.step_H) && gk_finite(head.reach);
+               gk_finite(head.time_base) && gk_finite(head.step_H) && gk_finite(head.reach) && gk_finite(head.table_h) && all_small(head.link_end, LINKS) && all_small(head.link_dash, LINKS);
     for (int p = 0; good && p < head.pairs; p++)
-        good = (head.memory[p].key.flank == 0 || head.memory[p].key.flank == 1) && all_small(head.memory[p].force, MAX_SLICES) && all_small(head.memory[p].gap, MAX_SLICES);
+        good = (head.memory[p].key.flank == 0 || head.memory[p].key.flank == 1) && all_small(head.memory[p].force, MAX_SLICES) && all_small(head.memory[p].gap, MAX_SLICES) && all_small(head.memory[p].end, MAX_SLICES) &&
+               all_small(head.memory[p].dash, MAX_SLICES);
     return good ? GK_OK : GK_BAD_VALUE;
 }

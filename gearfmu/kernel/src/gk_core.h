@@ -1,8 +1,9 @@
 /* Inside of the kernel: what model, setup and data are made of. One reading direction:
  *   gk_model.c  blob → gk_model          gk_setup.c  level, effects, h → gk_setup      gk_vars.c   variables by reference
- *   gk_strips.c slices → contact rows    gk_limit.c  which h, which γ                  gk_flow.c   modal coefficients of h
- *   gk_flank.c  where teeth may touch    gk_rows.c   displacement rows at those places gk_system.c the small system of a step
- *   gk_law.c    local line contact       gk_solve.c  its solution                       gk_step.c   one step; gk_comm.c many; gk_static.c none */
+ *   gk_strips.c slices → contact rows    gk_table.c  compliance between points         gk_flow.c   modal coefficients of h
+ *   gk_limit.c  which h, which γ         gk_flank.c  where teeth may touch             gk_rows.c   displacement rows at those places
+ *   gk_system.c the small system of a step   gk_law.c local line contact   gk_solve.c its solution   gk_tangent.c its matrix   gk_balance.c its energy
+ *   gk_step.c   one step; gk_comm.c many; gk_static.c none */
 #ifndef GK_CORE_H
 #define GK_CORE_H
 #include <math.h>
@@ -23,7 +24,7 @@ enum {
     MAX_PAIRS = 8,    /* tooth pairs looked at in one step, both flanks */
     MAX_SLICES = 10,
     MAX_FUNCTIONS = 6,
-    MAX_MODES = 6000, /* MAX_FUNCTIONS rows of so many fit the scratch matrices */
+    MAX_MODES = 6000,
     OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual table */
     MAX_CONTACTS = MAX_PAIRS * MAX_SLICES,
     CACHE = 4         /* coefficient sets kept */
@@ -38,7 +39,7 @@ enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_C
 /* rigid coordinates */
 enum { XA, YA, PHIA, XB, YB, PHIB, INERTIA_0, INERTIA_1, DISC_0, DISC_1, RIGID };
 enum { BORE_X, BORE_Y, BORE_RZ, BORE_ROWS };
-enum { MAX_ROWS = MAX_CONTACTS + LINKS, MAX_BASIS = MAX_CONTACTS + BORE_ROWS };
+enum { MAX_ROWS = MAX_CONTACTS + LINKS, MAX_STRIDE = (MAX_ROWS + 3) / 4 * 4, MAX_BASIS = MAX_CONTACTS + BORE_ROWS };
 
 enum {
 #define GK_VAR(S, ID, ...) V_##S##_##ID,
@@ -88,6 +89,13 @@ struct gk_model {
 };
 
 /* ---- chosen: level, effects, step ----------------------------------------------------------------------------------------------------------------- */
+typedef struct gk_table { /* compliances between the points of one gear, of one kind or of two side by side: what a force there displaces here */
+    gk_real *ff;   /* (2, 2, OFFSETS, rolls, rolls, block): from flank and roll to flank, tooth offset and roll; block: (kinds, strips, strips) padded to 8 */
+    double *fb;    /* (2, rolls, strips, 4 a kind): strip of tooth 0 to the bore node (x, y, rz), body-fixed axes */
+    double bb[2][9];
+    int kinds, block;
+} gk_table;
+
 typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | second parts], padded with zeros */
     int n, pairs, count;
     double *omega, *zeta; /* (n) */
@@ -95,10 +103,8 @@ typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | 
     gk_real *rows;        /* (2 flanks, rolls, strips, n) tooth 0 */
     gk_real *bore;        /* (3, n) */
     gk_real *cosine, *sine; /* (z, pairs) */
-    gk_real *c_ff;        /* (2, 2, OFFSETS, rolls, rolls, block) residual between strips */
-    double *c_fb;         /* (2, rolls, strips, 3) */
-    double c_bb[9];
-    int block; /* strips² padded to 4 */
+    gk_table residual;    /* static compliance of everything that is not dynamic */
+    double *path;         /* (2 flanks, rolls, strips² padded to 4): residual of a tooth's strips beyond all stored modes, what the contact's dashpot is parallel to */
 } gk_modal;
 
 typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
@@ -130,13 +136,14 @@ struct gk_setup {
     int slices;
     int strips;                  /* contact rows of a place: slices, or half of them where both halves of the face width do the same */
     double h, gamma, allowance, damping, width; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal; width: common face width */
-    double strip_width[MAX_SLICES], strip_term;
+    double strip_width[MAX_SLICES], strip_term, square_low, square_high, log_low, log_high; /* bounds of b² in the local law, and their ln */
     double inverse_mass[RIGID];
     int link[LINKS];             /* live bilateral rows */
     int given_torque[2];         /* the port's row carries a given torque */
     double link_c[LINKS];        /* compliance 1/k */
     double link_d[LINKS];        /* dashpot */
     gk_modal modal[2];
+    double *flexibility;         /* scratch of the tables: 2 + MAX_FUNCTIONS numbers a stored mode */
     gk_step_function *step;      /* gk_step_once in the widest vectors of this processor */
     gk_work *work; /* scratch and coefficient cache: neither model nor state */
     size_t state_size;
@@ -147,12 +154,12 @@ typedef struct gk_key { int32_t flank, tooth; } gk_key; /* flank 0 drive, 1 coas
 
 typedef struct gk_memory { /* what a tooth pair remembers from the last step */
     gk_key key;
-    double force[MAX_SLICES], gap[MAX_SLICES]; /* λ0, s0 */
+    double force[MAX_SLICES], gap[MAX_SLICES], dash[MAX_SLICES], end[MAX_SLICES]; /* λ0; s0; η_d of the last step and f_d at its end */
 } gk_memory;
 
 typedef struct gk_motion { double phi, w, a; } gk_motion;
 
-typedef struct gk_ledger { double work, dissipated, baseline; } gk_ledger;
+typedef struct gk_ledger { double work, dissipated, baseline, lag; } gk_ledger; /* lag: energy that the dashpots' force holds in what it deflects */
 
 struct gk_data {
     uint64_t magic;
@@ -160,6 +167,7 @@ struct gk_data {
     double value[GK_VARS];
     double x[RIGID], v[RIGID], f[RIGID];
     double link[LINKS];          /* λ0 of the bilateral rows (clutch: the constant torque of the last step) */
+    double link_dash[LINKS], link_end[LINKS];
     double time_base, step_H, time_last; /* time = time_base + count·H */
     int64_t count;
     gk_motion input[2], blend[2]; /* outer ends at the start of the communication step; jump that is blended away */
@@ -167,6 +175,7 @@ struct gk_data {
     double v_bore[2];            /* speed of the bore nodes before the last internal step */
     double balance_h, rk_h;
     double state_h, state_gamma; /* the step for which x and q are expressed; 0: physical */
+    double table_h;              /* the internal step with tables of its own: that of the run's first communication step */
     double angle[2];             /* bore angle at a torque port, massless part included */
     double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
     gk_ledger ledger;
@@ -192,31 +201,40 @@ typedef struct gk_place { /* one tooth pair on one flank at the predicted positi
     int memory;                       /* its entry in gk_data.memory, −1 if new */
 } gk_place;
 
-typedef struct gk_local { double width, c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high; } gk_local;
+typedef struct gk_local { double c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high; } gk_local;
+typedef struct gk_approach { double delta, slope, energy; } gk_approach; /* δ(λ), δ′, ∫ λ dδ */
 
-typedef struct gk_system { /* unknown forces of one step: contacts, then links */
-    int contacts, n, strips;
+/* Unknown forces of one step: contacts, then links. Closed contact, bilateral row, sticking clutch:
+ *     g + D z + A (λ + f_d) + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction,   f_d = ½η_d + (β − ½)(η_d − η_d0): the dashpot's force at the end of the step
+ * D: what a force in the step does to the gaps; P + δ: the path that the row's own dashpot is parallel to; A: everything else that has no mass and carries the whole force. */
+typedef struct gk_system {
+    int contacts, n, stride, strips;
     gk_row_kind kind[MAX_ROWS];
     int link_of[MAX_ROWS];            /* −1 for contacts */
     int place_of[MAX_CONTACTS];
     int bore[2][BORE_ROWS];           /* rows that pull at the bores, −1: none */
-    double g[MAX_ROWS], g0[MAX_ROWS], force0[MAX_ROWS];
-    double force[MAX_ROWS], eta[MAX_ROWS], z[MAX_ROWS];
+    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_ROWS], dash0[MAX_ROWS], end0[MAX_STRIDE], lag0[MAX_STRIDE];
     double damping[MAX_ROWS];         /* 2c/h of the row's dashpot */
     double bound[MAX_ROWS];           /* clutch: |z| ≤ bound */
     double weight[MAX_ROWS];          /* slices that a row stands for: η is shared out per slice */
-    gk_local local[MAX_CONTACTS];
+    double width[MAX_CONTACTS];
+    gk_local local[MAX_PAIRS];        /* law of a place, per metre */
+    double rigid[RIGID][MAX_STRIDE];  /* derivative of the rows by each rigid coordinate */
+    double *D, *A;                    /* (n, stride) symmetric */
+    double *J, *L;                    /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor */
+    double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_ROWS]; /* P: strips of a place, (strips, strips); links: 1/k */
+
+    double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE], z[MAX_STRIDE]; /* λ, η_d, η = η_d + α·direction, z = λ + η */
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
-    double rigid[MAX_ROWS][RIGID];
-    double *D, *C, *K;                /* (n, n) row-major: what forces do to gaps in the step; massless compliance C′ without the local law; κ part, C′ + K is the compliance itself */
-    double *J, *rhs;                  /* factorised tangent of the active set */
-    double direction[MAX_ROWS], alpha; /* η = α·direction + dashpot */
-    double path[MAX_ROWS], slope[MAX_ROWS]; /* C′λ + δ of active rows; δ′ in the tangent */
-    double squeeze[MAX_ROWS], squeeze0[MAX_ROWS]; /* deflection of the massless path, (C′ + K)λ + δ, at the end and at the start */
+    double direction[MAX_STRIDE], alpha;
+    double beta[MAX_STRIDE], end[MAX_STRIDE];         /* β: ¾ where the last step had a dashpot force too, else ½; f_d */
+    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE]; /* D z, Aλ, A f_d */
+    double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
+    gk_approach law[MAX_CONTACTS];    /* at the present λ */
+    double slope[MAX_CONTACTS];       /* δ′ in the tangent */
     double stored0;                   /* energy of the massless part at the start of the step */
-    int column[MAX_ROWS], columns;    /* rows that can carry force */
-    int pivot[MAX_ROWS], rank, map[MAX_ROWS];
+    double held0;                     /* energy that the dashpots' force holds in A at the start */
     int rounds, limit_reached, curved;
 } gk_system;
 
@@ -226,7 +244,7 @@ struct gk_work {
     uint64_t clock;
     gk_place place[MAX_PAIRS];
     int places;
-    gk_real *qp[2], *vp[2], *force[2], *zero[2], *scaled; /* predicted modal state; modal force of the rows; zeros; row times coefficient */
+    gk_real *qp[2], *vp[2], *force[2], *zero[2], *scaled; /* predicted modal state; modal force of the rows; zeros; row times two coefficients */
     gk_real *reading[2];                      /* read_q q + read_v v where that is not q */
     const gk_real *y[2];                      /* displacement that the rows read: qp, reading, or zero at rest */
     gk_real *stage[2][7], *trial[2];          /* rk45: derivatives (v, a) and trial state (q, v) */
@@ -238,8 +256,12 @@ struct gk_work {
     double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
-    double matrix[5 * MAX_ROWS * MAX_ROWS];       /* D, C′, K, J and the gathered C″ */
+    double matrix[4 * MAX_STRIDE * MAX_STRIDE];   /* D, A, J, L */
+    gk_table table[2];                            /* of each gear: D and C′ of one step */
+    double table_h, table_gamma;                  /* which step; 0: none yet */
 };
+
+typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
 
 /* gk_vars.c */
 gk_effects gk_effects_of(const gk_data *data);
@@ -254,19 +276,32 @@ void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *fr
 /* gk_system.c */
 void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work);
 void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const modal_speed[2], const double *speed, double *rate);
+/* gk_table.c */
+void gk_table_residual(const gk_model *model, gk_setup *setup);
+void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coefficients *k);
+void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[2]);
+void gk_table_path(const gk_model *model, const gk_setup *setup, const gk_place *place, double *out);
 /* gk_law.c */
 void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);
-double gk_law_approach(const gk_local *law, double force, double *slope);
-double gk_law_energy(const gk_local *law, double force);
+void gk_law_bounds(const gk_model *model, gk_setup *setup);
+gk_approach gk_law_at(const gk_local *law, double width, double force);
 /* gk_solve.c */
 void gk_solve_contacts(gk_system *s);
 void gk_solve_plain(gk_system *s);
-void gk_solve_energy(gk_system *s);
-double gk_solve_end_gap(const gk_system *s, int row);
-double gk_solve_massless(const gk_system *s, int row);
-double gk_solve_stored(const gk_system *s, const double *force);
+void gk_solve_settle(gk_system *s);
+void gk_solve_set(gk_system *s, int row, double force);
+void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
+void gk_solve_path(const gk_system *s, const double *x, double *y);
+double gk_solve_stored(const gk_system *s);
+/* gap at the end as the contact sees it, and the deflection of the massless part under it: their sum is the distance that is left */
+static inline double gk_solve_end_gap(const gk_system *s, int i) { return s->g[i] + s->Dz[i] + s->lag[i]; }
+static inline double gk_solve_massless(const gk_system *s, int i) { return s->Al[i] + s->squeeze[i]; }
+/* gk_tangent.c */
+void gk_tangent_factorise(gk_system *s);
+void gk_tangent_solve(const gk_system *s, double *x);
+/* gk_balance.c */
+void gk_balance_solve(gk_system *s);
 /* gk_strips.c */
-typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, gk_setup *setup);
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out);
@@ -279,7 +314,7 @@ gk_step_function *gk_wide_step(int widest);
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);
 void gk_step_remember(const gk_setup *setup, gk_data *data);
-void gk_step_scatter(const gk_setup *setup, int g, const double *x, gk_real *out);
+void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double *y, gk_real *out_x, gk_real *out_y);
 double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
 /* gk_static.c */
 typedef struct gk_boundary { gk_port_kind kind; double torque, phi, k; } gk_boundary;
@@ -304,6 +339,34 @@ static inline double gk_floor(double x)
     return whole > x ? whole - 1.0 : whole;
 }
 static inline int gk_finite(double x) { return x - x == 0.0; }
+
+/* four doubles at once, the same bits at every vector width; rows of the small system are padded to them */
+typedef double gk_quad __attribute__((vector_size(4 * sizeof(double)), may_alias, aligned(sizeof(double))));
+#define GK_INLINE static inline __attribute__((always_inline))
+/* calls f(…, quads) with the usual sizes as constants, so that the compiler keeps short rows in registers */
+#define GK_SIZED(quads, f, ...)            \
+    switch (quads) {                       \
+    case 2: f(__VA_ARGS__, 2); break;      \
+    case 3: f(__VA_ARGS__, 3); break;      \
+    case 4: f(__VA_ARGS__, 4); break;      \
+    default: f(__VA_ARGS__, quads);        \
+    }
+
+/* y += f x over quads `from` … `to` − 1 */
+GK_INLINE void gk_axpy(double f, const double *x, double *y, int from, int to)
+{
+    const gk_quad *a = (const gk_quad *)x;
+    gk_quad *b = (gk_quad *)y;
+    for (int q = from; q < to; q++) b[q] += f * a[q];
+}
+
+static inline double gk_dot_quads(const double *x, const double *y, int quads)
+{
+    const gk_quad *a = (const gk_quad *)x, *b = (const gk_quad *)y;
+    gk_quad sum = {0};
+    for (int q = 0; q < quads; q++) sum += a[q] * b[q];
+    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
+}
 
 /* Σ a_k b_k in LANES fixed lanes, added up as a tree: the same bits at every vector width. n is a multiple of LANES. */
 typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias, aligned(sizeof(gk_real)))); /* states start anywhere */

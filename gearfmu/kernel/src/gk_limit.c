@@ -50,7 +50,7 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
 {
     gk_work *work = setup->work;
     gk_system *s = &work->system;
-    double frame[RIGID] = {0}, slope;
+    double frame[RIGID] = {0};
     frame[PHIA] = 2.0 * GK_PI * position / model->gear[0].teeth;
     frame[PHIB] = -frame[PHIA] * model->gear[0].r_b / model->gear[1].r_b;
     if (model->kind == KIND_FLAT) frame[XB] = -model->distance, frame[PHIA] = frame[PHIB] = 0.0;
@@ -62,24 +62,26 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
     for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
     gk_rows_form(model, setup, frame, work);
     gk_system_form(model, setup, data, gk_flow_for(setup, h, gamma), work);
-    const int n = s->n;
-    double *C = s->J, *K = C + n * n, full = model->torque_max / (model->gear[0].r_b * setup->width);
-    memcpy(K, s->C, (size_t)n * n * sizeof *K);
+    const int n = s->n, stride = s->stride;
+    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS], full = model->torque_max / (model->gear[0].r_b * setup->width);
+    for (int i = 0; i < n * n; i++) K[i] = -s->A[i / n * stride + i % n];
     gk_coefficients plain = *gk_flow_for(setup, h, gamma);
     plain.rigid_kappa = 0.0;
     plain.flow[0].exact = plain.flow[1].exact = 0;
     gk_system_form(model, setup, data, &plain, work);
     for (int i = 0; i < n * n; i++) {
-        C[i] = s->C[i];
-        K[i] = C[i] - K[i];
+        const int row = i / n, column = i % n;
+        C[i] = s->A[row * stride + column];
+        K[i] += C[i];
+        if (row == column) C[i] += row < s->contacts ? gk_law_at(&s->local[s->place_of[row]], s->width[row], full * s->width[row]).slope : s->spring[row];
+        if (row < s->contacts && column < s->contacts && s->place_of[row] == s->place_of[column])
+            C[i] += s->path[s->place_of[row]][row % s->strips * s->strips + column % s->strips];
     }
-    for (int i = 0; i < n; i++) {
-        if (i < s->contacts) gk_law_approach(&s->local[i], full * s->local[i].width, &slope), C[i * n + i] += slope;
+    for (int i = 0; i < n; i++)
         if (s->kind[i] == ROW_CLUTCH || s->kind[i] == ROW_TORQUE) {
             for (int j = 0; j < n; j++) C[i * n + j] = C[j * n + i] = K[i * n + j] = K[j * n + i] = 0.0;
             C[i * n + i] = 1.0;
         }
-    }
     return cholesky(C, n) ? largest(C, K, n) : INFINITY;
 }
 

@@ -14,6 +14,29 @@ static const double A[STAGES][6] = {{0},
                                     {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
 static const double ERROR[STAGES] = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
 
+/* Dashpots on the rows' paths P + δ in series with A: with λ̇ = −J⁻¹ġ, J = A + S, their force is S c S λ̇, passed on through J⁻¹ (first order in c; A does not follow its rate). Contacts never pull. */
+static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate)
+{
+    double y[MAX_STRIDE], path[MAX_ROWS];
+    for (int i = 0; i < s->stride; i++) y[i] = i < s->n && s->active[i] ? -rate[i] : 0.0;
+    gk_tangent_solve(s, y);
+    for (int pass = 0; pass < 2; pass++) { /* y ← c S y, then S y */
+        gk_solve_path(s, y, path);
+        for (int i = 0; i < s->n; i++) {
+            const int contact = s->kind[i] == ROW_CONTACT;
+            const double c = !s->active[i] ? 0.0 : contact ? (setup->on.damping ? setup->damping * setup->strip_width[i % s->strips] : 0.0) : setup->link_d[s->link_of[i]];
+            y[i] = (path[i] + (contact ? s->slope[i] * y[i] : 0.0)) * (pass ? s->active[i] : c);
+        }
+    }
+    gk_tangent_solve(s, y);
+    for (int i = 0; i < s->n; i++) {
+        if (!s->active[i]) continue;
+        const double dashpot = s->kind[i] == ROW_CONTACT ? gk_clamp(y[i], -s->force[i], s->force[i]) : y[i];
+        s->z[i] = s->force[i] + dashpot;
+        s->eta[i] = 2.0 * dashpot; /* reported force: λ + η/2 */
+    }
+}
+
 /* forces and accelerations at work->trial, trial_rigid; outer ends at `part` of the step; result in stage i */
 static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int i, const double outer[2])
 {
@@ -38,25 +61,17 @@ static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data 
         if (s->kind[r] == ROW_SPRING) s->clip[r] = 2;
     gk_solve_plain(s);
     gk_system_rates(setup, work, speed, work->speed, rate);
-    for (int r = 0; r < s->n; r++) { /* dashpots parallel to the massless path; contacts never pull */
-        if (s->kind[r] == ROW_TORQUE || s->kind[r] == ROW_CLUTCH) continue;
-        const int contact = s->kind[r] == ROW_CONTACT;
-        const double c = contact ? (setup->on.damping ? setup->damping * setup->strip_width[r % s->strips] : 0.0) : setup->link_d[s->link_of[r]];
-        double dashpot = -c * rate[r];
-        if (contact) dashpot = gk_clamp(dashpot, -s->force[r], s->force[r]);
-        s->z[r] = s->force[r] + dashpot;
-        s->eta[r] = 2.0 * dashpot; /* reported force: λ + η/2 */
-    }
+    add_dashpots(setup, s, rate);
     for (int d = 0; d < RIGID; d++) {
         double force = 0.0;
-        for (int r = 0; r < s->n; r++) force += s->rigid[r][d] * s->z[r];
+        for (int r = 0; r < s->n; r++) force += s->rigid[d][r] * s->z[r];
         work->stage_rigid[i][d] = work->speed[d];
         work->stage_rigid[i][RIGID + d] = force * setup->inverse_mass[d];
     }
     for (int g = 0; g < 2; g++) {
         const gk_modal *m = &setup->modal[g];
         gk_real *v = work->stage[g][i], *a = v + m->n;
-        if (m->n) gk_step_scatter(setup, g, s->z, work->force[g]);
+        if (m->n) gk_step_scatter(setup, g, s->z, s->z, work->force[g], work->reading[g]);
         for (int j = 0; j < m->n; j++) {
             const gk_real zeta = setup->on.modal_damping ? (gk_real)(2.0 * m->zeta[j] * m->omega[j]) : 0;
             v[j] = speed[g][j];

@@ -5,32 +5,33 @@
 static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, gk_real *out)
 {
     const gk_modal *modal = &setup->modal[g];
-    const int n = modal->n, P = modal->pairs, strips = setup->strips;
-    const gk_real *table = modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * strips * n;
+    const int n = 2 * modal->n / LANES, P = n / 2, strips = setup->strips; /* in halves of LANES */
     const gk_real w0 = (gk_real)p->weight[g][0], w1 = (gk_real)p->weight[g][1], w2 = (gk_real)p->weight[g][2], w3 = (gk_real)p->weight[g][3];
-    const gk_real *c = modal->cosine + (size_t)p->tooth[g] * P, *s = modal->sine + (size_t)p->tooth[g] * P;
-    const size_t next = (size_t)strips * n;
-    for (int strip = 0; strip < strips; strip++, table += n, out += n) {
-        const gk_real *t0 = table, *t1 = t0 + next, *t2 = t1 + next, *t3 = t2 + next;
+    const gk_half *t0 = (const gk_half *)modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * strips * n;
+    const gk_half *t1 = t0 + strips * n, *t2 = t1 + strips * n, *t3 = t2 + strips * n;
+    const gk_half *c = (const gk_half *)modal->cosine + p->tooth[g] * P, *s = (const gk_half *)modal->sine + p->tooth[g] * P;
+    gk_half *to = (gk_half *)out;
+    for (int strip = 0; strip < strips; strip++, t0 += n, t1 += n, t2 += n, t3 += n, to += n)
         for (int k = 0; k < P; k++) {
-            gk_real first = (w0 * t0[k] + w1 * t1[k]) + (w2 * t2[k] + w3 * t3[k]);
-            gk_real second = (w0 * t0[P + k] + w1 * t1[P + k]) + (w2 * t2[P + k] + w3 * t3[P + k]);
-            out[k] = first * c[k] - second * s[k];
-            out[P + k] = first * s[k] + second * c[k];
+            const gk_half first = (w0 * t0[k] + w1 * t1[k]) + (w2 * t2[k] + w3 * t3[k]);
+            const gk_half second = (w0 * t0[P + k] + w1 * t1[P + k]) + (w2 * t2[P + k] + w3 * t3[P + k]);
+            to[k] = first * c[k] - second * s[k];
+            to[P + k] = first * s[k] + second * c[k];
         }
-    }
 }
 
 static void bore_rows(const gk_modal *modal, double attitude, gk_real *out)
 {
     double sine, cosine;
     gk_sincos(attitude, &sine, &cosine);
-    const gk_real c = (gk_real)cosine, s = (gk_real)sine, *x = modal->bore, *y = x + modal->n, *rz = y + modal->n;
-    const int n = modal->n;
+    const int n = 2 * modal->n / LANES;
+    const gk_real c = (gk_real)cosine, s = (gk_real)sine;
+    const gk_half *x = (const gk_half *)modal->bore, *y = x + n, *rz = y + n;
+    gk_half *to = (gk_half *)out;
     for (int k = 0; k < n; k++) {
-        out[k] = c * x[k] - s * y[k];
-        out[n + k] = s * x[k] + c * y[k];
-        out[2 * n + k] = rz[k];
+        to[k] = c * x[k] - s * y[k];
+        to[n + k] = s * x[k] + c * y[k];
+        to[2 * n + k] = rz[k];
     }
 }
 

@@ -1,4 +1,4 @@
-/* Level, effects, slices and step → gk_setup: which modes are dynamic, their tables in lanes, and the static residual of all others (docs/theory.md, eq. 2). */
+/* Level, effects, slices and step → gk_setup: which modes are dynamic, and their rows in lanes. */
 #include <stdio.h>
 #include "gk_core.h"
 
@@ -22,6 +22,13 @@ static int lanes_of(const gk_gear *gear, int modes)
     return lanes;
 }
 
+static void lay_out_table(bump *b, const gk_setup *setup, const gk_gear *gear, int kinds, gk_table *table)
+{
+    const size_t R = (size_t)gear->rolls, A = (size_t)setup->strips, block = (A * A * (size_t)kinds + 7) / 8 * 8;
+    table->ff = take(b, 4 * OFFSETS * R * R * block * sizeof(gk_real));
+    table->fb = take(b, 2 * R * A * 4 * (size_t)kinds * sizeof(double));
+}
+
 static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g, int modes)
 {
     const gk_gear *gear = &model->gear[g];
@@ -30,7 +37,6 @@ static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g,
     m->count = modes;
     m->pairs = padded(lanes_of(gear, modes));
     m->n = 2 * m->pairs;
-    m->block = (setup->strips * setup->strips + 3) / 4 * 4;
     n = (size_t)m->n;
     m->omega = take(b, n * sizeof(double));
     m->zeta = take(b, n * sizeof(double));
@@ -39,8 +45,8 @@ static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g,
     m->bore = take(b, BORE_ROWS * n * sizeof(gk_real));
     m->cosine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
     m->sine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
-    m->c_ff = take(b, 4 * OFFSETS * R * R * (size_t)m->block * sizeof(gk_real));
-    m->c_fb = take(b, 2 * R * A * 3 * sizeof(double));
+    m->path = take(b, 2 * R * ((A * A + 3) / 4 * 4) * sizeof(double));
+    lay_out_table(b, setup, gear, 1, &m->residual);
 }
 
 static void lay_out_flow(bump *b, const gk_setup *setup, gk_coefficients *k)
@@ -72,9 +78,11 @@ static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const 
         for (int i = 0; i < 7; i++) work->stage[g][i] = take(&b, 2 * n * sizeof(gk_real));
         work->trial[g] = take(&b, 2 * n * sizeof(gk_real));
         work->basis[g] = take(&b, (size_t)(MAX_PAIRS * setup->strips + BORE_ROWS) * n * sizeof(gk_real));
+        lay_out_table(&b, setup, &model->gear[g], 2, &work->table[g]);
         if (setup->modal[g].n > widest) widest = setup->modal[g].n;
     }
-    work->scaled = take(&b, (size_t)widest * sizeof(gk_real));
+    work->scaled = take(&b, 2 * (size_t)widest * sizeof(gk_real));
+    setup->flexibility = take(&b, (2 + MAX_FUNCTIONS) * (size_t)(model->gear[0].modes > model->gear[1].modes ? model->gear[0].modes : model->gear[1].modes) * sizeof(double));
     for (int i = 0; i < CACHE; i++) lay_out_flow(&b, setup, &work->cache[i]);
     lay_out_flow(&b, setup, &work->at_rest);
     lay_out_flow(&b, setup, &work->explicit_rows);
@@ -173,86 +181,6 @@ static void fill_modes(const gk_gear *gear, gk_modal *m, int strips, gk_strip_we
     }
 }
 
-/* row on tooth `offset` divided by ω², in the modes' own order, so that a dot product with a tooth-0 row gives Σ N Nᵀ/ω² over the dynamic modes */
-static void turned_row(const gk_gear *gear, int modes, const double *row, int offset, double *out)
-{
-    for (int k = 0; k < modes; k++) {
-        double sine, cosine, flexibility = 1.0 / (gear->omega[k] * gear->omega[k]);
-        int64_t step = (int64_t)gear->diameter[k] * offset % gear->z;
-        gk_sincos(2.0 * GK_PI * (double)step / gear->z, &sine, &cosine);
-        if (gear->part[k] == 1) {
-            out[k] = (row[k] * cosine - row[k + 1] * sine) * flexibility;
-            out[k + 1] = (row[k] * sine + row[k + 1] * cosine) * flexibility;
-            k++;
-        } else {
-            out[k] = row[k] * cosine * flexibility;
-        }
-    }
-}
-
-static double dot(const double *a, const double *b, int n)
-{
-    double lane[4] = {0, 0, 0, 0};
-    int k = 0;
-    for (; k + 4 <= n; k += 4)
-        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
-    for (; k < n; k++) lane[0] += a[k] * b[k];
-    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
-}
-
-/* weightᵀ · cell · weight into the lanes of one table cell; cell (A, A) in double */
-static void store_cell(const double *cell, int A, int strips, gk_strip_weights weight, gk_real *out)
-{
-    for (int s = 0; s < strips; s++)
-        for (int t = 0; t < strips; t++) {
-            double sum = 0.0;
-            for (int a = 0; a < A; a++)
-                for (int b = 0; b < A; b++) sum += weight[s][a] * weight[t][b] * cell[a * A + b];
-            out[s * strips + t] = (gk_real)sum;
-        }
-}
-
-/* residual flank–flank: C_static − Σ N Nᵀ/ω² on the grid points, then between strips */
-static void fill_flank_residual(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight, double *scratch)
-{
-    const size_t R = (size_t)gear->rolls, N = (size_t)gear->modes;
-    const int A = gear->functions;
-    double cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
-    memset(m->c_ff, 0, 4 * OFFSETS * R * R * (size_t)m->block * sizeof(gk_real));
-    for (int to = 0; to < 2; to++)
-        for (int o = 0; o < OFFSETS; o++)
-            for (size_t j = 0; j < R; j++) {
-                for (int b = 0; b < A; b++) turned_row(gear, m->count, gear->rows + (((size_t)to * R + j) * A + b) * N, o - 3, scratch + (size_t)b * m->count);
-                for (int from = 0; from < 2; from++)
-                    for (size_t i = 0; i < R; i++) {
-                        const size_t at = (((size_t)(from * 2 + to) * OFFSETS + (size_t)o) * R + i) * R + j;
-                        for (int a = 0; a < A; a++)
-                            for (int b = 0; b < A; b++)
-                                cell[a * A + b] = gear->c_ff[at * A * A + a * A + b] - dot(gear->rows + (((size_t)from * R + i) * A + a) * N, scratch + (size_t)b * m->count, m->count);
-                        store_cell(cell, A, strips, weight, m->c_ff + at * (size_t)m->block);
-                    }
-            }
-}
-
-static void fill_bore_residual(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight, double *scratch)
-{
-    const int A = gear->functions;
-    const size_t N = (size_t)gear->modes;
-    for (int c = 0; c < BORE_ROWS; c++) {
-        turned_row(gear, m->count, gear->bore + (size_t)c * N, 0, scratch);
-        for (int point = 0; point < 2 * gear->rolls; point++)
-            for (int s = 0; s < strips; s++) {
-                double sum = 0.0;
-                for (int a = 0; a < A; a++) {
-                    const size_t row = (size_t)point * A + a;
-                    sum += weight[s][a] * (gear->c_fb[3 * row + (size_t)c] - dot(gear->rows + row * N, scratch, m->count));
-                }
-                m->c_fb[3 * ((size_t)point * strips + s) + (size_t)c] = sum;
-            }
-        for (int d = 0; d < BORE_ROWS; d++) m->c_bb[3 * d + c] = gear->c_bb[3 * d + c] - dot(gear->bore + (size_t)d * N, scratch, m->count);
-    }
-}
-
 static void fill_links(const gk_model *model, gk_setup *setup)
 {
     for (int g = 0; g < 2; g++) {
@@ -343,14 +271,15 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(work->cycles, 0, sizeof work->cycles);
     setup->state_size = sizeof(gk_data);
     gk_strips_fill(model, setup);
+    gk_law_bounds(model, setup);
     for (int g = 0; g < 2; g++) {
         gk_strip_weights weight;
         gk_strips_rows(model, setup, g, weight);
         fill_modes(&model->gear[g], &setup->modal[g], setup->strips, weight);
-        if (setup->on.residual) fill_flank_residual(&model->gear[g], &setup->modal[g], setup->strips, weight, work->matrix);
-        if (setup->on.residual) fill_bore_residual(&model->gear[g], &setup->modal[g], setup->strips, weight, work->matrix);
         setup->state_size += 3 * (size_t)setup->modal[g].n * sizeof(gk_real);
     }
+    gk_table_residual(model, setup);
+    work->table_h = work->table_gamma = 0.0;
     fill_links(model, setup);
     fill_timeless(setup);
     outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);

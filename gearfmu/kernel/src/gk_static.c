@@ -42,7 +42,7 @@ static void balance_rotation(const gk_model *model, const gk_setup *setup, const
         const int coordinate[2] = {3 * g + 2, DISC_0 + g};
         for (int c = 0; c <= model->port[g].chain; c++) {
             double force = given[coordinate[c]] + (s->n == 0 && c == 0 && !model->port[g].chain ? b[g].torque : 0.0);
-            for (int i = 0; i < s->n; i++) force += s->rigid[i][coordinate[c]] * s->z[i];
+            for (int i = 0; i < s->n; i++) force += s->rigid[coordinate[c]][i] * s->z[i];
             net += turn[g] * force;
             inertia += turn[g] * turn[g] / setup->inverse_mass[coordinate[c]];
         }
@@ -76,7 +76,7 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
     gk_solve_plain(s);
     for (int d = 0; d < RIGID; d++) {
         double z = 0.0;
-        for (int i = 0; i < s->n; i++) z += s->rigid[i][d] * s->z[i];
+        for (int i = 0; i < s->n; i++) z += s->rigid[d][i] * s->z[i];
         const double x = work->frame[d] + work->at_rest.rigid_mobility * rest->inverse_mass[d] * z;
         const double arm = d == XA || d == YA || d == XB || d == YB ? 1.0 : d == PHIB || d == INERTIA_1 || d == DISC_1 ? model->gear[1].r_b : model->gear[0].r_b;
         moved = gk_max(moved, fabs(x - data->x[d]) * arm);
@@ -95,7 +95,7 @@ static void spread(const gk_setup *setup, gk_data *data)
     data->state_h = data->state_gamma = 0.0;
     for (int g = 0; g < 2; g++) {
         const int n = setup->modal[g].n;
-        if (n) gk_step_scatter(setup, g, s->force, q + 2 * n);
+        if (n) gk_step_scatter(setup, g, s->force, s->force, q + 2 * n, setup->work->reading[g]);
         for (int i = 0; i < n; i++) {
             q[i] = setup->modal[g].omega2[i] > 0 ? q[2 * n + i] / setup->modal[g].omega2[i] : 0;
             q[n + i] = 0;
@@ -105,7 +105,7 @@ static void spread(const gk_setup *setup, gk_data *data)
     for (int d = 0; d < RIGID; d++) {
         data->f[d] = 0.0;
         for (int i = 0; i < s->n; i++)
-            if (s->kind[i] != ROW_CLUTCH) data->f[d] += s->rigid[i][d] * s->force[i];
+            if (s->kind[i] != ROW_CLUTCH) data->f[d] += s->rigid[d][i] * s->force[i];
     }
 }
 

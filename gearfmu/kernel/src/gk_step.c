@@ -64,45 +64,54 @@ static int remembered(const gk_data *data, gk_key key)
     return -1;
 }
 
-/* status and forces at the start of the step; gaps as this step's C′ sees them: g0 = s0 − C′λ0 − δ(λ0) */
+/* The start of the step as this step's compliance sees it: massless deflection and energy under λ0, gaps g0 = s0 − C′λ0 − δ(λ0); then the first guess of status and forces */
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
 {
-    s->limit_reached = s->rounds = s->rank = 0;
-    s->alpha = s->stored0 = 0.0;
-    memset(s->direction, 0, sizeof s->direction);
+    const gk_work *work = setup->work;
+    int given = 0; /* forces that act already */
+    s->limit_reached = s->rounds = 0;
+    s->alpha = 0.0;
+    memset(s->direction, 0, (size_t)s->stride * sizeof *s->direction);
+    for (int i = s->n; i < s->stride; i++) s->force[i] = s->z[i] = s->dash[i] = s->eta[i] = 0.0;
+    memset(s->squeeze0, 0, (size_t)s->n * sizeof *s->squeeze0);
     s->curved = setup->on.hertz && s->contacts > 0;
     for (int i = 0; i < s->n; i++) {
-        const double *c = s->C + (size_t)i * s->n;
-        const double *kappa = s->K + (size_t)i * s->n;
-        double sum = 0.0, plain = 0.0, approach = 0.0, slope;
-        const int link = s->link_of[i];
-        for (int j = 0; j < s->n; j++) sum += c[j] * s->force0[j], plain += kappa[j] * s->force0[j];
-        if (s->kind[i] == ROW_CONTACT && s->force0[i] > 0.0) approach = gk_law_approach(&s->local[i], s->force0[i], &slope);
-        s->squeeze0[i] = sum + plain + approach;
-        s->stored0 += 0.5 * sum * s->force0[i] + (s->kind[i] == ROW_CONTACT && s->force0[i] > 0.0 ? gk_law_energy(&s->local[i], s->force0[i]) : 0.0);
-        s->force[i] = s->z[i] = s->force0[i];
-        s->eta[i] = 0.0;
         s->clip[i] = 2;
-        s->g0[i] = -sum;
-        s->active[i] = s->kind[i] == ROW_SPRING;
+        s->beta[i] = s->dash0[i] != 0.0 ? 0.75 : 0.5;
+        s->active[i] = s->kind[i] == ROW_CLUTCH ? (unsigned char)data->locked[s->link_of[i] - CLUTCH_0] : 1;
+        s->z[i] = 0.0;
+        if (s->kind[i] == ROW_CLUTCH && !s->active[i]) s->z[i] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
+        gk_solve_set(s, i, s->force0[i]);
+    }
+    gk_solve_settle(s);
+    s->stored0 = gk_solve_stored(s);
+    s->held0 = 0.0;
+    gk_solve_times(s, s->A, s->end0, s->lag0);
+    for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
+    for (int i = 0; i < s->n; i++) {
+        const double deflection = gk_solve_massless(s, i);
+        s->squeeze0[i] = s->squeeze[i];
+        s->g0[i] = -deflection;
         switch (s->kind[i]) {
         case ROW_CONTACT: {
-            const gk_place *p = &setup->work->place[s->place_of[i]];
-            const gk_memory *m = p->memory < 0 ? NULL : &data->memory[p->memory];
-            s->g0[i] = m ? m->gap[i % s->strips] - sum - approach : s->g[i];
+            const gk_place *p = &work->place[s->place_of[i]];
+            if (p->memory < 0) s->g0[i] = s->g[i];
+            else s->g0[i] += data->memory[p->memory].gap[i % s->strips];
             s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
             if (s->force0[i] > 0.0 && s->damping[i] > 0.0) s->clip[i] = 0;
             break;
         }
         case ROW_SPRING: s->clip[i] = 0; break;
-        case ROW_TORQUE: s->force[i] = s->z[i] = setup->work->torque[link - PORT_0]; break;
-        case ROW_CLUTCH:
-            s->g0[i] = s->g[i];
-            s->active[i] = (unsigned char)data->locked[link - CLUTCH_0];
-            s->force[i] = 0.0;
-            s->z[i] = s->active[i] ? 0.0 : s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
+        case ROW_TORQUE:
+            s->active[i] = 0;
+            s->force[i] = work->torque[s->link_of[i] - PORT_0];
+            given |= s->force[i] != s->force0[i];
+            break;
+        case ROW_CLUTCH: s->g0[i] = s->g[i];
         }
+        given |= s->clip[i] != 2 && s->dash0[i] != 0.0;
     }
+    if (given) gk_solve_settle(s);
 }
 
 static int all_finite(const gk_system *s)
@@ -112,18 +121,21 @@ static int all_finite(const gk_system *s)
     return 1;
 }
 
-/* Σ rows·x into lanes: modal force of the row forces x on gear g */
-void gk_step_scatter(const gk_setup *setup, int g, const double *x, gk_real *out)
+/* Σ rows·x and Σ rows·y into lanes: modal forces of the row forces x and y on gear g */
+void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double *y, gk_real *out_x, gk_real *out_y)
 {
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
     const int n = setup->modal[g].n;
-    memset(out, 0, (size_t)n * sizeof *out);
+    memset(out_x, 0, (size_t)n * sizeof *out_x);
+    memset(out_y, 0, (size_t)n * sizeof *out_y);
     for (int r = 0; r < s->contacts + BORE_ROWS; r++) {
         const int row = r < s->contacts ? r : s->bore[g][r - s->contacts];
-        if (row < 0 || x[row] == 0.0) continue;
-        const gk_real w = (gk_real)(r < s->contacts ? -x[row] : x[row]), *b = work->basis[g] + (size_t)r * n;
-        for (int i = 0; i < n; i++) out[i] += w * b[i];
+        if (row < 0 || (x[row] == 0.0 && y[row] == 0.0)) continue;
+        const gk_real sign = r < s->contacts ? -1 : 1, w = sign * (gk_real)x[row], u = sign * (gk_real)y[row];
+        const gk_half *b = (const gk_half *)(work->basis[g] + (size_t)r * n);
+        gk_half *to_x = (gk_half *)out_x, *to_y = (gk_half *)out_y;
+        for (int i = 0; i < 2 * n / LANES; i++) to_x[i] += w * b[i], to_y[i] += u * b[i];
     }
 }
 
@@ -157,19 +169,19 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     for (int g = 0; g < 2; g++) {
         const int n = setup->modal[g].n;
         if (n) {
-            gk_step_scatter(setup, g, s->z, work->force[g]);
+            gk_real *next = work->reading[g];
+            gk_step_scatter(setup, g, s->z, s->force, work->force[g], next);
             double lost = correct_modes(setup, k, g, q);
             if (setup->on.modal_damping) data->ledger.dissipated += lost;
-            gk_step_scatter(setup, g, s->force, q + 2 * n);
+            memcpy(q + 2 * n, next, (size_t)n * sizeof *next);
         }
         q += 3 * n;
     }
     for (int d = 0; d < RIGID; d++) {
-        double z = 0.0, force = 0.0;
-        for (int i = 0; i < s->n; i++) {
-            z += s->rigid[i][d] * s->z[i];
-            if (s->kind[i] != ROW_CLUTCH) force += s->rigid[i][d] * s->force[i];
-        }
+        const double z = gk_dot_quads(s->rigid[d], s->z, s->stride / 4);
+        double force = gk_dot_quads(s->rigid[d], s->force, s->stride / 4);
+        for (int i = s->contacts; i < s->n; i++)
+            if (s->kind[i] == ROW_CLUTCH) force -= s->rigid[d][i] * s->force[i];
         const double before = data->x[d];
         data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
         data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_mass[d] * z;
@@ -178,17 +190,18 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     }
 }
 
-/* what ports brought in and what dashpots and clutches took in this step */
+/* What ports brought in and what dashpots and clutches took in this step. A dashpot takes −½ η_d·Δgap; what its force deflects elsewhere (A f_d) it holds as energy or gives back. */
 static void account(const gk_setup *setup, gk_data *data)
 {
     gk_work *work = setup->work;
     const gk_system *s = &work->system;
+    double held = 0.0, taken = 0.0;
     for (int i = 0; i < s->n; i++) {
         const int link = s->link_of[i], port = link - PORT_0, clutch = link - CLUTCH_0;
         const double mean = 0.5 * (s->force0[i] + s->z[i]);
         switch (s->kind[i]) {
         case ROW_CLUTCH:
-            data->ledger.dissipated -= mean * (work->moved[INERTIA_0 + clutch] - work->moved[DISC_0 + clutch]);
+            taken -= mean * (work->moved[INERTIA_0 + clutch] - work->moved[DISC_0 + clutch]);
             data->locked[clutch] = s->active[i];
             break;
         case ROW_TORQUE: {
@@ -198,10 +211,13 @@ static void account(const gk_setup *setup, gk_data *data)
             break;
         }
         default:
-            if (s->active[i] && s->clip[i] != 2) data->ledger.dissipated -= 0.5 * (s->eta[i] - s->alpha * s->direction[i]) * (gk_solve_end_gap(s, i) - s->g0[i]);
+            taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->dash[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
+            held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
             if (link == PORT_0 || link == PORT_1) data->ledger.work += mean * (work->outer[port] - work->outer_before[port]);
         }
     }
+    data->ledger.dissipated += taken - (held - s->held0);
+    data->ledger.lag = held;
 }
 
 void gk_step_remember(const gk_setup *setup, gk_data *data)
@@ -215,11 +231,15 @@ void gk_step_remember(const gk_setup *setup, gk_data *data)
     for (int i = 0; i < s->n; i++) {
         if (i >= s->contacts) {
             data->link[s->link_of[i]] = s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i];
+            data->link_dash[s->link_of[i]] = s->dash[i];
+            data->link_end[s->link_of[i]] = s->end[i];
             continue;
         }
         gk_memory *m = &data->memory[s->place_of[i]];
         m->force[i % s->strips] = s->force[i];
         m->gap[i % s->strips] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+        m->dash[i % s->strips] = s->dash[i];
+        m->end[i % s->strips] = s->end[i];
         deepest = gk_max(deepest, -work->place[s->place_of[i]].gap);
     }
     data->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
@@ -232,6 +252,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_system *s = &work->system;
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
     GK_MARK(work);
+    if (h == data->table_h && gamma == setup->gamma && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
     express(setup, data, k);
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;
@@ -249,7 +270,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_step_recall(setup, data, s);
     GK_LAP(work, PHASE_SYSTEM);
     if (setup->integrator == MIX4) gk_solve_plain(s);
-    else gk_solve_energy(s);
+    else gk_balance_solve(s);
     if (!all_finite(s)) return GK_DIVERGED;
     GK_LAP(work, PHASE_SOLVE);
     correct(setup, data, k);
@@ -263,7 +284,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     return GK_OK;
 }
 
-/* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step */
+/* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step; with what dashpots hold */
 double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {
     const gk_system *s = &setup->work->system;
@@ -279,5 +300,5 @@ double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coeff
         }
         q += 3 * n;
     }
-    return sum + gk_solve_stored(s, s->force);
+    return sum + gk_solve_stored(s) + data->ledger.lag;
 }

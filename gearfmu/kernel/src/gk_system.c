@@ -1,26 +1,6 @@
-/* The small system of a step (docs/theory.md, eq. 10): which forces are unknown, what they do to the gaps within the step (D) and at once through what is massless (C′), and the gaps without them.
+/* The small system of a step (docs/theory.md, eq. 10): which forces are unknown, what they do to the gaps within the step (D) and at once through what is massless (A, P), and the gaps without them.
  * Rows: slices of all places, then the live bilateral rows (bearings, port springs, shafts, clutches). Contact forces press inward, rows measure outward: a contact row is −(flank row). */
 #include "gk_core.h"
-
-static void link_gradient(const gk_model *model, int link, const gk_work *work, double *rigid)
-{
-    int g = link == BEARING_1X || link == BEARING_1Y || link == PORT_1 || link == SHAFT_1 || link == CLUTCH_1;
-    int phi = g ? PHIB : PHIA;
-    memset(rigid, 0, RIGID * sizeof *rigid);
-    switch (link) {
-    case BEARING_0X: case BEARING_1X:
-        rigid[3 * g] = 1.0;
-        rigid[phi] = -work->read[g][work->system.contacts + BORE_Y]; /* the elastic bore displacement turns with the frame */
-        break;
-    case BEARING_0Y: case BEARING_1Y:
-        rigid[3 * g + 1] = 1.0;
-        rigid[phi] = work->read[g][work->system.contacts + BORE_X];
-        break;
-    case PORT_0: case PORT_1: rigid[model->port[g].chain ? INERTIA_0 + g : phi] = 1.0; break;
-    case SHAFT_0: case SHAFT_1: rigid[phi] = 1.0, rigid[DISC_0 + g] = -1.0; break;
-    default: rigid[INERTIA_0 + g] = 1.0, rigid[DISC_0 + g] = -1.0;
-    }
-}
 
 /* what every basis row reads of y, B·y */
 static void gather(const gk_setup *setup, const gk_work *work, int g, const gk_real *y, double *read)
@@ -32,71 +12,27 @@ static void gather(const gk_setup *setup, const gk_work *work, int g, const gk_r
 /* row of the system that basis row i of gear g stands in, −1: none */
 static int row_of(const gk_system *s, int g, int i) { return i < s->contacts ? i : s->bore[g][i - s->contacts]; }
 
-/* B diag(w) Bᵀ over `lanes` of both halves, added to the upper triangle of the system matrix */
-static void gram(const gk_setup *setup, gk_work *work, int g, const gk_real *w, int lanes, double *out)
+/* B diag(mobility) Bᵀ and −B diag(κ) Bᵀ, added to the upper triangles of D and A: for a step that has no table */
+static void gram(const gk_setup *setup, gk_work *work, int g, const gk_flow *flow, double *D, double *A)
 {
     const gk_system *s = &work->system;
     const int n = setup->modal[g].n, P = setup->modal[g].pairs, rows = s->contacts + BORE_ROWS;
-    if (!n || !lanes) return;
+    gk_real *moves = work->scaled, *yields = moves + n;
+    if (!n) return;
     for (int i = 0; i < rows; i++) {
         const gk_real *b = work->basis[g] + (size_t)i * n;
-        gk_real *v = work->scaled;
-        if (row_of(s, g, i) < 0) continue;
-        double *line = out + (size_t)row_of(s, g, i) * s->n;
-        for (int k = 0; k < lanes; k++) v[k] = b[k] * w[k];
-        for (int k = 0; k < lanes; k++) v[P + k] = b[P + k] * w[P + k];
+        const int row = row_of(s, g, i);
+        if (row < 0) continue;
+        for (int k = 0; k < n; k++) moves[k] = b[k] * flow->mobility[k], yields[k] = b[k] * flow->kappa[k];
         for (int j = i; j < rows; j++) {
+            const gk_real *other = work->basis[g] + (size_t)j * n;
             const int column = row_of(s, g, j);
             if (column < 0) continue;
-            const gk_real *other = work->basis[g] + (size_t)j * n;
-            const double sum = lanes == P ? gk_dot(v, other, n) : gk_dot(v, other, lanes) + gk_dot(v + P, other + P, lanes);
-            line[column] += (i < s->contacts) == (j < s->contacts) ? sum : -sum;
+            const double sign = (i < s->contacts) == (j < s->contacts) ? 1.0 : -1.0;
+            D[row * s->stride + column] += sign * gk_dot(moves, other, n);
+            if (flow->exact) A[row * s->stride + column] -= sign * (gk_dot(yields, other, flow->exact) + gk_dot(yields + P, other + P, flow->exact));
         }
     }
-}
-
-/* residual between the strips of two places, added to the system matrix */
-static void residual_pair(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, const gk_place *q, double *out, int n)
-{
-    const gk_modal *modal = &setup->modal[g];
-    const int offset = q->number[g] - p->number[g], strips = setup->strips;
-    gk_real sum[MAX_SLICES * MAX_SLICES + 3] = {0};
-    if (offset < -3 || offset > 3) return;
-    const gk_real *table = modal->c_ff + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + 3) * gear->rolls * gear->rolls * modal->block;
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const gk_real w = (gk_real)(p->weight[g][i] * q->weight[g][j]);
-            const gk_real *t = table + ((size_t)(p->index[g] + i) * gear->rolls + q->index[g] + j) * modal->block;
-            for (int k = 0; k < modal->block; k++) sum[k] += w * t[k];
-        }
-    for (int a = 0; a < strips; a++)
-        for (int b = 0; b < strips; b++) out[a * n + b] += sum[a * strips + b];
-}
-
-/* static compliance of what is not dynamic: flank–flank, flank–bore, bore–bore, into the upper triangle of C */
-static void residual(const gk_setup *setup, const gk_gear *gear, const gk_work *work, int g, double attitude)
-{
-    const gk_system *s = &work->system;
-    const gk_modal *modal = &setup->modal[g];
-    const int strips = setup->strips, n = s->n;
-    for (int p = 0; p < work->places; p++) {
-        const gk_place *place = &work->place[p];
-        double *block = s->C + (size_t)p * strips * n, sine, cosine;
-        for (int q = p; q < work->places; q++) residual_pair(setup, gear, g, place, &work->place[q], block + q * strips, n);
-        gk_sincos(attitude + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
-        for (int a = 0; a < strips; a++) {
-            double c[3] = {0, 0, 0};
-            for (int i = 0; i < 4; i++)
-                for (int k = 0; k < 3; k++)
-                    c[k] += place->weight[g][i] * modal->c_fb[((size_t)(place->flank * gear->rolls + place->index[g] + i) * strips + a) * 3 + k];
-            const double turned[3] = {c[0] * cosine - c[1] * sine, c[0] * sine + c[1] * cosine, c[2]};
-            for (int k = 0; k < 3; k++)
-                if (s->bore[g][k] >= 0) block[a * n + s->bore[g][k]] -= turned[k];
-        }
-    }
-    for (int i = 0; i < 3; i++)
-        for (int k = i; k < 3; k++)
-            if (s->bore[g][i] >= 0 && s->bore[g][k] >= 0) s->C[(size_t)s->bore[g][i] * n + s->bore[g][k]] += modal->c_bb[3 * i + k];
 }
 
 static void list_contacts(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, gk_work *work)
@@ -111,10 +47,11 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->force0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].force[i];
             s->damping[s->n] = setup->on.damping ? 2.0 * setup->damping * setup->strip_width[i] / h : 0.0;
             s->bound[s->n] = 0.0;
+            s->end0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].end[i];
+            s->dash0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].dash[i];
             s->weight[s->n] = setup->strip_width[i] * setup->slices / setup->width;
-            if (i == 0) gk_law_set(model, setup, place->curvature, &s->local[s->n]);
-            else s->local[s->n] = s->local[s->n - i];
-            s->local[s->n].width = setup->strip_width[i];
+            s->width[s->n] = setup->strip_width[i];
+            if (i == 0) gk_law_set(model, setup, place->curvature, &s->local[p]);
         }
     s->contacts = s->n;
 }
@@ -136,6 +73,9 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
         if (link <= BEARING_1Y) s->bore[link / 2][link % 2] = s->n;
         else if (link <= PORT_1 ? !model->port[link - PORT_0].chain : link <= SHAFT_1) s->bore[(link - PORT_0) % 2][BORE_RZ] = s->n;
         s->force0[s->n] = link >= CLUTCH_0 ? 0.0 : data->link[link];
+        s->end0[s->n] = data->link_end[link];
+        s->dash0[s->n] = data->link_dash[link];
+        s->spring[s->n] = setup->link_c[link];
         s->damping[s->n] = 2.0 * setup->link_d[link] / h;
         s->bound[s->n] = link >= CLUTCH_0 ? 2.0 * data->value[GK_OF_SHAFT(CAPACITY, link - CLUTCH_0)] : 0.0;
         s->n++;
@@ -152,38 +92,47 @@ static void elastic(const gk_system *s, double (*const read)[MAX_BASIS], double 
             if (s->bore[g][k] >= 0) out[s->bore[g][k]] = read[g][s->contacts + k];
 }
 
-/* rigid part of a link's displacement: its gradient times the coordinates, but not the turning part of the bearing rows, which is a derivative and no displacement */
-static double rigid_part(const gk_system *s, int i, const double *x)
+/* what a link reads of rigid coordinates x, and its derivatives as row i */
+static double link_reading(const gk_model *model, const gk_work *work, int link, const double *x, double (*rigid)[MAX_STRIDE], int i)
 {
-    double sum = 0.0;
-    for (int d = 0; d < RIGID; d++)
-        if (s->link_of[i] > BEARING_1Y || (d != PHIA && d != PHIB)) sum += s->rigid[i][d] * x[d];
-    return sum;
+    const int g = link <= BEARING_1Y ? link / 2 : (link - PORT_0) % 2, phi = g ? PHIB : PHIA, outer = INERTIA_0 + g, disc = DISC_0 + g;
+    switch (link) {
+    case BEARING_0X: case BEARING_1X:
+        rigid[3 * g][i] = 1.0;
+        rigid[phi][i] = -work->read[g][work->system.contacts + BORE_Y]; /* the elastic bore displacement turns with the frame */
+        return x[3 * g];
+    case BEARING_0Y: case BEARING_1Y:
+        rigid[3 * g + 1][i] = 1.0;
+        rigid[phi][i] = work->read[g][work->system.contacts + BORE_X];
+        return x[3 * g + 1];
+    case PORT_0: case PORT_1:
+        rigid[model->port[g].chain ? outer : phi][i] = 1.0;
+        return x[model->port[g].chain ? outer : phi];
+    case SHAFT_0: case SHAFT_1:
+        rigid[phi][i] = 1.0, rigid[disc][i] = -1.0;
+        return x[phi] - x[disc];
+    default:
+        rigid[outer][i] = 1.0, rigid[disc][i] = -1.0;
+        return x[outer] - x[disc];
+    }
 }
 
 /* gaps at the predicted frames: undeformed gap minus outward elastic displacement; springs measure relative to their outer ends; clutches read half a step of slip */
 static void gaps(const gk_model *model, double h, gk_work *work)
 {
     gk_system *s = &work->system;
+    for (int d = 0; d < RIGID; d++) memset(s->rigid[d], 0, (size_t)s->stride * sizeof(double));
     elastic(s, work->read, s->g);
-    for (int i = 0; i < s->n; i++) {
+    for (int i = 0; i < s->contacts; i++) {
+        const gk_place *p = &work->place[s->place_of[i]];
+        s->g[i] += p->gap;
+        for (int d = 0; d < INERTIA_0; d++) s->rigid[d][i] = p->gradient[d];
+    }
+    for (int i = s->contacts; i < s->n; i++) {
         const int port = s->link_of[i] - PORT_0;
-        switch (s->kind[i]) {
-        case ROW_CONTACT: {
-            const gk_place *p = &work->place[s->place_of[i]];
-            s->g[i] += p->gap;
-            memcpy(s->rigid[i], p->gradient, sizeof p->gradient);
-            memset(s->rigid[i] + 6, 0, (RIGID - 6) * sizeof(double));
-            break;
-        }
-        case ROW_CLUTCH:
-            link_gradient(model, s->link_of[i], work, s->rigid[i]);
-            s->g[i] += 0.5 * h * rigid_part(s, i, work->speed);
-            break;
-        default:
-            link_gradient(model, s->link_of[i], work, s->rigid[i]);
-            s->g[i] += rigid_part(s, i, work->frame) - (s->kind[i] == ROW_SPRING && port >= 0 && port < 2 ? work->outer[port] : 0.0);
-        }
+        if (s->kind[i] == ROW_CLUTCH) s->g[i] += 0.5 * h * link_reading(model, work, s->link_of[i], work->speed, s->rigid, i);
+        else s->g[i] += link_reading(model, work, s->link_of[i], work->frame, s->rigid, i);
+        if (s->kind[i] == ROW_SPRING && port >= 0 && port < 2) s->g[i] -= work->outer[port];
     }
 }
 
@@ -195,48 +144,74 @@ void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const 
     elastic(s, work->read_rate, rate);
     for (int i = 0; i < s->n; i++) {
         const int port = s->link_of[i] - PORT_0;
-        for (int d = 0; d < RIGID; d++) rate[i] += s->rigid[i][d] * speed[d];
+        for (int d = 0; d < RIGID; d++) rate[i] += s->rigid[d][i] * speed[d];
         if (s->kind[i] == ROW_SPRING && port >= 0 && port < 2) rate[i] -= work->outer_speed[port];
     }
 }
 
-static void rigid_part_of_matrices(const gk_setup *setup, const gk_coefficients *k, gk_system *s)
+static void mirror(gk_system *s)
 {
-    const int n = s->n;
-    for (int i = 0; i < n; i++) {
-        for (int j = i; j < n; j++) {
-            double sum = 0.0;
-            for (int d = 0; d < RIGID; d++) sum += s->rigid[i][d] * s->rigid[j][d] * setup->inverse_mass[d];
-            s->D[i * n + j] += k->rigid_mobility * sum;
-            if (s->kind[i] != ROW_CLUTCH && s->kind[j] != ROW_CLUTCH) s->K[i * n + j] += k->rigid_kappa * sum;
-            s->C[i * n + j] -= s->K[i * n + j];
-            s->D[j * n + i] = s->D[i * n + j];
-            s->C[j * n + i] = s->C[i * n + j];
-            s->K[j * n + i] = s->K[i * n + j];
-        }
-        if (s->link_of[i] >= 0) s->C[i * n + i] += setup->link_c[s->link_of[i]];
+    const int n = s->n, stride = s->stride;
+    for (int i = 0; i < n; i++)
+        for (int j = i + 1; j < n; j++) s->D[j * stride + i] = s->D[i * stride + j], s->A[j * stride + i] = s->A[i * stride + j];
+}
+
+/* what one rigid coordinate adds to D and A */
+GK_INLINE void add_coordinate(gk_system *s, const double *row, double moves, double yields, const int quads)
+{
+    for (int i = 0; i < s->n; i++) {
+        if (row[i] == 0.0) continue;
+        gk_axpy(moves * row[i], row, s->D + i * 4 * quads, 0, quads);
+        gk_axpy(yields * row[i], row, s->A + i * 4 * quads, 0, quads);
     }
 }
 
-/* Forms the system at work->place for the weights of k: D from the mobilities, K from κ, C′ = residual − K + 1/k on the links' diagonal.
- * The local law is not in C′ (it depends on the force). */
+/* a clutch is a row of speeds, without κ */
+static void add_rigid(const gk_setup *setup, const gk_coefficients *k, gk_system *s)
+{
+    for (int d = 0; d < RIGID; d++) {
+        const double moves = k->rigid_mobility * setup->inverse_mass[d], yields = -k->rigid_kappa * setup->inverse_mass[d];
+        if (setup->inverse_mass[d] > 0.0) GK_SIZED(s->stride / 4, add_coordinate, s, s->rigid[d], moves, yields)
+    }
+    for (int i = s->contacts; i < s->n; i++)
+        if (s->kind[i] == ROW_CLUTCH)
+            for (int j = 0; j < s->n; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
+}
+
+/* the paths of the contacts' own dashpots; what is in P is not in A */
+static void take_paths(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    gk_system *s = &work->system;
+    const int strips = s->strips;
+    for (int p = 0; p < work->places; p++) {
+        gk_table_path(model, setup, &work->place[p], s->path[p]);
+        for (int a = 0; a < strips; a++)
+            for (int b = 0; b < strips; b++) s->A[(p * strips + a) * s->stride + p * strips + b] -= s->path[p][a * strips + b];
+    }
+}
+
+/* Forms the system at work->place for the step k: D, A and the paths of the rows' own dashpots, P and 1/k; C′ = A + P. The local law is in neither (it depends on the force). */
 void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work)
 {
     gk_system *s = &work->system;
     list_rows(model, setup, data, k->h, work);
-    const int n = s->n;
-    const size_t size = (size_t)n * n;
+    s->stride = (s->n + 3) / 4 * 4;
+    const size_t size = (size_t)(s->stride * s->stride);
+    const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma;
     s->D = work->matrix;
-    s->C = s->D + size;
-    s->K = s->C + size;
-    s->J = s->K + size;
-    memset(s->D, 0, 3 * size * sizeof(double));
+    s->A = s->D + size;
+    s->J = s->A + size;
+    s->L = s->J + size;
+    memset(s->D, 0, 2 * size * sizeof(double));
     for (int g = 0; g < 2; g++) {
+        double *const both[2] = {s->D, s->A}, *const residual[2] = {s->A, NULL};
         gather(setup, work, g, work->y[g], work->read[g]);
-        gram(setup, work, g, k->flow[g].mobility, setup->modal[g].pairs, s->D);
-        if (setup->on.residual) residual(setup, &model->gear[g], work, g, work->frame[g ? PHIB : PHIA] + model->gear[g].phase);
-        gram(setup, work, g, k->flow[g].kappa, k->flow[g].exact, s->K);
+        if (tables) gk_table_add(model, setup, g, &work->table[g], both);
+        else gram(setup, work, g, &k->flow[g], s->D, s->A);
+        if (!tables && setup->on.residual) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
     }
     gaps(model, k->h, work);
-    rigid_part_of_matrices(setup, k, s);
+    mirror(s);
+    add_rigid(setup, k, s);
+    take_paths(model, setup, work);
 }

@@ -19,17 +19,25 @@
 #define gk_flow_for gk_flow_for_avx2
 #define gk_flank_find gk_flank_find_avx2
 #define gk_rows_form gk_rows_form_avx2
+#define gk_table_residual gk_table_residual_avx2
+#define gk_table_for gk_table_for_avx2
+#define gk_table_add gk_table_add_avx2
+#define gk_table_path gk_table_path_avx2
 #define gk_system_form gk_system_form_avx2
 #define gk_system_rates gk_system_rates_avx2
 #define gk_law_set gk_law_set_avx2
-#define gk_law_approach gk_law_approach_avx2
-#define gk_law_energy gk_law_energy_avx2
+#define gk_law_bounds gk_law_bounds_avx2
+#define gk_law_at gk_law_at_avx2
 #define gk_solve_contacts gk_solve_contacts_avx2
 #define gk_solve_plain gk_solve_plain_avx2
-#define gk_solve_energy gk_solve_energy_avx2
-#define gk_solve_end_gap gk_solve_end_gap_avx2
-#define gk_solve_massless gk_solve_massless_avx2
+#define gk_solve_settle gk_solve_settle_avx2
+#define gk_solve_set gk_solve_set_avx2
+#define gk_solve_times gk_solve_times_avx2
+#define gk_solve_path gk_solve_path_avx2
 #define gk_solve_stored gk_solve_stored_avx2
+#define gk_tangent_factorise gk_tangent_factorise_avx2
+#define gk_tangent_solve gk_tangent_solve_avx2
+#define gk_balance_solve gk_balance_solve_avx2
 #define gk_step_once gk_step_once_avx2
 #define gk_step_recall gk_step_recall_avx2
 #define gk_step_remember gk_step_remember_avx2
@@ -39,8 +47,11 @@
 #include "gk_flow.c"
 #include "gk_flank.c"
 #include "gk_rows.c"
+#include "gk_table.c"
 #include "gk_system.c"
+#include "gk_tangent.c"
 #include "gk_solve.c"
+#include "gk_balance.c"
 #include "gk_step.c"
 #undef gk_step_once
 #if defined(__clang__)

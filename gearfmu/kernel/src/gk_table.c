@@ -1,0 +1,249 @@
+/* Compliance between the points of a gear, on the roll grid: the static residual of what is not dynamic (docs/theory.md, eq. 2) and, for the step of a run, what a force moves within the step (D) and at
+ * once (C′ = residual − κ part). A sum over modes between two places depends on their rolls and tooth offset only, so it is done once on the grid and interpolated with the weights of the rows on both
+ * sides: the same matrix as from the rows themselves, at a cost that does not know the number of modes. */
+#include "gk_core.h"
+
+/* flexibilities of a table's sums over modes, in the order of the stored modes: cell = base − Σ N Nᵀ flexibility */
+typedef struct recipe { int modes, kinds, is_static[2]; const double *flexibility[2]; } recipe;
+
+/* row on tooth `offset`, times the flexibility of each mode, so that a dot product with a tooth-0 row gives the sum over modes */
+static void turned_row(const gk_gear *gear, int modes, const double *row, int offset, const double *flexibility, double *out)
+{
+    for (int k = 0; k < modes; k++) {
+        double sine, cosine;
+        gk_sincos(2.0 * GK_PI * (double)((int64_t)gear->diameter[k] * offset % gear->z) / gear->z, &sine, &cosine);
+        if (gear->part[k] == 1) {
+            out[k] = (row[k] * cosine - row[k + 1] * sine) * flexibility[k];
+            out[k + 1] = (row[k] * sine + row[k + 1] * cosine) * flexibility[k + 1];
+            k++;
+        } else {
+            out[k] = row[k] * cosine * flexibility[k];
+        }
+    }
+}
+
+static double dot(const double *a, const double *b, int n)
+{
+    double lane[4] = {0, 0, 0, 0};
+    int k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
+    for (; k < n; k++) lane[0] += a[k] * b[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+
+/* weightᵀ · cell · weight; cell (A, A) between width functions → (strips, strips) */
+static void store_cell(const double *cell, int A, int strips, gk_strip_weights weight, double *out)
+{
+    for (int s = 0; s < strips; s++)
+        for (int t = 0; t < strips; t++) {
+            double sum = 0.0;
+            for (int a = 0; a < A; a++)
+                for (int b = 0; b < A; b++) sum += weight[s][a] * weight[t][b] * cell[a * A + b];
+            out[s * strips + t] = sum;
+        }
+}
+
+static int block_of(int strips, int kinds) { return (kinds * strips * strips + 7) / 8 * 8; }
+
+/* one column of cells: from every flank and roll to (flank `to`, tooth offset o − 3, roll j) */
+static void fill_column(const gk_gear *gear, const recipe *r, int strips, gk_strip_weights weight, int to, int o, size_t j, double *scratch, gk_real *ff)
+{
+    const size_t R = (size_t)gear->rolls, N = (size_t)gear->modes, block = (size_t)block_of(strips, r->kinds);
+    const int A = gear->functions;
+    double cell[MAX_FUNCTIONS * MAX_FUNCTIONS], between[MAX_SLICES * MAX_SLICES];
+    for (int kind = 0; kind < r->kinds; kind++) {
+        for (int b = 0; b < A; b++) turned_row(gear, r->modes, gear->rows + (((size_t)to * R + j) * A + b) * N, o - 3, r->flexibility[kind], scratch + (size_t)b * r->modes);
+        for (int from = 0; from < 2; from++)
+            for (size_t i = 0; i < R; i++) {
+                const size_t at = (((size_t)(from * 2 + to) * OFFSETS + (size_t)o) * R + i) * R + j;
+                for (int a = 0; a < A; a++)
+                    for (int b = 0; b < A; b++)
+                        cell[a * A + b] = (r->is_static[kind] ? gear->c_ff[at * A * A + a * A + b] : 0.0) -
+                                          dot(gear->rows + (((size_t)from * R + i) * A + a) * N, scratch + (size_t)b * r->modes, r->modes);
+                store_cell(cell, A, strips, weight, between);
+                gk_real *to_table = ff + at * block + (size_t)(kind * strips * strips);
+                for (int c = 0; c < strips * strips; c++) to_table[c] = (gk_real)between[c];
+            }
+    }
+}
+
+static void fill_bore(const gk_gear *gear, const recipe *r, int strips, gk_strip_weights weight, double *scratch, gk_table *table)
+{
+    const int A = gear->functions, width = 4 * r->kinds;
+    const size_t N = (size_t)gear->modes;
+    for (int kind = 0; kind < r->kinds; kind++)
+        for (int c = 0; c < BORE_ROWS; c++) {
+            turned_row(gear, r->modes, gear->bore + (size_t)c * N, 0, r->flexibility[kind], scratch);
+            for (int point = 0; point < 2 * gear->rolls; point++)
+                for (int s = 0; s < strips; s++) {
+                    double sum = 0.0;
+                    for (int a = 0; a < A; a++) {
+                        const size_t row = (size_t)point * A + a;
+                        sum += weight[s][a] * ((r->is_static[kind] ? gear->c_fb[3 * row + (size_t)c] : 0.0) - dot(gear->rows + row * N, scratch, r->modes));
+                    }
+                    table->fb[(size_t)width * ((size_t)point * strips + s) + (size_t)(4 * kind + c)] = sum;
+                }
+            for (int d = 0; d < BORE_ROWS; d++)
+                table->bb[kind][3 * d + c] = (r->is_static[kind] ? gear->c_bb[3 * d + c] : 0.0) - dot(gear->bore + (size_t)d * N, scratch, r->modes);
+        }
+}
+
+static void fill_table(const gk_model *model, const gk_setup *setup, int g, const recipe *r, gk_table *table)
+{
+    const gk_gear *gear = &model->gear[g];
+    gk_strip_weights weight;
+    gk_strips_rows(model, setup, g, weight);
+    table->kinds = r->kinds;
+    table->block = block_of(setup->strips, r->kinds);
+    memset(table->ff, 0, 4 * OFFSETS * (size_t)(gear->rolls * gear->rolls * table->block) * sizeof(gk_real));
+    for (int to = 0; to < 2; to++)
+        for (int o = 0; o < OFFSETS; o++)
+            for (int j = 0; j < gear->rolls; j++) fill_column(gear, r, setup->strips, weight, to, o, (size_t)j, setup->flexibility + 2 * gear->modes, table->ff);
+    fill_bore(gear, r, setup->strips, weight, setup->flexibility + 2 * gear->modes, table);
+}
+
+/* residual of a tooth's own strips beyond all stored modes */
+static void fill_path(const gk_model *model, const gk_setup *setup, int g, const double *flexibility)
+{
+    const gk_gear *gear = &model->gear[g];
+    const gk_modal *m = &setup->modal[g];
+    const size_t R = (size_t)gear->rolls, A = (size_t)gear->functions, N = (size_t)gear->modes, cells = (size_t)(setup->strips * setup->strips + 3) / 4 * 4;
+    double *turned = setup->flexibility + 2 * gear->modes, cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
+    gk_strip_weights weight;
+    gk_strips_rows(model, setup, g, weight);
+    for (size_t f = 0; f < 2; f++)
+        for (size_t i = 0; i < R; i++) {
+            const double *rows = gear->rows + (f * R + i) * A * N, *base = gear->c_ff + ((((f * 2 + f) * OFFSETS + 3) * R + i) * R + i) * A * A;
+            for (size_t b = 0; b < A; b++) turned_row(gear, gear->modes, rows + b * N, 0, flexibility, turned + b * N);
+            for (size_t a = 0; a < A; a++)
+                for (size_t b = 0; b < A; b++) cell[a * A + b] = base[a * A + b] - dot(rows + a * N, turned + b * N, gear->modes);
+            store_cell(cell, gear->functions, setup->strips, weight, m->path + (f * R + i) * cells);
+        }
+}
+
+/* the static tables of a level; without the residual the path is the local law alone */
+void gk_table_residual(const gk_model *model, gk_setup *setup)
+{
+    for (int g = 0; g < 2; g++) {
+        const gk_gear *gear = &model->gear[g];
+        double *flexibility = setup->flexibility;
+        if (!setup->on.residual) {
+            memset(setup->modal[g].path, 0, 2 * (size_t)(gear->rolls * ((setup->strips * setup->strips + 3) / 4 * 4)) * sizeof(double));
+            continue;
+        }
+        for (int k = 0; k < gear->modes; k++) flexibility[k] = 1.0 / (gear->omega[k] * gear->omega[k]);
+        const recipe r = {setup->modal[g].count, 1, {1, 0}, {flexibility, NULL}};
+        fill_table(model, setup, g, &r, &setup->modal[g].residual);
+        fill_path(model, setup, g, flexibility);
+    }
+}
+
+/* D and C′ of the step k */
+void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coefficients *k)
+{
+    for (int g = 0; g < 2; g++) {
+        const gk_gear *gear = &model->gear[g];
+        const gk_modal *m = &setup->modal[g];
+        const gk_flow *f = &k->flow[g];
+        double *moves = setup->flexibility, *yields = moves + gear->modes;
+        for (int i = 0, lane = -1; i < m->count; i++) {
+            if (gear->part[i] != 2) lane++;
+            const int at = gear->part[i] == 2 ? m->pairs + lane : lane;
+            moves[i] = -(double)f->mobility[at];
+            yields[i] = (double)f->kappa[at] + (setup->on.residual ? 1.0 / (gear->omega[i] * gear->omega[i]) : 0.0);
+        }
+        const recipe r = {m->count, 2, {0, setup->on.residual}, {moves, yields}};
+        fill_table(model, setup, g, &r, &setup->work->table[g]);
+    }
+    setup->work->table_h = k->h;
+    setup->work->table_gamma = k->gamma;
+}
+
+/* ---- reading ------------------------------------------------------------------------------------------------------------------------------------------- */
+enum { HALVES = (2 * MAX_SLICES * MAX_SLICES + 7) / 8 };
+
+/* Σ w_i w_j cell_ij over the 4 × 4 grid rolls around two places */
+GK_INLINE void interpolate(const gk_place *p, const gk_place *q, int g, const gk_real *cells, int rolls, gk_half *out, const int halves)
+{
+    gk_half sum[HALVES];
+    for (int k = 0; k < halves; k++) sum[k] = (gk_half){0};
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) {
+            const gk_real w = (gk_real)(p->weight[g][i] * q->weight[g][j]);
+            const gk_half *t = (const gk_half *)cells + (size_t)(((p->index[g] + i) * rolls + q->index[g] + j) * halves);
+            for (int k = 0; k < halves; k++) sum[k] += w * t[k];
+        }
+    memcpy(out, sum, (size_t)halves * sizeof *sum);
+}
+
+/* between the strips of two places, added to the matrices of the table's kinds */
+static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const gk_place *p, const gk_place *q, int strips, double *const out[2], int stride)
+{
+    const int offset = q->number[g] - p->number[g];
+    gk_half sum[HALVES];
+    if (offset < -3 || offset > 3) return;
+    const gk_real *cells = table->ff + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + 3) * (size_t)(gear->rolls * gear->rolls * table->block);
+    GK_SIZED(table->block / 8, interpolate, p, q, g, cells, gear->rolls, sum)
+    const gk_real *value = (const gk_real *)sum;
+    for (int kind = 0; kind < table->kinds; kind++)
+        for (int a = 0; a < strips; a++)
+            for (int b = 0; b < strips; b++) out[kind][a * stride + b] += *value++;
+}
+
+/* strips of a place to the bore, turned from the tooth's axes into inertial ones */
+static void place_bore(const gk_system *s, const gk_gear *gear, int g, const gk_table *table, const gk_place *place, int first, double attitude, double *const out[2])
+{
+    double sine, cosine;
+    gk_sincos(attitude + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
+    const int strips = s->strips, kinds = table->kinds, *row = s->bore[g];
+    for (int a = 0; a < strips; a++) {
+        gk_quad c[2] = {{0}, {0}};
+        const gk_quad *t = (const gk_quad *)table->fb + (size_t)((place->flank * gear->rolls + place->index[g]) * strips + a) * (size_t)kinds;
+        for (int i = 0; i < 4; i++, t += strips * kinds)
+            for (int kind = 0; kind < kinds; kind++) c[kind] += place->weight[g][i] * t[kind];
+        for (int kind = 0; kind < kinds; kind++) {
+            double *line = out[kind] + (first + a) * s->stride;
+            if (row[BORE_X] >= 0) line[row[BORE_X]] -= c[kind][0] * cosine - c[kind][1] * sine;
+            if (row[BORE_Y] >= 0) line[row[BORE_Y]] -= c[kind][0] * sine + c[kind][1] * cosine;
+            if (row[BORE_RZ] >= 0) line[row[BORE_RZ]] -= c[kind][2];
+        }
+    }
+}
+
+/* flank–flank, flank–bore and bore–bore compliance of gear g into the upper triangles of out[kind] */
+void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[2])
+{
+    const gk_work *work = setup->work;
+    const gk_system *s = &work->system;
+    const gk_gear *gear = &model->gear[g];
+    const int strips = setup->strips, stride = s->stride, *row = s->bore[g];
+    const double attitude = work->frame[g ? PHIB : PHIA] + gear->phase;
+    for (int p = 0; p < work->places; p++) {
+        const gk_place *place = &work->place[p];
+        for (int q = p; q < work->places; q++) {
+            const int at = (p * stride + q) * strips;
+            double *const block[2] = {out[0] + at, table->kinds > 1 ? out[1] + at : NULL};
+            flank_pair(gear, g, table, place, &work->place[q], strips, block, stride);
+        }
+        place_bore(s, gear, g, table, place, p * strips, attitude, out);
+    }
+    for (int i = 0; i < BORE_ROWS; i++)
+        for (int k = i; k < BORE_ROWS; k++)
+            if (row[i] >= 0 && row[k] >= 0)
+                for (int kind = 0; kind < table->kinds; kind++) out[kind][row[i] * stride + row[k]] += table->bb[kind][3 * i + k];
+}
+
+/* P of a place: both teeth */
+void gk_table_path(const gk_model *model, const gk_setup *setup, const gk_place *place, double *out)
+{
+    const int quads = (setup->strips * setup->strips + 3) / 4;
+    gk_quad sum[MAX_SLICES * MAX_SLICES / 4];
+    for (int k = 0; k < quads; k++) sum[k] = (gk_quad){0};
+    for (int g = 0; g < 2; g++) {
+        const gk_quad *t = (const gk_quad *)setup->modal[g].path + (size_t)((place->flank * model->gear[g].rolls + place->index[g]) * quads);
+        for (int i = 0; i < 4; i++, t += quads)
+            for (int k = 0; k < quads; k++) sum[k] += place->weight[g][i] * t[k];
+    }
+    memcpy(out, sum, (size_t)quads * sizeof *sum);
+}
