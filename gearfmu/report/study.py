@@ -11,7 +11,6 @@ from gearfmu.report.style import COLOURS, MUTED, panels, styled
 
 QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
 MARKS = {"rk45": "s", "dg4": "o"}
-LABELLED = 3  # steps of a line that are written beside it
 
 
 def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -> list[Path]:
@@ -51,13 +50,15 @@ def draw(panel: Any, rows: Sequence[Any], slices: int, name: str) -> None:
         panel.loglog(time, error, color=colour, linewidth=1.2 if own else 0.7, **style)
         if own and name == "te":
             _write_steps(panel, line, time, error)
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
     panel.set_ylabel(f"{QUANTITIES[name]}, %")
 
 
 def _write_steps(panel: Any, line: list[Any], time: list[float], error: list[float]) -> None:
-    """The step beside the first, a middle and the last point of a line."""
-    chosen = sorted({0, len(line) // 2, len(line) - 1})[:LABELLED]
-    for k in chosen:
+    """The step beside the first and the last point of a line."""
+    for k in sorted({0, len(line) - 1}):
         panel.annotate(
             f"{1e6 * line[k].h_s:.3g} µs",
             (time[k], error[k]),
