@@ -28,6 +28,11 @@ test-full: $(STAMP)
 bench: $(STAMP)
 	for benchmark in $(BENCHMARKS); do echo "== $$benchmark"; $(RUN) benchmarks/$$benchmark.py || exit 1; done
 
+## make stability   the hard cases at every level and step: benchmarks/stability.csv and .json, docs/stability.md
+stability: $(STAMP)
+	$(RUN) -m gearfmu.cli stability --out benchmarks/stability.csv --jobs $(JOBS); failures=$$?; \
+	$(RUN) -m gearfmu.stability.page benchmarks/stability.csv docs/stability.md && exit $$failures
+
 ## make wheel       dist/*.whl with the linux64 and win64 kernels
 wheel: $(STAMP)
 	$(RUN) -m pip install --quiet build
@@ -56,4 +61,4 @@ $(STAMP): $(VENV)/.base
 	$(RUN) -m pip install --quiet -e ".[test]"
 	@touch $@
 
-.PHONY: help demo test test-full bench wheel models docs lint
+.PHONY: help demo test test-full bench stability wheel models docs lint

@@ -9,9 +9,7 @@ from typing import Any
 import click
 
 from gearfmu.commands.shared import Quantity, progress_bar
-
-LEVELS = ("fast", "standard", "full")
-STEPS = ("default", "half", "quarter")
+from gearfmu.stability.case import LEVELS, STEPS
 
 
 class StepSize(Quantity):
@@ -29,19 +27,35 @@ class StepSize(Quantity):
 
 
 @click.command()
-@click.option("--level", "levels", multiple=True, type=click.Choice(LEVELS), help="Level; may repeat. All when not given.")
-@click.option("--h", "steps", multiple=True, type=StepSize(), help="Internal step; may repeat. The three words when not given.")
+@click.option(
+    "--level", "levels", multiple=True, type=click.Choice(LEVELS), help="Level; may repeat. All when not given."
+)
+@click.option(
+    "--h", "steps", multiple=True, type=StepSize(), help="Internal step; may repeat. The three words when not given."
+)
 @click.option("--scene", "scenes", multiple=True, help="Scene; may repeat. All when not given.")
-@click.option("--out", type=click.Path(path_type=Path), help="Table (CSV), with the facts beside it (JSON); a later call goes on with it.")
-@click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, show_default="processors", help="Processes.")
-def stability(levels: tuple[str, ...], steps: tuple[Any, ...], scenes: tuple[str, ...], out: Path | None, jobs: int) -> int:
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="Table (CSV), with the facts beside it (JSON); a later call goes on with it.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(1),
+    default=os.cpu_count() or 1,
+    show_default="number of processors",
+    help="Processes.",
+)
+def stability(
+    levels: tuple[str, ...], steps: tuple[Any, ...], scenes: tuple[str, ...], out: Path | None, jobs: int
+) -> int:
     """Run the hard cases. Exit code: the number of failures (at most 99), 0 for none."""
-    from gearfmu import stability as room
+    from gearfmu.stability import suite
 
-    wanted = room.tasks(scenes or tuple(room.SCENES), levels or LEVELS, steps or STEPS)
+    wanted = suite.tasks(scenes or tuple(suite.SCENES), levels or LEVELS, steps or tuple(STEPS))
     with progress_bar("stability") as progress:
-        rows = room.run_suite(wanted, out, jobs, progress)
-    click.echo(room.table(rows), nl=False)
+        rows = suite.run_suite(wanted, out, jobs, progress)
+    click.echo(suite.table(rows), nl=False)
     failures = [row for row in rows if row.failed]
     for row in failures:
         said = "; ".join(row.finding.complaints) or "must run through at the default step"

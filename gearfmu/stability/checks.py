@@ -12,6 +12,7 @@ from gearfmu.stability.record import Record, overlap
 
 ENERGY = 1e-4  # of the energy through the ports and the largest stored one: the balance of a loaded damped run
 SOFTEST = 1.2e8  # N/m: one tooth pair in the corner of its path; 12.5 N/(mm µm) × 14 mm = 1.75e8 at the pitch point
+BANDS = ((200.0, 1000.0), (1000.0, 4000.0))  # Hz
 CLEARANCE = 30e-6  # m: twice the tip relief, which separates flanks whose involutes overlap
 
 
@@ -78,15 +79,15 @@ def mean_torque(record: Record, pair: PairGeometry) -> float:
     return float(pair.gears[0].r_b * (record["mesh.force_mean"][1:] * steps).sum() / steps.sum())
 
 
-def levels(record: Record, bands: tuple[tuple[float, float], ...] = ((200.0, 1000.0), (1000.0, 4000.0))) -> dict[str, float]:
-    """Level of the mean mesh force in bands (Hz), dB re 1 N rms, Hann window; equal communication steps."""
+def levels(record: Record) -> dict[str, float]:
+    """Level of the mean mesh force in BANDS, dB re 1 N rms, Hann window; equal communication steps."""
     force = record["mesh.force_mean"][1:]
     step = float(np.mean(np.diff(record.time)))
     window = np.hanning(force.size + 1)[:-1]
     power = 2.0 * np.abs(np.fft.rfft((force - force.mean()) * window)) ** 2 / (window**2).sum() / force.size
     line = np.fft.rfftfreq(force.size, step)
     found = {}
-    for low, high in bands:
+    for low, high in BANDS:
         share = power[(line >= low) & (line < high)].sum()
         found[f"level_{low:g}_{high:g}_Hz_dB"] = float(10.0 * np.log10(max(share, 1e-12)))
     return found

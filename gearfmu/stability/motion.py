@@ -1,4 +1,4 @@
-"""What drives the scenes: shafts whose outer ends turn at given speeds, wound up against each other to carry a torque."""
+"""What drives the scenes: shafts whose outer ends turn at given speeds, wound up against each other under torque."""
 
 from __future__ import annotations
 

@@ -29,9 +29,8 @@ def run_up_and_down(case: Case) -> Finding:
         facts[f"open_share_{name}"] = float(lost.mean())
         facts[f"jump_{name}_rpm"] = _onset(lost)
         said += at_least(f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 0.05)
-    said += at_least(
-        "distance of the jumps up and down (rpm)", facts["jump_up_rpm"] - facts["jump_down_rpm"], 2.0 * (HIGH - LOW) / BINS
-    )
+    apart = facts["jump_up_rpm"] - facts["jump_down_rpm"]
+    said += at_least("distance of the jumps up and down (rpm)", apart, 2.0 * (HIGH - LOW) / BINS)
     return finding(made, pair, said, facts)
 
 

@@ -7,7 +7,7 @@ import hashlib
 import io
 import json
 import multiprocessing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,11 +19,12 @@ from gearfmu.kernel.build import library_path
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.stage import load_stage
 from gearfmu.stability.bench import PLAIN
-from gearfmu.stability.case import COMPLETED, Case, Finding
+from gearfmu.stability.case import COMPLETED, LEVELS, STEPS, Case, Finding
 from gearfmu.stability.scenes import SCENES
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
 JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping")
+GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
 
@@ -58,7 +59,7 @@ def tasks(scenes: Sequence[str], levels: Sequence[str], steps: Sequence[str | fl
     if unknown:
         raise GearfmuError(f"no scene {', '.join(unknown)}; there are {', '.join(SCENES)}")
     return [
-        Task(scene, Case(level, step) if isinstance(step, str) else Case(level, "given", step))
+        Task(scene, Case(level, step) if isinstance(step, str) else Case(level, GIVEN, step))
         for scene in SCENES
         if scene in scenes
         for level in levels
@@ -70,21 +71,28 @@ def run_suite(wanted: Sequence[Task], out: Path | None, jobs: int, progress: Pro
     """Rows of `wanted` in its order. out: the table (CSV) with its facts beside it (JSON), brought up to date after
     every row; rows that are there already with the same fingerprint are not run again. jobs: processes."""
     key, kept = fingerprint(), read(out) if out else []
-    done = {(row.scene, row.case): row for row in kept if row.key == key}
-    left = [task for task in wanted if (task.scene, task.case) not in done]
+    done = {Task(row.scene, row.case): row for row in kept if row.key == key}
+    left = [task for task in wanted if task not in done]
+    for count, (task, found) in enumerate(_judged(left, jobs), 1):
+        done[task] = Row(task.scene, task.case, found, key)
+        if out:
+            write(out, list(done.values()))
+        if progress:
+            progress(count / len(left), f"{task.scene} {task.case.level}")
+    if out:
+        write(out, list(done.values()))
+    return [done[task] for task in wanted]
+
+
+def _judged(left: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Finding]]:
+    """Findings as they come; one job runs in this process."""
+    if jobs == 1:
+        yield from ((task, judge(task)) for task in left)
+        return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(max_workers=jobs, mp_context=context) as pool:
         running = {pool.submit(judge, task): task for task in left}
-        for count, future in enumerate(as_completed(running), 1):
-            task = running[future]
-            done[(task.scene, task.case)] = Row(task.scene, task.case, future.result(), key)
-            if out:
-                write(out, list(done.values()))
-            if progress:
-                progress(count / len(left), f"{task.scene} {task.case.level}")
-    if out:
-        write(out, list(done.values()))
-    return [done[(task.scene, task.case)] for task in wanted]
+        yield from ((running[future], future.result()) for future in as_completed(running))
 
 
 def judge(task: Task) -> Finding:
@@ -131,10 +139,19 @@ def facts_path(out: Path) -> Path:
 
 def write(out: Path, rows: Sequence[Row]) -> None:
     """Table and facts, in the order of the scenes."""
-    order = list(SCENES)
-    placed = sorted(rows, key=lambda row: (order.index(row.scene), row.case.level, -row.finding.h))
+    placed = in_order(rows)
+    entries = ",\n".join(json.dumps(asdict(row), ensure_ascii=False) for row in placed)
+    write_text(facts_path(out), f"[\n{entries}\n]\n")
     write_text(out, table(placed))
-    write_text(facts_path(out), json.dumps([asdict(row) for row in placed], indent=1, ensure_ascii=False) + "\n")
+
+
+def in_order(rows: Sequence[Row]) -> list[Row]:
+    """Rows by scene, level and step."""
+    scenes, steps = list(SCENES), [*STEPS, GIVEN]
+    return sorted(
+        rows,
+        key=lambda r: (scenes.index(r.scene), LEVELS.index(r.case.level), steps.index(r.case.step), -r.finding.h),
+    )
 
 
 def read(out: Path) -> list[Row]:
@@ -145,7 +162,8 @@ def read(out: Path) -> list[Row]:
     try:
         return [_row(entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
     except (ValueError, KeyError, TypeError) as error:
-        raise GearfmuError(f"{path}: these are no facts of the suite ({error}); remove the file or name another") from None
+        remedy = "remove the file or name another"
+        raise GearfmuError(f"{path}: these are no facts of the suite ({error}); {remedy}") from None
 
 
 def _row(entry: dict[str, Any]) -> Row:

@@ -27,7 +27,9 @@ def with_deviations(spec: StageSpec, *tables: dict[int, float]) -> StageSpec:
     return spec.model_copy(update={"gears": gears})
 
 
-def light_te(spec: StageSpec, bodies: list[ReducedBody], *tables: dict[int, float], torque: float = LIGHT) -> np.ndarray:
+def light_te(
+    spec: StageSpec, bodies: list[ReducedBody], *tables: dict[int, float], torque: float = LIGHT
+) -> np.ndarray:
     return loaded_te(assemble(with_deviations(spec, *tables), bodies), [torque], POSITIONS).te[0]
 
 
