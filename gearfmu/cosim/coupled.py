@@ -68,12 +68,10 @@ def run_coupled(cut: Cut, plan: Plan) -> Result:
         if not coupled.recorder.count:
             raise
         outcome, message = getattr(error, "outcome", STOPPED), str(error)
-    facts, exchange = coupled.facts(), coupled.master.exchange
-    cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
+    facts, ports = coupled.facts(), coupled.master.ports
     trace = coupled.recorder.trace({})
-    return Result(
-        trace, outcome, message, cpu, cpu * share, exchange.work, exchange.throughput, coupled.master.order, facts
-    )
+    cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
+    return Result(trace, outcome, message, cpu, cpu * share, ports.work, ports.throughput, coupled.master.order, facts)
 
 
 class _Timed:
@@ -81,7 +79,7 @@ class _Timed:
 
     def __init__(self, unit: Unit) -> None:
         self.unit, self.seconds = unit, 0.0
-        for name in ("outputs", "initialize", "resolve", "set", "get", "save", "restore"):
+        for name in ("outputs", "initialize", "resolve", "set", "get", "log", "save", "restore"):
             setattr(self, name, getattr(unit, name))
 
     def step(self, time: float, h: float) -> None:

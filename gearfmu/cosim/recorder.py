@@ -1,4 +1,4 @@
-"""Recorder: chosen outputs of stage and drivetrain at every communication point, in arrays taken once."""
+"""Recorder: chosen outputs of stage and drivetrain at every communication point, kept by the units' own logs."""
 
 from __future__ import annotations
 
@@ -28,30 +28,32 @@ class Recorder:
         unfit = [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in everything)]
         if unfit:
             raise CouplingError(f"nothing to record for {', '.join(unfit)}; there are {', '.join(everything)}")
-        self._units = {"": stage, DRIVE: drive}
-        self._handles: dict[str, Any] = {
-            prefix: unit.resolve(list(self._names[prefix])) for prefix, unit in self._units.items()
+        units = {"": stage, DRIVE: drive}
+        self._logs = {
+            prefix: units[prefix].log(list(names), points) for prefix, names in self._names.items() if names
         }
-        self._rows = {prefix: np.zeros((points, len(names))) for prefix, names in self._names.items()}
-        self._time = np.zeros(points)
-        self.count = 0
+        self._take = [log.take for log in self._logs.values()]
+        self._time: list[float] = []
+
+    @property
+    def count(self) -> int:
+        """Number of recorded times."""
+        return len(self._time)
 
     def take(self, time: float) -> None:
         """Record the present outputs as those of `time`, s."""
-        self._time[self.count] = time
-        for prefix, unit in self._units.items():
-            if self._names[prefix]:
-                self._rows[prefix][self.count] = unit.get(self._handles[prefix])
-        self.count += 1
+        for take in self._take:
+            take()
+        self._time.append(time)
 
     def trace(self, meta: dict[str, Any]) -> Trace:
         """Everything recorded so far."""
         channels = {}
-        for prefix, names in self._names.items():
-            for column, (name, about) in zip(self._rows[prefix][: self.count].T, names.items(), strict=True):
-                values = np.round(column).astype(np.int64) if about.whole else column
+        for prefix, log in self._logs.items():
+            for column, (name, about) in zip(log.rows()[: self.count].T, self._names[prefix].items(), strict=True):
+                values = np.round(column).astype(np.int64) if about.whole else np.ascontiguousarray(column)
                 channels[prefix + name] = Channel(values, about.unit, about.description)
-        return Trace(self._time[: self.count], channels, meta)
+        return Trace(np.array(self._time), channels, meta)
 
 
 def _chosen(prefix: str, unit: Unit, patterns: Sequence[str]) -> dict[str, Variable]:

@@ -29,7 +29,7 @@ def coupled(plant: Plant, name: str, h: float) -> tuple[np.ndarray, float]:
         chosen.step(n * h, h)
         rows.append(stage.get(handle).copy())
     work = stage.get(stage.resolve(["energy.work"]))[0]
-    return np.array(rows), (chosen.exchange.work + work) / chosen.exchange.throughput
+    return np.array(rows), (chosen.ports.work + work) / chosen.ports.throughput
 
 
 def whole(plant: Plant, h: float) -> np.ndarray:
