@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def finding(
     """The finding of a recorded run: scene's own complaints are heard only when it reached its end. energy: limit of
     the energy residual."""
     depth = float(overlap(record, pair).max())
-    found = {"open_share": record.open_share, "impact_rate": record.impact_rate} if record.time.size > 1 else {}
+    found = lost(record)
     found |= {"trouble": float(record["solver.trouble"][-1]), "status": float(record["solver.status"][-1])}
     said = [*common(record, depth, energy), *(complaints if record.outcome == COMPLETED else ())]
     outcome = record.outcome
@@ -55,6 +56,11 @@ def common(record: Record, depth: float, energy: float) -> list[str]:
         pressed = f"twice what the largest force presses is {1e6 * deepest:.0f} µm"
         said.append(f"flanks overlap by {1e6 * depth:.0f} µm, {pressed}")
     return said
+
+
+def lost(record: Record) -> dict[str, float]:
+    """Contact-loss share and impacts per second."""
+    return {"open_share": record.open_share, "impact_rate": record.impact_rate} if record.time.size > 1 else {}
 
 
 def near(what: str, value: float, wanted: float, relative: float) -> list[str]:
@@ -91,3 +97,20 @@ def levels(record: Record) -> dict[str, float]:
         share = power[(line >= low) & (line < high)].sum()
         found[f"level_{low:g}_{high:g}_Hz_dB"] = float(10.0 * np.log10(max(share, 1e-12)))
     return found
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A statistic of a chaotic scene: value of the finest run, and how far another may lie from it."""
+
+    value: float
+    limit: float
+
+
+def statistics(facts: Mapping[str, float], expected: Mapping[str, Expected]) -> list[str]:
+    """Complaints about statistics that are not those of the scene."""
+    return [
+        f"{name} is {facts[name]:.4g} instead of {wanted.value:.4g} ± {wanted.limit:.2g}"
+        for name, wanted in expected.items()
+        if not abs(facts[name] - wanted.value) <= wanted.limit
+    ]

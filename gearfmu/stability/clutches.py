@@ -13,7 +13,7 @@ from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import ChainSpec, PortSpec
 from gearfmu.stability.bench import Variant, geometry, internal_step, kernel, model
 from gearfmu.stability.case import COMPLETED, Case, Finding
-from gearfmu.stability.checks import at_least, finding
+from gearfmu.stability.checks import Expected, at_least, finding, lost, statistics
 from gearfmu.stability.record import NAMES, Record, run
 
 LOCKINGS, PERIOD = 100, 5e-3  # number, s
@@ -23,6 +23,8 @@ CLUTCHED = PortSpec(
     c=1.0,
     chain=ChainSpec(inertia=0.06, disc_inertia=0.006, shaft_k=23900.0, shaft_c=0.5),
 )  # the passenger car's (docs/drivetrain.md)
+DUMPED = {"open_share": Expected(0.0423, 0.003), "coast_share": Expected(0.333, 0.01)}  # as in loads.py
+LOCKED = {"open_share": Expected(0.304, 0.03), "impact_rate": Expected(1206.0, 120.0)}
 OUTPUT = PortSpec(kind="spring", k=25200.0, c=0.6)
 
 
@@ -45,8 +47,7 @@ def clutch_dump(case: Case) -> Finding:
     said = at_least("share of contact on the coast flanks", facts["coast_share"], 0.01)
     said += at_least("impacts", made["mesh.impacts"][-1], 10)
     said += at_least("clutch locked at the end", float(locked[-1]), 1)
-    variant = Variant()
-    return finding(made, geometry(variant), said, facts)
+    return finding(made, geometry(Variant()), said + statistics(facts | lost(made), DUMPED), facts)
 
 
 def clutch_hundred_times(case: Case) -> Finding:
@@ -70,4 +71,6 @@ def clutch_hundred_times(case: Case) -> Finding:
     locked = made["pinion.clutch.locked"] > 0.5
     count = int(np.sum(locked[1:] & ~locked[:-1])), int(np.sum(~locked[1:] & locked[:-1]))
     said = at_least("lockings", count[0], rounds) + at_least("slippings", count[1], rounds)
-    return finding(made, geometry(variant), said, {"lockings": float(count[0]), "slippings": float(count[1])})
+    facts = {"lockings": float(count[0]), "slippings": float(count[1])}
+    said += statistics(lost(made), LOCKED) if case.part == 1 else []
+    return finding(made, geometry(variant), said, facts)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gearfmu.stability.bench import PLAIN, Variant, geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
-from gearfmu.stability.checks import at_least, finding
+from gearfmu.stability.checks import Expected, at_least, finding, statistics
 from gearfmu.stability.loads import NOMINAL, H
 from gearfmu.stability.motion import RPM, UpAndDown, loaded
 from gearfmu.stability.record import Record, run
@@ -14,6 +14,7 @@ from gearfmu.stability.record import Record, run
 LOW, HIGH, DURATION = 5000.0, 18000.0, 2.0  # rpm, rpm, s
 RESONANCE = (8500.0, 11500.0)  # rpm: mesh frequency 2.3 … 3.1 kHz about the mode of mesh and bearings
 BINS = 60
+EXPECTED = {"open_share_up": Expected(0.0093, 0.0015), "open_share_down": Expected(0.034, 0.005)}  # as in loads.py
 
 
 def run_up_and_down(case: Case) -> Finding:
@@ -29,6 +30,7 @@ def run_up_and_down(case: Case) -> Finding:
         facts[f"open_share_{name}"] = float(lost.mean())
         facts[f"jump_{name}_rpm"] = _onset(lost)
         said += at_least(f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 0.05)
+    said += statistics(facts, EXPECTED)
     apart = facts["jump_up_rpm"] - facts["jump_down_rpm"]
     said += at_least("distance of the jumps up and down (rpm)", apart, 2.0 * (HIGH - LOW) / BINS)
     return finding(made, pair, said, facts)
