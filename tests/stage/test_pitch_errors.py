@@ -3,14 +3,19 @@ the other gear on one side and away from it on the other."""
 
 from __future__ import annotations
 
+import csv
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gearfmu import cli
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
@@ -103,3 +108,19 @@ def test_bodies_and_models_without_deviations_are_what_they_were(
     assert [body_hash(body_inputs(changed, i)) for i in (0, 1)] == [body_hash(body_inputs(spec, i)) for i in (0, 1)]
     assert assemble(changed, bodies).hash != plain.hash
     assert assemble(with_deviations(spec, {3: 0.0}, {}), bodies).blob == plain.blob
+
+
+def test_gearfmu_te_of_a_stage_file_with_a_pitch_error(tmp_path: Path) -> None:
+    """The bodies are those of the stage without it: nothing is reduced again."""
+    shipped = find_stage("fzg_c").parent
+    for name in ("pinion.h5", "wheel.h5"):
+        shutil.copy(shipped / name, tmp_path / name)
+    base = f'base = "{(shipped / "stage.toml").as_posix()}"'
+    table = '[gears.pinion]\nindex_deviation = { "0" = "50 µm", "3" = "-5 µm" }'
+    (tmp_path / "stage.toml").write_text(f'{base}\nname = "worn"\n{table}\n', encoding="utf-8")
+    out = tmp_path / "te.csv"
+    order = ["te", str(tmp_path / "stage.toml"), "--torque", "1 mN*m", "--positions", "4", "--out", str(out)]
+    assert cli.outcome(order) == 0
+    found = [float(row["te_um"]) for row in csv.DictReader(out.open())]
+    assert found[0] == pytest.approx(-50 * math.cos(math.radians(20)), abs=2e-3)
+    assert found[3] == pytest.approx(0, abs=2e-3)
