@@ -10,7 +10,6 @@ import numpy as np
 
 from gearfmu.cosim.dynamics import Dynamics, Mode
 from gearfmu.cosim.events import Event
-from gearfmu.cosim.network import Source
 
 
 @dataclass(slots=True)
@@ -31,14 +30,25 @@ class State:
         return State(self.time, self.x, self.mode, self.torque, self.motion, self.tau_mean, self.work, self.events)
 
 
-Special = Callable[[Sequence[State]], np.ndarray]
+class Table:
+    """k states side by side: x (k, states), torques of the sources by name (k,), the states themselves."""
+
+    def __init__(self, dynamics: Dynamics, states: Sequence[State]) -> None:
+        self.states, self.x = states, np.array([state.x for state in states])
+        self.sources = {}
+        for source in dynamics.network.sources:
+            node, times = dynamics.node[source.node], [state.time for state in states]
+            phi, w = self.x[:, node].tolist(), self.x[:, dynamics.n + node].tolist()
+            self.sources[source.name] = np.array(list(map(source.torque, times, phi, w)))
+
+
+Special = Callable[[Table], np.ndarray]
 
 
 class Outputs:
     """Names of all outputs and their values: most are linear in state and input, y = C x + D u, some are `special`.
 
-    position : place of every name, linear outputs first; ports have the names of their nodes too. special : functions
-    of k states that give (k,) values, by place.
+    position : place of every name, linear outputs first; ports have the names of their nodes too.
     """
 
     def __init__(self, dynamics: Dynamics) -> None:
@@ -51,32 +61,37 @@ class Outputs:
         for port, node in network.motion_ports.items():
             names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("tau", "tau_mean")}
         self.position = names
-        self.special: dict[int, Special] = dict(enumerate(special.values(), start=self.linear))
+        self._special: dict[int, Special] = dict(enumerate(special.values(), start=self.linear))
 
-    def table(self, places: Sequence[int], states: Sequence[State]) -> np.ndarray:
+    def special(self, place: int, state: State) -> float:
+        """Value of an output that is not linear."""
+        return float(self._special[place](Table(self.dynamics, [state]))[0])
+
+    def values(self, places: Sequence[int], states: Sequence[State]) -> np.ndarray:
         """(k, places) values at k states."""
-        found, x = np.zeros((len(states), len(places))), np.array([state.x for state in states])
-        u = self._inputs(states, x)
-        for mode in dict.fromkeys(state.mode for state in states):
-            rows = np.array([state.mode == mode for state in states])
-            m = self.dynamics.matrices(mode)
+        found, table = np.zeros((len(states), len(places))), Table(self.dynamics, states)
+        known = np.hstack([table.x, self._inputs(table)])
+        modes = list(dict.fromkeys(state.mode for state in states))
+        for mode in modes:
+            rows = np.array([state.mode == mode for state in states]) if len(modes) > 1 else slice(None)
+            m, chosen = self.dynamics.matrices(mode), known[rows]
             for column, place in enumerate(places):
                 if place < self.linear:
-                    found[rows, column] = _combined(m.c[place], x[rows]) + _combined(m.d[place], u[rows])
+                    found[rows, column] = _combined(np.concatenate([m.c[place], m.d[place]]), chosen)
         for column, place in enumerate(places):
             if place >= self.linear:
-                found[:, column] = self.special[place](states)
+                found[:, column] = self._special[place](table)
         return found
 
-    def _inputs(self, states: Sequence[State], x: np.ndarray) -> np.ndarray:
+    def _inputs(self, table: Table) -> np.ndarray:
         """(k, inputs) u at the states: port torques and sources, capacities of slipping clutches, accelerations, 1."""
-        d, network = self.dynamics, self.dynamics.network
+        d, network, states = self.dynamics, self.dynamics.network, table.states
         u = np.zeros((len(states), d.inputs))
         torque = np.array([state.torque for state in states]).reshape(len(states), -1)
         for k, node in enumerate(network.torque_ports.values()):
             u[:, d.node[node]] += torque[:, k]
         for source in network.sources:
-            u[:, d.node[source.node]] += self._source(source, states)
+            u[:, d.node[source.node]] += table.sources[source.name]
         for k, clutch in enumerate(network.clutches):
             u[:, d.n + k] = [
                 state.mode[0][k] * max(clutch.capacity.ends(state.time, state.time)[0], 0.0) for state in states
@@ -92,18 +107,13 @@ class Outputs:
             f"{network.nodes[node].name}.tau_mean": partial(_mean, k) for k, node in enumerate(d.driven)
         }
         found |= {f"{clutch.name}.locked": partial(_locked, k) for k, clutch in enumerate(network.clutches)}
-        found |= {f"{source.name}.tau": partial(self._source, source) for source in network.sources}
+        found |= {f"{source.name}.tau": partial(_source, source.name) for source in network.sources}
         return found | {"energy.work": _work, "energy.stored": self.energy}
 
-    def _source(self, source: Source, states: Sequence[State]) -> np.ndarray:
-        node, torque = self.dynamics.node[source.node], source.torque
-        speed = self.dynamics.n + node
-        return np.array([torque(state.time, state.x.item(node), state.x.item(speed)) for state in states])
-
-    def energy(self, states: Sequence[State]) -> np.ndarray:
+    def energy(self, table: Table) -> np.ndarray:
         """(k,) kinetic energy of the inertias and potential energy of the springs, J."""
-        d, x = self.dynamics, np.array([state.x for state in states])
-        energy = np.zeros(len(states))
+        d, x = self.dynamics, table.x
+        energy = np.zeros(len(x))
         for k, m in enumerate(d.inverse_inertia):
             if m > 0:
                 energy += 0.5 * x[:, d.n + k] ** 2 / m
@@ -127,7 +137,7 @@ class NetworkLog:
 
     def rows(self) -> np.ndarray:
         """(times, names) values."""
-        return self._outputs.table(self._places, self._kept)
+        return self._outputs.values(self._places, self._kept)
 
 
 def _combined(row: np.ndarray, table: np.ndarray) -> np.ndarray:
@@ -138,13 +148,17 @@ def _combined(row: np.ndarray, table: np.ndarray) -> np.ndarray:
     return total
 
 
-def _mean(k: int, states: Sequence[State]) -> np.ndarray:
-    return np.array([state.tau_mean[k] for state in states])
+def _mean(k: int, table: Table) -> np.ndarray:
+    return np.array([state.tau_mean[k] for state in table.states])
 
 
-def _locked(k: int, states: Sequence[State]) -> np.ndarray:
-    return np.array([float(state.mode[0][k] == 0) for state in states])
+def _locked(k: int, table: Table) -> np.ndarray:
+    return np.array([float(state.mode[0][k] == 0) for state in table.states])
 
 
-def _work(states: Sequence[State]) -> np.ndarray:
-    return np.array([state.work for state in states])
+def _source(name: str, table: Table) -> np.ndarray:
+    return table.sources[name]
+
+
+def _work(table: Table) -> np.ndarray:
+    return np.array([state.work for state in table.states])

@@ -174,7 +174,7 @@ class PyUnit:
         else:
             np.dot(rows, state.x, out=handle.buffer)
         for place in handle.special:
-            handle.buffer[place] = self._outputs.special[handle.outputs[place]]([state])[0]
+            handle.buffer[place] = self._outputs.special(handle.outputs[place], state)
         return handle.buffer
 
     def _rows(self, handle: Handle) -> np.ndarray:
@@ -347,4 +347,4 @@ class PyUnit:
 
     def energy(self) -> float:
         """Kinetic energy of the inertias and potential energy of the springs, J."""
-        return float(self._outputs.energy([self._state])[0])
+        return self._outputs.special(self._outputs.position["energy.stored"], self._state)
