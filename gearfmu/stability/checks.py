@@ -24,12 +24,11 @@ def finding(
     facts: Mapping[str, float] | None = None,
     energy: float = ENERGY,
 ) -> Finding:
-    """The finding of a recorded run: scene's own complaints are heard only when it reached its end. energy: limit of
-    the energy residual."""
+    """The finding of a recorded run; complaints: the scene's own. energy: limit of the energy residual."""
     depth = float(overlap(record, pair).max())
     found = lost(record)
     found |= {"trouble": float(record["solver.trouble"][-1]), "status": float(record["solver.status"][-1])}
-    said = [*common(record, depth, energy), *(complaints if record.outcome == COMPLETED else ())]
+    said = [*common(record, depth, energy), *complaints]
     outcome = record.outcome
     if outcome != COMPLETED:
         outcome = f"{outcome}@{record.time[-1]:.6g}"

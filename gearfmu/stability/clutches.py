@@ -14,7 +14,7 @@ from gearfmu.spec.stage import ChainSpec, PortSpec
 from gearfmu.stability.bench import Variant, geometry, internal_step, kernel, model
 from gearfmu.stability.case import COMPLETED, Case, Finding
 from gearfmu.stability.checks import Expected, at_least, finding, lost, statistics
-from gearfmu.stability.record import NAMES, Record, run
+from gearfmu.stability.record import NAMES, Record, Stopped, run
 
 LOCKINGS, PERIOD = 100, 5e-3  # number, s
 CLUTCHED = PortSpec(
@@ -41,6 +41,8 @@ def clutch_dump(case: Case) -> Finding:
     outcome = COMPLETED if trace.meta["outcome"] == OK else str(trace.meta["outcome"])
     names = {name: np.asarray(trace[name], float) for name in NAMES}
     made = Record(trace.time, names, passed, outcome, float(trace.meta["cpu_s"]))
+    if outcome != COMPLETED:
+        raise Stopped(made)
     locked = trace["pinion.clutch.locked"]
     facts = {"locked_at_s": float(trace.time[np.argmax(locked)]) if locked.any() else float("nan")}
     facts["coast_share"] = float(np.mean(made["mesh.contact"] < 0))

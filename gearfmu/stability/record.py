@@ -74,6 +74,14 @@ class Record:
         return float(np.ptp(self["mesh.impacts"]) / np.ptp(self.time))
 
 
+class Stopped(Exception):
+    """A run that the kernel gave up; `record` holds what came before."""
+
+    def __init__(self, record: Record) -> None:
+        super().__init__(record.outcome)
+        self.record = record
+
+
 class Run:
     """One instance under way: `advance` steps it, `record` ends it. The loop of every scene."""
 
@@ -115,8 +123,8 @@ class Run:
 
 
 def run(kernel: Kernel, inputs: Inputs, duration: float, step: float) -> Record:
-    """From static equilibrium at t = 0 over `duration` with communication steps `step` (s); a run that the kernel gives
-    up keeps its samples."""
+    """From static equilibrium at t = 0 over `duration` with communication steps `step` (s). Stopped, with the samples
+    so far, when the kernel gives up."""
     return run_times(kernel, inputs, np.arange(round(duration / step) + 1) * step)
 
 
@@ -137,8 +145,10 @@ def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarra
     except SimulationError as error:
         outcome = error.outcome
     cpu = clock.process_time() - started
-    made = going.record(outcome, cpu)
-    return going.record(outcome, cpu, _powers(made, speeds, inputs))
+    made = going.record(outcome, cpu, _powers(going.record(outcome, cpu), speeds, inputs))
+    if outcome != COMPLETED:
+        raise Stopped(made)
+    return made
 
 
 def _powers(made: Record, speeds: np.ndarray, inputs: Inputs) -> np.ndarray:

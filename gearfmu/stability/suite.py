@@ -18,8 +18,10 @@ from gearfmu.files import write_text
 from gearfmu.kernel.build import library_path
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.stage import load_stage
-from gearfmu.stability.bench import PLAIN
+from gearfmu.stability.bench import PLAIN, Variant, geometry
 from gearfmu.stability.case import COMPLETED, LEVELS, STEPS, Case, Finding
+from gearfmu.stability.checks import finding
+from gearfmu.stability.record import Stopped
 from gearfmu.stability.scenes import SCENES
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
@@ -96,9 +98,11 @@ def _judged(left: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Finding]]:
 
 
 def judge(task: Task) -> Finding:
-    """The finding of one task; what the kernel refuses or gives up before the first step is a named outcome too."""
+    """The finding of one task; what the kernel refuses or gives up is a named outcome."""
     try:
         return SCENES[task.scene](task.case)
+    except Stopped as stop:
+        return finding(stop.record, geometry(Variant()))
     except SimulationError as error:
         return _nothing(f"{error.outcome}@{error.time:.6g}", task.case, str(error))
     except ModelError as error:

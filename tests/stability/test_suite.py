@@ -126,9 +126,25 @@ def test_judges_hear_what_is_wrong(calm: record.Record) -> None:
     sunk = dict(calm.values) | {"pinion.gear.phi": calm["pinion.gear.phi"] + 0.01}
     assert "overlap" in checks.finding(replace(calm, values=sunk), pair).complaints[0]
     assert checks.finding(calm, pair, ["too quiet"]).outcome == "failed"
-    stopped = replace(calm, outcome="diverged")
-    assert checks.finding(stopped, pair, ["too quiet"]).outcome == "diverged@0.01"
-    assert not checks.finding(stopped, pair, ["too quiet"]).complaints
+    assert checks.finding(replace(calm, outcome="diverged"), pair).outcome == "diverged@0.01"
+
+
+def test_a_run_that_stops_is_named_with_its_last_good_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From 3 ms on the pinion's shaft end turns by 100 rad a step: no scene, but what a scene would make of it."""
+    calm = loaded(loads.RELIEVED, Constant(100.0), loads.NOMINAL)
+
+    def mad(case: Case) -> Finding:
+        def inputs(time: float) -> dict[str, float]:
+            return dict(calm(time)) | ({"pinion.phi": 1e6 * time} if time > 3e-3 else {})
+
+        made = record.run(bench.kernel(bench.model(loads.RELIEVED), case), inputs, 0.02, 1e-4)
+        raise AssertionError(f"this cannot run to its end: {made.time[-1]}")
+
+    monkeypatch.setitem(SCENES, "jammed", mad)
+    found = suite.judge(Task("jammed", Case("fast")))
+    outcome, _, time = found.outcome.partition("@")
+    assert outcome in {"diverged", "penetration", "energy"} and 0.003 <= float(time) < 0.02
+    assert found.realtime_factor > 0 and found.penetration > 0 and row(found).failed
 
 
 def test_levels_of_a_sine() -> None:
