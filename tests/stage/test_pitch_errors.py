@@ -13,11 +13,14 @@ import pytest
 
 from gearfmu import cli
 from gearfmu.body import ReducedBody
+from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
+from gearfmu.kernel import Kernel
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.blob import read_blob, write_blob
 
 LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
 DEVIATION = 50e-6
@@ -108,6 +111,15 @@ def test_bodies_and_models_without_deviations_are_what_they_were(
     assert [body_hash(body_inputs(changed, i)) for i in (0, 1)] == [body_hash(body_inputs(spec, i)) for i in (0, 1)]
     assert assemble(changed, bodies).hash != plain.hash
     assert assemble(with_deviations(spec, {3: 0.0}, {}), bodies).blob == plain.blob
+
+
+def test_the_kernel_refuses_what_are_no_index_deviations(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    sections = read_blob(assemble(with_deviations(spec, {3: DEVIATION}, {}), bodies).blob)
+    angles = sections["index0"]
+    for wrong in (angles[:-1], np.append(angles, 0.0), np.full(angles.size, 0.1)):
+        with pytest.raises(ModelError, match="index deviations are not two small angles a tooth"):
+            Kernel(write_blob(sections | {"index0": wrong}))
+    assert Kernel(write_blob(sections | {"index0": -angles})).hash
 
 
 def test_gearfmu_te_of_a_stage_file_with_a_pitch_error(tmp_path: Path) -> None:
