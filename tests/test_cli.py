@@ -223,6 +223,23 @@ def test_reduce_tells_degrees_of_freedom_time_and_memory(tmp_path: Path, capsys:
         assert f"{cost['cpu_s']:g} s CPU time and {cost['peak_memory_GB']:g} GB" in out
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo terminals")
+def test_long_work_shows_a_progress_bar_on_a_terminal_and_only_there(tmp_path: Path) -> None:
+    import pty
+
+    line = "simulate fzg_c --torque 80~N*m --speed 2000~rpm --duration 4~ms --settle 1~ms --set level=rigid".split()
+    command = [sys.executable, "-m", "gearfmu.cli", *(word.replace("~", " ") for word in line)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "100"}
+    near, far = pty.openpty()
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=far, env=environment, cwd=tmp_path, check=True)
+    os.close(far)
+    shown = os.read(near, 1 << 16).decode(errors="replace")
+    os.close(near)
+    plain = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, check=True)
+    assert "fzg_c" in shown and "━" in shown and "━" not in done.stdout.decode()
+    assert plain.stderr == b""
+
+
 @pytest.fixture
 def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder, with a file of every kind in it that cannot be used."""
