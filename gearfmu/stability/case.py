@@ -13,13 +13,11 @@ COMPLETED = "completed"
 @dataclass(frozen=True)
 class Case:
     """level: of the kernel. step: a name of STEPS, a part of the kernel's default step. h: internal step, s, instead of
-    that; 0 for none. part: of the long scenes' durations and
-    counts (10 s, 1e7 steps, 1e4 rollbacks); a table has 1, a quick test less."""
+    that; 0 for none."""
 
     level: str
     step: str = "default"
     h: float = 0.0
-    part: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -27,9 +25,10 @@ class Finding:
     """How a case went.
 
     outcome: "completed", a named outcome with its last good time ("penetration@0.0123"), or "failed" when the run
-    reached its end but not as it must; complaints: what is wrong, one sentence each. energy_residual: largest
-    |energy.residual| over the energy that passed through the ports plus the largest stored energy. penetration: largest
-    overlap of the undeformed flanks, m. realtime_factor: CPU seconds per simulated second. facts: statistics.
+    reached its end but not as it must; complaints: what is wrong, one sentence each. energy_residual: largest change of
+    what the energy balance leaves, over the energy that passed through the ports plus the largest stored energy.
+    penetration: largest overlap of the undeformed flanks, m. realtime_factor: CPU seconds per simulated second. facts:
+    statistics.
     """
 
     outcome: str

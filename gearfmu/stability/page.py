@@ -31,8 +31,8 @@ time (`penetration@0.0123`) is an answer too. What a scene complains of is a fai
 |---|---|
 | `h_s` | internal step in use, s |
 | `outcome` | `completed`; the kernel's outcome @ last good time, s; `failed`: reached its end, but not as it must |
-| `energy_residual` | largest magnitude of what the energy balance leaves, over the energy that passed through the \
-ports (sum of magnitudes) plus the largest stored energy |
+| `energy_residual` | largest change in the run of stored energy − work + dissipation, over the energy that passed \
+through the ports (sum of magnitudes) plus the largest stored energy |
 | `penetration_m` | largest overlap of the undeformed involutes at the positions of the bore nodes, at communication \
 points: the elastic approach under load; what the contact law itself lets through is zero |
 | `realtime_factor` | CPU seconds per simulated second on a shared machine, reading of all outputs included |

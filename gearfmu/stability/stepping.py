@@ -44,16 +44,15 @@ def rollbacks(case: Case) -> Finding:
     """Rattle; at every step the state is saved, the run goes astray for 1 to 3 steps under other inputs and returns:
     10⁴ times, and the end is bit for bit that of the straight run."""
     variant = Variant(ports=(DRIVEN, LOOSE))
-    count = round(ROLLBACKS * case.part)
     inputs, start = swinging(1500 * RPM, 53.0, 6000.0, 5.0)
     straight = kernel(model(variant), case, start)
-    calm = run(straight, inputs, count * ROLLBACK_STEP, ROLLBACK_STEP)
+    calm = run(straight, inputs, ROLLBACKS * ROLLBACK_STEP, ROLLBACK_STEP)
     random, astray = np.random.default_rng(2), kernel(model(variant), case, start)
-    going, started = Run(astray, count), clock.process_time()
+    going, started = Run(astray, ROLLBACKS), clock.process_time()
     going.set(inputs(0.0))
     astray.initialize(0.0)
     going.take(0.0)
-    for i in range(count):
+    for i in range(ROLLBACKS):
         now = i * ROLLBACK_STEP
         saved = astray.save()
         for k in range(int(random.integers(1, LONGEST_WANDER + 1))):
@@ -65,9 +64,9 @@ def rollbacks(case: Case) -> Finding:
         going.take(now + ROLLBACK_STEP)
     made = going.record(calm.outcome, clock.process_time() - started)
     same = astray.save() == straight.save() and all(np.array_equal(made[name], calm[name]) for name in made.values)
-    said = [] if same else [f"the run with {count} rollbacks does not end in the state of the straight run"]
+    said = [] if same else [f"the run with {ROLLBACKS} rollbacks does not end in the state of the straight run"]
     made = replace(made, throughput=calm.throughput)
-    return finding(made, geometry(variant), said, {"rollbacks": float(count)})
+    return finding(made, geometry(variant), said, {"rollbacks": float(ROLLBACKS)})
 
 
 def ten_million_steps(case: Case) -> Finding:
@@ -75,7 +74,7 @@ def ten_million_steps(case: Case) -> Finding:
     pair = geometry(RELIEVED)
     turning = loaded(RELIEVED, Constant(SPEED), NOMINAL)
     inner = run(kernel(model(RELIEVED), case), turning, 4 * MESH_PERIOD, MESH_PERIOD).h
-    periods = int(INTERNAL_STEPS * case.part * inner / MESH_PERIOD) + 1
+    periods = int(INTERNAL_STEPS * inner / MESH_PERIOD) + 1
     before = _memory()
     made = run(kernel(model(RELIEVED), case), turning, periods * MESH_PERIOD, MESH_PERIOD)
     grown = _memory() - before - 2 * made.time.size * 8 * (len(made.values) + 4)
