@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib import rc_context
+
 from gearfmu.files import written_whole
 from gearfmu.report.style import COLOURS, MUTED, panels, styled
 
@@ -19,7 +21,7 @@ def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -
     rows: of gearfmu.study, one scene; slices: of the scene, drawn full, others thin.
     """
     written = []
-    with styled():
+    with styled(), rc_context({"svg.hashsalt": "study"}):
         figure, axes = panels((2.7, 2.4, 2.4))
         for name, panel in zip(QUANTITIES, axes, strict=True):
             draw(panel, rows, slices, name)
