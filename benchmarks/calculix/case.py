@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from deck import Placed, Problem, extruded, run_deck, torques, write_deck
+from ccx import run_deck, torques
+from deck import Placed, Problem, write_deck
 from gearfmu.geometry import GearGeometry, PairGeometry
 from section import Fineness, gear_plane
+from solid import extruded
 
 THIN = 1e-6  # m, half thickness that stands for plane stress
 
@@ -26,10 +28,10 @@ class Case:
     condition: str = "half_width"
     bores: str = "clamped"
     bore_radius: float | None = None
-    layers: int = 4
-    layer_growth: float = 0.65
+    layers: int = 1
+    layer_growth: float = 1.0
     fine: Fineness = field(default_factory=Fineness)
-    penalty: float = 1e17
+    penalty: float = 3e16
     element: str = "C3D20R"
 
     def levels(self, face_width: float) -> np.ndarray:
@@ -42,17 +44,19 @@ class Case:
 
 @dataclass(frozen=True)
 class Load:
-    """A position of the pair and what is asked there. turn: pinion's angle (rad) from where tooth 0 lies on +x;
-    te: (steps,) m displacements of the pinion along the line of action, r_b1·angle."""
+    """A position of the pair and what is done there. turn: pinion's angle (rad) from where tooth 0 lies on +x; te: (m)
+    displacement of the pinion along the line of action, r_b1·angle; margin: (m) how far beyond the ends of the path of
+    contact teeth may touch with their tip edges."""
 
     turn: float
-    te: Sequence[float]
+    te: float
+    margin: float = 0.0
 
 
 @dataclass(frozen=True)
 class Solution:
-    """line_load: (steps, 2) N/m from the torques of pinion and wheel bore. te: (steps,) m. nodes, elements: counts.
-    seconds: wall time of ccx."""
+    """line_load: (loads, 2) N/m, torque over base radius and width of pinion and wheel (equal for contact on the line
+    of action). te: (loads,) m. nodes, elements: counts. seconds: wall time of ccx."""
 
     te: np.ndarray
     line_load: np.ndarray
@@ -61,9 +65,9 @@ class Solution:
     seconds: float
 
     def te_at(self, line_load: float) -> float:
-        """te (m) at a line load (N/m): the polynomial through all steps."""
-        mean = self.line_load.mean(axis=1)
-        return float(np.polyval(np.polyfit(mean / line_load, self.te, len(mean) - 1), 1.0))
+        """te (m) at a line load (N/m) of the pinion: the polynomial through all loads."""
+        pinion = self.line_load[:, 0]
+        return float(np.polyval(np.polyfit(pinion / line_load, self.te, len(pinion) - 1), 1.0))
 
 
 def touching(pair: PairGeometry, turn: float, margin: float) -> dict[tuple[int, int], tuple[float, float]]:
@@ -101,22 +105,21 @@ def pitch_point_turn(pair: PairGeometry) -> float:
     return pair.path["C"] / pair.gears[0].r_b - pair.gears[0].psi_b - pair.alpha_wt
 
 
-def problem_of(case: Case, pair: PairGeometry, face_width: float, load: Load, margin: float = 0.0) -> Problem:
-    """The contact problem of a case at a position; every pair of teeth near the path of contact may touch."""
+def problem_of(case: Case, pair: PairGeometry, face_width: float, load: Load) -> Problem:
+    """The contact problem of a case; every pair of teeth near the path of contact may touch."""
     gears = [bored(gear, case.bore_radius) for gear in pair.gears]
-    pairs = touching(pair, load.turn, margin)
+    pairs = touching(pair, load.turn, load.margin)
     contacts = [{teeth[k]: rolls[k] for teeth, rolls in pairs.items()} for k in (0, 1)]
-    solids = [
-        extruded(gear_plane(gear, rolls, range(gear.z), case.fine), case.levels(face_width))
+    sections = [
+        gear_plane(gear, rolls, range(-(gear.z // 2), gear.z - gear.z // 2), case.fine)
         for gear, rolls in zip(gears, contacts, strict=True)
     ]
-    ratio = gears[0].r_b / gears[1].r_b
-    turns = [te / gears[0].r_b for te in load.te]
-    still = [0.0] * len(turns)
+    solids = [extruded(section, case.levels(face_width)) for section in sections]
+    phase = pair.wheel_phase - load.turn * gears[0].r_b / gears[1].r_b
     return Problem(
         gears=(
-            Placed("P", solids[0], np.zeros(2), load.turn, case.bores, turns),
-            Placed("W", solids[1], np.array([pair.a, 0.0]), pair.wheel_phase - load.turn * ratio, case.bores, still),
+            Placed("P", solids[0], np.zeros(2), load.turn, case.bores, load.te / gears[0].r_b),
+            Placed("W", solids[1], np.array([pair.a, 0.0]), phase, case.bores, 0.0),
         ),
         pairs=list(pairs),
         sides="both" if case.condition == "plane_strain" else "low",
@@ -130,16 +133,20 @@ def bored(gear: GearGeometry, radius: float | None) -> GearGeometry:
     return gear if radius is None else replace(gear, r_bore=radius)
 
 
-def solve(case: Case, pair: PairGeometry, face_width: float, load: Load, deck: Path, margin: float = 0.0) -> Solution:
-    """Write the deck, run ccx, read the bores' torques. RuntimeError when ccx gives up."""
-    problem = problem_of(case, pair, face_width, load, margin)
-    write_deck(problem, deck)
-    seconds = run_deck(deck)
-    half = case.levels(face_width)[-1]
-    base = np.array([gear.r_b for gear in pair.gears])
+def solve(case: Case, pair: PairGeometry, face_width: float, loads: Sequence[Load], folder: Path) -> Solution:
+    """Write a deck a load, run ccx, read the bores' torques. RuntimeError when ccx gives up."""
+    folder.mkdir(parents=True, exist_ok=True)
+    base, half = np.array([gear.r_b for gear in pair.gears]), case.levels(face_width)[-1]
+    line_load, seconds = [], 0.0
+    for number, load in enumerate(loads):
+        deck = folder / f"load_{number}.inp"
+        problem = problem_of(case, pair, face_width, load)
+        write_deck(problem, deck)
+        seconds += run_deck(deck)
+        line_load.append(torques(problem, deck.with_suffix(".dat")) / base / half)
     return Solution(
-        te=np.array(load.te),
-        line_load=torques(problem, deck.with_suffix(".dat")) / base / half,
+        te=np.array([load.te for load in loads]),
+        line_load=np.array(line_load),
         nodes=sum(len(gear.solid.nodes) for gear in problem.gears),
         elements=sum(len(gear.solid.elements) for gear in problem.gears),
         seconds=seconds,

@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from deck import require_ccx
+from ccx import require_ccx
 from gearfmu.files import written_whole
 from positions import POSITIONS, TORQUES, read
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from case import Case, Load, solve
-from deck import require_ccx
+from ccx import require_ccx
 from gearfmu.body import load_stage_bodies
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry
@@ -31,7 +31,7 @@ from section import Fineness
 POSITIONS = 12
 TORQUES = (80.0, 302.0, 600.0)  # N·m on the pinion
 MARGIN = 2.5e-3  # m: pairs as far beyond the ends of the path may touch with their tip edges
-CASE = Case("positions", bores="averaged", layers=2, layer_growth=0.5, fine=Fineness(patch=0.42e-3, size=0.05e-3))
+CASE = Case("positions", bores="averaged", fine=Fineness(patch=0.42e-3, size=0.05e-3))
 HERE = Path(__file__).parent
 
 
@@ -44,11 +44,10 @@ def te_of_gearfmu(spec: StageSpec) -> np.ndarray:
 def solved(spec: StageSpec, position: int, guess: np.ndarray, work: Path) -> list[dict[str, Any]]:
     """Rows of one position; guess (torques,) m: the displacements at which CalculiX is asked for the torque."""
     pair = PairGeometry.of(spec)
-    deck = work / f"position_{position:02d}" / "deck.inp"
-    deck.parent.mkdir(parents=True, exist_ok=True)
     turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
     width = spec.gears[0].face_width
-    solution = solve(CASE, pair, width, Load(turn, list(guess)), deck, MARGIN)
+    loads = [Load(turn, te, MARGIN) for te in guess]
+    solution = solve(CASE, pair, width, loads, work / f"position_{position:02d}")
     balance = (solution.line_load[:, 0] / solution.line_load[:, 1] - 1).tolist()
     return [
         {

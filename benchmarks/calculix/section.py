@@ -8,7 +8,7 @@ along the surface are each sector's own. The tip edge rounding is meshed as an a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,8 @@ CORE_DEPTH = 0.6  # depth of the root block under the root circle, modules
 class Fineness:
     """Elements of a section. patch: (m) half length of the fine surface zone; size: (m) of its elements; coarse: (m)
     largest surface element; growth from the patch outwards. thickness, depth_growth: elements from surface to tooth
-    middle. rim, root: elements of the loaded and of every other sector (root, far_root; far_flank)."""
+    middle. rim: from the root block to the bore. root: along half a space, far_root and far_flank in sectors without
+    contact. toothed: so many sectors beside a touched one have their tooth; farther ones end at the root circle."""
 
     patch: float = 0.25e-3
     size: float = 0.042e-3
@@ -42,8 +43,8 @@ class Fineness:
 @dataclass(frozen=True)
 class Plane:
     """nodes (N, 2) m, body frame. quads (E, 8) counter-clockwise, mid nodes last. bore: (B, 3) start, end, middle of
-    its edges. flank, patch: per fine tooth the edges (F, 3) of its sg = +1 surface from root form point to tip edge, and
-    those of them in the fine zone."""
+    its edges. flank, patch: by touched tooth the edges (F, 3) of its sg = +1 surface from root form point to tip edge,
+    and those of them in the fine zone."""
 
     nodes: np.ndarray
     quads: np.ndarray
@@ -138,8 +139,7 @@ def quadrilaterals(lattice: np.ndarray) -> np.ndarray:
 
 
 def gear_plane(gear: GearGeometry, contacts: Mapping[int, float], teeth: range, fine: Fineness) -> Plane:
-    """The section of `teeth` sectors (range(0, z) or a segment such as range(-2, 3)); `contacts`: roll (m) at which a
-    tooth of this gear is touched."""
+    """The section of the sectors `teeth`; contacts: roll (m) at which a tooth of this gear is touched."""
     cells, bore, flank, patch = [], [], {}, {}
     for tooth in teeth:
         near = min(abs((tooth - loaded + gear.z // 2) % gear.z - gear.z // 2) for loaded in contacts) <= fine.toothed
@@ -153,17 +153,26 @@ def gear_plane(gear: GearGeometry, contacts: Mapping[int, float], teeth: range, 
         if tooth in contacts:
             flank[tooth] = _edges(surface(gear, stations)) @ turn
             patch[tooth] = flank[tooth][np.diff(stations[::2]) < 1.2 * fine.size]
-    points = np.concatenate(cells)
-    index, first = _joined(points.reshape(-1, 2))
-    find = dict(zip(map(tuple, _keys(points.reshape(-1, 2)[first]).tolist()), range(len(first)), strict=True))
-    numbers = lambda edges: np.array([[find[tuple(key)] for key in _keys(e).tolist()] for e in edges])  # noqa: E731
+    nodes, (quads, bore_edges, *zones) = _joined(cells, bore, *flank.values(), *patch.values())
     return Plane(
-        nodes=points.reshape(-1, 2)[first],
-        quads=index.reshape(-1, 8),
-        bore=numbers(np.concatenate(bore)),
-        flank={tooth: numbers(edges) for tooth, edges in flank.items()},
-        patch={tooth: numbers(edges) for tooth, edges in patch.items()},
+        nodes=nodes,
+        quads=quads,
+        bore=bore_edges,
+        flank=dict(zip(flank, zones[: len(flank)], strict=True)),
+        patch=dict(zip(patch, zones[len(flank) :], strict=True)),
     )
+
+
+def _joined(*groups: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Nodes (N, 2), and each group's points (…, 2) as node numbers (…). Points within 10 nm of each other are one node;
+    the bins are shifted off the axes, where the rounding of turned points has either sign."""
+    groups = [np.concatenate(group) if isinstance(group, list) else group for group in groups]
+    points = np.concatenate([group.reshape(-1, 2) for group in groups])
+    bins = np.floor(points / 1e-8 + 0.37).astype(np.int64)
+    _, first, index = np.unique(bins, axis=0, return_index=True, return_inverse=True)
+    ends = np.cumsum([group.size // 2 for group in groups])[:-1]
+    parts = np.split(index.ravel(), ends)
+    return points[first], [part.reshape(group.shape[:-1]) for part, group in zip(parts, groups, strict=True)]
 
 
 def _turning(angle: float) -> np.ndarray:
@@ -174,14 +183,3 @@ def _turning(angle: float) -> np.ndarray:
 
 def _edges(line: np.ndarray) -> np.ndarray:
     return np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1)
-
-
-def _keys(points: np.ndarray) -> np.ndarray:
-    """Nodes closer than a nanometre are one: coordinates in units of 10 nm, shifted off the rounding limit of zero."""
-    return np.floor(points / 1e-8 + 0.37).astype(np.int64)
-
-
-def _joined(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Node number of every point, and the first point of every node."""
-    _, first, index = np.unique(_keys(points), axis=0, return_index=True, return_inverse=True)
-    return index.ravel(), first
