@@ -33,6 +33,17 @@ stability: $(STAMP)
 	$(RUN) -m gearfmu.cli stability --out benchmarks/stability.csv --jobs $(JOBS); failures=$$?; \
 	$(RUN) -m gearfmu.stability.page benchmarks/stability.csv docs/stability.md && exit $$failures
 
+## make study       what accuracy costs: tables and charts of docs/study.md in benchmarks/study (bodies alone: make study-bodies)
+study: $(STAMP)
+	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --jobs $(JOBS)
+	$(RUN) -m gearfmu.cli study pair_loaded pair_light --out benchmarks/study --table cuts
+	$(RUN) -m gearfmu.cli study pair_loaded --out benchmarks/study --table order --table limits
+	$(RUN) benchmarks/levels.py
+
+## make study-bodies  how far the shipped bodies are from refined ones (reduces six gears: up to an hour)
+study-bodies: $(STAMP)
+	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --table bodies
+
 ## make wheel       dist/*.whl with the linux64 and win64 kernels
 wheel: $(STAMP)
 	$(RUN) -m pip install --quiet build
@@ -61,4 +72,4 @@ $(STAMP): $(VENV)/.base
 	$(RUN) -m pip install --quiet -e ".[test]"
 	@touch $@
 
-.PHONY: help demo test test-full bench stability wheel models docs lint
+.PHONY: help demo test test-full bench study study-bodies stability wheel models docs lint

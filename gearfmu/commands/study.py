@@ -78,7 +78,12 @@ def _other(table: str, specs: Sequence[Any], out: Path, quick: bool) -> None:
     click.echo(tidy(rows, [name for name in vars(rows[0]) if name != "message"]))
     for message in dict.fromkeys(row.message for row in rows if getattr(row, "message", "")):
         click.echo(f"- {message}")
-    click.echo(path)
+    written = [path]
+    if table == "bodies":
+        from gearfmu.report.study import write_bodies_chart
+
+        written += write_bodies_chart([*kept, *rows], path)
+    click.echo(", ".join(map(str, written)))
 
 
 def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | None) -> list[Any]:

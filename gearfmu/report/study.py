@@ -86,3 +86,27 @@ def _rank(level: str) -> int:
 def _undated(suffix: str) -> dict[str, str | None]:
     """No date in the file: the same rows give the same bytes."""
     return {"Date": None} if suffix == ".svg" else {}
+
+
+def write_bodies_chart(rows: Sequence[Any], path: Path) -> list[Path]:
+    """Distance of level full to refined bodies as bars, SVG and PNG beside each other; rows: BodyRow of
+    gearfmu.study.refined."""
+    refined, scenes = list(dict.fromkeys(r.refined for r in rows)), list(dict.fromkeys(r.scene for r in rows))
+    written, width = [], 0.8 / len(scenes)
+    with styled(), rc_context({"svg.hashsalt": "bodies"}):
+        figure, axes = panels((1.7,) * len(QUANTITIES))
+        for name, panel in zip(QUANTITIES, axes, strict=True):
+            for k, scene in enumerate(scenes):
+                found = {r.refined: 100 * getattr(r, f"{name}_error") for r in rows if r.scene == scene}
+                place = [i + width * (k - (len(scenes) - 1) / 2) for i, text in enumerate(refined) if text in found]
+                panel.bar(place, [found[text] for text in refined if text in found], width, label=scene)
+            panel.set_yscale("log")
+            panel.yaxis.set_major_formatter("{x:g}")
+            panel.set_ylabel(f"{QUANTITIES[name]}, %")
+            panel.set_xticks(range(len(refined)), refined)
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        for suffix in (".svg", ".png"):
+            with written_whole(path.with_suffix(suffix)) as temporary:
+                figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=_undated(suffix))
+            written.append(path.with_suffix(suffix))
+    return written

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from gearfmu.errors import SpecError
-from gearfmu.report.study import write_chart
+from gearfmu.report.study import write_bodies_chart, write_chart
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.study import Job, ReferenceRow, Row, study
 from gearfmu.study.bench import Point, _Replay, measure, models_for, paired_price
+from gearfmu.study.cuts import cut_rows
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
+from gearfmu.study.limits import limit_rows
 from gearfmu.study.notes import notes
+from gearfmu.study.refined import BodyRow, body_rows, cheap
 from gearfmu.study.table import read_rows, tidy, write_rows
 
 COLUMNS = "scene,level,integrator,h_s,n_dyn,slices,te_error,te_mean_error,force_error,bearing_error,realtime_factor,cpu_ratio"
@@ -125,6 +128,35 @@ def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
     text = first[0].decode()
     assert first == again and first[1][:4] == b"\x89PNG"
     assert "full, rk45" in text and "rigid" in text and "5 µs" in text
+
+
+def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
+    rows = [BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
+            for scene in ("one", "other") for text in ("slices 10", "mesh × 1.3")]
+    svg, png = write_bodies_chart(rows, tmp_path / "bodies.csv")
+    text = svg.read_text(encoding="utf-8")
+    assert png.stat().st_size > 1000 and all(word in text for word in ("one", "other", "slices 10", "mesh × 1.3"))
+
+
+def test_cheap_refinements_of_a_few_milliseconds(scene: SceneSpec) -> None:
+    """Ten slices and a finer roll grid move level full by less than the level fast is off."""
+    rows = body_rows([scene], cheap(scene), h=5e-6)
+    assert [row.refined for row in rows] == ["slices 10", "rolls 64"] and all(row.cpu_s == 0 for row in rows)
+    assert all(0 < row.te_error < 0.05 and row.n_dyn == rows[0].n_dyn for row in rows)
+
+
+def test_a_higher_cut_has_more_modes_and_less_error(scene: SceneSpec) -> None:
+    rows, _ = cut_rows(scene, quick=True)
+    low, high = (min(rows, key=lambda r: r.n_dyn), max(rows, key=lambda r: r.n_dyn))
+    assert low.n_dyn < high.n_dyn and low.te_error > 3 * high.te_error and low.h_default_s >= high.h_default_s
+
+
+def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
+    rows = limit_rows(scene, ("fast",), (12, 6, 4, 1))
+    kinds = [row.kind for row in rows]
+    assert kinds == ["default", "above", "above", "above", "refused"] and "use h <=" in rows[-1].message
+    assert [row.gamma_lowered for row in rows] == [False, False, True, True, True]
+    assert rows[2].gamma > rows[3].gamma and rows[3].te_error > rows[0].te_error
 
 
 def test_committed_tables_have_the_columns(tmp_path: Path) -> None:
