@@ -85,8 +85,17 @@ class KernelUnit:
         """Inputs for the next step."""
         handle.buffer[:] = values
         if self.kernel.set_many(handle.references, handle.values):
+            self._refused(handle)
+
+    def _refused(self, handle: KernelHandle) -> None:
+        """Set one by one, which raises with the kernel's reason, and leave all as they were."""
+        before = [self.kernel.get(name) for name in handle.names]
+        try:
             for name, value in zip(handle.names, handle.buffer.tolist(), strict=True):
-                self.kernel.set(name, value)  # raises with the kernel's reason
+                self.kernel.set(name, value)
+        finally:
+            for name, value in zip(handle.names, before, strict=True):
+                self.kernel.set(name, value)
 
     def get(self, handle: KernelHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer."""

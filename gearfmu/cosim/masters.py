@@ -29,7 +29,8 @@ RATE = "_rate"  # a signal's rate is the input of its name with this ending
 @dataclass(frozen=True)
 class Wiring:
     """What an importer connects: motion inputs of the stage, rates of its signals, and the torque output that jacobi
-    holds over a step ("tau" or "tau_next"). An input that is not connected stays at zero."""
+    holds over a step ("tau" or "tau_next"). Start values of φ and w are given in any case; after them an input that is
+    not connected stays as it is."""
 
     motion: tuple[str, ...] = KEYS
     rates: bool = True
@@ -57,26 +58,33 @@ class _Exchange:
         self.signals = [signal for _, signal in cut.signals]
         self.rates = len(self.signals) if wiring.rates else 0
         known = [name for name, _ in cut.signals] + [name + RATE for name, _ in cut.signals][: self.rates]
-        motion = [f"{shaft}.{key}" for shaft in cut.shafts for key in wiring.motion]
-        self._places = [3 * k + KEYS.index(key) for k in range(len(cut.shafts)) for key in wiring.motion]
-        self._inputs: Any = cut.stage.resolve(motion + known)
         self._values = np.zeros(3 * len(cut.shafts) + len(known))
         self.motion, self._known = self._values[: 3 * len(cut.shafts)], self._values[3 * len(cut.shafts) :]
-        self._whole = wiring.motion == KEYS
+        self._start = self._some(tuple(dict.fromkeys(("phi", "w", *wiring.motion))), known)
+        self._inputs = self._some(wiring.motion, known)
+
+    def _some(self, keys: tuple[str, ...], known: list[str]) -> tuple[Any, np.ndarray | slice]:
+        """Handle of these motions of every shaft and all known inputs, and their places among the values."""
+        shafts = self.cut.shafts
+        names = [f"{shaft}.{key}" for shaft in shafts for key in keys]
+        places = [3 * k + KEYS.index(key) for k in range(len(shafts)) for key in keys]
+        places += range(3 * len(shafts), len(self._values))
+        whole = places == list(range(len(self._values)))
+        return self.stage.resolve(names + known), slice(None) if whole else np.array(places)
 
     def begin(self, time: float) -> None:
         """Initialise the drivetrain, then the stage at the drivetrain's motion."""
         self.ports.begin(time)
         self.ports.now(self.motion)
         self._know(time, 0.0)
-        self._send()
+        self._send(self._start)
         self.stage.initialize(time)
 
     def send(self, time: float, h: float) -> None:
         """`motion` and the signals of the step to the stage."""
         if self.signals:
             self._know(time, h)
-        self._send()
+        self._send(self._inputs)
 
     def _know(self, time: float, h: float) -> None:
         for k, signal in enumerate(self.signals):
@@ -85,9 +93,9 @@ class _Exchange:
             if self.rates:
                 self._known[len(self.signals) + k] = (last - first) / h if h else 0.0
 
-    def _send(self) -> None:
-        values = self._values if self._whole else np.concatenate([self.motion[self._places], self._known])
-        self.stage.set(self._inputs, values)
+    def _send(self, inputs: tuple[Any, np.ndarray | slice]) -> None:
+        handle, places = inputs
+        self.stage.set(handle, self._values[places])
 
     def torque(self, key: str) -> Any:
         """Handle of one torque output of every shaft."""
@@ -97,9 +105,8 @@ class _Exchange:
 class GsMean:
     """Master `gs_mean`."""
 
-    order = 2
-
     def __init__(self, cut: Cut) -> None:
+        self.order = 2 if _everything(cut.wiring) else 1
         self.exchange = _Exchange(cut)
         self.ports, self.stage = self.exchange.ports, cut.stage
         self._tau, self._mean = self.exchange.torque("tau"), self.exchange.torque("tau_mean")
@@ -124,7 +131,7 @@ class Jacobi:
         self.exchange = _Exchange(cut)
         self.ports, self.stage = self.exchange.ports, cut.stage
         self._held = self.exchange.torque(cut.wiring.held)
-        self.order = 2 if cut.wiring == Wiring(held="tau_next") else 1
+        self.order = 2 if _everything(cut.wiring) and cut.wiring.held == "tau_next" else 1
 
     def begin(self, time: float) -> None:
         """Initialise both units."""
@@ -139,6 +146,11 @@ class Jacobi:
         self.exchange.send(time, h)
         self.stage.step(time, h)
         self.ports.step(tau, time, h)
+
+
+def _everything(wiring: Wiring) -> bool:
+    """Whether all inputs of the stage are connected."""
+    return wiring.motion == KEYS and wiring.rates
 
 
 Master = GsMean | Jacobi
