@@ -64,7 +64,7 @@ class Record:
     @property
     def realtime_factor(self) -> float:
         """CPU seconds per simulated second, reading of the outputs included."""
-        return self.cpu_s / self.time[-1] if self.time[-1] else 0.0
+        return float(self.cpu_s / self.time[-1]) if self.time[-1] else 0.0
 
     @property
     def open_share(self) -> float:
