@@ -33,7 +33,8 @@ RELIEVED = Variant()
 
 
 def start_in_mid_backlash(case: Case) -> Finding:
-    """Teeth centred in the spaces at 1500 rpm, no contact; after 10 ms the load comes within 10 ms."""
+    """Teeth centred in the spaces at 1500 rpm, no contact; after 10 ms 302 N·m come within 10 ms. Contact neither
+    before nor lost for good: the mesh carries the torque to 1 %."""
     pair = geometry(RELIEVED)
     wind = Step(0.01, 0.02, mid_backlash(RELIEVED), winding(RELIEVED, NOMINAL))
     made = run(kernel(model(RELIEVED), case), Turning(RELIEVED, Constant(1500 * RPM), (wind,)), 0.1, H)
@@ -44,7 +45,8 @@ def start_in_mid_backlash(case: Case) -> Finding:
 
 
 def torque_reversal(case: Case) -> Finding:
-    """±torque_max within 5 ms through the backlash and back, at 2000 rpm."""
+    """±torque_max within 5 ms through the backlash and back, at 2000 rpm. Impacts on either side, and the torque
+    carried to 2 % by the coast flanks, then by the drive flanks."""
     pair, ends = geometry(RELIEVED), (winding(RELIEVED, LARGEST), winding(RELIEVED, -LARGEST))
     turn = Turning(
         RELIEVED, Constant(2000 * RPM), (Step(0.02, 0.025, *ends), Step(0.065, 0.07, ends[1], ends[0]))
@@ -78,7 +80,8 @@ def swinging(speed: float, frequency: float, acceleration: float, drag: float) -
 
 
 def light_load_rattle(case: Case) -> Finding:
-    """Idle rattle: the driver swings at 53 Hz, a loose wheel with a drag of 5 N·m: 40 % of the time without contact."""
+    """Idle rattle: the driver swings at 53 Hz, a loose wheel with a drag of 5 N·m: 40 % of the time without contact.
+    The impulse of the mesh is that of the drag to 1 %; contact-loss share, impact rate and band levels repeat."""
     variant, frequency, periods = Variant(ports=(DRIVEN, LOOSE)), 53.0, 40
     pair, step = geometry(variant), 1.0 / 53.0 / 188.0
     inputs, start = swinging(1500 * RPM, frequency, 6000.0, 5.0)
@@ -92,7 +95,8 @@ def light_load_rattle(case: Case) -> Finding:
 
 
 def overload(case: Case) -> Finding:
-    """From 302 N·m to ten times torque_max within 10 ms, at 1000 rpm. The local law goes on along its tangent there."""
+    """From 302 N·m to ten times torque_max within 10 ms, at 1000 rpm. The local law goes on along its tangent
+    there; the mesh carries the torque to 3 %."""
     pair, torque = geometry(RELIEVED), 10 * LARGEST
     wound = winding(RELIEVED, NOMINAL)
     wind = Step(0.005, 0.015, wound, wound * torque / NOMINAL)
@@ -103,7 +107,8 @@ def overload(case: Case) -> Finding:
 
 
 def hardly_any_load(case: Case) -> Finding:
-    """0.1 N·m of drag on a loose wheel, driver at 1000 rpm."""
+    """0.1 N·m of drag on a loose wheel, driver at 1000 rpm: nearly always apart, and yet the impulse of the mesh is
+    that of the drag to 3 %."""
     variant = Variant(ports=(DRIVEN, LOOSE))
     pair = geometry(variant)
     inputs, start = swinging(1000 * RPM, 1.0, 0.0, 0.1)
@@ -116,7 +121,7 @@ def hardly_any_load(case: Case) -> Finding:
 
 
 def standstill(case: Case) -> Finding:
-    """302 N·m at rest for 10 s: nothing may creep."""
+    """302 N·m at rest for 10 s: force and transmission error may not creep by more than 1e-4."""
     pair = geometry(RELIEVED)
     made = run(kernel(model(RELIEVED), case), loaded(RELIEVED, Constant(0.0), NOMINAL), 10.0, 1e-3)
     said, facts = [], {}
@@ -128,7 +133,7 @@ def standstill(case: Case) -> Finding:
 
 
 def high_speed(case: Case) -> Finding:
-    """302 N·m at 20 000 rpm."""
+    """302 N·m at 20 000 rpm: the mesh carries the torque to 1 %."""
     return _steady(RELIEVED, case, 20000 * RPM, NOMINAL)
 
 
@@ -145,7 +150,8 @@ def tip_contact(case: Case) -> Finding:
 
 
 def pitch_error(case: Case) -> Finding:
-    """One pinion tooth 50 µm out of its place: once a revolution it holds the pinion back."""
+    """One pinion tooth 50 µm out of its place: once a revolution it holds the pinion back by 20 µm or more, four
+    turns long."""
     variant, speed = Variant(pitch_error=50e-6), 1500 * RPM
     pair = geometry(variant)
     made = run(kernel(model(variant), case), loaded(variant, Constant(speed), NOMINAL), 0.2, H)
@@ -157,18 +163,19 @@ def pitch_error(case: Case) -> Finding:
 
 
 def soft_bearings(case: Case) -> Finding:
-    """Bearings of 1e6 N/m: the axes give way by 0.5 mm under 20 N·m."""
+    """Bearings of 1e6 N/m: the axes give way by 0.5 mm under 20 N·m, which the mesh carries to 1 %. (302 N·m would
+    pull the gears out of mesh.)"""
     variant = Variant(bearing=1e6)
     return _steady(variant, case, 1000 * RPM, 20.0)
 
 
 def stiff_bearings(case: Case) -> Finding:
-    """Bearings of 1e10 N/m under 302 N·m."""
+    """Bearings of 1e10 N/m under 302 N·m, which the mesh carries to 1 %."""
     return _steady(Variant(bearing=1e10), case, 2000 * RPM, NOMINAL)
 
 
 def jammed(case: Case) -> Finding:
-    """Both flanks at once: 20 µm of interference instead of backlash, 30 N·m."""
+    """20 µm of interference instead of backlash, 30 N·m: both flanks in contact all the time."""
     pair = replace(geometry(RELIEVED), backlash=INTERFERENCE)
     inputs = loaded(RELIEVED, Constant(1000 * RPM), 30.0)
     made = run(kernel(model(RELIEVED), case, {"backlash": INTERFERENCE}), inputs, 0.1, H)
