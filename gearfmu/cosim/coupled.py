@@ -20,14 +20,15 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """How a cut is stepped: master, communication step H in s, number of steps, what to record; progress is told the
-    done fraction."""
+    """How a cut is stepped: master, communication step H in s, number of steps, what to record and what of it to leave
+    out; progress is told the done fraction."""
 
     master: str
     step: float
     steps: int
     record: tuple[str, ...] = ("*",)
     progress: Progress | None = None
+    omit: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class _Run:
     def __init__(self, cut: Cut, plan: Plan) -> None:
         self.cut, self.plan = cut, plan
         self.master: Master = master(plan.master, cut)
-        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1)
+        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, plan.omit)
         known = cut.stage.outputs()
         self._fact_names = [
             name

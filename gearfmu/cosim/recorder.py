@@ -19,11 +19,13 @@ class Recorder:
     """Rows of one run: `take` at every communication point, `trace` at the end.
 
     patterns : names of stage outputs, and of drivetrain outputs with the prefix "drive."; "*" and "?" as in file names.
-    Raises CouplingError for a pattern that fits nothing.
+    omit : patterns of names that are left out nevertheless. Raises CouplingError for a pattern that fits nothing.
     """
 
-    def __init__(self, stage: Unit, drive: Unit, patterns: Sequence[str], points: int) -> None:
-        self._names = {"": _chosen("", stage, patterns), DRIVE: _chosen(DRIVE, drive, patterns)}
+    def __init__(
+        self, stage: Unit, drive: Unit, patterns: Sequence[str], points: int, omit: Sequence[str] = ()
+    ) -> None:
+        self._names = {prefix: _chosen(prefix, unit, patterns, omit) for prefix, unit in (("", stage), (DRIVE, drive))}
         everything = [prefix + name for prefix, unit in (("", stage), (DRIVE, drive)) for name in unit.outputs()]
         unfit = [pattern for pattern in patterns if not any(fnmatchcase(name, pattern) for name in everything)]
         if unfit:
@@ -56,9 +58,13 @@ class Recorder:
         return Trace(np.array(self._time), channels, meta)
 
 
-def _chosen(prefix: str, unit: Unit, patterns: Sequence[str]) -> dict[str, Variable]:
+def _chosen(prefix: str, unit: Unit, patterns: Sequence[str], omit: Sequence[str]) -> dict[str, Variable]:
     return {
         name: about
         for name, about in unit.outputs().items()
-        if any(fnmatchcase(prefix + name, pattern) for pattern in patterns)
+        if _fits(prefix + name, patterns) and not _fits(prefix + name, omit)
     }
+
+
+def _fits(name: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)

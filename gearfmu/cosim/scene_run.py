@@ -12,7 +12,7 @@ from gearfmu import fmu
 from gearfmu.body import load_stage_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
-from gearfmu.cosim.drivetrain import build, shafts_of, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.drivetrain import build, shafts_of, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.source import Source
@@ -94,7 +94,8 @@ def run_once(
     try:
         drive = PyUnit(build(scene, shafts), scene.coupling.micro_step or None)
         cut = Cut(stage, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts), wiring)
-        return run_coupled(cut, Plan(scene.coupling.master, scene.coupling.step, scene.steps, scene.record, progress))
+        coupling, omit = scene.coupling, stage_joints(scene, shafts)
+        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
     finally:
         stage.close()
 
