@@ -2,29 +2,33 @@
 
     python benchmarks/harness.py
 
-Scene clutch_closure, master gs_mean, communication step 100 µs. Medians over the steps: whole step; its share inside
-the stage's `step` (kernel and one call); harness: the difference and that one call, which is timed with nothing to do.
-Two recordings: everything (some fifty channels), and one channel. `trace`: making the trace of the kept rows, a step.
-Prints a table and writes benchmarks/harness.csv. Aim (issue 3, design): 20 µs with the FMU, 5 µs with the kernel.
+Scene clutch_closure, master gs_mean, communication step 100 µs; everything recorded (some seventy channels), or one.
+step, stage: medians over the steps of the whole step and of its share inside the stage's `step` (kernel and one call);
+harness: the median difference and that one call, which is timed with nothing to do. Parts, processor time of loops of
+their own: unit (set, step without kernel, get, log), drivetrain (motion ahead and step), signals. trace: what making
+the trace of the kept rows takes, per step.
+Prints a table and writes benchmarks/harness.csv. Aim (issue 3, design): harness 20 µs with the FMU, 5 µs with the
+kernel.
 """
 
 from __future__ import annotations
 
 import csv
-import platform
 import tempfile
 import time as clock
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearfmu import fmu
-from gearfmu.cosim.drivetrain import build, shafts_of, stage_signals, stage_start
+from gearfmu.cosim.drivetrain import build, shafts_of, stage_joints, stage_signals, stage_start
 from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.masters import Cut, master
+from gearfmu.cosim.ports import KEYS
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.recorder import Recorder
+from gearfmu.cosim.recorder import DRIVE, Recorder
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import load_scene
@@ -49,48 +53,79 @@ class Clocked:
         self.spent = clock.perf_counter_ns() - started
 
 
-def empty_call(stage: Any) -> float:
-    """Median time, ns, of one timed call of the stage's library with nothing to do."""
-    handle, spent = stage.resolve([]), []
-    address = np.zeros(1).ctypes.data
-    for _ in range(STEPS):
-        started = clock.perf_counter_ns()
-        if isinstance(stage, FmuUnit):
-            stage.read("Real", None, 0, address)
-        else:
-            stage.get(handle)
-        spent.append(clock.perf_counter_ns() - started)
-    return float(np.median(spent))
+def loop(call: Callable[[], object]) -> float:
+    """Processor time of a call, µs, mean of a loop, smallest of five."""
+    found = []
+    for _ in range(5):
+        started = clock.thread_time_ns()
+        for _ in range(STEPS):
+            call()
+        found.append(clock.thread_time_ns() - started)
+    return 1e-3 * min(found) / STEPS
 
 
-def measure(source: Source, recorded: str) -> dict[str, object]:
-    """One row: medians in µs."""
-    scene = load_scene("clutch_closure")
-    shafts = shafts_of(source.model.spec)
-    stage = source.unit({"level": "rigid", "slices": 1} | stage_start(scene, shafts))
-    timed, drive = Clocked(stage), PyUnit(build(scene, shafts))
-    chosen = master("gs_mean", Cut(timed, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts)))
-    recorder = Recorder(timed, drive, RECORDED[recorded], STEPS)
-    chosen.begin(0.0)
+def empty_call(stage: Any) -> Callable[[], object]:
+    """A call of the stage's library with nothing to do."""
+    if isinstance(stage, FmuUnit):
+        return lambda: stage.read("Real", None, 0, None)
+    handle = stage.resolve([])
+    return lambda: stage.get(handle)
+
+
+def run(chosen: Any, recorder: Recorder, timed: Clocked) -> tuple[float, float, float]:
+    """Medians over the steps, µs: whole step, inside the stage, outside."""
     whole, inside = np.zeros(STEPS), np.zeros(STEPS)
     for n in range(STEPS):
         started = clock.perf_counter_ns()
         chosen.step(n * STEP, STEP)
         recorder.take((n + 1) * STEP)
         whole[n], inside[n] = clock.perf_counter_ns() - started, timed.spent
-    started = clock.perf_counter_ns()
+    return tuple(1e-3 * float(np.median(values)) for values in (whole, inside, whole - inside))
+
+
+def measure(source: Source, recorded: str) -> dict[str, object]:
+    """One row: times in µs."""
+    scene = load_scene("clutch_closure")
+    shafts = shafts_of(source.model.spec)
+    stage = source.unit({"level": "rigid", "slices": 1} | stage_start(scene, shafts))
+    timed, drive = Clocked(stage), PyUnit(build(scene, shafts))
+    chosen = master("gs_mean", Cut(timed, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts)))
+    recorder = Recorder(timed, drive, RECORDED[recorded], STEPS, stage_joints(scene, shafts))
+    chosen.begin(0.0)
+    whole, inside, outside = run(chosen, recorder, timed)
+    empty = loop(empty_call(stage))
+    started = clock.thread_time_ns()
     channels = len(recorder.trace({}).channels)
-    trace = (clock.perf_counter_ns() - started) / STEPS
-    harness = float(np.median(whole - inside)) + empty_call(stage)
-    stage.close()
-    return {
+    trace = 1e-3 * (clock.thread_time_ns() - started) / STEPS
+    found = {
         "unit": "fmu" if source.fmu_path else "kernel",
         "channels": channels,
-        "step_us": round(1e-3 * float(np.median(whole)), 2),
-        "stage_us": round(1e-3 * float(np.median(inside)), 2),
-        "harness_us": round(1e-3 * harness, 2),
-        "trace_us": round(1e-3 * trace, 2),
-        "machine": platform.processor() or platform.machine(),
+        "step_us": whole,
+        "stage_us": inside,
+        "harness_us": outside + empty,
+        **parts(chosen, stage, empty, [n for n in recorder.trace({}).channels if not n.startswith(DRIVE)]),
+        "trace_us": trace,
+    }
+    stage.close()
+    return {key: round(value, 2) if isinstance(value, float) else value for key, value in found.items()}
+
+
+def parts(chosen: Any, stage: Any, empty: float, names: list[str]) -> dict[str, float]:
+    """What unit, drivetrain and signals cost of a step, µs."""
+    exchange, ports, time = chosen.exchange, chosen.ports, STEPS * STEP
+    inputs = stage.resolve([f"{shaft}.{key}" for shaft in exchange.cut.shafts for key in KEYS])
+    mean, log = exchange.torque("tau_mean"), stage.log(names, 5 * STEPS)
+    values, tau = exchange.motion.copy(), stage.get(mean).tolist()
+    given = loop(lambda: stage.set(inputs, values))
+
+    def drivetrain() -> None:
+        ports.ahead(time, STEP, exchange.motion)
+        ports.step(tau, time, STEP)
+
+    return {
+        "unit_us": given + empty + loop(lambda: stage.get(mean).tolist()) + loop(log.take),
+        "drivetrain_us": loop(drivetrain),
+        "signals_us": loop(lambda: exchange.send(time, STEP)) - given,
     }
 
 
