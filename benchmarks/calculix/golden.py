@@ -13,7 +13,7 @@ from typing import Any
 
 from ccx import require_ccx
 from gearfmu.files import written_whole
-from positions import POSITIONS, TORQUES, read
+from positions import POSITIONS, read
 
 HERE = Path(__file__).parent
 GOLDEN = HERE.parents[1] / "tests" / "reference" / "calculix_fzg_c.json"
@@ -22,15 +22,9 @@ GOLDEN = HERE.parents[1] / "tests" / "reference" / "calculix_fzg_c.json"
 def collected(version: str) -> dict[str, Any]:
     """The goldens: secants at the pitch point and te by torque over the positions, µm."""
     stiffness = {row["case"]: float(row["secant_N_per_mm_um"]) for row in read(HERE / "pitch_point.csv")}
-    rows = read(HERE / "positions.csv")
-    te = {
-        f"{torque:g}": {
-            round(POSITIONS * float(row["position"])): float(row["te_um"])
-            for row in rows
-            if float(row["torque_Nm"]) == torque
-        }
-        for torque in TORQUES
-    }
+    te: dict[str, dict[int, float]] = {}
+    for row in read(HERE / "positions.csv"):
+        te.setdefault(row["torque_Nm"], {})[round(POSITIONS * float(row["position"]))] = float(row["te_um"])
     return {
         "made_by": "python benchmarks/calculix/pitch_point.py; python benchmarks/calculix/positions.py; "
         "python benchmarks/calculix/golden.py",

@@ -1,11 +1,12 @@
 """Loaded transmission error over one pitch by CalculiX: 12 positions, three torques, beside what `gearfmu te` says.
 
-    python benchmarks/calculix/positions.py [POSITION …] [--work DIR] [--out positions.csv] [--compare]
+    python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--work DIR] [--out positions.csv] [--compare]
 
-The bores' mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does), the pinion turned to
-three angles a position; te at the torques asked is read off the parabola through the three points. Positions that the
-table has are not run again unless named. `--compare` runs nothing: it prints both codes side by side.
-Needs CalculiX's ccx (Debian: calculix-ccx); some minutes a position.
+The bores' mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does). The pinion is turned
+to where gearfmu expects the torque; from the torque that comes out (within a few per cent) te is moved to the one asked
+by gearfmu's tangent stiffness. What the table has is not run again unless its position is named. `--compare` runs
+nothing: it prints both codes side by side. Needs CalculiX's ccx (Debian: calculix-ccx); half a minute to some minutes a
+run.
 """
 
 from __future__ import annotations
@@ -23,42 +24,55 @@ from case import Case, Load, solve
 from ccx import require_ccx
 from gearfmu.body import load_stage_bodies
 from gearfmu.files import written_whole
-from gearfmu.geometry import PairGeometry
+from gearfmu.geometry import PairGeometry, hertz
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.stage import assemble, loaded_te
+from gearfmu.stage import TeResult, assemble, loaded_te
 from section import Fineness
 
 POSITIONS = 12
 TORQUES = (80.0, 302.0, 600.0)  # N·m on the pinion
 MARGIN = 2.5e-3  # m: pairs as far beyond the ends of the path may touch with their tip edges
-CASE = Case("positions", bores="averaged", fine=Fineness(patch=0.42e-3, size=0.05e-3))
+PATCH, SIZE = 1.35, 0.3  # fine zone and its elements, in Hertz half-widths of one pair that carries everything
 HERE = Path(__file__).parent
 
 
-def te_of_gearfmu(spec: StageSpec) -> np.ndarray:
-    """(torques, positions) m."""
+def te_of_gearfmu(spec: StageSpec) -> TeResult:
+    """Transmission error and tangent stiffness at all torques and positions."""
     model = assemble(spec, load_stage_bodies(spec))
-    return loaded_te(model, TORQUES, POSITIONS, rigid_bearings=True).te
+    return loaded_te(model, TORQUES, POSITIONS, rigid_bearings=True)
 
 
-def solved(spec: StageSpec, position: int, guess: np.ndarray, work: Path) -> list[dict[str, Any]]:
-    """Rows of one position; guess (torques,) m: the displacements at which CalculiX is asked for the torque."""
-    pair = PairGeometry.of(spec)
+def case_at(spec: StageSpec, pair: PairGeometry, torque: float) -> Case:
+    """Averaged bores; fine zone as wide as contact at this torque (N·m) needs it."""
+    materials = [gear.material for gear in spec.gears]
+    e_star = hertz.contact_modulus(
+        (materials[0].youngs_modulus, materials[1].youngs_modulus),
+        (materials[0].poisson_ratio, materials[1].poisson_ratio),
+    )
+    radius = hertz.largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
+    load = torque / pair.gears[0].r_b / spec.gears[0].face_width
+    half_width = hertz.half_width(load, radius, e_star)
+    return Case("positions", bores="averaged", fine=Fineness(patch=PATCH * half_width, size=SIZE * half_width))
+
+
+def solved(spec: StageSpec, ours: TeResult, torque: float, position: int, work: Path) -> dict[str, Any]:
+    """The table's row of one torque and position."""
+    pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES.index(torque)
     turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
-    width = spec.gears[0].face_width
-    loads = [Load(turn, te, MARGIN) for te in guess]
-    solution = solve(CASE, pair, width, loads, work / f"position_{position:02d}")
-    balance = (solution.line_load[:, 0] / solution.line_load[:, 1] - 1).tolist()
-    return [
-        {
-            "torque_Nm": f"{torque:g}",
-            "position": f"{position / POSITIONS:.6f}",
-            "te_um": f"{1e6 * solution.te_at(torque / width / pair.gears[0].r_b):.4f}",
-            "torque_imbalance": f"{imbalance:.1e}",
-            "seconds": f"{solution.seconds:.0f}",
-        }
-        for torque, imbalance in zip(TORQUES, balance, strict=True)
-    ]
+    load = Load(turn, ours.te[row, position], MARGIN)
+    folder = work / f"position_{position:02d}_{torque:g}"
+    solution = solve(case_at(spec, pair, torque), pair, width, [load], folder)
+    force, wheel = solution.line_load[0] * width
+    te = load.te + (torque / pair.gears[0].r_b - force) / ours.stiffness[row, position]
+    return {
+        "torque_Nm": f"{torque:g}",
+        "position": f"{position / POSITIONS:.6f}",
+        "te_um": f"{1e6 * te:.4f}",
+        "solved_te_um": f"{1e6 * load.te:.4f}",
+        "solved_torque_Nm": f"{force * pair.gears[0].r_b:.3f}",
+        "wheel_torque_over_ratio_Nm": f"{wheel * pair.gears[0].r_b:.3f}",
+        "seconds": f"{solution.seconds:.0f}",
+    }
 
 
 def read(path: Path) -> list[dict[str, Any]]:
@@ -80,7 +94,7 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
 
 def compare(spec: StageSpec, rows: list[dict[str, Any]]) -> None:
     """Print te of both codes, and mean and peak to peak over the positions that there are."""
-    ours = 1e6 * te_of_gearfmu(spec)
+    ours = 1e6 * te_of_gearfmu(spec).te
     print("torque_Nm,position,calculix_um,gearfmu_um,difference_%")
     for torque, curve in zip(TORQUES, ours, strict=True):
         here = [row for row in rows if float(row["torque_Nm"]) == torque]
@@ -99,6 +113,7 @@ def compare(spec: StageSpec, rows: list[dict[str, Any]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("positions", nargs="*", type=int, metavar="POSITION", help=f"0 … {POSITIONS - 1}")
+    parser.add_argument("--torque", type=float, action="append", choices=TORQUES, help="N·m on the pinion; may repeat")
     parser.add_argument("--stage", default="fzg_c")
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
     parser.add_argument("--out", type=Path, default=HERE / "positions.csv")
@@ -108,13 +123,19 @@ def main() -> None:
     if chosen.compare:
         return compare(spec, rows)
     require_ccx()
-    guess = te_of_gearfmu(spec)
-    done = {round(POSITIONS * float(row["position"])) for row in rows}
-    for position in chosen.positions or [k for k in range(POSITIONS) if k not in done]:
-        fresh = solved(spec, position, guess[:, position], chosen.work)
-        rows = [row for row in rows if round(POSITIONS * float(row["position"])) != position] + fresh
-        write(chosen.out, rows)
-        print(f"position {position}: {[row['te_um'] for row in fresh]} µm", file=sys.stderr, flush=True)
+    ours = te_of_gearfmu(spec)
+    done = {_place(row) for row in rows}
+    for torque in chosen.torque or TORQUES:
+        for position in chosen.positions or [k for k in range(POSITIONS) if (torque, k) not in done]:
+            fresh = solved(spec, ours, torque, position, chosen.work)
+            rows = [row for row in rows if _place(row) != (torque, position)] + [fresh]
+            write(chosen.out, rows)
+            print(f"{torque:g} N·m, position {position}: {fresh['te_um']} µm", file=sys.stderr, flush=True)
+
+
+def _place(row: dict[str, Any]) -> tuple[float, int]:
+    """Torque (N·m) and number of the position of a row."""
+    return float(row["torque_Nm"]), round(POSITIONS * float(row["position"]))
 
 
 if __name__ == "__main__":
