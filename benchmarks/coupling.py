@@ -9,7 +9,8 @@ Errors: rms of the difference over the whole scene, over the rms of the AC part 
 average: ringing and tooth mesh alone) and over the standard deviation of the torque. predicted_over_true: Richardson's
 estimate from H and H/2 (`gearfmu run --verify`) over the true error. lock_shift_s: of the communication point at which
 the clutch is seen locked. All runs of a group have the same internal step h.
-Prints the table, writes benchmarks/coupling.csv and docs/pictures/coupling.svg.
+Prints the table, writes benchmarks/coupling.csv, docs/pictures/coupling.svg and the table of docs/coupling.md;
+with the argument `page` the last two from the committed table.
 """
 
 from __future__ import annotations
@@ -27,13 +28,14 @@ from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.masters import Wiring
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
-from gearfmu.files import written_whole
+from gearfmu.files import write_text, written_whole
 from gearfmu.report.style import panels, styled
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.stage.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE, PICTURE = Path(__file__).with_suffix(".csv"), ROOT / "docs" / "pictures" / "coupling.svg"
+PAGE, BEGIN, END = ROOT / "docs" / "coupling.md", "<!-- begin: benchmarks/coupling.py -->\n", "<!-- end -->"
 STEPS = (25e-6, 50e-6, 100e-6, 200e-6, 250e-6, 500e-6, 1e-3)
 WHOLE = Window(0.0, steady=False)
 
@@ -158,47 +160,87 @@ def shown(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
 
 
-def draw(table: list[dict[str, object]]) -> None:
-    """Error over H of the lines that have a name here."""
-    named = {
-        ("inside", "gs_mean", "", ""): "gs_mean",
-        ("inside", "jacobi", "tau_next", ""): "jacobi, tau_next held",
-        ("inside", "jacobi", "tau", ""): "jacobi",
-        ("inside", "jacobi", "tau", "capacity_rate"): "jacobi, capacity held too",
-        ("outside", "gs_mean", "", ""): "gs_mean, clutch outside, cut at stiff shafts",
-        ("outside", "jacobi", "tau", ""): "jacobi, clutch outside, cut at stiff shafts",
-    }
+NAMED = {
+    ("inside", "gs_mean", "", ""): "gs_mean",
+    ("inside", "jacobi", "tau_next", ""): "jacobi, tau_next held",
+    ("inside", "jacobi", "tau", ""): "jacobi",
+    ("inside", "jacobi", "tau", "capacity_rate"): "jacobi, capacity held too",
+    ("outside", "gs_mean", "", ""): "gs_mean, cut at stiff shafts",
+    ("outside", "jacobi", "tau", ""): "jacobi, cut at stiff shafts",
+}
+Table = list[dict[str, str]]
+
+
+def line_of(row: dict[str, str]) -> tuple[str, ...]:
+    """What makes the line of a row."""
+    return tuple(row[key] for key in ("clutch", "master", "held", "unconnected"))
+
+
+def draw(table: Table) -> None:
+    """Error over H of the lines that have a name."""
     with styled():
         figure, (axes,) = panels((3.2,))
-        for (clutch, master, held, unconnected), label in named.items():
-            key = ("fast", clutch, master, held, unconnected)
+        for line, label in NAMED.items():
             points = [
-                (1e6 * row["H_s"], 100 * row["error_over_std"])
+                (1e6 * float(row["H_s"]), 100 * float(row["error_over_std"]))
                 for row in table
-                if (row["level"], row["clutch"], row["master"], row["held"], row["unconnected"]) == key
-                and row["outcome"] == OK
-                and row["error_over_std"] < 1.0
+                if row["level"] == "fast" and line_of(row) == line and row["outcome"] == OK
             ]
-            axes.loglog(*zip(*points, strict=True), "o--" if clutch == "outside" else "o-", label=label)
+            points = [point for point in points if point[1] < 100]
+            axes.loglog(*zip(*points, strict=True), "o--" if line[0] == "outside" else "o-", label=label)
         axes.set(xlabel="communication step in µs", ylabel="input shaft torque, rms error in % of its std")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         with written_whole(PICTURE) as temporary:
             figure.savefig(temporary, format="svg")
 
 
-def main() -> None:
-    """Measure, print, write."""
+def page(table: Table) -> str:
+    """The table of docs/coupling.md: errors at 100 µs and 1 ms, line by line."""
+    steps = ("0.0001", "0.001")
+    head = "| clutch | master | torque held | not connected | 100 µs: std | AC | 1 ms: std | AC |\n"
+    lines = [head, "|---|---|---|---|---|---|---|---|\n"]
+    fast = [row for row in table if row["level"] == "fast"]
+    for line in dict.fromkeys(map(line_of, fast)):
+        rows = {row["H_s"]: row for row in fast if line_of(row) == line}
+        errors = [percent(rows[step], key) for step in steps for key in ("error_over_std", "error_over_ac")]
+        lines.append("| " + " | ".join([*(f"`{part}`" if part else "" for part in line), *errors]) + " |\n")
+    return "".join(lines).replace("`inside`", "inside").replace("`outside`", "outside")
+
+
+def percent(row: dict[str, str], key: str) -> str:
+    """An error in %, two digits, or how the run ended."""
+    if row["outcome"] != OK:
+        return "stopped"
+    value = 100 * float(row[key])
+    return "unstable" if value > 1e3 else f"{value:.2g} %" if value < 10 else f"{value:.0f} %"
+
+
+def measured() -> Table:
+    """All lines, printed as they come, written at the end."""
     table = []
     for group, lines, steps in PLAN:
         for line in rows(group, lines, steps):
-            table.append({column: line.get(column) for column in COLUMNS})
-            print("  ".join(shown(line.get(column)) for column in COLUMNS), flush=True)
+            table.append({column: shown(line.get(column)) for column in COLUMNS})
+            print("  ".join(table[-1].values()), flush=True)
     with written_whole(FILE) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
-        writer.writerows({column: shown(value) for column, value in line.items()} for line in table)
+        writer.writerows(table)
+    return table
+
+
+def main() -> None:
+    """Measure (or read), print, write."""
+    if sys.argv[1:] == ["page"]:
+        with open(FILE, newline="", encoding="utf-8") as file:
+            table = list(csv.DictReader(file))
+    else:
+        table = measured()
     draw(table)
+    text = PAGE.read_text(encoding="utf-8")
+    start, end = text.index(BEGIN) + len(BEGIN), text.index(END)
+    write_text(PAGE, text[:start] + page(table) + text[end:])
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
