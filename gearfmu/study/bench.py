@@ -170,7 +170,7 @@ def default_step(scene: SceneSpec, model: StageModel, point: Point) -> float:
     return measure(scene.model_copy(update={"duration": scene.coupling.step, "settle": 0.0}), model, point).h
 
 
-class _Replay:
+class Replay:
     """A kernel at the settled state of a recording, stepped in chunks."""
 
     def __init__(self, recording: Recording) -> None:
@@ -219,7 +219,7 @@ def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
     processor seconds. Both ran the same scene; NaN for a run that stopped early."""
     if run.outcome != OK or base.outcome != OK:
         return Price(float("nan"), float("nan"))
-    one, other = _Replay(run.recording), _Replay(base.recording)
+    one, other = Replay(run.recording), Replay(base.recording)
     spent, steps = np.zeros(2), 0
     while one.left and spent[0] < looked_at:
         count = min(CHUNK, one.left)

@@ -13,7 +13,7 @@ from gearfmu.study.ladder import base_point, fitting
 from gearfmu.study.norm import errors
 from gearfmu.study.reference import Reference, make_reference
 
-CUTS = (15e3, 25e3, 35e3, 50e3, 60e3, 70e3, 85e3, 100e3, 120e3, 150e3, 200e3)  # Hz
+CUTS = (15e3, 35e3, 50e3, 70e3, 85e3, 100e3, 120e3, 150e3, 200e3)  # Hz
 STEPS = (10e-6, 6.7e-6, 5e-6, 2.5e-6)  # s
 
 

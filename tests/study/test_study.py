@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gearfmu import cli
 from gearfmu.errors import SpecError
 from gearfmu.report.study import write_bodies_chart, write_chart
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.study import Job, ReferenceRow, Row, study
-from gearfmu.study.bench import Point, _Replay, measure, models_for, paired_price
+from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.cuts import cut_rows
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
 from gearfmu.study.limits import limit_rows
@@ -63,11 +64,12 @@ def test_a_study_goes_on_where_it_stopped(made: tuple[Path, tuple[Row, ...]], sc
 
 
 def test_rows_of_another_kernel_are_measured_anew(scene: SceneSpec, tmp_path: Path) -> None:
+    """In two processes."""
     other = Row(scene.name, "rigid", "dg4", fitting(20e-6, 7.5e-6), 0, 5, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0)
     write_rows(tmp_path / "study.csv", Row, [other, ROW])
     (tmp_path / "study.json").write_text(json.dumps({scene.name: {"identity": "of before"}}))
     short = scene.model_copy(update={"duration": 3e-3, "settle": 1e-3})
-    rows = study(Job(short, tmp_path, defaults=True)).rows
+    rows = study(Job(short, tmp_path, defaults=True, workers=2)).rows
     assert len(rows) == 4 and all(row.te_error < 1.0 for row in rows)
     assert ROW in read_rows(tmp_path / "study.csv", Row), "rows of other scenes stay"
 
@@ -76,7 +78,7 @@ def test_a_replay_is_the_run(scene: SceneSpec) -> None:
     """What is timed is what was measured: the replay ends in the state of the run."""
     model = models_for(scene)
     run = measure(scene, model, Point("fast", h=5e-6))
-    replay = _Replay(run.recording)
+    replay = Replay(run.recording)
     steps = replay.left
     replay.chunk(steps)
     assert steps == round((scene.duration - scene.settle) / scene.coupling.step) and replay.left == 0
@@ -128,6 +130,22 @@ def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
     text = first[0].decode()
     assert first == again and first[1][:4] == b"\x89PNG"
     assert "full, rk45" in text and "rigid" in text and "5 µs" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["pair_loaded"], cli.USAGE_ERROR, "--out"),
+        (["--out", "x"], cli.USAGE_ERROR, "SCENE"),
+        (["pair_loaded", "--out", "x", "--table", "costs"], cli.USAGE_ERROR, "bodies"),
+        (["pair_loadet", "--out", "x"], 1, "pair_loaded"),
+    ],
+)
+def test_wrong_usage_names_what_there_is(
+    arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.outcome(["study", *arguments]) == code and words in capsys.readouterr().err
+    assert not Path("x").exists()
 
 
 def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
