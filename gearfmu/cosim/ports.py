@@ -84,6 +84,7 @@ class SmoothPorts(Ports):
         """As `Ports.ahead`."""
         unit = self._unit
         if not unit.in_one_step(h):
+            self._foreseen = None
             super().ahead(time, h, out)
             return
         if h != self._h:
