@@ -1,0 +1,112 @@
+"""The work–precision chart of a study: error against processor time per simulated second."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+
+from gearfmu.files import written_whole
+from gearfmu.report.style import COLOURS, MUTED, panels, styled
+
+QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
+MARKS = {"rk45": "s", "dg4": "o"}
+
+
+def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -> list[Path]:
+    """SVG and PNG beside each other at `path` with the suffix replaced; returns both.
+
+    rows: of gearfmu.study, one scene; slices: of the scene, drawn full, others thin.
+    """
+    written = []
+    with styled(), rc_context({"svg.hashsalt": "study"}):
+        figure, axes = panels((2.7, 2.4, 2.4))
+        for name, panel in zip(QUANTITIES, axes, strict=True):
+            draw(panel, rows, slices, name)
+        axes[0].set_title(title, loc="left")
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axes[-1].set_xlabel("processor time of the stage per simulated second")
+        for suffix in (".svg", ".png"):
+            target = path.with_suffix(suffix)
+            with written_whole(target) as temporary:
+                figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=_undated(suffix))
+            written.append(target)
+    return written
+
+
+def draw(panel: Any, rows: Sequence[Any], slices: int, name: str) -> None:
+    """One quantity (te, force, bearing) of the rows into a matplotlib panel."""
+    lines: dict[tuple[str, str, int], list[Any]] = {}
+    for row in rows:
+        if row.realtime_factor > 0 and getattr(row, f"{name}_error") > 0:
+            lines.setdefault((row.level, row.integrator, row.slices), []).append(row)
+    kinds = list(dict.fromkeys(key[:2] for key in sorted(lines, key=lambda key: _rank(key[0]))))
+    for key, line in sorted(lines.items(), key=lambda item: _rank(item[0][0])):
+        own = key[2] == slices
+        line.sort(key=lambda row: row.h_s)
+        time, error = [r.realtime_factor for r in line], [100 * getattr(r, f"{name}_error") for r in line]
+        colour = COLOURS[kinds.index(key[:2]) % len(COLOURS)]
+        style = {"marker": MARKS.get(key[1], "^"), "markersize": 4.0, "label": _label(key)} if own else {"alpha": 0.35}
+        panel.loglog(time, error, color=colour, linewidth=1.2 if own else 0.7, **style)
+        if own and name == "te":
+            _write_steps(panel, line, time, error)
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
+    panel.set_ylabel(f"{QUANTITIES[name]}, %")
+
+
+def _write_steps(panel: Any, line: list[Any], time: list[float], error: list[float]) -> None:
+    """The step beside the first and the last point of a line."""
+    for k in sorted({0, len(line) - 1}):
+        panel.annotate(
+            f"{1e6 * line[k].h_s:.3g} µs",
+            (time[k], error[k]),
+            textcoords="offset points",
+            xytext=(4, 4),
+            color=MUTED,
+            fontsize=7,
+        )
+
+
+def _label(key: tuple[str, str, int]) -> str:
+    level, integrator, _ = key
+    if level == "paper":
+        return f"paper: truncated modes, {integrator}"
+    return level if integrator == "dg4" else f"{level}, {integrator}"
+
+
+def _rank(level: str) -> int:
+    order = ("rigid", "fast", "standard", "full", "paper")
+    return order.index(level) if level in order else len(order)
+
+
+def _undated(suffix: str) -> dict[str, str | None]:
+    """No date in the file: the same rows give the same bytes."""
+    return {"Date": None} if suffix == ".svg" else {}
+
+
+def write_bodies_chart(rows: Sequence[Any], path: Path) -> list[Path]:
+    """Distance of level full to refined bodies as bars, SVG and PNG beside each other; rows: BodyRow of
+    gearfmu.study.refined."""
+    refined, scenes = list(dict.fromkeys(r.refined for r in rows)), list(dict.fromkeys(r.scene for r in rows))
+    written, width = [], 0.8 / len(scenes)
+    with styled(), rc_context({"svg.hashsalt": "bodies"}):
+        figure, axes = panels((1.7,) * len(QUANTITIES))
+        for name, panel in zip(QUANTITIES, axes, strict=True):
+            for k, scene in enumerate(scenes):
+                found = {r.refined: 100 * getattr(r, f"{name}_error") for r in rows if r.scene == scene}
+                place = [i + width * (k - (len(scenes) - 1) / 2) for i, text in enumerate(refined) if text in found]
+                panel.bar(place, [found[text] for text in refined if text in found], width, label=scene)
+            panel.set_yscale("log")
+            panel.yaxis.set_major_formatter("{x:g}")
+            panel.set_ylabel(f"{QUANTITIES[name]}, %")
+            panel.set_xticks(range(len(refined)), refined)
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        for suffix in (".svg", ".png"):
+            with written_whole(path.with_suffix(suffix)) as temporary:
+                figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=_undated(suffix))
+            written.append(path.with_suffix(suffix))
+    return written
