@@ -1,42 +1,109 @@
-"""Linearised mesh mode of a stage and the contact damping that gives it 3 % of critical: rigid gears on their bearings, tangent mesh stiffness of `te` averaged over a pitch.
+"""Linearised mesh mode of a stage and the contact damping that gives it 3 % of critical: rigid gears on their bearings,
+the tangent mesh stiffness of `te` averaged over a pitch, with modal damping in the flexible part and the dashpots across
+the contacts' own paths (residual beyond all stored modes and local law, docs/theory.md 2.5).
 
     python benchmarks/mesh_mode.py [STAGE] [TORQUE_NM]
 """
+
 from __future__ import annotations
 
 import sys
 
 import numpy as np
-from scipy.linalg import eigh
+from numpy.polynomial.legendre import Legendre
+from scipy.linalg import eig
+from scipy.optimize import brentq
 
-from gearfmu.body import load_body
+from gearfmu.body import ReducedBody, load_stage_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.library import model_folder
-from gearfmu.spec.stage import load_stage
+from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import assemble, loaded_te
 
 RATIO = 0.03
+CLOSING = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion's axis, r_b φ; wheel's axis, r_b φ
 
 
-def mesh_mode(stage: str, torque: float) -> tuple[float, float, float]:
-    """Frequency (Hz) of the mode with most mesh deflection, its mesh stiffness (N/m) and the dashpot (N·s/m²) per tooth pair and metre of face width."""
+def strip_weights(slices: int, functions: int) -> np.ndarray:
+    """(slices, functions): load of each slice on the width functions."""
+    edges = np.linspace(-1, 1, slices + 1)
+    integral = [Legendre.basis(a).integ() for a in range(functions)]
+    return np.array(
+        [
+            [(2 * a + 1) * (p(high) - p(low)) / (high - low) for a, p in enumerate(integral)]
+            for low, high in zip(edges[:-1], edges[1:], strict=True)
+        ]
+    )
+
+
+def residual_path(body: ReducedBody, slices: int) -> float:
+    """Deflection of a tooth's flank beyond all stored modes under 1 N shared evenly by the slices, mean over the roll."""
+    weights = strip_weights(slices, body.flank_rows.shape[2]).mean(axis=0)
+    omega2 = (2 * np.pi * body.frequency) ** 2
+    rows = body.flank_rows[0]
+    beyond = body.static_ff[0, 0, 0].diagonal(axis1=0, axis2=1).transpose(2, 0, 1)  # (rolls, functions, functions)
+    beyond = beyond - np.einsum("ian,ibn->iab", rows / omega2, rows)
+    return float(np.einsum("a,iab,b->i", weights, beyond, weights).mean())
+
+
+def local_path(spec: StageSpec, force: float) -> float:
+    """Tangent of the local law (theory, eq. 7) for one tooth pair that carries `force`, both bodies, m/N."""
+    pair = PairGeometry.of(spec)
+    rolls = [np.sqrt(gear.r**2 - gear.r_b**2) for gear in pair.gears]
+    width = min(gear.face_width for gear in spec.gears)
+    local = [2 * (1 - g.material.poisson_ratio**2) / (np.pi * g.material.youngs_modulus) for g in spec.gears]
+    half_width = np.sqrt(2 * sum(local) * force / width / sum(1 / roll for roll in rolls))
+    terms = [c * (np.log(4 * g.body.strip_half_width / half_width) - 1.5) for c, g in zip(local, spec.gears, strict=True)]
+    return sum(terms) / width
+
+
+def mesh_mode(stage: str, torque: float) -> dict[str, float]:
+    """Frequency (Hz), mesh stiffness (N/m), compliance of a contact's own path (m/N) and the dashpot (N·s/m²) for RATIO."""
     spec = load_stage(stage)
-    bodies = [load_body(model_folder(spec) / f"{gear.name}.h5") for gear in spec.gears]
+    bodies = load_stage_bodies(spec)
     result = loaded_te(assemble(spec, bodies), [torque], positions=64, rigid_bearings=True)
-    k, pairs = result.stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
-    inertia = [body.inertia[2, 2] / gear.r_b**2 for body, gear in zip(bodies, PairGeometry.of(spec).gears, strict=True)]
-    bearings = [gear.bearing.stiffness for gear in spec.gears]
-    closing = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion's axis, r_b φ; wheel's axis, r_b φ
-    stiffness = k * np.outer(closing, closing) + np.diag([bearings[0], 0, bearings[1], 0])
-    omega2, modes = eigh(stiffness, np.diag([bodies[0].mass, inertia[0], bodies[1].mass, inertia[1]]))
-    deflection = (closing @ modes) ** 2
-    mode = np.argmax(k * deflection / np.maximum(omega2, 1.0) * (omega2 > 1.0))
-    omega = np.sqrt(omega2[mode])
-    return omega / (2 * np.pi), k, 2 * RATIO * omega / deflection[mode] / (pairs * spec.gears[0].face_width)
+    stiffness, pairs = result.stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
+    gears = PairGeometry.of(spec).gears
+    path = sum(residual_path(body, spec.contact.slices) for body in bodies)
+    path += local_path(spec, torque / gears[0].r_b / pairs)
+    mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])
+    width = min(gear.face_width for gear in spec.gears)
+
+    def mode(damping: float) -> complex:
+        """Eigenvalue (1/s) of the mode with most mesh deflection."""
+        s = 1j * np.sqrt(stiffness / mass.min())
+        for _ in range(40):
+            omega = abs(s)
+            flexible = (1 / stiffness - path / pairs) / (1 + 2 * spec.gears[0].modal_damping * s / omega)
+            closing = 1 / (flexible + path / pairs / (1 + s * damping * width * path))
+            matrix = closing * np.outer(CLOSING, CLOSING).astype(complex)
+            for i, (gear, body) in enumerate(zip(spec.gears, bodies, strict=True)):
+                c = 2 * gear.bearing.damping_ratio * np.sqrt(gear.bearing.stiffness * body.mass)
+                matrix[2 * i, 2 * i] += gear.bearing.stiffness + s * c
+            values, shapes = eig(matrix, np.diag(mass))
+            share = np.abs(CLOSING @ (shapes / np.sqrt(np.einsum("ij,i,ij->j", shapes.conj(), mass, shapes)))) ** 2
+            s = 1j * np.sqrt(values[np.argmax(share * (np.abs(values) > 1e6))])
+            s = s if s.imag > 0 else -s
+        return complex(s)
+
+    def ratio(damping: float) -> float:
+        s = mode(damping)
+        return -s.real / abs(s)
+
+    damping = brentq(lambda c: ratio(c) - RATIO, 0.0, 1e6)
+    return {
+        "frequency": abs(mode(damping)) / (2 * np.pi),
+        "stiffness": stiffness,
+        "path": path,
+        "without": ratio(0.0),
+        "damping": damping,
+    }
 
 
 if __name__ == "__main__":
-    chosen, load = (sys.argv[1:] + ["fzg_c", "302"][len(sys.argv) - 1:])[:2]
-    frequency, k_mesh, damping = mesh_mode(chosen, float(load))
-    print(f"{chosen} at {load} N·m: mesh mode {frequency / 1e3:.2f} kHz, mean mesh stiffness {k_mesh * 1e-6:.1f} N/µm, "
-          f"contact damping for {RATIO:.0%} of critical {damping:.3g} N·s/m²")
+    chosen, load = (sys.argv[1:] + ["fzg_c", "302"][len(sys.argv) - 1 :])[:2]
+    found = mesh_mode(chosen, float(load))
+    print(
+        f"{chosen} at {load} N·m: mesh mode {found['frequency'] / 1e3:.2f} kHz, mean mesh stiffness "
+        f"{found['stiffness'] * 1e-6:.1f} N/µm, own path of a contact {1e-6 / found['path']:.0f} N/µm; damping ratio without "
+        f"contact dashpots {found['without']:.2%}; contact damping for {RATIO:.0%} of critical {found['damping']:.3g} N·s/m²"
+    )

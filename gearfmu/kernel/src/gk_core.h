@@ -27,7 +27,8 @@ enum {
     MAX_MODES = 6000,
     OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual table */
     MAX_CONTACTS = MAX_PAIRS * MAX_SLICES,
-    CACHE = 4         /* coefficient sets kept */
+    CACHE = 4,        /* coefficient sets kept */
+    GAMMAS = 25       /* γ is known at h·2^(−i/4) */
 };
 
 /* bilateral rows of the small system; they exist when `live` */
@@ -135,7 +136,7 @@ struct gk_setup {
     gk_effects on;
     int slices;
     int strips;                  /* contact rows of a place: slices, or half of them where both halves of the face width do the same */
-    double h, gamma, allowance, damping, width; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal; width: common face width */
+    double h, gamma_at[GAMMAS], allowance, damping, width; /* allowance: what opens the coast flanks beyond the teeth's own numbers, along the normal; width: common face width */
     double strip_width[MAX_SLICES], strip_term, square_low, square_high, log_low, log_high; /* bounds of b² in the local law, and their ln */
     double inverse_mass[RIGID];
     int link[LINKS];             /* live bilateral rows */
@@ -154,7 +155,7 @@ typedef struct gk_key { int32_t flank, tooth; } gk_key; /* flank 0 drive, 1 coas
 
 typedef struct gk_memory { /* what a tooth pair remembers from the last step */
     gk_key key;
-    double force[MAX_SLICES], gap[MAX_SLICES], dash[MAX_SLICES], end[MAX_SLICES]; /* λ0; s0; η_d of the last step and f_d at its end */
+    double force[MAX_SLICES], gap[MAX_SLICES], dash[MAX_SLICES], end[MAX_SLICES]; /* λ0; s0; η_d of the last step, f_d at its end */
 } gk_memory;
 
 typedef struct gk_motion { double phi, w, a; } gk_motion;
@@ -205,8 +206,9 @@ typedef struct gk_local { double c, a, beta, low, high, q_low, c_low, phi_log, p
 typedef struct gk_approach { double delta, slope, energy; } gk_approach; /* δ(λ), δ′, ∫ λ dδ */
 
 /* Unknown forces of one step: contacts, then links. Closed contact, bilateral row, sticking clutch:
- *     g + D z + A (λ + f_d) + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction,   f_d = ½η_d + (β − ½)(η_d − η_d0): the dashpot's force at the end of the step
- * D: what a force in the step does to the gaps; P + δ: the path that the row's own dashpot is parallel to; A: everything else that has no mass and carries the whole force. */
+ *     g + D z + Aλ + lag + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction
+ * D: what a force in the step does to the gaps; P + δ: the path that the row's own dashpot is parallel to; A = Q − K: everything else that has no mass, Q, less the κ part.
+ * lag = Q f_d − ½K η_d: what the dashpots' force at the end of the step, f_d = ½η_d + (β − ½)(η_d − η_d0), deflects; the κ part of its mean. */
 typedef struct gk_system {
     int contacts, n, stride, strips;
     gk_row_kind kind[MAX_ROWS];
@@ -220,7 +222,7 @@ typedef struct gk_system {
     double width[MAX_CONTACTS];
     gk_local local[MAX_PAIRS];        /* law of a place, per metre */
     double rigid[RIGID][MAX_STRIDE];  /* derivative of the rows by each rigid coordinate */
-    double *D, *A;                    /* (n, stride) symmetric */
+    double *D, *A, *Q;                /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
     double *J, *L;                    /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor */
     double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_ROWS]; /* P: strips of a place, (strips, strips); links: 1/k */
 
@@ -228,8 +230,8 @@ typedef struct gk_system {
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
     double direction[MAX_STRIDE], alpha;
-    double beta[MAX_STRIDE], end[MAX_STRIDE];         /* β: ¾ where the last step had a dashpot force too, else ½; f_d */
-    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE]; /* D z, Aλ, A f_d */
+    double beta[MAX_STRIDE], end[MAX_STRIDE];               /* β: ¾ where the last step had a dashpot force too, else ½; f_d */
+    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE]; /* D z, Aλ, Q f_d − ½K η_d */
     double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     gk_approach law[MAX_CONTACTS];    /* at the present λ */
     double slope[MAX_CONTACTS];       /* δ′ in the tangent */
@@ -256,8 +258,8 @@ struct gk_work {
     double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
-    double matrix[4 * MAX_STRIDE * MAX_STRIDE];   /* D, A, J, L */
-    gk_table table[2];                            /* of each gear: D and C′ of one step */
+    double matrix[5 * MAX_STRIDE * MAX_STRIDE];   /* D, A, Q, J, L */
+    gk_table table[2];                            /* of each gear: D and −K of one step */
     double table_h, table_gamma;                  /* which step; 0: none yet */
 };
 
@@ -291,6 +293,7 @@ void gk_solve_plain(gk_system *s);
 void gk_solve_settle(gk_system *s);
 void gk_solve_set(gk_system *s, int row, double force);
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
+void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag);
 void gk_solve_path(const gk_system *s, const double *x, double *y);
 double gk_solve_stored(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the massless part under it: their sum is the distance that is left */
@@ -307,6 +310,7 @@ void gk_strips_fill(const gk_model *model, gk_setup *setup);
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out);
 /* gk_limit.c */
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
+double gk_limit_gamma(const gk_setup *setup, double h);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);
 /* gk_wide.c */
 gk_step_function *gk_wide_step(int widest);

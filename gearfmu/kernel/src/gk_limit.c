@@ -1,5 +1,6 @@
-/* Which internal step: μ′ = 1 − λ_min(C^−½ C′ C^−½) over the roll positions (docs/theory.md, 3.5). Energy is conserved while C′ > 0, accuracy wants μ′ ≤ ½.
- * Default h: the largest with μ′(h′) ≤ ½ for all h′ ≤ h, at most h_max of the stage and 1/40 of the mesh period at speed_max. A larger h lowers γ; above 1/8 of the period it is refused. */
+/* Which internal step: μ′ = largest eigenvalue of C⁻¹K over the roll positions (docs/theory.md, 3.5), C the compliance that answers at once: outside the paths of the dashpots all of it, in them what the
+ * dashpots let move within a step, S(1 + ΓS)⁻¹. Energy is conserved while C′ > 0, accuracy wants μ′ ≤ ½. Modes above ωh = 1.2 have no κ, so μ′ goes up and down with h.
+ * Default h: the largest with μ′ ≤ ½, at most h_max of the stage and 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = ½; above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "gk_core.h"
 
@@ -46,11 +47,49 @@ static double largest(const double *L, const double *K, int n)
     return value;
 }
 
+/* X = S (1 + Γ S)⁻¹ of a block (n, n), by Gauss elimination of (1 + S Γ) X = S */
+static void yielding(const double *S, const double *damping, int n, double *X)
+{
+    double B[MAX_SLICES * MAX_SLICES];
+    for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * damping[i % n] + (i / n == i % n);
+    for (int k = 0; k < n; k++)
+        for (int i = 0; i < n; i++) {
+            if (i == k) continue;
+            const double f = B[i * n + k] / B[k * n + k];
+            for (int j = 0; j < n; j++) B[i * n + j] -= f * B[k * n + j], X[i * n + j] -= f * X[k * n + j];
+        }
+    for (int i = 0; i < n * n; i++) X[i] /= B[i / n * n + i / n];
+}
+
+/* C: what answers at once; K: κ part, both (n, n) */
+static void instant(const gk_system *s, double full, double *C, double *K)
+{
+    const int n = s->n, strips = s->strips;
+    for (int i = 0; i < n * n; i++) {
+        C[i] = s->Q[i / n * s->stride + i % n];
+        K[i] = C[i] - s->A[i / n * s->stride + i % n];
+    }
+    for (int p = 0; p * strips < s->contacts; p++) {
+        const int first = p * strips;
+        double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
+        memcpy(S, s->path[p], (size_t)(strips * strips) * sizeof *S);
+        for (int a = 0; a < strips; a++) S[a * strips + a] += gk_law_at(&s->local[p], s->width[first + a], full * s->width[first + a]).slope;
+        yielding(S, s->damping + first, strips, X);
+        for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
+    }
+    for (int i = s->contacts; i < n; i++) {
+        C[i * n + i] += s->spring[i] / (1.0 + s->damping[i] * s->spring[i]);
+        if (s->kind[i] == ROW_SPRING) continue;
+        for (int j = 0; j < n; j++) C[i * n + j] = C[j * n + i] = K[i * n + j] = K[j * n + i] = 0.0;
+        C[i * n + i] = 1.0;
+    }
+}
+
 static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma, double position)
 {
     gk_work *work = setup->work;
     gk_system *s = &work->system;
-    double frame[RIGID] = {0};
+    double frame[RIGID] = {0}, C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
     frame[PHIA] = 2.0 * GK_PI * position / model->gear[0].teeth;
     frame[PHIB] = -frame[PHIA] * model->gear[0].r_b / model->gear[1].r_b;
     if (model->kind == KIND_FLAT) frame[XB] = -model->distance, frame[PHIA] = frame[PHIB] = 0.0;
@@ -62,27 +101,8 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
     for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
     gk_rows_form(model, setup, frame, work);
     gk_system_form(model, setup, data, gk_flow_for(setup, h, gamma), work);
-    const int n = s->n, stride = s->stride;
-    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS], full = model->torque_max / (model->gear[0].r_b * setup->width);
-    for (int i = 0; i < n * n; i++) K[i] = -s->A[i / n * stride + i % n];
-    gk_coefficients plain = *gk_flow_for(setup, h, gamma);
-    plain.rigid_kappa = 0.0;
-    plain.flow[0].exact = plain.flow[1].exact = 0;
-    gk_system_form(model, setup, data, &plain, work);
-    for (int i = 0; i < n * n; i++) {
-        const int row = i / n, column = i % n;
-        C[i] = s->A[row * stride + column];
-        K[i] += C[i];
-        if (row == column) C[i] += row < s->contacts ? gk_law_at(&s->local[s->place_of[row]], s->width[row], full * s->width[row]).slope : s->spring[row];
-        if (row < s->contacts && column < s->contacts && s->place_of[row] == s->place_of[column])
-            C[i] += s->path[s->place_of[row]][row % s->strips * s->strips + column % s->strips];
-    }
-    for (int i = 0; i < n; i++)
-        if (s->kind[i] == ROW_CLUTCH || s->kind[i] == ROW_TORQUE) {
-            for (int j = 0; j < n; j++) C[i * n + j] = C[j * n + i] = K[i * n + j] = K[j * n + i] = 0.0;
-            C[i * n + i] = 1.0;
-        }
-    return cholesky(C, n) ? largest(C, K, n) : INFINITY;
+    instant(s, model->torque_max / (model->gear[0].r_b * setup->width), C, K);
+    return cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
 }
 
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
@@ -107,28 +127,37 @@ static double gamma_for(const gk_model *model, const gk_setup *setup, double h)
     return low;
 }
 
+static const double QUARTER_OCTAVE = 0.84089641525371454; /* 2^(−1/4) */
+
+/* γ of any h: the smaller of its neighbours on the scale, so a pure function of the setup and h */
+double gk_limit_gamma(const gk_setup *setup, double h)
+{
+    double at = setup->h;
+    int i = 0;
+    if (setup->integrator != DG4) return 0.0;
+    while (i < GAMMAS - 1 && h < at * (1.0 - 1e-9)) at *= QUARTER_OCTAVE, i++;
+    return i && h > at * (1.0 + 1e-9) ? gk_min(setup->gamma_at[i - 1], setup->gamma_at[i]) : setup->gamma_at[i];
+}
+
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE])
 {
-    static const double ladder[] = {0.5e-6, 1e-6, 1.5e-6, 2e-6, 2.5e-6, 3e-6, 4e-6, 5e-6, 6e-6, 7.5e-6, 10e-6, 12.5e-6, 15e-6, 20e-6};
+    static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6, 4e-6, 3e-6, 2.5e-6, 2e-6, 1.5e-6, 1e-6, 0.5e-6};
     const double period = 2.0 * GK_PI / (model->speed_max * model->gear[0].teeth);
-    const int variational = setup->integrator == DG4;
+    const int variational = setup->integrator == DG4, rungs = (int)(sizeof ladder / sizeof *ladder);
     double limit = gk_min(model->h_max, period / 40.0), h = wished;
-    if (!(wished > 0.0)) {
-        h = gk_min(ladder[0], limit);
-        for (int i = 0; i < (int)(sizeof ladder / sizeof *ladder); i++) {
-            double next = gk_min(ladder[i], limit);
-            if (variational && gk_limit_mu(model, setup, next, 1.0) > MU) break;
-            h = next;
-            if (ladder[i] >= limit) break;
+    if (!(wished > 0.0))
+        for (int i = 0; i < rungs; i++) {
+            h = gk_min(ladder[i], limit);
+            if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) && (!variational || gk_limit_mu(model, setup, h, 1.0) <= MU)) break;
         }
-    }
     if (h > period / 8.0) {
         snprintf(message, GK_MESSAGE, "h = %.3g s is more than 1/8 of the mesh period at speed_max; use h <= %.3g s", h, period / 8.0);
         return GK_STEP_TOO_LARGE;
     }
     setup->h = h;
-    setup->gamma = variational ? gamma_for(model, setup, h) : 0.0;
-    if (variational && setup->gamma < 0.7)
-        snprintf(message, GK_MESSAGE, "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; a smaller h is more accurate", h, setup->gamma);
+    double at = h;
+    for (int i = 0; i < GAMMAS; i++, at *= QUARTER_OCTAVE) setup->gamma_at[i] = variational ? gamma_for(model, setup, at) : 0.0;
+    if (variational && setup->gamma_at[0] < 0.7)
+        snprintf(message, GK_MESSAGE, "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; a smaller h is more accurate", h, setup->gamma_at[0]);
     return GK_OK;
 }

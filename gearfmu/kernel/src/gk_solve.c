@@ -1,7 +1,7 @@
 /* The complementarity problem of a step (docs/theory.md, eq. 10):
  *
  *   closed contact, bilateral row, sticking clutch:  gap + deflection = 0;   open contact: λ = 0 and gap + deflection ≥ 0;   slipping clutch: z = ±bound
- *   gap = g + D z + A f_d,   deflection = Aλ + Pλ + δ(λ),   z = λ + η,   η = α·direction + η_d
+ *   gap = g + D z + lag,   deflection = Aλ + Pλ + δ(λ),   z = λ + η,   η = α·direction + η_d
  *   dashpot of a row that is closed at both ends: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to |λ0 + λ1| (no pull)
  *
  * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last one (block principal pivoting, Júdice & Pires 1994). */
@@ -32,6 +32,16 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
 /* y = matrix x; the matrix is symmetric, so its rows are its columns */
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y) { GK_SIZED(s->stride / 4, times, s, matrix, x, y) }
 
+/* what the dashpots' force deflects outside their paths: Q·end − ½K·dash, K = Q − A */
+void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag)
+{
+    double later[MAX_STRIDE], mean[MAX_STRIDE], part[MAX_STRIDE];
+    for (int i = 0; i < s->n; i++) mean[i] = 0.5 * dash[i], later[i] = end[i] - mean[i];
+    gk_solve_times(s, s->Q, later, lag);
+    gk_solve_times(s, s->A, mean, part);
+    for (int i = 0; i < s->n; i++) lag[i] += part[i];
+}
+
 /* P x */
 void gk_solve_path(const gk_system *s, const double *x, double *y)
 {
@@ -61,14 +71,14 @@ void gk_solve_settle(gk_system *s)
         s->dash[i] = 0.0;
         if (s->active[i] && s->clip[i] != 2) s->dash[i] = s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (s->squeeze[i] - s->squeeze0[i]);
         s->end[i] = s->clip[i] == 2 ? 0.0 : s->beta[i] * s->dash[i] - (s->beta[i] - 0.5) * s->dash0[i];
-        dashpots |= s->end[i] != 0.0;
+        dashpots |= s->end[i] != 0.0 || s->dash[i] != 0.0;
         s->eta[i] = s->alpha * s->direction[i] + s->dash[i];
         if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
         else if (s->active[i]) s->z[i] = s->force[i];
     }
     gk_solve_times(s, s->D, s->z, s->Dz);
     gk_solve_times(s, s->A, s->force, s->Al);
-    if (dashpots) gk_solve_times(s, s->A, s->end, s->lag);
+    if (dashpots) gk_solve_lag(s, s->end, s->dash, s->lag);
     else memset(s->lag, 0, (size_t)s->n * sizeof *s->lag);
 }
 
@@ -97,7 +107,7 @@ static int move(gk_system *s, const double *x, double *e, double *change)
     return s->curved && *change > SOLVED * size;
 }
 
-/* what the law's bend e leaves in the equations: −(e + (D + βA) Γ e) */
+/* what the law's bend e leaves in the equations: −(e + B Γ e) */
 static void bend(const gk_system *s, const double *e, double *r)
 {
     const int quads = s->stride / 4;
@@ -105,7 +115,8 @@ static void bend(const gk_system *s, const double *e, double *r)
     for (int j = 0; j < s->contacts; j++) {
         if (!s->active[j] || s->clip[j] != 0 || s->damping[j] == 0.0) continue;
         gk_axpy(-s->damping[j] * e[j], s->D + j * s->stride, r, 0, quads);
-        gk_axpy(-s->beta[j] * s->damping[j] * e[j], s->A + j * s->stride, r, 0, quads);
+        gk_axpy(-(s->beta[j] - 0.5) * s->damping[j] * e[j], s->Q + j * s->stride, r, 0, quads);
+        gk_axpy(-0.5 * s->damping[j] * e[j], s->A + j * s->stride, r, 0, quads);
     }
     for (int i = 0; i < s->n; i++) r[i] = !s->active[i] ? 0.0 : i < s->contacts ? r[i] - e[i] : r[i];
 }

@@ -86,7 +86,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
     gk_solve_settle(s);
     s->stored0 = gk_solve_stored(s);
     s->held0 = 0.0;
-    gk_solve_times(s, s->A, s->end0, s->lag0);
+    gk_solve_lag(s, s->end0, s->dash0, s->lag0);
     for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
     for (int i = 0; i < s->n; i++) {
         const double deflection = gk_solve_massless(s, i);
@@ -190,7 +190,7 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     }
 }
 
-/* What ports brought in and what dashpots and clutches took in this step. A dashpot takes −½ η_d·Δgap; what its force deflects elsewhere (A f_d) it holds as energy or gives back. */
+/* What ports brought in and what dashpots and clutches took in this step. A dashpot takes −½ η_d·Δgap; what its force deflects elsewhere (lag) it holds as energy or gives back. */
 static void account(const gk_setup *setup, gk_data *data)
 {
     gk_work *work = setup->work;
@@ -252,7 +252,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_system *s = &work->system;
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
     GK_MARK(work);
-    if (h == data->table_h && gamma == setup->gamma && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
+    if (h == data->table_h && gamma == gk_limit_gamma(setup, h) && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
     express(setup, data, k);
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;

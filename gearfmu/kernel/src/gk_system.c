@@ -153,7 +153,12 @@ static void mirror(gk_system *s)
 {
     const int n = s->n, stride = s->stride;
     for (int i = 0; i < n; i++)
-        for (int j = i + 1; j < n; j++) s->D[j * stride + i] = s->D[i * stride + j], s->A[j * stride + i] = s->A[i * stride + j];
+        for (int j = i + 1; j < n; j++) {
+            s->D[j * stride + i] = s->D[i * stride + j];
+            s->A[j * stride + i] = s->A[i * stride + j];
+            s->Q[j * stride + i] = s->Q[i * stride + j];
+        }
+    for (int k = 0; k < n * stride; k++) s->A[k] += s->Q[k];
 }
 
 /* what one rigid coordinate adds to D and A */
@@ -178,7 +183,7 @@ static void add_rigid(const gk_setup *setup, const gk_coefficients *k, gk_system
             for (int j = 0; j < s->n; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
 }
 
-/* the paths of the contacts' own dashpots; what is in P is not in A */
+/* the paths of the contacts' own dashpots; what is in P is not in A and Q */
 static void take_paths(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     gk_system *s = &work->system;
@@ -186,11 +191,15 @@ static void take_paths(const gk_model *model, const gk_setup *setup, gk_work *wo
     for (int p = 0; p < work->places; p++) {
         gk_table_path(model, setup, &work->place[p], s->path[p]);
         for (int a = 0; a < strips; a++)
-            for (int b = 0; b < strips; b++) s->A[(p * strips + a) * s->stride + p * strips + b] -= s->path[p][a * strips + b];
+            for (int b = 0; b < strips; b++) {
+                const int at = (p * strips + a) * s->stride + p * strips + b;
+                s->A[at] -= s->path[p][a * strips + b];
+                s->Q[at] -= s->path[p][a * strips + b];
+            }
     }
 }
 
-/* Forms the system at work->place for the step k: D, A and the paths of the rows' own dashpots, P and 1/k; C′ = A + P. The local law is in neither (it depends on the force). */
+/* Forms the system at work->place for the step k: D, A, Q and the paths of the rows' own dashpots, P and 1/k; C′ = A + P. The local law is in neither (it depends on the force). */
 void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, gk_work *work)
 {
     gk_system *s = &work->system;
@@ -200,15 +209,16 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma;
     s->D = work->matrix;
     s->A = s->D + size;
-    s->J = s->A + size;
+    s->Q = s->A + size;
+    s->J = s->Q + size;
     s->L = s->J + size;
-    memset(s->D, 0, 2 * size * sizeof(double));
+    memset(s->D, 0, 3 * size * sizeof(double));
     for (int g = 0; g < 2; g++) {
-        double *const both[2] = {s->D, s->A}, *const residual[2] = {s->A, NULL};
+        double *const both[2] = {s->D, s->A}, *const residual[2] = {s->Q, NULL};
         gather(setup, work, g, work->y[g], work->read[g]);
         if (tables) gk_table_add(model, setup, g, &work->table[g], both);
         else gram(setup, work, g, &k->flow[g], s->D, s->A);
-        if (!tables && setup->on.residual) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
+        if (setup->on.residual) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
     }
     gaps(model, k->h, work);
     mirror(s);

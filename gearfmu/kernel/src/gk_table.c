@@ -1,5 +1,5 @@
 /* Compliance between the points of a gear, on the roll grid: the static residual of what is not dynamic (docs/theory.md, eq. 2) and, for the step of a run, what a force moves within the step (D) and at
- * once (C′ = residual − κ part). A sum over modes between two places depends on their rolls and tooth offset only, so it is done once on the grid and interpolated with the weights of the rows on both
+ * corrects (the κ part of C′). A sum over modes between two places depends on their rolls and tooth offset only, so it is done once on the grid and interpolated with the weights of the rows on both
  * sides: the same matrix as from the rows themselves, at a cost that does not know the number of modes. */
 #include "gk_core.h"
 
@@ -139,7 +139,7 @@ void gk_table_residual(const gk_model *model, gk_setup *setup)
     }
 }
 
-/* D and C′ of the step k */
+/* D and −K of the step k */
 void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coefficients *k)
 {
     for (int g = 0; g < 2; g++) {
@@ -151,9 +151,9 @@ void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coeffic
             if (gear->part[i] != 2) lane++;
             const int at = gear->part[i] == 2 ? m->pairs + lane : lane;
             moves[i] = -(double)f->mobility[at];
-            yields[i] = (double)f->kappa[at] + (setup->on.residual ? 1.0 / (gear->omega[i] * gear->omega[i]) : 0.0);
+            yields[i] = (double)f->kappa[at];
         }
-        const recipe r = {m->count, 2, {0, setup->on.residual}, {moves, yields}};
+        const recipe r = {m->count, 2, {0, 0}, {moves, yields}};
         fill_table(model, setup, g, &r, &setup->work->table[g]);
     }
     setup->work->table_h = k->h;

@@ -1,5 +1,5 @@
-/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + (D + Aβ) Γ S,  S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its
- * limit ±(λ0 + λ1) is ±(D + Aβ) instead. By columns of whole quads; an inactive row is an empty one. Close to symmetric positive definite: no pivoting. */
+/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + ½A + (β − ½)Q,  S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its
+ * limit ±(λ0 + λ1) is ±B instead. By columns of whole quads; an inactive row is an empty one. Close to symmetric positive definite: no pivoting. */
 #include "gk_core.h"
 
 /* column j: what λ_j does to all rows */
@@ -8,15 +8,17 @@ GK_INLINE void form_column(const gk_system *s, int j, const double *mask, double
     const int strips = s->strips, contact = j < s->contacts;
     const int place = contact ? s->place_of[j] : 0, first = contact ? place * strips : j, count = contact ? strips : 1;
     const double limit = s->clip[j] == 2 ? 0.0 : s->clip[j];
-    const gk_quad *D = (const gk_quad *)s->D, *A = (const gk_quad *)s->A, *on = (const gk_quad *)mask;
+    const gk_quad *D = (const gk_quad *)s->D, *A = (const gk_quad *)s->A, *Q = (const gk_quad *)s->Q, *on = (const gk_quad *)mask;
     gk_quad c[MAX_STRIDE / 4];
     double own[MAX_SLICES];
-    for (int q = 0; q < quads; q++) c[q] = (1.0 + limit) * D[j * quads + q] + (1.0 + s->beta[j] * limit) * A[j * quads + q];
+    for (int q = 0; q < quads; q++) c[q] = D[j * quads + q] + A[j * quads + q];
+    if (limit != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += limit * (D[j * quads + q] + 0.5 * A[j * quads + q] + (s->beta[j] - 0.5) * Q[j * quads + q]);
     for (int e = first; e < first + count; e++) {
         own[e - first] = !s->active[e] ? 0.0 : contact ? s->path[place][(e - first) * strips + j - first] + (e == j ? s->slope[j] : 0.0) : s->spring[j];
-        const double moves = s->clip[e] == 0 ? s->damping[e] * own[e - first] : 0.0, yields = s->beta[e] * moves;
+        const double moves = s->clip[e] == 0 ? s->damping[e] * own[e - first] : 0.0, mean = 0.5 * moves, later = (s->beta[e] - 0.5) * moves;
         if (moves == 0.0) continue;
-        for (int q = 0; q < quads; q++) c[q] += moves * D[e * quads + q] + yields * A[e * quads + q];
+        for (int q = 0; q < quads; q++) c[q] += moves * D[e * quads + q] + mean * A[e * quads + q] + later * Q[e * quads + q];
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
     for (int e = 0; e < count; e++) column[first + e] += own[e];
