@@ -1,5 +1,5 @@
-"""Pictures of the README from the trace of the demo: python docs/pictures/make.py [out/demo/trace.h5] (its chart of error
-against time: docs/pictures/cost.py)"""
+"""Pictures of the README from the trace of the demo: python docs/pictures/make.py [out/demo/trace.h5]
+(its chart of error against time: docs/pictures/cost.py)"""
 
 from __future__ import annotations
 

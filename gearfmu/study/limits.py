@@ -1,4 +1,5 @@
-"""What a larger internal step does: default step by its rule, γ lowered with a warning, refusal with the step to use."""
+"""What a larger internal step does: default step by its rule, γ lowered with a warning, refusal with the step to
+use."""
 
 from __future__ import annotations
 

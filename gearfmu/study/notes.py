@@ -28,8 +28,8 @@ def notes(rows: tuple[Row, ...], references: tuple[ReferenceRow, ...]) -> Iterat
     for r in references:
         if not r.reached:
             yield (
-                f"reference, {r.slices} slices: at {1e6 * r.h_s:.3g} µs it still moves by {100 * r.te_moved:.2g} % (te), "
-                f"{100 * r.force_moved:.2g} % (force), more than a fifth of the smallest error of level full"
+                f"reference, {r.slices} slices: at {1e6 * r.h_s:.3g} µs it still moves by "
+                f"{100 * r.te_moved:.2g} % (te), {100 * r.force_moved:.2g} % (force), more than a fifth of the smallest error of level full"
             )
         small = [row for row in rows if row.slices == r.slices and row.te_error < 5 * r.te_moved]
         if small:

@@ -102,7 +102,7 @@ def _reference_of(text: str, slices: int, quick: bool) -> Reference:
 
 
 def identity(scene: SceneSpec, model: StageModel, kernel: str) -> str:
-    """Hex digest of what decides the numbers: scene, stage and bodies (the model), hash of the kernel library, format."""
+    """Hex digest of what decides the numbers: scene, stage with bodies (the model), kernel library, format."""
     return hashlib.sha256(f"{FORMAT} {scene.hash} {model.hash} {kernel}".encode()).hexdigest()
 
 

@@ -73,7 +73,8 @@ def read_rows(path: Path, kind: type[AnyRow]) -> list[AnyRow]:
         reader = csv.DictReader(file)
         found = list(reader)
     if list(reader.fieldnames or ()) != names or any(None in line.values() for line in found):
-        raise SpecError([Problem(str(path), "header", ",".join(reader.fieldnames or ()), f"remove it: {names} is read")])
+        columns = ",".join(reader.fieldnames or ())
+        raise SpecError([Problem(str(path), "header", columns, f"remove it, or give another folder: {names} is read")])
     return [kind(**{f.name: _value(str(f.type), line[f.name]) for f in fields(kind)}) for line in found]
 
 
@@ -125,11 +126,14 @@ def _value(kind: str, text: str) -> Any:
 
 
 def _plain(values: tuple) -> list[Any]:
-    return [("true" if v else "false") if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in values]
+    texts = {True: "true", False: "false"}
+    return [texts[v] if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in values]
 
 
 def _shown(value: Any) -> str:
-    return ("yes" if value else "no") if isinstance(value, bool) else f"{value:.3g}" if isinstance(value, float) else str(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _order(row: Row | ReferenceRow | TransientRow) -> tuple:

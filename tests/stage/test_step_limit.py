@@ -76,8 +76,8 @@ def test_default_step_is_the_largest_up_to_which_the_limit_holds(
         kernel.set(name, value)
     kernel.initialize()
     kernel.step(0.0, 1e-3)
-    count = 1e-3 / kernel.get("solver.h")
-    assert count == pytest.approx(np.ceil(1e-3 / wanted - 1e-9)), f"{kernel.get('solver.h'):.3g} s, rule: {wanted:.3g} s"
+    used = kernel.get("solver.h")
+    assert 1e-3 / used == pytest.approx(np.ceil(1e-3 / wanted - 1e-9)), f"{used:.3g} s, rule: {wanted:.3g} s"
     assert kernel.get("solver.status") == 0 and not kernel.warning
 
 

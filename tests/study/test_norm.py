@@ -23,7 +23,8 @@ def signals(**changes: object) -> Signals:
 
 
 def test_alternating_part_and_mean_apart() -> None:
-    found = signals(te=1e-6 * (1.02 * SINE) + 40e-6 + 0.05e-6, force=100 * SINE + 3000 + 10 * np.cos(2 * np.pi * 500 * TIME))
+    beside = 10 * np.cos(2 * np.pi * 500 * TIME)
+    found = signals(te=1.02e-6 * SINE + 40e-6 + 0.05e-6, force=100 * SINE + 3000 + beside)
     e = errors(found, signals())
     assert e.te == pytest.approx(0.02, rel=1e-9)
     assert e.te_mean == pytest.approx(0.05 * np.sqrt(2), rel=1e-9)  # over the rms of a sine of 1 µm
@@ -75,5 +76,6 @@ def test_kept_signals_read_back(tmp_path) -> None:
     made = signals(locked=SINE > 0, steady=False)
     made.trace({}).save(tmp_path / "s.h5")
     read = kept_signals(Trace.load(tmp_path / "s.h5"))
-    assert all(np.array_equal(getattr(read, name), getattr(made, name)) for name in ("te", "force", "bearing", "locked"))
+    for name in ("te", "force", "bearing", "locked"):
+        assert np.array_equal(getattr(read, name), getattr(made, name))
     assert (read.interval, read.start, read.steady) == (made.interval, made.start, made.steady)

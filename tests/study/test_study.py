@@ -22,7 +22,9 @@ from gearfmu.study.notes import notes
 from gearfmu.study.refined import BodyRow, body_rows, cheap
 from gearfmu.study.table import read_rows, tidy, write_rows
 
-COLUMNS = "scene,level,integrator,h_s,n_dyn,slices,te_error,te_mean_error,force_error,bearing_error,realtime_factor,cpu_ratio"
+COLUMNS = (
+    "scene,level,integrator,h_s,n_dyn,slices,te_error,te_mean_error,force_error,bearing_error,realtime_factor,cpu_ratio"
+)
 ROW = Row("s", "fast", "dg4", 5e-6, 51, 5, 0.02, -0.001, 0.07, 0.03, 0.5, 1.0)
 
 
@@ -102,7 +104,8 @@ def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
 
 
 def test_errors_that_grow_as_the_step_shrinks_are_told() -> None:
-    rows = [Row(*("s", "fast", "dg4", h, 51, 5), e, 0.0, 0.07, 0.03, 1.0, 1.0) for h, e in ((1e-5, 0.008), (5e-6, 0.016))]
+    found = ((1e-5, 0.008), (5e-6, 0.016))
+    rows = [Row("s", "fast", "dg4", h, 51, 5, e, 0.0, 0.07, 0.03, 1.0, 1.0) for h, e in found]
     coarse = ReferenceRow("s", 5, 1e-7, 400, 0.01, 0.0, 0.0, False)
     told = list(notes(tuple(rows), (coarse,)))
     assert any("te error grows from 0.8 % at 10 µs to 1.6 % at 5 µs" in text for text in told)
@@ -159,8 +162,8 @@ def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
 def test_cheap_refinements_of_a_few_milliseconds(scene: SceneSpec) -> None:
     """Ten slices and a finer roll grid move level full by less than the level fast is off."""
     rows = body_rows([scene], cheap(scene), h=5e-6)
-    assert [row.refined for row in rows] == ["slices 10", "rolls 64", "rolls 128"] and all(row.cpu_s == 0 for row in rows)
-    assert all(0 < row.te_error < 0.05 and row.n_dyn == rows[0].n_dyn for row in rows)
+    assert [row.refined for row in rows] == ["slices 10", "rolls 64", "rolls 128"]
+    assert all(0 < row.te_error < 0.05 and row.n_dyn == rows[0].n_dyn and row.cpu_s == 0 for row in rows)
 
 
 def test_a_higher_cut_has_more_modes_and_less_error(scene: SceneSpec) -> None:
