@@ -1,7 +1,7 @@
 /* Inside of the kernel: what model, setup and data are made of. One reading direction:
  *   gk_model.c  blob → gk_model          gk_setup.c  level, effects, h → gk_setup      gk_vars.c   variables by reference
  *   gk_strips.c slices → contact rows    gk_limit.c  which h, which γ                  gk_flow.c   modal coefficients of h
- *   gk_flank.c  where teeth may touch    gk_rows.c   displacement rows at those places gk_system.c the small system of a step
+ *   gk_flank.c  where teeth may touch (gk_still.c: may not move)  gk_rows.c   displacement rows at those places gk_system.c the small system of a step
  *   gk_law.c    local line contact       gk_solve.c  its solution                       gk_step.c   one step; gk_comm.c many; gk_static.c none */
 #ifndef GK_CORE_H
 #define GK_CORE_H
@@ -114,7 +114,7 @@ typedef struct gk_coefficients {
 } gk_coefficients;
 
 typedef struct gk_effects {
-    int residual, hertz, coast, damping, relief, corner, bearings, modal_damping;
+    int residual, hertz, coast, damping, relief, corner, bearings, modal_damping, roll_motion;
 } gk_effects;
 
 typedef struct gk_work gk_work;
@@ -166,6 +166,7 @@ struct gk_data {
     double balance_h, rk_h;
     double state_h, state_gamma; /* the step for which x and q are expressed; 0: physical */
     double angle[2];             /* bore angle at a torque port, massless part included */
+    double still[RIGID];         /* frames of the start, where all is taken that depends on position when roll_motion is off */
     double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
     gk_ledger ledger;
     int64_t steps, rounds, trouble, impacts;
@@ -231,6 +232,7 @@ struct gk_work {
     double stage_rigid[7][2 * RIGID], trial_rigid[2 * RIGID];
     gk_real *basis[2];                        /* (MAX_BASIS, n): rows of the contacts, then bore rows in inertial axes */
     double frame[RIGID], speed[RIGID];        /* predicted */
+    double attitude[2];                       /* of the gears whose rows the system is formed with */
     double moved[RIGID];
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
     double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
@@ -247,6 +249,8 @@ gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data
 const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma);
 /* gk_flank.c */
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *frame, double reach, gk_place *place);
+/* gk_still.c */
+int gk_still_find(const gk_model *model, const gk_setup *setup, const double *still, const double *frame, gk_place *place);
 /* gk_rows.c */
 void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work);
 /* gk_system.c */

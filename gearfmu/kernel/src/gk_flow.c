@@ -54,9 +54,29 @@ static oscillator linear_force(double omega, double zeta, double h)
     return o;
 }
 
+/* The flow in gk_real with the determinant of the exact one, e^(−2ζωh): rounded one by one to single precision the four numbers let an undamped mode grow or fade by up to 1e-7 of its energy
+ * every step, always the same way. Among the neighbours of a11, a12 and a22, each with the a21 that belongs to it, the best determinant is taken: some 1e-10. */
+static void round_flow(const oscillator *o, gk_real out[4])
+{
+    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7;
+    double least = INFINITY;
+    if (sizeof(gk_real) > sizeof(float)) {
+        out[0] = (gk_real)o->a11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)o->a22;
+        return;
+    }
+    for (int choice = 0; choice < 75; choice++) {
+        const gk_real a11 = (gk_real)(o->a11 * (1.0 + ulp * (choice % 5 - 2))), a22 = (gk_real)(o->a22 * (1.0 + ulp * (choice / 5 % 5 - 2))),
+                      a12 = (gk_real)(o->a12 * (1.0 + ulp * (choice / 25 - 1))), a21 = (gk_real)(((double)a11 * a22 - wanted) / a12);
+        const double error = fabs((double)a11 * a22 - (double)a12 * a21 - wanted);
+        if (error < least) least = error, out[0] = a11, out[1] = a12, out[2] = a21, out[3] = a22;
+    }
+}
+
 static void store(gk_flow *f, int i, const oscillator *o)
 {
-    f->a11[i] = (gk_real)o->a11, f->a12[i] = (gk_real)o->a12, f->a21[i] = (gk_real)o->a21, f->a22[i] = (gk_real)o->a22;
+    gk_real a[4] = {0, 0, 0, 0};
+    if (o->a12 != 0.0) round_flow(o, a);
+    f->a11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->a22[i] = a[3];
     f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
     f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;

@@ -117,6 +117,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
     gk_work *work = setup->work;
     double given[RIGID] = {0};
     rest.on.damping = 0;
+    rest.on.roll_motion = 1;
     for (int g = 0; g < 2; g++) {
         rest.given_torque[g] = !grounded(&b[g]);
         rest.link_c[PORT_0 + g] = b[g].kind == PORT_SPRING ? 1.0 / b[g].k : 0.0;
@@ -144,6 +145,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
         }
         if (moved * (MOBILITY / mobility) <= AT_REST) {
             spread(&rest, data);
+            memcpy(data->still, data->x, sizeof data->still);
             return GK_OK;
         }
         if (!gk_finite(moved)) break;

@@ -236,14 +236,15 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;
     GK_LAP(work, PHASE_PREDICT);
-    work->places = gk_flank_find(model, setup, work->frame, data->reach, work->place);
+    const double *where = setup->on.roll_motion ? work->frame : data->still;
+    work->places = setup->on.roll_motion ? gk_flank_find(model, setup, where, data->reach, work->place) : gk_still_find(model, setup, where, work->frame, work->place);
     if (work->places < 0) return work->places = 0, GK_DIVERGED;
     for (int p = 0; p < work->places; p++) {
         work->place[p].memory = remembered(data, work->place[p].key);
         if (work->place[p].gap < -model->overlap_max) return GK_PENETRATION;
     }
     GK_LAP(work, PHASE_FIND);
-    gk_rows_form(model, setup, work->frame, work);
+    gk_rows_form(model, setup, where, work);
     GK_LAP(work, PHASE_ROWS);
     gk_system_form(model, setup, data, k, work);
     gk_step_recall(setup, data, s);

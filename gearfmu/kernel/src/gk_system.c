@@ -2,7 +2,7 @@
  * Rows: slices of all places, then the live bilateral rows (bearings, port springs, shafts, clutches). Contact forces press inward, rows measure outward: a contact row is −(flank row). */
 #include "gk_core.h"
 
-static void link_gradient(const gk_model *model, int link, const gk_work *work, double *rigid)
+static void link_gradient(const gk_model *model, const gk_setup *setup, int link, const gk_work *work, double *rigid)
 {
     int g = link == BEARING_1X || link == BEARING_1Y || link == PORT_1 || link == SHAFT_1 || link == CLUTCH_1;
     int phi = g ? PHIB : PHIA;
@@ -10,11 +10,11 @@ static void link_gradient(const gk_model *model, int link, const gk_work *work, 
     switch (link) {
     case BEARING_0X: case BEARING_1X:
         rigid[3 * g] = 1.0;
-        rigid[phi] = -work->read[g][work->system.contacts + BORE_Y]; /* the elastic bore displacement turns with the frame */
+        if (setup->on.roll_motion) rigid[phi] = -work->read[g][work->system.contacts + BORE_Y]; /* the elastic bore displacement turns with the frame */
         break;
     case BEARING_0Y: case BEARING_1Y:
         rigid[3 * g + 1] = 1.0;
-        rigid[phi] = work->read[g][work->system.contacts + BORE_X];
+        if (setup->on.roll_motion) rigid[phi] = work->read[g][work->system.contacts + BORE_X];
         break;
     case PORT_0: case PORT_1: rigid[model->port[g].chain ? INERTIA_0 + g : phi] = 1.0; break;
     case SHAFT_0: case SHAFT_1: rigid[phi] = 1.0, rigid[DISC_0 + g] = -1.0; break;
@@ -162,7 +162,7 @@ static double rigid_part(const gk_system *s, int i, const double *x)
 }
 
 /* gaps at the predicted frames: undeformed gap minus outward elastic displacement; springs measure relative to their outer ends; clutches read half a step of slip */
-static void gaps(const gk_model *model, double h, gk_work *work)
+static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work *work)
 {
     gk_system *s = &work->system;
     elastic(s, work->read, s->g);
@@ -177,11 +177,11 @@ static void gaps(const gk_model *model, double h, gk_work *work)
             break;
         }
         case ROW_CLUTCH:
-            link_gradient(model, s->link_of[i], work, s->rigid[i]);
+            link_gradient(model, setup, s->link_of[i], work, s->rigid[i]);
             s->g[i] += 0.5 * h * rigid_part(s, i, work->speed);
             break;
         default:
-            link_gradient(model, s->link_of[i], work, s->rigid[i]);
+            link_gradient(model, setup, s->link_of[i], work, s->rigid[i]);
             s->g[i] += rigid_part(s, i, work->frame) - (s->kind[i] == ROW_SPRING && port >= 0 && port < 2 ? work->outer[port] : 0.0);
         }
     }
@@ -234,9 +234,9 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     for (int g = 0; g < 2; g++) {
         gather(setup, work, g, work->y[g], work->read[g]);
         gram(setup, work, g, k->flow[g].mobility, setup->modal[g].pairs, s->D);
-        if (setup->on.residual) residual(setup, &model->gear[g], work, g, work->frame[g ? PHIB : PHIA] + model->gear[g].phase);
+        if (setup->on.residual) residual(setup, &model->gear[g], work, g, work->attitude[g]);
         gram(setup, work, g, k->flow[g].kappa, k->flow[g].exact, s->K);
     }
-    gaps(model, k->h, work);
+    gaps(model, setup, k->h, work);
     rigid_part_of_matrices(setup, k, s);
 }
