@@ -55,20 +55,18 @@ static oscillator linear_force(double omega, double zeta, double h)
 }
 
 /* The flow in gk_real with the determinant of the exact one, e^(−2ζωh): rounded one by one to single precision the four numbers let an undamped mode grow or fade by up to 1e-7 of its energy
- * every step, always the same way. Among the neighbours of a11, a12 and a22, each with the a21 that belongs to it, the best determinant is taken: some 1e-10. */
+ * every step, always the same way. a11 and a22 carry the frequency and stay; among the neighbours of a12 (a few 1e-6: the shape of the orbit) that one is taken whose a21 gives the best
+ * determinant, some 1e-10. */
 static void round_flow(const oscillator *o, gk_real out[4])
 {
-    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7;
+    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, enough = 2e-11;
     double least = INFINITY;
-    if (sizeof(gk_real) > sizeof(float)) {
-        out[0] = (gk_real)o->a11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)o->a22;
-        return;
-    }
-    for (int choice = 0; choice < 75; choice++) {
-        const gk_real a11 = (gk_real)(o->a11 * (1.0 + ulp * (choice % 5 - 2))), a22 = (gk_real)(o->a22 * (1.0 + ulp * (choice / 5 % 5 - 2))),
-                      a12 = (gk_real)(o->a12 * (1.0 + ulp * (choice / 25 - 1))), a21 = (gk_real)(((double)a11 * a22 - wanted) / a12);
-        const double error = fabs((double)a11 * a22 - (double)a12 * a21 - wanted);
-        if (error < least) least = error, out[0] = a11, out[1] = a12, out[2] = a21, out[3] = a22;
+    out[0] = (gk_real)o->a11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)o->a22;
+    if (sizeof(gk_real) > sizeof(float)) return;
+    for (int choice = 0; choice < 75 && least > enough; choice++) {
+        const gk_real a12 = (gk_real)(o->a12 * (1.0 + ulp * ((choice & 1 ? 1 : -1) * ((choice + 1) / 2)))), a21 = (gk_real)(((double)out[0] * out[3] - wanted) / a12);
+        const double error = fabs((double)out[0] * out[3] - (double)a12 * a21 - wanted);
+        if (error < least) least = error, out[1] = a12, out[2] = a21;
     }
 }
 
