@@ -29,6 +29,7 @@ VERBS = {
     "simulate": ("gearfmu.commands.runs:simulate", "Run a stage alone, without FMU and drivetrain."),
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
+    "study": ("gearfmu.commands.study:study", "What accuracy costs: error against time of the fidelity levels."),
     "inspect": ("gearfmu.commands.files:inspect", "Say what one of our files holds."),
     "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; table of FMU variables."),
 }

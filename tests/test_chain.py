@@ -60,6 +60,12 @@ def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
     assert (tmp_path / "te.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_te_is_zero_without_load(tmp_path: Path) -> None:
+    shown = gearfmu("te", "fzg_c", "--torque", "0 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
+    data = np.genfromtxt(tmp_path / "te.csv", delimiter=",", skip_header=1)
+    assert np.abs(data[:, 2]).max() < 1e-5 and np.all(data[:, 3] > 50) and "0.0 N·m: mean" in shown
+
+
 def test_export_and_validate(tmp_path: Path) -> None:
     gearfmu("export", "fzg_c", "-o", tmp_path / "pair.fmu", "--port", "pinion=torque", "--port", "wheel=fixed")
     assert "0 problems" in gearfmu("validate", tmp_path / "pair.fmu")

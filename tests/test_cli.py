@@ -210,3 +210,14 @@ def test_validate_of_what_is_no_fmu_is_an_error(tmp_path: Path, capsys: pytest.C
 
 def test_version_is_the_packages() -> None:
     assert process("--version").stdout.strip() == f"gearfmu, version {importlib.metadata.version('gearfmu')}"
+
+
+def test_reduce_tells_degrees_of_freedom_time_and_memory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of the shipped bodies, which are up to date: read, not made again."""
+    code, out, _ = call("reduce", "fzg_c", capsys=capsys)
+    assert code == 0
+    for gear in ("pinion", "wheel"):
+        made = json.loads(process("inspect", ROOT / "reduced_models" / "fzg_c" / f"{gear}.h5", "--json").stdout)
+        size, cost = made["mesh"], made["provenance"]
+        assert f"{size['dof_body']} DOF, {made['facts']['teeth']} sectors of {size['dof_sector']}" in out
+        assert f"{cost['cpu_s']:g} s CPU time and {cost['peak_memory_GB']:g} GB" in out

@@ -35,7 +35,7 @@ from gearfmu.spec.stage import StageSpec
 FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
 _PICTURE_MODES = 12
 _PICTURE_LOADS = 5
-_DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1)
+_DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 
 Progress = Callable[[str, float], None]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -64,8 +65,18 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
         click.echo(
             f"{body.name}: {body.modes} modes to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, "
             f"frequency response within {body.frf.max_error:.1e} to {body.frf.band[1] / 1e3:.0f} kHz, input "
-            f"{body.input_hash[:12]}"
+            f"{body.input_hash[:12]}\n  {_cost(body)}"
         )
+
+
+def _cost(body: Any) -> str:
+    """Size of the finite elements behind a body, and the processor time and memory its reduction took."""
+    mesh, made = body.mesh, body.provenance
+    memory = made["peak_memory_GB"]
+    return (
+        f"{mesh['dof_body']} DOF, {body.teeth} sectors of {mesh['dof_sector']}; reduced in {made['cpu_s']:g} s CPU time"
+        + ("" if memory is None else f" and {memory:g} GB")
+    )
 
 
 def _chosen(gears: tuple, only: str | None) -> list:

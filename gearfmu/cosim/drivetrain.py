@@ -17,6 +17,7 @@ from gearfmu.spec.stage import ChainSpec, PortSpec, StageSpec
 
 ROLLING_SPEED = 0.1  # m/s over which rolling resistance builds up: no force at standstill
 SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffens
+JOINED = 1e6  # N·m: capacity that keeps the clutch of the wheel's chain closed, so that both its inertias are one
 
 
 @dataclass(frozen=True)
@@ -51,19 +52,36 @@ def stage_ports(scene: SceneSpec, shafts: Shafts) -> dict[str, PortSpec]:
         }
     car = scene.passenger_car
     if car.chain_in_fmu:
-        chain = ChainSpec(
-            inertia=car.secondary_inertia,
-            disc_inertia=car.disc_inertia,
-            shaft_k=car.input_shaft_stiffness,
-            shaft_c=car.input_shaft_damping,
-        )
-        pinion = PortSpec(kind="spring", k=car.dmf_stiffness, c=car.dmf_damping, chain=chain)
-    else:
-        pinion = PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping)
+        return {shafts.pinion: _clutch_chain(car), shafts.wheel: _final_drive_chain(car)}
     return {
-        shafts.pinion: pinion,
+        shafts.pinion: PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping),
         shafts.wheel: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
     }
+
+
+def _clutch_chain(car: PassengerCar) -> PortSpec:
+    """Engine ─ [dual-mass flywheel ─ secondary mass ─ clutch ─ disc ─ input shaft] ─ pinion."""
+    chain = ChainSpec(
+        inertia=car.secondary_inertia,
+        disc_inertia=car.disc_inertia,
+        shaft_k=car.input_shaft_stiffness,
+        shaft_c=car.input_shaft_damping,
+    )
+    return PortSpec(kind="spring", k=car.dmf_stiffness, c=car.dmf_damping, chain=chain)
+
+
+def _final_drive_chain(car: PassengerCar) -> PortSpec:
+    """Road wheels ─ [half shafts ─ final drive ─ output shaft] ─ wheel gear. The final drive is both inertias of a
+    chain whose clutch stays closed: outside, on the stiff output shaft, it would let a communication step of 1 ms
+    blow up."""
+    chain = ChainSpec(
+        inertia=0.5 * car.final_drive_inertia,
+        disc_inertia=0.5 * car.final_drive_inertia,
+        shaft_k=car.output_shaft_stiffness,
+        shaft_c=car.output_shaft_damping,
+    )
+    half_shafts = _half_shafts(car)
+    return PortSpec(kind="spring", k=half_shafts.k, c=half_shafts.c, chain=chain)
 
 
 def capacity(scene: SceneSpec) -> Signal:
@@ -79,9 +97,14 @@ def stage_signals(scene: SceneSpec, shafts: Shafts) -> tuple[tuple[str, Signal],
 
 def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
     """Start values of the stage that follow from the drivetrain: behind an open clutch the gears turn with the
-    vehicle, not with the engine."""
-    in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
-    return {f"{shafts.pinion}.disc.w_start": scene.start.pinion_speed} if in_stage else {}
+    vehicle, not with the engine; the wheel's chain is closed."""
+    if scene.passenger_car is None or not scene.passenger_car.chain_in_fmu:
+        return {}
+    return {
+        f"{shafts.pinion}.disc.w_start": scene.start.pinion_speed,
+        f"{shafts.wheel}.disc.w_start": _wheel_speed(scene, shafts),
+        f"{shafts.wheel}.clutch.capacity": JOINED,
+    }
 
 
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
@@ -112,48 +135,51 @@ def road_load(car: PassengerCar) -> Callable[[float, float, float], float]:
 def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
     engine_w = scene.start.pinion_speed + scene.start.slip
     engine = Inertia("engine", car.crank_inertia + car.dmf_primary_inertia, w=engine_w)
-    nodes, springs, port = _vehicle(scene, car, shafts)
+    nodes, tyres = _vehicle(scene, car, shafts)
     sources = (Source("combustion", "engine", engine_torque(car)), Source("road", "vehicle", road_load(car)))
     if car.chain_in_fmu:
-        return Network(
-            (engine, *nodes), springs, (), sources, torque_ports={shafts.pinion: "engine", shafts.wheel: port}
-        )
-    secondary, disc = (
+        ports = {shafts.pinion: "engine", shafts.wheel: "wheels"}
+        return Network((engine, *nodes), (tyres,), (), sources, torque_ports=ports)
+    secondary, disc, final_drive = (
         Inertia("secondary", car.secondary_inertia, w=engine_w),
         Inertia("disc", car.disc_inertia, w=scene.start.pinion_speed),
+        Inertia("final_drive", car.final_drive_inertia, w=_wheel_speed(scene, shafts)),
     )
-    dmf = Spring("dmf", {"engine": 1.0, "secondary": -1.0}, car.dmf_stiffness, car.dmf_damping)
-    clutch = Clutch("clutch", "secondary", "disc", capacity(scene), scene.clutch.peak)
     return Network(
-        (engine, secondary, disc, *nodes),
-        (dmf, *springs),
-        (clutch,),
+        (engine, secondary, disc, final_drive, *nodes),
+        (_dual_mass_flywheel(car), _half_shafts(car), tyres),
+        (Clutch("clutch", "secondary", "disc", capacity(scene), scene.clutch.peak),),
         sources,
-        torque_ports={shafts.pinion: "disc", shafts.wheel: port},
+        torque_ports={shafts.pinion: "disc", shafts.wheel: "final_drive"},
     )
 
 
-def _vehicle(
-    scene: SceneSpec, car: PassengerCar, shafts: Shafts
-) -> tuple[tuple[Inertia, ...], tuple[Spring, ...], str]:
-    """Final drive – half shafts – driven wheels – tyres – vehicle with the other two wheels, all referred to the
-    output shaft."""
-    w, referred = -scene.start.pinion_speed / shafts.ratio, 1.0 / car.final_drive_ratio**2
+def _dual_mass_flywheel(car: PassengerCar) -> Spring:
+    return Spring("dmf", {"engine": 1.0, "secondary": -1.0}, car.dmf_stiffness, car.dmf_damping)
+
+
+def _half_shafts(car: PassengerCar) -> Spring:
+    k, c = car.half_shaft_stiffness * _referred(car), car.half_shaft_damping * _referred(car)
+    return Spring("half_shafts", {"final_drive": 1.0, "wheels": -1.0}, k, c)
+
+
+def _referred(car: PassengerCar) -> float:
+    """What stiffnesses, dampings and inertias at the road wheels are worth at the output shaft."""
+    return 1.0 / car.final_drive_ratio**2
+
+
+def _wheel_speed(scene: SceneSpec, shafts: Shafts) -> float:
+    return -scene.start.pinion_speed / shafts.ratio
+
+
+def _vehicle(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> tuple[tuple[Inertia, ...], Spring]:
+    """Driven wheels – tyres – vehicle with the other two wheels, all referred to the output shaft."""
+    w, referred = _wheel_speed(scene, shafts), _referred(car)
     speed = max(abs(w) * car.road_wheel_radius / car.final_drive_ratio, SLOWEST_TYRE)
     tyre = car.tyre_slip_stiffness * car.road_wheel_radius**2 / speed * referred
     body = (car.vehicle_mass * car.road_wheel_radius**2 + 2.0 * car.road_wheel_inertia) * referred
-    nodes = (
-        Inertia("final_drive", car.final_drive_inertia, w=w),
-        Inertia("wheels", 2.0 * car.road_wheel_inertia * referred, w=w),
-        Inertia("vehicle", body, w=w),
-    )
-    half_shafts = Spring(
-        "half_shafts",
-        {"final_drive": 1.0, "wheels": -1.0},
-        car.half_shaft_stiffness * referred,
-        car.half_shaft_damping * referred,
-    )
-    return nodes, (half_shafts, Spring("tyres", {"wheels": 1.0, "vehicle": -1.0}, 0.0, tyre)), "final_drive"
+    nodes = (Inertia("wheels", 2.0 * car.road_wheel_inertia * referred, w=w), Inertia("vehicle", body, w=w))
+    return nodes, Spring("tyres", {"wheels": 1.0, "vehicle": -1.0}, 0.0, tyre)
 
 
 def _rig(scene: SceneSpec, rig: TestRig, shafts: Shafts) -> Network:

@@ -13,19 +13,22 @@ This page is made by `python -m gearfmu.cosim.table > docs/drivetrain.md` from `
 shipped scenes. A scene may give other values in its table `[passenger_car]` or `[test_rig]`. "Assumed" means: of the
 size that is usual in such a car, taken from no measurement.
 
-## Signs All angles about +z; an external pair counter-rotates, so that everything behind the wheel gear turns
-negatively while the pinion turns positively. In a spring port the outside gives `.phi`, `.w`, `.a` of the spring's
-outer end and receives `.tau`, the torque on the outside.
+## Signs
+All angles about +z; an external pair counter-rotates, so that everything behind the wheel gear turns negatively while
+the pinion turns positively. In a spring port the outside gives `.phi`, `.w`, `.a` of the spring's outer end and
+receives `.tau`, the torque on the outside.
 
 ## Where the cut lies
-The stage is cut off at compliant elements, and the springs belong to the stage. With `chain_in_fmu = true`:
+The stage is cut off at compliant elements, and the springs belong to the stage. With `chain_in_fmu = true` both cuts
+lie at soft springs, and a communication step of 1 ms is possible ([coupling](coupling.md)):
 
-    outside            stage (FMU or kernel)                                                       outside engine,
-    primary ─┤ dual-mass flywheel ─ secondary ─ clutch ─ disc ─ input shaft ─ pinion wheel ─ output shaft ├─ final
-    drive ─ half shafts ─ wheels ─ tyres ─ vehicle
+    engine ─┤ dual-mass flywheel ─ secondary mass ─ clutch ─ disc ─ input shaft ─ pinion
+              wheel ─ output shaft ─ final drive ─ half shafts ├─ road wheels ─ tyres ─ vehicle
 
-With `chain_in_fmu = false` secondary mass, clutch and disc are computed outside and the cut on the pinion's side is
-               the input shaft."""
+What stands between ┤ and ├ is stage (FMU or kernel): two ports with a chain. The wheel's chain keeps its clutch closed
+(capacity 1e6 N·m), so that its two inertias, half the final drive each, are one.
+With `chain_in_fmu = false` secondary mass, clutch and disc, final drive and half shafts are computed outside; the cuts
+are input shaft and output shaft."""
 
 
 def page() -> str:

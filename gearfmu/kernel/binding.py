@@ -38,6 +38,8 @@ _SIGNATURES = {
     "gk_defaults": (c_int, [c_void_p, c_void_p]),
     "gk_set": (c_int, [c_void_p, c_void_p, c_uint32, c_double]),
     "gk_get": (c_int, [c_void_p, c_void_p, c_uint32, POINTER(c_double)]),
+    "gk_set_many": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t, c_void_p]),
+    "gk_get_many": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t, c_void_p]),
     "gk_prepare": (c_int, [c_void_p, c_void_p, c_void_p, c_char_p]),
     "gk_initialize": (c_int, [c_void_p, c_void_p, c_void_p, c_double]),
     "gk_step": (c_int, [c_void_p, c_void_p, c_void_p, c_double, c_double]),

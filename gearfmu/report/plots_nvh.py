@@ -45,13 +45,14 @@ def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) 
                 axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, lw=0.9)
             _level_axis(axis, "dB re 1 N")
             axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
-            _mark_orders(axis, part.time, trace, mesh_angle)
+            marked = _mark_orders(axis, part.time, trace, mesh_angle)
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
-        f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). Dotted: mesh orders."
+        f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). "
+        + ("Dotted: mesh orders." if marked else "Mesh orders are not marked: the speed is not known or not steady.")
     )
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
 
@@ -182,14 +183,14 @@ def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
 
 
-def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndarray | None) -> None:
-    """Mark the mesh orders at the median speed of the window, where nine tenths of it stay within 10 %."""
+def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndarray | None) -> bool:
+    """Mark the mesh orders at the median speed, if nine tenths of the window stay within 10 %; whether it did."""
     if mesh_angle is None:
-        return
+        return False
     frequency = np.interp(time, trace.time, np.gradient(mesh_angle, trace.time)) / (2 * np.pi)
     low, middle, high = np.percentile(frequency, [5, 50, 95])
     if middle <= 0 or high - low > 0.1 * middle:
-        return
+        return False
     for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 24) + 1):
         axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
         axis.annotate(
@@ -201,6 +202,7 @@ def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndar
             fontsize=8,
             color=MUTED,
         )
+    return True
 
 
 def _overlay_orders(axis: Axes, trace: Trace, mesh_angle: np.ndarray | None, limit: float) -> None:

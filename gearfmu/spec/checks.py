@@ -17,6 +17,7 @@ STRIP_PER_HERTZ = 1.5  # the local law needs w > 1.12 b; at 1.5 b its tangent st
 _LARGEST_ALLOWANCE = 0.1  # of the module: more is a wrong centre distance or profile shift
 _LARGEST_THICKENING = 0.005  # of the module
 _LARGEST_RELIEF = 0.1  # of the module
+_LARGEST_INDEX_DEVIATION = 0.05  # of the module: coarser than every tolerance class of ISO 1328-1
 _RIM_PER_TOOTH_HEIGHT = 0.5  # thinner rims are outside the rim thickness factor of ISO 6336-3
 
 Found = Iterator[tuple[str, float | str, str]]
@@ -55,6 +56,7 @@ def _gear(gear: GearSpec, shape: GearGeometry) -> Found:
     rack = _rack_problems(gear, shape)
     yield from rack
     yield from _rim_problems(gear, shape)
+    yield from _index_problems(gear, shape)
     if not rack:
         yield from _tip_problems(gear, shape)
 
@@ -92,6 +94,16 @@ def _rim_problems(gear: GearSpec, shape: GearGeometry) -> Found:
             gear.bore_diameter,
             f"leaves a rim thinner than half the tooth height: at most {_mm(_floor(largest))}",
         )
+
+
+def _index_problems(gear: GearSpec, shape: GearGeometry) -> Found:
+    largest = _LARGEST_INDEX_DEVIATION * shape.m
+    for tooth, deviation in gear.index_deviation.items():
+        field = f"index_deviation.{tooth}"
+        if tooth >= gear.teeth:
+            yield field, deviation, f"there is no such tooth: they are numbered 0 to {gear.teeth - 1}"
+        elif abs(deviation) > largest:
+            yield field, deviation, f"more than a twentieth of the module: at most {_mm(largest)}"
 
 
 def _tip_problems(gear: GearSpec, shape: GearGeometry) -> Found:

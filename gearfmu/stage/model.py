@@ -87,6 +87,7 @@ def assemble(spec: StageSpec, bodies: Sequence[Any], rolls: int = ROLLS) -> Stag
         gear, shape, body = spec.gears[i], geometry.gears[i], bodies[i]
         phase = geometry.wheel_phase if i else 0.0
         sections[f"gear{i}"] = _gear_numbers(gear, shape, body, phase)
+        sections |= _index_numbers(i, gear, shape)
         sections[f"port{i}"] = _port_numbers(spec.ports[gear.name])
         sections |= body_sections(i, body, resampling(body.roll, shape.s_form, shape.s_tip, rolls), degrees)
     return StageModel(spec, write_blob(sections), tuple(body.input_hash for body in bodies))
@@ -142,6 +143,15 @@ def _gear_numbers(gear: GearSpec, shape: GearGeometry, body: Any, phase: float) 
             damping,
         ]
     )
+
+
+def _index_numbers(index: int, gear: GearSpec, shape: GearGeometry) -> dict[str, np.ndarray]:
+    """Angles (2 flanks, z) rad by which the teeth are out of their places; no section when all are in place."""
+    if not any(gear.index_deviation.values()):
+        return {}
+    angles = np.zeros((2, gear.teeth))
+    angles[:, list(gear.index_deviation)] = np.array(list(gear.index_deviation.values())) / shape.r
+    return {f"index{index}": angles}
 
 
 def _port_numbers(port: PortSpec) -> np.ndarray:

@@ -14,6 +14,7 @@ from gearfmu.stage.blob import read_blob, write_blob
 from gearfmu.stage.model import BEARING_K, StageModel
 
 TANGENT = 1e-4
+LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
 SHARES = 4
 RIGID = 1e13  # N/m: 1 nm at 10 kN
 
@@ -39,8 +40,9 @@ def loaded_te(
     """te = r_b1 φ_1 + r_b2 φ_2 of the bore nodes at positions i/N of one pitch (no end point), wheel held at
     −position · 2π/z_2.
 
-    torques: N·m on the pinion; positive drives. rigid_bearings: the bore nodes are held on their axes. parameters: of
-    the kernel, e.g. slices=10. SimulationError(no_equilibrium) where there is none.
+    torques: N·m on the pinion; positive drives, 0 is the limit of a vanishing driving torque: the unloaded (kinematic)
+    transmission error. rigid_bearings: the bore nodes are held on their axes. parameters: of the kernel, e.g.
+    slices=10. SimulationError(no_equilibrium) where there is none.
     """
     kernel = (on_rigid_bearings(model) if rigid_bearings else model).kernel(**{"level": 0.0, **parameters})
     kernel.prepare()
@@ -54,11 +56,14 @@ def loaded_te(
         np.empty((len(torques), positions)),
         np.zeros((len(torques), positions, SHARES)),
     )
+    least = LEAST * model.spec.torque_max
     for i, torque in enumerate(torques):
+        carried = torque if abs(torque) >= least else math.copysign(least, torque)
         for j, part in enumerate(position):
-            state = kernel.transmission(-part * pitch, torque)
-            te[i, j] = state.te
-            stiffness[i, j] = _tangent(kernel, -part * pitch, torque) / base_radius
+            state = kernel.transmission(-part * pitch, carried)
+            tangent = _tangent(kernel, -part * pitch, carried)
+            te[i, j] = state.te + (torque - carried) / tangent
+            stiffness[i, j] = tangent / base_radius
             shares[i, j] = _shares(state)
     return TeResult(np.asarray(torques, float), position, te, stiffness, shares)
 

@@ -94,6 +94,25 @@ def test_stiffness_of_one_tooth_pair_against_iso_6336():
     assert pair_stiffness(bodies, spec, twist=True) == pytest.approx(0.8 * 15.78, rel=0.05)
 
 
+def test_a_symmetric_load_does_not_notice_that_motion_out_of_the_plane_is_held():
+    """Even width functions move the bore neither along z nor about x and y, statically or by any mode, nor couple to
+    them through the bore or the inertia; odd ones do, so zero is not the answer to everything."""
+    planar, out = [0, 1, 5], [2, 3, 4]
+    for body in load_stage_bodies(load_stage("fzg_c")):
+        even = np.arange(body.static_fb.shape[2]) % 2 == 0
+        symmetric = body.parity > 0
+        scale = np.abs(body.static_fb[:, :, ~even][..., out]).max(axis=(0, 1, 2))
+        assert np.all(scale > 0) and np.all(np.abs(body.static_fb[:, :, even][..., out]) < 1e-9 * scale)
+        scale = np.abs(body.bore_rows[out][:, ~symmetric]).max(axis=1, keepdims=True)
+        assert np.all(scale > 0) and np.all(np.abs(body.bore_rows[out][:, symmetric]) < 1e-9 * scale)
+        scale = np.abs(body.bore_rows[planar]).max(axis=1, keepdims=True)
+        assert np.all(np.abs(body.bore_rows[planar][:, ~symmetric]) < 1e-9 * scale)
+        assert np.all(body.flank_rows[:, :, even][..., ~symmetric] == 0)
+        size = np.sqrt(body.static_bb.diagonal())
+        assert np.abs(body.static_bb / np.outer(size, size))[np.ix_(planar, out)].max() < 1e-9
+        assert np.abs(body.inertia[2, :2]).max() < 1e-9 * body.inertia[2, 2]
+
+
 def test_neighbour_teeth_move_along_less_than_the_loaded_one():
     for body in load_stage_bodies(load_stage("fzg_c")):
         middle = len(body.roll) // 2

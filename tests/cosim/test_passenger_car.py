@@ -104,9 +104,9 @@ def test_road_load_opposes_the_motion_and_vanishes_at_rest():
 
 
 def test_kinetic_energy_is_that_of_the_moving_vehicle():
-    """Referred inertias hold the energy of mass and four road wheels at the vehicle's speed, besides final drive and
-    engine."""
-    scene = closure()
+    """Referred inertias hold the energy of mass and four road wheels at the vehicle's speed, besides final drive,
+    engine, flywheel and disc."""
+    scene = closure(chain_in_fmu=False)
     unit = PyUnit(build(scene, SHAFTS))
     wheel_w = scene.start.pinion_speed / SHAFTS.ratio
     road_w = wheel_w / CAR.final_drive_ratio
@@ -117,14 +117,17 @@ def test_kinetic_energy_is_that_of_the_moving_vehicle():
         + 0.5 * CAR.final_drive_inertia * wheel_w**2
     )
     assert unit.energy() == pytest.approx(
-        expected + 0.5 * (CAR.crank_inertia + CAR.dmf_primary_inertia) * engine_w**2, rel=1e-12
+        expected
+        + 0.5 * (CAR.crank_inertia + CAR.dmf_primary_inertia + CAR.secondary_inertia) * engine_w**2
+        + 0.5 * CAR.disc_inertia * scene.start.pinion_speed**2,
+        rel=1e-12,
     )
 
 
 def test_vehicle_side_frequencies():
     """Final drive against wheels through the half shafts: eigenvalue of the matrices and of a run, tyres left free to
     slip."""
-    network = build(closure(tyre_slip_stiffness=1e-6, half_shaft_damping=0.0), SHAFTS)
+    network = build(closure(chain_in_fmu=False, tyre_slip_stiffness=1e-6, dmf_stiffness=1e-6), SHAFTS)
     unit = PyUnit(network)
     mass = np.diag([node.inertia for node in network.nodes])
     rows = unit.dynamics.extension
@@ -138,14 +141,15 @@ def test_ports_and_drivetrain_hold_every_inertia_and_spring_once():
     """Chain inside or outside the FMU: the same sum of inertias, the same stiffnesses."""
     inside, outside = closure(), closure(chain_in_fmu=False)
     ports_in, ports_out = stage_ports(inside, SHAFTS), stage_ports(outside, SHAFTS)
-    chain = ports_in["pinion"].chain
-    total_in = sum(node.inertia for node in build(inside, SHAFTS).nodes) + chain.inertia + chain.disc_inertia
+    chains = [port.chain for port in ports_in.values()]
+    total_in = sum(node.inertia for node in build(inside, SHAFTS).nodes)
+    total_in += sum(chain.inertia + chain.disc_inertia for chain in chains)
     assert total_in == pytest.approx(sum(node.inertia for node in build(outside, SHAFTS).nodes), rel=1e-14)
     springs_out = [spring.k for spring in build(outside, SHAFTS).springs] + [port.k for port in ports_out.values()]
     springs_in = (
         [spring.k for spring in build(inside, SHAFTS).springs]
         + [port.k for port in ports_in.values()]
-        + [chain.shaft_k]
+        + [chain.shaft_k for chain in chains]
     )
     assert sorted(springs_in) == pytest.approx(sorted(springs_out))
     assert stage_signals(outside, SHAFTS) == () and stage_start(outside, SHAFTS) == {}

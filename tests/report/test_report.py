@@ -129,6 +129,16 @@ def test_spectrum_data_hold_the_mesh_order(folder: Path) -> None:
     assert data[names[-2]][peak] == pytest.approx(200 / np.sqrt(2), rel=0.16)
 
 
+def test_mesh_orders_are_marked_where_the_speed_is_steady_and_said_to_be_missing_where_not(
+    folder: Path, tmp_path: Path
+) -> None:
+    run_up = coupled_run().window(0, 0.09)
+    unsteady = report.write(run_up, SUMMARY, tmp_path).read_text(encoding="utf-8")
+    steady = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Dotted: mesh orders" in steady and "Mesh orders are not marked" not in steady
+    assert "Mesh orders are not marked" in unsteady and "Dotted: mesh orders" not in unsteady
+
+
 def test_order_data_are_the_amplitudes(folder: Path) -> None:
     data = np.genfromtxt(folder / "data" / "orders.csv", delimiter=",", names=True, deletechars="")
     late = data["time_[s]"] > 0.15

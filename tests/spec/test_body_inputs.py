@@ -68,6 +68,7 @@ OTHERS = [
     ("gears.0.rack.addendum", 1.1),
     ("gears.1.teeth", 25),
     ("gears.0.bearing.stiffness", 1e8),
+    ("gears.0.index_deviation", {3: 50e-6}),
     ("contact.slices", 1),
     ("contact.damping", 0.0),
     ("ports.pinion.k", 1.0),

@@ -347,3 +347,21 @@ def test_text_of_a_stage_reads_back_as_the_same_stage(tmp_path: Path) -> None:
     assert load_stage(path).model_copy(update={"source": Path("x")}) == load_stage("fzg_c").model_copy(
         update={"source": Path("x")}
     )
+
+
+def test_index_deviations_by_tooth(write: Write) -> None:
+    table = {"0": "50 µm", "15": "-12 µm"}
+    path = write({"gears.pinion.index_deviation": table})
+    assert load_stage(path).gears[0].index_deviation == pytest.approx({0: 50e-6, 15: -12e-6})
+    assert load_stage(path).gears[1].index_deviation == {}
+    text = stage_text(changed({"gears.pinion.index_deviation": table}), "mine", "fzg_c")
+    assert 'index_deviation = { "0" = "50 µm", "15" = "-12 µm" }' in text
+
+
+def test_index_deviations_of_no_tooth_or_beyond_every_tolerance(write: Write) -> None:
+    found = problems(write({"gears.pinion.index_deviation": {"16": "5 µm", "3": "1 mm", "2": "10 µm"}}))
+    assert set(found) == {"gears.pinion.index_deviation.16", "gears.pinion.index_deviation.3"}
+    assert "0 to 15" in found["gears.pinion.index_deviation.16"].remedy
+    assert "0.225 mm" in found["gears.pinion.index_deviation.3"].remedy
+    found = problems(write({"gears.wheel.index_deviation": {"-1": "5 µm", "two": "5 µm", "3": 5e-6}}))
+    assert len(found) == 3 and "unit" in found["gears.wheel.index_deviation.3"].remedy

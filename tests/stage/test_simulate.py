@@ -54,6 +54,13 @@ def test_mean_values_are_those_of_the_load(steady: Trace, relieved: StageModel, 
     assert steady["wheel.tau_mean"][samples].mean() == pytest.approx(-LOAD * 24 / 16, rel=5e-3)
 
 
+def test_te_is_what_its_name_says(steady: Trace, pair: PairGeometry) -> None:
+    """mesh.te = r_b1 φ_1 + r_b2 φ_2 of the bore nodes."""
+    angles = (steady["pinion.gear.phi"], steady["wheel.gear.phi"])
+    expected = sum(shape.r_b * phi for shape, phi in zip(pair.gears, angles, strict=True))
+    assert np.abs(steady["mesh.te"] - expected).max() < 1e-9 * np.abs(angles[0]).max()
+
+
 def test_work_is_accounted_for(steady: Trace) -> None:
     through = float(np.trapezoid(np.abs(steady["pinion.tau"] * steady["pinion.gear.w"]), steady.time))
     left = np.abs(steady["energy.residual"]).max() / through

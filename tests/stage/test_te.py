@@ -46,6 +46,31 @@ def test_vanishes_with_the_load_and_grows_with_it(plain: StageModel) -> None:
     assert np.allclose(values[1] / values[0], 1e3, rtol=1e-2)  # the local law is linear at vanishing force
 
 
+@pytest.mark.parametrize("rigid_bearings", [False, True])
+def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageModel, rigid_bearings: bool) -> None:
+    """The zero of the scale: with nothing to bend them the involutes of the pair as drawn touch at te = 0 everywhere."""
+    result = loaded_te(plain, [0.0, 302.0], 64, rigid_bearings=rigid_bearings)
+    assert np.abs(result.te[0]).max() < 1e-11 and result.te[1].min() > 2e-5
+    assert np.all(result.stiffness[0] > 0.4 * result.stiffness[1])
+
+
+def test_unloaded_te_of_a_relieved_pair_is_the_gap_of_the_nearest_flanks(
+    relieved: StageModel, relief_spec: StageSpec, pair: PairGeometry
+) -> None:
+    """With the axes held: te₀ = min over the pairs in reach of the relief depths at the rolls of contact, to the shift
+    of these rolls by te₀ itself (slope of the relief: < 1 %)."""
+    shapes, positions = pair.gears, 64
+    found = loaded_te(relieved, [0.0], positions, rigid_bearings=True, **{"effect.tip_contact": 0.0}).te[0]
+    first = shapes[0].r_b * (shapes[0].psi_b + pair.alpha_wt)  # roll of pinion tooth 0 at position 0
+    rolls = first + pair.base_pitch * (np.arange(-3, 4)[:, None] + np.arange(positions) / positions)
+    depth = np.zeros(rolls.shape)
+    for gear, shape, roll in zip(relief_spec.gears, shapes, (rolls, pair.length - rolls), strict=True):
+        start = gear.tip_relief.start_roll
+        relief = gear.tip_relief.amount * (np.maximum(roll - start, 0) / (shape.s_a - start)) ** 2
+        depth += np.where((roll < shape.s_form) | (roll > shape.s_tip), np.inf, relief)
+    assert found.max() > 3e-6 and np.allclose(found, depth.min(axis=0), rtol=1e-2, atol=1e-11)
+
+
 def test_negative_torque_is_carried_by_the_coast_flanks_across_the_backlash(
     plain: StageModel, pair: PairGeometry
 ) -> None:

@@ -73,6 +73,9 @@ GK_API size_t gk_data_size(const gk_model *model);
 GK_API gk_outcome gk_defaults(const gk_model *model, gk_data *data);
 GK_API gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, double value);
 GK_API gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference, double *value);
+/* `count` of them at once: when one is refused none is set */
+GK_API gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *references, size_t count, const double *values);
+GK_API gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_t *references, size_t count, double *values);
 GK_API gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
 GK_API gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *data, double time);
 /* One communication step from `time` to time + H. The first H is taken as given; a later one within 8 ulp(time + H) of the last counts as that one.

@@ -194,7 +194,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
     data->count = 0;
     outputs(model, setup, data, 0.0);
     for (int g = 0; g < 2; g++) {
-        data->value[GK_OF_SHAFT(TAU_MEAN, g)] = data->value[GK_OF_SHAFT(TAU, g)];
+        data->value[GK_OF_SHAFT(TAU_MEAN, g)] = data->value[GK_OF_SHAFT(TAU_NEXT, g)] = data->value[GK_OF_SHAFT(TAU, g)];
         data->value[GK_OF_SHAFT(FX_MEAN, g)] = data->value[GK_OF_SHAFT(FX, g)];
         data->value[GK_OF_SHAFT(FY_MEAN, g)] = data->value[GK_OF_SHAFT(FY, g)];
     }
@@ -208,13 +208,15 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *
 }
 
 /* ---- guarded internal step ------------------------------------------------------------------------------------------------------------------------------- */
-typedef struct span { double start, H; gk_motion jump[2]; } span; /* the communication step an internal step belongs to */
+typedef struct span { double start, H; gk_motion jump[2]; double capacity[2]; } span; /* the communication step an internal step belongs to; capacities at its start */
 
-static void ports_at(gk_data *data, gk_work *work, const span *c, const gk_model *model, double tau)
+/* inputs of the internal step from tau to tau + h: outer ends at its end, capacities in its middle */
+static void ports_at(gk_data *data, gk_work *work, const span *c, const gk_model *model, double tau, double h)
 {
     for (int g = 0; g < 2; g++) {
+        if (model->port[g].chain) data->value[GK_OF_SHAFT(CAPACITY, g)] = gk_max(0.0, c->capacity[g] + data->value[GK_OF_SHAFT(CAPACITY_RATE, g)] * (tau + 0.5 * h));
         work->outer_before[g] = work->outer[g];
-        work->outer[g] = model->port[g].kind == PORT_SPRING ? carried(data->input[g], c->jump[g], tau, c->H).phi : 0.0;
+        work->outer[g] = model->port[g].kind == PORT_SPRING ? carried(data->input[g], c->jump[g], tau + h, c->H).phi : 0.0;
         work->torque[g] = model->port[g].kind == PORT_TORQUE ? data->value[GK_OF_SHAFT(TAU_IN, g)] : 0.0;
     }
 }
@@ -224,7 +226,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
 {
     gk_work *work = setup->work;
     const double before[2] = {work->outer[0], work->outer[1]};
-    ports_at(data, work, c, model, tau + h);
+    ports_at(data, work, c, model, tau, h);
     gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : setup->step(model, setup, data, h, setup->gamma);
     if (outcome == GK_OK || setup->integrator == RK45) return outcome;
     data->trouble++;
@@ -234,7 +236,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
         return outcome ? outcome : advance(model, setup, data, c, tau + 0.5 * h, 0.5 * h, depth + 1);
     }
     data->status |= 2;
-    ports_at(data, work, c, model, tau + h);
+    ports_at(data, work, c, model, tau, h);
     outcome = setup->step(model, setup, data, h, 0.0);
     if (outcome) work->outer[0] = before[0], work->outer[1] = before[1];
     return outcome;
@@ -290,7 +292,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     gk_outcome outcome = accept_step(data, time, wished);
     if (outcome) return outcome;
     gk_work *work = setup->work;
-    span c = {gk_time(data), data->step_H, {{0, 0, 0}, {0, 0, 0}}};
+    span c = {gk_time(data), data->step_H, {{0, 0, 0}, {0, 0, 0}}, {data->value[V_0_CAPACITY], data->value[V_1_CAPACITY]}};
     const double count = c.H / setup->h * (1.0 - 1e-12);
     if (!(count < 1e9)) return GK_BAD_STEP;
     const int64_t steps = 1 + (int64_t)count; /* ceil, guarded against rounding of H / h */
@@ -307,6 +309,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
         if (i + 1 == steps)
             for (int g = 0; g < 2; g++) data->v_bore[g] = bore_speed(setup, data, g);
         outcome = advance(model, setup, data, &c, (double)i * h, h, 0);
+        for (int g = 0; g < 2; g++) data->value[GK_OF_SHAFT(CAPACITY, g)] = c.capacity[g];
         if (outcome) { /* stands at the last good time; the outside may restore or stop */
             data->time_base = c.start + (double)i * h;
             data->count = 0;
@@ -327,6 +330,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     data->value[V_M_FORCE_MEAN] = t.force / c.H;
     data->value[V_M_FORCE_MAX] = t.highest;
     outputs(model, setup, data, h);
+    for (int g = 0; g < 2; g++) data->value[GK_OF_SHAFT(TAU_NEXT, g)] = 2.0 * data->value[GK_OF_SHAFT(TAU, g)] - data->value[GK_OF_SHAFT(TAU_MEAN, g)];
     if (balance(setup, data, h)) return GK_OK;
     data->phase = PHASE_FAILED; /* no state to go on from: only a restored one */
     data->time_base = c.start, data->count = 0, data->step_H = 0.0;

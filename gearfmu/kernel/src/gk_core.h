@@ -64,6 +64,8 @@ typedef struct gk_gear {
     int z, modes, rolls, functions;
     const double *omega, *zeta, *rows, *bore, *c_ff, *c_fb, *c_bb;
     const int32_t *diameter, *part;
+    const double *index;  /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
+    double index_most;    /* the largest of them along the flank normal, m */
 } gk_gear;
 
 typedef struct gk_port {

@@ -4,7 +4,8 @@
  * External pair, side sg = ±1, R = r_bA + r_bB, d = C_B − C_A, a = |d|, L = √(a² − R²), t = arg d − sg·arccos(R/a), n = sg·(−sin t, cos t):
  *     roll of A  s_A = r_bA sg (β_A − t),   roll of B  s_B = r_bB sg (β_B − t − π),   g = L − s_A − s_B + δ_A(s_A) + δ_B(s_B)
  * with β the base angle of the tooth's flank and δ the tip relief. Beyond the end of a flank (s > s_tip) the tip edge, an arc of radius ρ tangent to the flank, meets the
- * other involute along that involute's normal. Gap and gradient go over continuously. Gradients are exact derivatives of these gaps, relief slope included. */
+ * other involute along that involute's normal. Gap and gradient go over continuously. Gradients are exact derivatives of these gaps, relief slope included.
+ * A tooth with an index deviation ε is the same tooth at β + ε (eq. 4a). */
 #include "gk_core.h"
 
 typedef struct line { /* line of action of one side */
@@ -137,6 +138,21 @@ static void grid(const gk_gear *gear, double roll, int *index, double *w)
     }
 }
 
+/* Teeth out of their places (index deviation, ISO 1328-1): flank, roll and base angle turn with the tooth. Returns what the gap loses. */
+static double misplace(const gk_model *model, double sg, gk_place *p, double beta[2])
+{
+    double closer = 0.0;
+    for (int i = 0; i < 2; i++) {
+        const gk_gear *gear = &model->gear[i];
+        if (!gear->index) continue;
+        const double angle = gear->index[p->flank * gear->z + p->tooth[i]], roll = sg * gear->r_b * angle;
+        beta[i] += angle;
+        p->roll[i] += roll;
+        closer += roll;
+    }
+    return closer;
+}
+
 static int side(const gk_model *model, const gk_setup *setup, const double *frame, int flank, double reach, gk_place *place, int room)
 {
     const gk_gear *A = &model->gear[0], *B = &model->gear[1];
@@ -146,8 +162,8 @@ static int side(const gk_model *model, const gk_setup *setup, const double *fram
     double pitch = 2.0 * GK_PI / A->teeth, pitch_b = 2.0 * GK_PI / B->teeth, p_b = A->r_b * pitch;
     double base_a = frame[PHIA] + A->phase + sg * A->psi_b, base_b = frame[PHIB] + B->phase + sg * B->psi_b + shift * pitch_b;
     double s_a = A->r_b * sg * (base_a - l.t), s_b = B->r_b * sg * (base_b - l.t - GK_PI);
-    double allowance = flank ? setup->allowance : 0.0, g = l.L - s_a - s_b + allowance;
-    if (!(g < reach)) return 0; /* the whole side is open: it costs this one comparison */
+    double allowance = flank ? setup->allowance : 0.0, g = l.L - s_a - s_b + allowance, misplaced = A->index_most + B->index_most;
+    if (!(g - misplaced < reach)) return 0; /* the whole side is open: it costs this one comparison */
     double beyond = setup->on.corner ? 0.5 * p_b : 0.0;
     /* teeth whose roll on A lies between B's and A's ends */
     double first = l.L - B->s_tip - beyond, last = A->s_tip + beyond;
@@ -161,15 +177,16 @@ static int side(const gk_model *model, const gk_setup *setup, const double *fram
         p->roll[0] = s_a + sg * k * p_b;
         p->roll[1] = s_b - sg * k * p_b;
         double beta[2] = {base_a + k * pitch, base_b - k * pitch_b};
-        int corner = p->roll[0] > A->s_tip ? 0 : p->roll[1] > B->s_tip ? 1 : -1;
-        if (corner < 0) flank_contact(model, setup, &l, g, p);
-        else if (!corner_contact(model, setup, frame, &l, corner, beta, p)) continue;
-        else p->gap += allowance;
-        if (!(p->gap < reach)) continue;
         p->number[0] = k;
         p->number[1] = shift - k;
         p->tooth[0] = modulo(k, A->z);
         p->tooth[1] = modulo(shift - k, B->z);
+        const double closer = misplaced > 0.0 ? misplace(model, sg, p, beta) : 0.0;
+        int corner = p->roll[0] > A->s_tip ? 0 : p->roll[1] > B->s_tip ? 1 : -1;
+        if (corner < 0) flank_contact(model, setup, &l, g - closer, p);
+        else if (!corner_contact(model, setup, frame, &l, corner, beta, p)) continue;
+        else p->gap += allowance;
+        if (!(p->gap < reach)) continue;
         for (int i = 0; i < 2; i++) grid(&model->gear[i], p->roll[i], &p->index[i], p->weight[i]);
         found++;
     }

@@ -91,6 +91,20 @@ static gk_outcome open_gear(gk_model *model, int i, char message[GK_MESSAGE])
     return GK_OK;
 }
 
+/* optional section: index deviation of every tooth, rad, flank by flank */
+static gk_outcome open_index(gk_model *model, int i, char message[GK_MESSAGE])
+{
+    static const char *const names[2] = {"index0", "index1"};
+    gk_gear *g = &model->gear[i];
+    uint64_t count;
+    g->index = gk_blob_f64(&model->blob, names[i], &count);
+    g->index_most = 0.0;
+    if (!g->index) return GK_OK;
+    if (count != 2 * (uint64_t)g->z || !bounded(g->index, count, 0.1 / g->teeth)) return refuse(message, "index deviations", "are not two small angles a tooth");
+    for (uint64_t k = 0; k < count; k++) g->index_most = gk_max(g->index_most, g->r_b * fabs(g->index[k]));
+    return GK_OK;
+}
+
 static gk_outcome open_port(gk_model *model, int i, char message[GK_MESSAGE])
 {
     gk_port *p = &model->port[i];
@@ -144,7 +158,7 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
         return refuse(message, "stage data", "are out of range");
     if ((outcome = open_names(model, message))) return outcome;
     for (int i = 0; i < 2; i++)
-        if ((outcome = open_gear(model, i, message)) || (outcome = open_port(model, i, message))) return outcome;
+        if ((outcome = open_gear(model, i, message)) || (outcome = open_index(model, i, message)) || (outcome = open_port(model, i, message))) return outcome;
     if (model->gear[0].functions != model->gear[1].functions) return refuse(message, "width functions", "differ between the gears");
     if (model->kind == KIND_PAIR && !(model->distance > (model->gear[0].r_b + model->gear[1].r_b) * 1.0001)) return refuse(message, "centre distance", "is smaller than the base radii allow");
     model->overlap_max = model->kind == KIND_FLAT ? 1.0 : 0.25 * (model->gear[0].s_tip - model->gear[0].s_form);

@@ -94,7 +94,7 @@ gk_outcome gk_defaults(const gk_model *model, gk_data *data)
     return GK_OK;
 }
 
-gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, double value)
+static gk_outcome acceptable(const gk_model *model, const gk_data *data, uint32_t reference, double value)
 {
     if (reference >= GK_VARS || !exists(model, (int)reference)) return GK_BAD_VARIABLE;
     const gk_row *row = &TABLE[reference];
@@ -103,16 +103,31 @@ gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, doub
     if (data->phase == PHASE_FAILED) return GK_BAD_CALL;
     if (!gk_finite(value) || value < row->minimum || value > row->maximum) return GK_BAD_VALUE;
     if (row->type != GK_REAL && value != (double)(int)value) return GK_BAD_VALUE;
-    data->value[reference] = value;
     return GK_OK;
 }
 
-gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference, double *value)
+gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *references, size_t count, const double *values)
 {
-    if (reference >= GK_VARS || !exists(model, (int)reference)) return GK_BAD_VARIABLE;
-    *value = data->value[reference];
+    for (size_t i = 0; i < count; i++) {
+        gk_outcome outcome = acceptable(model, data, references[i], values[i]);
+        if (outcome) return outcome;
+    }
+    for (size_t i = 0; i < count; i++) data->value[references[i]] = values[i];
     return GK_OK;
 }
+
+gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, double value) { return gk_set_many(model, data, &reference, 1, &value); }
+
+gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_t *references, size_t count, double *values)
+{
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= GK_VARS || !exists(model, (int)references[i])) return GK_BAD_VARIABLE;
+        values[i] = data->value[references[i]];
+    }
+    return GK_OK;
+}
+
+gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference, double *value) { return gk_get_many(model, data, &reference, 1, value); }
 
 gk_effects gk_effects_of(const gk_data *data)
 {

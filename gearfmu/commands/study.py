@@ -1,0 +1,59 @@
+"""The verb study: what accuracy costs, as a table, CSV files and a chart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gearfmu.commands.shared import progress_bar
+
+ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
+
+
+@click.command()
+@click.argument("scene")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    help="Folder of study.csv, references.csv, transient.csv and the chart; a study that is there goes on.",
+)
+@click.option("--quick", is_flag=True, help="Few points on a short window.")
+@click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes.")
+def study(scene: str, out: Path, quick: bool, jobs: int) -> int:
+    """Error and price of the fidelity levels in SCENE, over the internal step and the slices."""
+    from gearfmu.commands.models import bodies_of
+    from gearfmu.report.study import write_chart
+    from gearfmu.spec.scene import load_scene
+    from gearfmu.study import Job
+    from gearfmu.study import study as run_study
+
+    spec = load_scene(scene)
+    bodies_of(spec.stage.name)
+    with progress_bar(spec.name) as progress:
+        found = run_study(Job(spec, out, quick, workers=jobs), progress)
+    click.echo(error_table(found.rows))
+    for note in found.notes:
+        click.echo(f"- {note}")
+    written = write_chart(found.rows, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
+    click.echo(", ".join(map(str, [out / "study.csv", *written])))
+    return 0
+
+
+def error_table(rows: Any) -> str:
+    """The rows as text: errors in percent of the alternating part, time per simulated second, ratio to level fast."""
+    lines = [ERRORS] + [
+        (
+            *(row.level, row.integrator, str(row.slices), str(row.n_dyn), f"{1e6 * row.h_s:.3g}"),
+            *(
+                f"{100 * getattr(row, f'{name}_error'):.2g}"
+                for name in ("te", "te_mean", "force", "bearing")
+            ),
+            *(f"{row.realtime_factor:.3g}", f"{row.cpu_ratio:.3g}"),
+        )
+        for row in rows
+    ]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)

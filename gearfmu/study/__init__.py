@@ -1,0 +1,8 @@
+"""What accuracy costs: error against time of the fidelity levels, observed orders, limits of the step."""
+
+from __future__ import annotations
+
+from gearfmu.study.run import Job, Study, study
+from gearfmu.study.table import ReferenceRow, Row, TransientRow
+
+__all__ = ["Job", "ReferenceRow", "Row", "Study", "TransientRow", "study"]

@@ -1,0 +1,223 @@
+"""One measured point of a study: a coupled run of a scene with its inputs kept, and its price by replay.
+
+The price is the processor time of the stage's communication steps alone. Inputs of the coupled run are played back to
+a fresh kernel in chunks, in turn with the same chunk of a second run (interleaved pairs: what slows the machine slows
+both), and what the calls from Python cost is taken off by calls that the kernel refuses at its door.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body import load_stage_bodies
+from gearfmu.cosim.coupled import OK
+from gearfmu.cosim.drivetrain import shafts_of, stage_ports
+from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
+from gearfmu.cosim.scene_run import run_once
+from gearfmu.cosim.source import Source
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble
+from gearfmu.study.norm import Signals, signals_of
+
+CHUNK = 100  # communication steps that are timed at once
+LOOKED_AT = 2.0  # s of processor time after which a replay has said enough
+
+
+@dataclass(frozen=True)
+class Point:
+    """One choice of fidelity: level, integrator, wished step (s; 0 the default of the model), slices."""
+
+    level: str
+    integrator: str = "dg4"
+    h: float = 0.0
+    slices: int = 5
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is needed to play a stage back: blob, start values, names and values (steps, k) of the inputs of every
+    communication step, the saved state at step `first`."""
+
+    blob: bytes
+    parameters: Mapping[str, float | bool | str]
+    names: tuple[str, ...]
+    start: np.ndarray
+    values: np.ndarray
+    step: float
+    first: int
+    state: bytes
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished run: what integrated it, signals, internal step (s; rk45: mean accepted step), dynamic modes,
+    outcome, what the kernel said, recording (None where it was left behind)."""
+
+    point: Point
+    integrator: str
+    signals: Signals
+    h: float
+    n_dyn: int
+    outcome: str
+    warning: str
+    recording: Recording | None = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Price:
+    """Processor time per simulated second, and over that of the other run of the pair."""
+
+    realtime_factor: float
+    cpu_ratio: float
+
+
+class _Kept(KernelUnit):
+    """A kernel unit that keeps its inputs, and its state at the first step at or after `settle`."""
+
+    def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
+        super().__init__(blob, parameters)
+        self.settle, self.now, self.start, self.rows = settle, {}, [], []
+        self.first, self.state = -1, b""
+
+    def set(self, handle: KernelHandle, values: Sequence[float]) -> None:
+        self.now.update(zip(handle.names, map(float, values), strict=True))
+        super().set(handle, values)
+
+    def initialize(self, time: float) -> None:
+        self.start = list(self.now.values())
+        super().initialize(time)
+
+    def step(self, time: float, h: float) -> None:
+        if self.first < 0 and time >= self.settle * (1.0 - 1e-12):
+            self.first, self.state = len(self.rows), self.save()
+        self.rows.append(list(self.now.values()))
+        super().step(time, h)
+
+
+@dataclass
+class _KeptSource:
+    """A Source whose unit is kept."""
+
+    model: StageModel
+    settle: float
+    unit_made: _Kept | None = None
+    parameters: Mapping[str, Any] | None = None
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> _Kept:
+        self.parameters = dict(parameters)
+        self.unit_made = _Kept(self.model.blob, parameters, self.settle)
+        return self.unit_made
+
+
+def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, **changes: Any) -> StageModel:
+    """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; changes: of the
+    StageSpec."""
+    spec = load_stage(scene.stage.name).model_copy(update=changes)
+    spec = spec.model_copy(update={"ports": stage_ports(scene, shafts_of(spec))})
+    return assemble(spec, bodies or load_stage_bodies(spec))
+
+
+def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
+    """A coupled run of the scene at `point`. ModelError when the kernel refuses it, with the kernel's reason."""
+    choice = {"level": point.level, "integrator": point.integrator, "h": point.h, "slices": point.slices}
+    changed = scene.model_copy(update={"stage": scene.stage.model_copy(update=choice), "record": ("*",)})
+    source = _KeptSource(model, scene.settle)
+    result = run_once(changed, source)
+    kept, facts, end = source.unit_made, result.facts, float(result.trace.time[-1])
+    integrator = _integrator(kept, point)
+    gears = tuple(gear.name for gear in model.spec.gears)
+    recording = Recording(
+        model.blob,
+        source.parameters,
+        tuple(kept.now),
+        np.array(kept.start),
+        np.array(kept.rows),
+        scene.coupling.step,
+        max(kept.first, 0),
+        kept.state,
+    )
+    return Run(
+        point,
+        integrator,
+        signals_of(result.trace, gears, scene.settle if end > scene.settle else 0.0),
+        end / facts["solver.steps"] if integrator == "rk45" else facts["solver.h"],
+        int(facts["solver.n_dyn"]),
+        result.outcome,
+        kept.kernel.warning,
+        recording,
+    )
+
+
+def _integrator(unit: _Kept, point: Point) -> str:
+    """What integrates: level paper is rk45 unless a clutch hangs on a port."""
+    clutch = any(name.endswith(".clutch.capacity") for name in unit.kernel.variables)
+    return "rk45" if point.level == "paper" and not clutch else point.integrator
+
+
+def default_step(scene: SceneSpec, model: StageModel, point: Point) -> float:
+    """The internal step (s) that the kernel takes at this point, from a run of one communication step."""
+    return measure(scene.model_copy(update={"duration": scene.coupling.step, "settle": 0.0}), model, point).h
+
+
+class _Replay:
+    """A kernel at the settled state of a recording, stepped in chunks."""
+
+    def __init__(self, recording: Recording) -> None:
+        unit = KernelUnit(recording.blob, recording.parameters)
+        self.kernel, self.recording = unit.kernel, recording
+        self.references = [self.kernel.variables[name].reference for name in recording.names]
+        self._set(recording.start)
+        unit.initialize(0.0)
+        self.rewind()
+
+    def _set(self, values: np.ndarray) -> None:
+        for reference, value in zip(self.references, values.tolist(), strict=True):
+            self.kernel.set_reference(reference, value)
+
+    def rewind(self) -> None:
+        """Back to the settled state."""
+        self.kernel.restore(self.recording.state)
+        self.at = self.recording.first
+
+    @property
+    def left(self) -> int:
+        """Communication steps that are left."""
+        return len(self.recording.values) - self.at
+
+    def chunk(self, count: int) -> float:
+        """Processor seconds of the next `count` communication steps, without the calls'."""
+        rows = self.recording.values[self.at : self.at + count].tolist()
+        idle = self._timed(rows, float("nan"))
+        spent = self._timed(rows, self.recording.step) - idle
+        self.at += count
+        return spent
+
+    def _timed(self, rows: list[list[float]], step: float) -> float:
+        set_one, take = self.kernel.set_reference, self.kernel.try_step
+        references, h, at = self.references, self.recording.step, self.at
+        started = clock.thread_time()
+        for k, row in enumerate(rows):
+            for reference, value in zip(references, row, strict=True):
+                set_one(reference, value)
+            take((at + k) * h, step)
+        return clock.thread_time() - started
+
+
+def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
+    """Price of `run`, in turn with `base`, over the settled part of the scene or until it has taken `looked_at`
+    processor seconds. Both ran the same scene; NaN for a run that stopped early."""
+    if run.outcome != OK or base.outcome != OK:
+        return Price(float("nan"), float("nan"))
+    one, other = _Replay(run.recording), _Replay(base.recording)
+    spent, steps = np.zeros(2), 0
+    while one.left and spent[0] < looked_at:
+        count = min(CHUNK, one.left)
+        spent += one.chunk(count), other.chunk(count)
+        steps += count
+    return Price(float(spent[0] / (steps * run.recording.step)), float(spent[0] / spent[1]))

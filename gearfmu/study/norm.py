@@ -1,0 +1,135 @@
+"""How far one run is from another: relative rms of the alternating part, means apart (docs/theory.md, 6).
+
+error      rms of the difference without its mean, over the rms of the reference's alternating part
+mean error difference of the means, over the same rms: both errors are in one unit and add as squares
+Settled scenes: the alternating part is the signal minus its mean, after settling. Transient scenes: the signal minus
+the reference's moving average over 10 ms, whole window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from gearfmu.cosim.accuracy import alternating, rms
+from gearfmu.stage.trace import Channel, Trace
+
+OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What a run is judged by, sampled every `interval` s from `start` s on.
+
+    te (n,) m, transmission error at the sample · force (n,) N, mesh force, mean over the interval · bearing (n, 4) N,
+    both bearings' x and y forces, means over the interval · locked (n,) bool, the clutch, or None · steady: settled
+    scene. A run that stopped early has fewer samples.
+    """
+
+    te: np.ndarray
+    force: np.ndarray
+    bearing: np.ndarray
+    locked: np.ndarray | None
+    interval: float
+    start: float
+    steady: bool
+
+    def trace(self, meta: dict) -> Trace:
+        """The signals as a Trace, to be kept in a file."""
+        time = self.start + self.interval * np.arange(self.te.size)
+        channels = {"te": Channel(self.te, "m"), "force": Channel(self.force, "N")}
+        channels |= {f"bearing_{k}": Channel(column, "N") for k, column in enumerate(self.bearing.T)}
+        if self.locked is not None:
+            channels["locked"] = Channel(self.locked)
+        return Trace(time, channels, meta | {"interval": self.interval, "start": self.start, "steady": self.steady})
+
+
+def signals_of(trace: Trace, gears: tuple[str, str], settle: float) -> Signals:
+    """The signals of a coupled run after `settle` (s); gears: names of pinion and wheel."""
+    part = trace.window(settle * (1.0 - 1e-12))
+    locked = f"{gears[0]}.clutch.locked"
+    columns = [part[f"bearing.{gear}.{axis}_mean"] for gear in gears for axis in ("fx", "fy")]
+    interval = float(trace.time[1] - trace.time[0])
+    found = part[locked].astype(bool) if locked in part else None
+    return Signals(
+        part["mesh.te"], part["mesh.force_mean"], np.stack(columns, 1), found, interval, float(part.time[0]), settle > 0
+    )
+
+
+def kept_signals(trace: Trace) -> Signals:
+    """The signals of a Trace made by `Signals.trace`."""
+    bearing = np.stack([trace[f"bearing_{k}"] for k in range(4)], 1)
+    locked = trace["locked"].astype(bool) if "locked" in trace else None
+    meta = trace.meta
+    return Signals(trace["te"], trace["force"], bearing, locked, meta["interval"], meta["start"], meta["steady"])
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors of transmission error, its mean, mesh force, and bearing forces (the worse of both bearings, x
+    and y together)."""
+
+    te: float
+    te_mean: float
+    force: float
+    bearing: float
+
+    def below(self, share: float, other: Errors) -> bool:
+        """Whether every alternating part's error is at most `share` of the other's."""
+        return all(
+            getattr(self, f.name) <= share * getattr(other, f.name) for f in fields(self) if f.name != "te_mean"
+        )
+
+
+STOPPED = Errors(float("nan"), float("nan"), float("nan"), float("nan"))
+
+
+def errors(found: Signals, wanted: Signals) -> Errors:
+    """Errors of a run against a reference of the same samples; NaN when it stopped early."""
+    if found.te.size != wanted.te.size:
+        return STOPPED
+    te, mean = _relative(found.te[:, None], wanted.te[:, None], wanted)
+    force, _ = _relative(found.force[:, None], wanted.force[:, None], wanted)
+    sides = [_relative(found.bearing[:, k : k + 2], wanted.bearing[:, k : k + 2], wanted)[0] for k in (0, 2)]
+    return Errors(te, mean, force, max(sides))
+
+
+def _relative(found: np.ndarray, wanted: np.ndarray, scale: Signals) -> tuple[float, float]:
+    """Errors of alternating part and mean of (n, k) components of one quantity, root of the sum of squares."""
+    ac = [alternating(column, scale.interval, scale.steady) for column in wanted.T]
+    size = float(np.sqrt(sum(rms(column) ** 2 for column in ac)))
+    difference = found - wanted
+    mean = difference.mean(axis=0)
+    return float(np.sqrt(np.sum(np.var(difference, axis=0)))) / size, float(mean.sum()) / size
+
+
+def lock_time(signals: Signals) -> float:
+    """Time (s) of the last locking of the clutch; NaN when it is open at the end or there is none."""
+    if signals.locked is None or not signals.locked.size or not signals.locked[-1]:
+        return float("nan")
+    opened = np.flatnonzero(~signals.locked)
+    return signals.start + signals.interval * (float(opened[-1]) + 1.0 if opened.size else 0.0)
+
+
+def band_levels(values: np.ndarray, interval: float) -> dict[float, float]:
+    """rms in each octave band (centre Hz) below the sampling limit, of samples (n,), by a Hann window and Parseval."""
+    window = np.hanning(values.size)
+    centred = (values - np.average(values, weights=window)) * window
+    power = 2.0 * np.abs(np.fft.rfft(centred)) ** 2 / (values.size * np.sum(window**2))
+    frequency = np.fft.rfftfreq(values.size, interval)
+    found = {}
+    for centre in OCTAVES:
+        inside = (frequency >= centre / np.sqrt(2)) & (frequency < centre * np.sqrt(2))
+        if centre * np.sqrt(2) < 0.5 / interval and np.count_nonzero(inside) >= 3:
+            found[centre] = float(np.sqrt(power[inside].sum()))
+    return found
+
+
+def band_error(found: Signals, wanted: Signals, window: slice) -> float:
+    """Largest difference (dB) of the octave-band levels of the mesh force over these samples; NaN when there are
+    none."""
+    if found.force.size != wanted.force.size or wanted.force[window].size < 32:
+        return float("nan")
+    levels = [band_levels(signals.force[window], signals.interval) for signals in (found, wanted)]
+    return max((abs(20 * np.log10(levels[0][band] / levels[1][band])) for band in levels[1]), default=float("nan"))

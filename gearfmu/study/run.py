@@ -1,0 +1,292 @@
+"""The study of a scene: error and price of every point of the ladder, kept in CSV files as they come, so that a study
+that was interrupted goes on where it stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from gearfmu.cosim.coupled import OK
+from gearfmu.errors import ModelError
+from gearfmu.files import write_text
+from gearfmu.kernel import library_path
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.stage import StageModel
+from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
+from gearfmu.study.ladder import LEVELS, base_point, points, quick_scene
+from gearfmu.study.norm import band_error, errors, lock_time
+from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
+from gearfmu.study.table import ReferenceRow, Row, TransientRow, read_rows, write_rows
+
+FORMAT = 1  # of what is kept: a study of another format is measured anew
+GROWTH = 1.1  # an error that grows by more than this factor as the step shrinks is told
+Progress = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A finished study of one scene: its rows, what they are measured against, and sentences about them."""
+
+    scene: SceneSpec
+    rows: tuple[Row, ...]
+    references: tuple[ReferenceRow, ...]
+    transients: tuple[TransientRow, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A scene, the folder for the files, quick: few points on a short window, defaults: only the default step of each
+    level with the scene's slices, workers: processes."""
+
+    scene: SceneSpec
+    out: Path
+    quick: bool = False
+    defaults: bool = False
+    workers: int = 1
+
+    @property
+    def window(self) -> SceneSpec:
+        """The scene as it is run."""
+        return quick_scene(self.scene) if self.quick else self.scene
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """What every point of a scene shares in one process."""
+
+    scene: SceneSpec
+    model: StageModel
+    base: Run
+
+
+@lru_cache(maxsize=1)
+def _bench(text: str) -> _Bench:
+    scene = SceneSpec.model_validate_json(text)
+    model = models_for(scene)
+    return _Bench(scene, model, measure(scene, model, base_point(scene)))
+
+
+def _price_of(text: str, point: Point) -> tuple[Run, Price] | str:
+    """A measured point without its recording, or why the kernel refuses it."""
+    bench = _bench(text)
+    try:
+        run = measure(bench.scene, bench.model, point)
+    except ModelError as error:
+        return str(error)
+    return replace(run, recording=None), paired_price(run, bench.base)
+
+
+def _reference_of(text: str, slices: int, quick: bool) -> Reference:
+    bench = _bench(text)
+    return make_reference(bench.scene, bench.model, slices, quick)
+
+
+def identity(scene: SceneSpec, model: StageModel) -> str:
+    """Hex digest of what decides the numbers: scene, kernel library, bodies and stage (the model), format."""
+    digest = hashlib.sha256(f"{FORMAT} {scene.hash} {model.hash}".encode())
+    digest.update(library_path().read_bytes())
+    return digest.hexdigest()
+
+
+def study(job: Job, progress: Progress | None = None) -> Study:
+    """Measure what is not yet in the folder and return all of it.
+
+    Writes study.csv, references.csv, transient.csv, study.json, reference/*.h5 in job.out, after every point. Raises
+    SpecError or BodyError when the scene cannot be run.
+    """
+    return _Study(job, progress or (lambda fraction, text="": None)).go()
+
+
+class _Study:
+    def __init__(self, job: Job, tell: Progress) -> None:
+        self.job, self.tell, self.scene = job, tell, job.window
+        self.text = self.scene.model_dump_json()
+        self.model = models_for(self.scene)
+        self.identity = identity(self.scene, self.model)
+        self.tables = {kind: _Table(job.out / name, kind) for name, kind in FILES.items()}
+        if self._kept_identity() != self.identity:
+            for table in self.tables.values():
+                table.drop(self.scene.name)
+        self.refused: list[str] = []
+
+    def go(self) -> Study:
+        """References first, then the points."""
+        wanted = self._wanted()
+        slices = sorted({point.slices for point in wanted})
+        missing = [point for point in wanted if not self._known(point)]
+        self._write_identity()
+        references = self._references(slices)
+        for done, (point, found) in enumerate(self._each(_price_of, missing)):
+            self.tell((done + 1) / (len(missing) + 1), f"{point.level} {point.integrator}, {point.slices} slices")
+            self._keep(point, found, references[point.slices])
+        kinds = (Row, ReferenceRow, TransientRow)
+        found = [tuple(self.tables[kind].of(self.scene.name)) for kind in kinds]
+        return Study(self.scene, *found, tuple([*notes(found[0], found[1]), *self.refused]))
+
+    def _wanted(self) -> list[Point]:
+        """Points with their default steps as numbers, each once."""
+        all_points = points(self.scene, self.job.quick)
+        if self.job.defaults:
+            own = self.scene.stage.slices
+            all_points = [p for p in all_points if not p.h and p.slices == own and p.level in LEVELS]
+        found = [p if p.h else replace(p, h=default_step(self.scene, self.model, p)) for p in all_points]
+        once: dict[tuple, Point] = {}
+        for point in found:
+            once.setdefault((point.level, point.integrator, f"{point.h:.6g}", point.slices), point)
+        return list(once.values())
+
+    def _known(self, point: Point) -> bool:
+        rows = self.tables[Row].of(self.scene.name)
+        return any(_is_at(row, point) for row in rows)
+
+    def _references(self, slices: list[int]) -> dict[int, Reference]:
+        folder = self.job.out / "reference"
+        paths = {count: folder / f"{self.scene.name}_{count}.h5" for count in slices}
+        found = {count: kept_reference(path, self.identity) for count, path in paths.items()}
+        missing = [count for count in slices if found[count] is None]
+        for count, reference in self._each(_reference_of, missing, self.job.quick):
+            found[count] = reference
+            keep_reference(reference, paths[count], self.identity)
+        table = self.tables[ReferenceRow]
+        table.drop(self.scene.name)
+        for count, r in found.items():
+            moved = (r.moved.te, r.moved.force, r.moved.bearing)
+            table.add(ReferenceRow(self.scene.name, count, r.h, r.n_dyn, *moved, r.reached))
+        return found
+
+    def _each(self, work: Callable, items: list, *more: object) -> Iterator[tuple]:
+        """(item, work(scene, item, …)) as they are done, in this process or in several."""
+        if self.job.workers <= 1 or len(items) <= 1:
+            for item in items:
+                self.tell(None, str(item) if isinstance(item, int) else item.level)
+                yield item, work(self.text, item, *more)
+            return
+        with ProcessPoolExecutor(self.job.workers) as pool:
+            waiting = {pool.submit(work, self.text, item, *more): item for item in items}
+            for future in as_completed(waiting):
+                yield waiting[future], future.result()
+
+    def _keep(self, point: Point, found: tuple[Run, Price] | str, reference: Reference) -> None:
+        if isinstance(found, str):
+            self.refused.append(f"{point.level}, {1e6 * point.h:.3g} µs, {point.slices} slices: refused: {found}")
+            return
+        run, price = found
+        if run.outcome != OK:
+            self.refused.append(f"{point.level}, {1e6 * run.h:.3g} µs: stopped: {run.outcome}")
+        if run.warning:
+            self.refused.append(f"{point.level}, {1e6 * run.h:.3g} µs, {point.slices} slices: {run.warning}")
+        self.tables[Row].add(_row(self.scene, run, price, reference))
+        if not reference.signals.steady:
+            self.tables[TransientRow].add(_transient(self.scene, run, reference))
+
+    def _kept_identity(self) -> str | None:
+        return _facts(self.job.out).get(self.scene.name, {}).get("identity")
+
+    def _write_identity(self) -> None:
+        facts = _facts(self.job.out)
+        facts[self.scene.name] = {
+            "identity": self.identity,
+            "model": self.model.hash,
+            "bodies": list(self.model.body_hashes),
+            "kernel": hashlib.sha256(library_path().read_bytes()).hexdigest(),
+            "duration_s": self.scene.duration,
+            "settle_s": self.scene.settle,
+            "machine": platform.machine(),
+        }
+        write_text(self.job.out / "study.json", json.dumps(facts, indent=1, sort_keys=True) + "\n")
+
+
+class _Table:
+    """A CSV file of rows, written after every change."""
+
+    def __init__(self, path: Path, kind: type) -> None:
+        self.path, self.kind, self.rows = path, kind, read_rows(path, kind)
+
+    def of(self, scene: str) -> list:
+        """The scene's rows."""
+        return [row for row in self.rows if row.scene == scene]
+
+    def add(self, row: object) -> None:
+        """One more; the file is sorted by its columns but the measured ones."""
+        self.rows = sorted([*self.rows, row], key=_order)
+        write_rows(self.path, self.kind, self.rows)
+
+    def drop(self, scene: str) -> None:
+        """Forget the scene's rows."""
+        if self.of(scene):
+            self.rows = [row for row in self.rows if row.scene != scene]
+            write_rows(self.path, self.kind, self.rows)
+
+
+FILES = {"study.csv": Row, "references.csv": ReferenceRow, "transient.csv": TransientRow}
+
+
+def _order(row: Row | ReferenceRow | TransientRow) -> tuple:
+    return (row.scene, row.slices, getattr(row, "level", ""), getattr(row, "integrator", ""), -row.h_s)
+
+
+def _is_at(row: Row, point: Point) -> bool:
+    """Whether the row is this point; the step of rk45 is its own."""
+    same = (row.level, row.slices) == (point.level, point.slices)
+    adaptive = row.integrator == "rk45"
+    if point.level == "paper":
+        return same
+    return same and row.integrator == point.integrator and (adaptive or np.isclose(row.h_s, point.h, rtol=1e-4))
+
+
+def _facts(folder: Path) -> dict:
+    try:
+        return json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def _row(scene: SceneSpec, run: Run, price: Price, reference: Reference) -> Row:
+    e, p = errors(run.signals, reference.signals), run.point
+    head = (scene.name, p.level, run.integrator, run.h, run.n_dyn, p.slices)
+    return Row(*head, e.te, e.te_mean, e.force, e.bearing, price.realtime_factor, price.cpu_ratio)
+
+
+def _transient(scene: SceneSpec, run: Run, reference: Reference) -> TransientRow:
+    wanted = reference.signals
+    locked = lock_time(wanted)
+    at = wanted.te.size if np.isnan(locked) else round((locked - wanted.start) / wanted.interval)
+    bands = [band_error(run.signals, wanted, part) for part in (slice(0, at), slice(at, None))]
+    head = (scene.name, run.point.level, run.integrator, run.h, run.point.slices)
+    return TransientRow(*head, lock_time(run.signals) - locked, *bands)
+
+
+def notes(rows: tuple[Row, ...], references: tuple[ReferenceRow, ...]) -> Iterator[str]:
+    """What the numbers alone do not say: errors that grow as the step shrinks, references that are not fine enough."""
+    lines: dict[tuple, list[Row]] = {}
+    for row in rows:
+        lines.setdefault((row.level, row.integrator, row.slices), []).append(row)
+    for (level, integrator, slices), line in lines.items():
+        line.sort(key=lambda row: -row.h_s)
+        for name in ("te", "force", "bearing"):
+            least = min(line, key=lambda row: getattr(row, f"{name}_error"))
+            last, low = getattr(line[-1], f"{name}_error"), getattr(least, f"{name}_error")
+            if last > GROWTH * low:
+                yield (
+                    f"{level} ({integrator}), {slices} slices: {name} error grows from {100 * low:.2g} % at "
+                    f"{1e6 * least.h_s:.3g} µs to {100 * last:.2g} % at {1e6 * line[-1].h_s:.3g} µs: the errors of "
+                    "time and of modes cancel in part"
+                )
+    for r in references:
+        if not r.reached:
+            yield (
+                f"reference, {r.slices} slices: at {1e6 * r.h_s:.3g} µs it still moves by {100 * r.te_moved:.2g} % (te), "
+                f"{100 * r.force_moved:.2g} % (force), more than a fifth of the smallest error of level full"
+            )
+        small = [row for row in rows if row.slices == r.slices and row.te_error < 5 * r.te_moved]
+        if small:
+            yield f"reference, {r.slices} slices: {len(small)} errors are smaller than five times what it moved"

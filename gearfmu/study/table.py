@@ -1,0 +1,109 @@
+"""Rows of a study and the CSV files they are kept in."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, astuple, dataclass, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.files import written_whole
+
+
+@dataclass(frozen=True)
+class Row:
+    """One point of the chart. Errors: study/norm.py. realtime_factor: processor seconds of the stage per simulated
+    second; cpu_ratio: that over the cost of level fast at its default step, measured in turn with it."""
+
+    scene: str
+    level: str
+    integrator: str
+    h_s: float
+    n_dyn: int
+    slices: int
+    te_error: float
+    te_mean_error: float
+    force_error: float
+    bearing_error: float
+    realtime_factor: float
+    cpu_ratio: float
+
+
+@dataclass(frozen=True)
+class ReferenceRow:
+    """What the errors of a scene are measured against, by how much it moved when its step was halved last, and
+    whether that is less than a fifth of the smallest error of its kind of level full."""
+
+    scene: str
+    slices: int
+    h_s: float
+    n_dyn: int
+    te_moved: float
+    force_moved: float
+    bearing_moved: float
+    reached: bool
+
+
+@dataclass(frozen=True)
+class TransientRow:
+    """What a transient scene is judged by beside the waveform: time of locking against the reference (s), largest
+    difference of the octave bands of the mesh force (dB) before and after it."""
+
+    scene: str
+    level: str
+    integrator: str
+    h_s: float
+    slices: int
+    lock_time_error_s: float
+    bands_before_lock_dB: float
+    bands_after_lock_dB: float
+
+
+AnyRow = TypeVar("AnyRow")
+
+
+def read_rows(path: Path, kind: type[AnyRow]) -> list[AnyRow]:
+    """Rows of a file written by `write_rows`; none when there is no file. SpecError for a file of other columns."""
+    if not path.is_file():
+        return []
+    names = [f.name for f in fields(kind)]
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        found = list(reader)
+    if list(reader.fieldnames or ()) != names or any(None in line.values() for line in found):
+        raise SpecError([Problem(str(path), "header", ",".join(reader.fieldnames or ()), f"remove it: {names} is read")])
+    return [kind(**{f.name: _value(str(f.type), line[f.name]) for f in fields(kind)}) for line in found]
+
+
+def write_rows(path: Path, kind: type[AnyRow], rows: Iterable[AnyRow]) -> None:
+    """All rows under a header of the field names; whole or not at all."""
+    with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([f.name for f in fields(kind)])
+        writer.writerows(map(_plain, map(astuple, rows)))
+
+
+def tidy(rows: Sequence[Any], columns: Sequence[str] | None = None) -> str:
+    """A table for the terminal: one row a line, numbers with three digits, columns aligned."""
+    if not rows:
+        return "(no rows)"
+    names = list(columns or asdict(rows[0]))
+    cells = [names] + [[_shown(getattr(row, name)) for name in names] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells)
+
+
+def _value(kind: str, text: str) -> Any:
+    if kind == "bool":
+        return text == "true"
+    return text if kind == "str" else int(text) if kind == "int" else float(text)
+
+
+def _plain(values: tuple) -> list[Any]:
+    return [("true" if v else "false") if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in values]
+
+
+def _shown(value: Any) -> str:
+    return ("yes" if value else "no") if isinstance(value, bool) else f"{value:.3g}" if isinstance(value, float) else str(value)

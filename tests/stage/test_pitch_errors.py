@@ -1,0 +1,103 @@
+"""Pitch errors by hand: a tooth out of its place by F_pi moves its flanks by F_pi cos α along their normals, towards
+the other gear on one side and away from it on the other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gearfmu.body import ReducedBody
+from gearfmu.geometry import PairGeometry
+from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.stage import StageSpec
+from gearfmu.stage import StageModel, assemble, loaded_te
+
+LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
+DEVIATION = 50e-6
+ALONG_NORMAL = DEVIATION * math.cos(math.radians(20.0))
+TEETH = (16, 24)
+
+
+def with_deviations(spec: StageSpec, *tables: dict[int, float]) -> StageSpec:
+    """The stage with index deviations (tooth → m) of pinion and wheel."""
+    pairs = zip(spec.gears, tables, strict=True)
+    gears = tuple(gear.model_copy(update={"index_deviation": table}) for gear, table in pairs)
+    return spec.model_copy(update={"gears": gears})
+
+
+def light_te(spec: StageSpec, bodies: list[ReducedBody], *tables: dict[int, float], torque: float = LIGHT) -> np.ndarray:
+    return loaded_te(assemble(with_deviations(spec, *tables), bodies), [torque], POSITIONS).te[0]
+
+
+@pytest.mark.parametrize("gear", [0, 1])
+def test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh(
+    gear: int, spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+) -> None:
+    """Unloaded te is −F_pi cos α as long as tooth 0 is on its flank, 0 once only its neighbour is in mesh, and never
+    below; in mesh for the contact ratio less the stretch at the other end where the neighbours have not come yet."""
+    tables: list[dict[int, float]] = [{}, {}]
+    tables[gear] = {0: DEVIATION}
+    te = light_te(spec, bodies, *tables)
+    held, free = np.abs(te + ALONG_NORMAL) < 2e-9, np.abs(te) < 2e-9
+    print(f"gear {gear}: tooth 0 holds for {held.mean():.3f} of the pitch, free for {free.mean():.3f}")
+    assert held.sum() > 0.4 * POSITIONS and free.sum() > 0.3 * POSITIONS
+    assert np.all(te > -ALONG_NORMAL - 2e-9) and np.all(te < 2e-9)
+    assert held[0] and free[-1] and np.all(np.diff(held.astype(int)) <= 0) and np.all(np.diff(free.astype(int)) >= 0)
+
+
+@pytest.mark.parametrize("gear", [0, 1])
+def test_a_receding_tooth_matters_only_where_it_is_alone(
+    gear: int, spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+) -> None:
+    """Neighbours take over before the pinion has moved by F_pi cos α: their tip corners reach in from off the line of
+    action."""
+    tables: list[dict[int, float]] = [{}, {}]
+    tables[gear] = {0: -DEVIATION}
+    te = light_te(spec, bodies, *tables)
+    assert np.all(te > -2e-9) and np.all(te < ALONG_NORMAL + 2e-9)
+    assert np.mean(np.abs(te) < 2e-9) > pair.contact_ratio - 1 and te.max() > 0.2 * ALONG_NORMAL
+
+
+def test_coast_flanks_see_the_other_side(spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry) -> None:
+    """The flank that leads on the drive side trails on the coast side: what protrudes there has a negative sign."""
+    te = light_te(spec, bodies, {0: -DEVIATION}, {}, torque=-LIGHT)
+    held = np.abs(te + pair.normal_backlash - ALONG_NORMAL) < 5e-9
+    assert held.mean() > 0.4 and np.all(te < -pair.normal_backlash + ALONG_NORMAL + 5e-9)
+    receding = light_te(spec, bodies, {0: DEVIATION}, {}, torque=-LIGHT)
+    assert np.all(receding < -pair.normal_backlash + 5e-9)
+
+
+def test_deviations_of_mating_teeth_cancel(spec: StageSpec, bodies: list[ReducedBody], plain: StageModel) -> None:
+    """A wheel tooth that gives way by as much as the pinion's protrudes: the pair runs as if both were in place, but
+    for the slight roll along the flanks."""
+    te = loaded_te(assemble(with_deviations(spec, {0: DEVIATION}, {0: -DEVIATION}), bodies), [LOAD], 16).te[0]
+    nominal = loaded_te(plain, [LOAD], 16).te[0]
+    assert np.abs(te - nominal).max() < 0.02 * nominal.mean()
+
+
+def test_a_protruding_tooth_carries_all_until_its_deflection_brings_the_next_one_in(
+    spec: StageSpec, bodies: list[ReducedBody]
+) -> None:
+    result = loaded_te(assemble(with_deviations(spec, {0: DEVIATION}, {}), bodies), [80.0, 1500.0], 16)
+    tooth_0 = result.shares[:, :4, 2]
+    assert np.all(tooth_0[0] == 1.0) and np.all(tooth_0[1] < 1.0)
+
+
+def test_all_teeth_out_by_the_same_are_a_turned_gear(
+    spec: StageSpec, bodies: list[ReducedBody], plain: StageModel
+) -> None:
+    """But for the direction of the elastic rows, which stay with the teeth's nominal places (F_pi/r = 1.4 mrad)."""
+    tables = ({k: DEVIATION for k in range(TEETH[0])}, {})
+    te = loaded_te(assemble(with_deviations(spec, *tables), bodies), [LOAD], 16).te[0]
+    assert np.allclose(te + ALONG_NORMAL, loaded_te(plain, [LOAD], 16).te[0], rtol=0, atol=2e-9)
+
+
+def test_bodies_and_models_without_deviations_are_what_they_were(
+    spec: StageSpec, bodies: list[ReducedBody], plain: StageModel
+) -> None:
+    changed = with_deviations(spec, {3: DEVIATION}, {})
+    assert [body_hash(body_inputs(changed, i)) for i in (0, 1)] == [body_hash(body_inputs(spec, i)) for i in (0, 1)]
+    assert assemble(changed, bodies).hash != plain.hash
+    assert assemble(with_deviations(spec, {3: 0.0}, {}), bodies).blob == plain.blob
