@@ -102,7 +102,7 @@ typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | 
 } gk_modal;
 
 typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
-    gk_real *a11, *a12, *a21, *a22, *b0q, *b0v, *bq, *bv; /* flow; response to the force at the start and at the end of the step */
+    gk_real *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv; /* flow (d11 = a11 − 1, d22 = a22 − 1); response to the force at the start and at the end of the step */
     gk_real *mobility, *read_q, *read_v;                  /* what a force at the end does to a gap; the gap reads read_q q + read_v v */
     gk_real *kappa, *inverse_s2;
     int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */

@@ -54,19 +54,21 @@ static oscillator linear_force(double omega, double zeta, double h)
     return o;
 }
 
-/* The flow in gk_real with the determinant of the exact one, e^(−2ζωh): rounded one by one to single precision the four numbers let an undamped mode grow or fade by up to 1e-7 of its energy
- * every step, always the same way. a11 and a22 carry the frequency and stay; among the neighbours of a12 (a few 1e-6: the shape of the orbit) that one is taken whose a21 gives the best
- * determinant, some 1e-10. */
+/* The flow in gk_real: a11 − 1, a12, a21, a22 − 1, which keeps frequencies to 1e-7 at any h, with the determinant of the exact one, e^(−2ζωh). Rounded one by one to single precision the four
+ * numbers let an undamped mode grow or fade by up to 1e-7 of its energy every step, always the same way; so among the nearest values and their neighbours, each with the a21 that belongs
+ * to it, those with the best determinant are taken, some 1e-10. */
 static void round_flow(const oscillator *o, gk_real out[4])
 {
-    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, enough = 2e-11;
+    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, d11 = o->a11 - 1.0, d22 = o->a22 - 1.0;
     double least = INFINITY;
-    out[0] = (gk_real)o->a11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)o->a22;
+    out[0] = (gk_real)d11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)d22;
     if (sizeof(gk_real) > sizeof(float)) return;
-    for (int choice = 0; choice < 75 && least > enough; choice++) {
-        const gk_real a12 = (gk_real)(o->a12 * (1.0 + ulp * ((choice & 1 ? 1 : -1) * ((choice + 1) / 2)))), a21 = (gk_real)(((double)out[0] * out[3] - wanted) / a12);
-        const double error = fabs((double)out[0] * out[3] - (double)a12 * a21 - wanted);
-        if (error < least) least = error, out[1] = a12, out[2] = a21;
+    for (int choice = 0; choice < 75; choice++) {
+        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 5 - 2))), (gk_real)(o->a12 * (1.0 + ulp * (choice / 25 - 1))), (gk_real)(d22 * (1.0 + ulp * (choice / 5 % 5 - 2)))};
+        const double product = (1.0 + (double)a[0]) * (1.0 + (double)a[2]) - wanted; /* what a12·a21 should be */
+        const gk_real a21 = (gk_real)(product / a[1]);
+        const double error = fabs(product - (double)a[1] * a21);
+        if (error < least) least = error, out[0] = a[0], out[1] = a[1], out[2] = a21, out[3] = a[2];
     }
 }
 
@@ -74,7 +76,7 @@ static void store(gk_flow *f, int i, const oscillator *o)
 {
     gk_real a[4] = {0, 0, 0, 0};
     if (o->a12 != 0.0) round_flow(o, a);
-    f->a11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->a22[i] = a[3];
+    f->d11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->d22[i] = a[3];
     f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
     f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;

@@ -48,7 +48,7 @@ static void lay_out_flow(bump *b, const gk_setup *setup, gk_coefficients *k)
     for (int g = 0; g < 2; g++) {
         size_t bytes = (size_t)setup->modal[g].n * sizeof(gk_real);
         gk_flow *f = &k->flow[g];
-        gk_real **array[] = {&f->a11, &f->a12, &f->a21, &f->a22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+        gk_real **array[] = {&f->d11, &f->a12, &f->a21, &f->d22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = take(b, bytes);
     }
 }

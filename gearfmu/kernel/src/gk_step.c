@@ -31,8 +31,8 @@ static void predict(const gk_setup *setup, const gk_data *data, const gk_coeffic
         const gk_real *v = q + n, *f = v + n;
         const gk_flow *w = &k->flow[g];
         for (int i = 0; i < n; i++) {
-            work->qp[g][i] = w->a11[i] * q[i] + w->a12[i] * v[i] + w->b0q[i] * f[i];
-            work->vp[g][i] = w->a21[i] * q[i] + w->a22[i] * v[i] + w->b0v[i] * f[i];
+            work->qp[g][i] = q[i] + (w->d11[i] * q[i] + w->a12[i] * v[i] + w->b0q[i] * f[i]);
+            work->vp[g][i] = v[i] + (w->a21[i] * q[i] + w->d22[i] * v[i] + w->b0v[i] * f[i]);
         }
         work->y[g] = work->qp[g];
         if (k->curved_read) {
