@@ -152,7 +152,7 @@ typedef struct gk_memory { /* what a tooth pair remembers from the last step */
 
 typedef struct gk_motion { double phi, w, a; } gk_motion;
 
-typedef struct gk_ledger { double work, dissipated, baseline; } gk_ledger;
+typedef struct gk_ledger { double work, dissipated, baseline, owed; } gk_ledger; /* owed: defect of energy that the balance of contacts tolerated so far */
 
 struct gk_data {
     uint64_t magic;
@@ -216,6 +216,7 @@ typedef struct gk_system { /* unknown forces of one step: contacts, then links *
     double path[MAX_ROWS], slope[MAX_ROWS]; /* C′λ + δ of active rows; δ′ in the tangent */
     double squeeze[MAX_ROWS], squeeze0[MAX_ROWS]; /* deflection of the massless path, (C′ + K)λ + δ, at the end and at the start */
     double stored0;                   /* energy of the massless part at the start of the step */
+    double owed, due;                 /* defect of energy that the steps before left; what of it this step should make good */
     int column[MAX_ROWS], columns;    /* rows that can carry force */
     int pivot[MAX_ROWS], rank, map[MAX_ROWS];
     int rounds, limit_reached, curved;

@@ -2,6 +2,7 @@
  * Until `correct` nothing of gk_data changes but its expression for another h, so a step that fails can be repeated with another h or scheme. */
 #include "gk_core.h"
 
+static const double PAYABLE = 1e-4; /* of the energy of the massless part: what a contact that only grazes cannot repay waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
@@ -103,6 +104,8 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
             s->z[i] = s->active[i] ? 0.0 : s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
         }
     }
+    s->owed = data->ledger.owed;
+    s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
 static int all_finite(const gk_system *s)
@@ -258,6 +261,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     account(setup, data);
     gk_step_remember(setup, data);
     data->rounds += s->rounds;
+    data->ledger.owed = s->owed;
     data->steps++;
     if (s->limit_reached) data->trouble++, data->status |= 4;
     GK_LAP(work, PHASE_REMEMBER);
