@@ -50,8 +50,8 @@ enum {
 #define GK_OF_SHAFT(ID, s) (V_0_##ID + (s) * (V_1_PHI_IN - V_0_PHI_IN))
 
 typedef enum { PORT_SPRING, PORT_TORQUE, PORT_FIXED } gk_port_kind;
-typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER } gk_level;
-typedef enum { DG4, MIX4, EM, RK45 } gk_integrator;
+typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER, LEVEL_EXPLICIT } gk_level;
+typedef enum { DG4, MIX4, EM, RK45, CENTRAL } gk_integrator;
 typedef enum { KIND_PAIR, KIND_FLAT } gk_kind;
 
 /* ---- constant: read from the blob -------------------------------------------------------------------------------------------------------------- */
@@ -110,6 +110,7 @@ typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
 
 typedef struct gk_coefficients {
     double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
+    int timeless;    /* forces move nothing in the step: D = 0 */
     int curved_read; /* mix4: the gap reads more than q */
     gk_flow flow[2];
     uint64_t age;
@@ -231,7 +232,7 @@ struct gk_work {
     gk_real *qp[2], *vp[2], *force[2], *zero[2], *scaled; /* predicted modal state; modal force of the rows; zeros; row times coefficient */
     gk_real *reading[2];                      /* read_q q + read_v v where that is not q */
     const gk_real *y[2];                      /* displacement that the rows read: qp, reading, or zero at rest */
-    gk_real *stage[2][7], *trial[2];          /* rk45: derivatives (v, a) and trial state (q, v) */
+    gk_real *stage[2][7], *trial[2];          /* rk45, central: derivatives (v, a) and trial state (q, v) */
     double stage_rigid[7][2 * RIGID], trial_rigid[2 * RIGID];
     gk_real *basis[2];                        /* (MAX_BASIS, n): rows of the contacts, then bore rows in inertial axes */
     double frame[RIGID], speed[RIGID];        /* predicted */
@@ -247,7 +248,12 @@ struct gk_work {
 /* gk_vars.c */
 gk_effects gk_effects_of(const gk_data *data);
 /* gk_rk45.c */
+int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int i, const double outer[2]);
 gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data *data, double h);
+/* gk_central.c */
+gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
+double gk_central_energy(const gk_setup *setup, const gk_data *data, double h);
+double gk_central_limit(const gk_model *model, const gk_setup *setup);
 /* gk_flow.c */
 const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma);
 /* gk_flank.c */
@@ -276,10 +282,12 @@ int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, gk_setup *setup);
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out);
 /* gk_limit.c */
+int gk_limit_cholesky(double *a, int n);
+void gk_limit_solve(const double *L, double *x, int n);
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);
 /* gk_wide.c */
-gk_step_function *gk_wide_step(int widest);
+gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
 /* gk_step.c */
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);

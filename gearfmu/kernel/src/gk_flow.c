@@ -115,6 +115,7 @@ const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma
     }
     oldest->h = h;
     oldest->gamma = gamma;
+    oldest->timeless = 0;
     oldest->curved_read = setup->integrator == MIX4;
     oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
     oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;

@@ -3,11 +3,11 @@
 #include <stdio.h>
 #include "gk_core.h"
 
-static const double MU = 0.5;
+static const double MU = 0.5, WITHIN = 0.9, BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
 enum { POSITIONS = 8, POWER_ROUNDS = 60 };
 
 /* Cholesky of a (n, n), in place, lower; 0 when not positive */
-static int cholesky(double *a, int n)
+int gk_limit_cholesky(double *a, int n)
 {
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
@@ -20,6 +20,19 @@ static int cholesky(double *a, int n)
     return 1;
 }
 
+/* x ← (L Lᵀ)⁻¹ x */
+void gk_limit_solve(const double *L, double *x, int n)
+{
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++) x[i] -= L[i * n + k] * x[k];
+        x[i] /= L[i * n + i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) x[i] -= L[k * n + i] * x[k];
+        x[i] /= L[i * n + i];
+    }
+}
+
 /* largest eigenvalue of C⁻¹ K, C = L Lᵀ, K symmetric positive semidefinite */
 static double largest(const double *L, const double *K, int n)
 {
@@ -30,14 +43,7 @@ static double largest(const double *L, const double *K, int n)
             y[i] = 0.0;
             for (int j = 0; j < n; j++) y[i] += K[i * n + j] * x[j];
         }
-        for (int i = 0; i < n; i++) {
-            for (int k = 0; k < i; k++) y[i] -= L[i * n + k] * y[k];
-            y[i] /= L[i * n + i];
-        }
-        for (int i = n - 1; i >= 0; i--) {
-            for (int k = i + 1; k < n; k++) y[i] -= L[k * n + i] * y[k];
-            y[i] /= L[i * n + i];
-        }
+        gk_limit_solve(L, y, n);
         value = 0.0;
         for (int i = 0; i < n; i++) value = gk_max(value, fabs(y[i]));
         if (!(value > 0.0)) return 0.0;
@@ -80,7 +86,7 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
             C[i * n + i] = 1.0;
         }
     }
-    return cholesky(C, n) ? largest(C, K, n) : INFINITY;
+    return gk_limit_cholesky(C, n) ? largest(C, K, n) : INFINITY;
 }
 
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
@@ -110,7 +116,8 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
     static const double ladder[] = {0.5e-6, 1e-6, 1.5e-6, 2e-6, 2.5e-6, 3e-6, 4e-6, 5e-6, 6e-6, 7.5e-6, 10e-6, 12.5e-6, 15e-6, 20e-6};
     const double period = 2.0 * GK_PI / (model->speed_max * model->gear[0].teeth);
     const int variational = setup->integrator == DG4;
-    double limit = gk_min(model->h_max, period / 40.0), h = wished;
+    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup) : INFINITY; /* explicit: a limit of stability */
+    double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
     if (!(wished > 0.0)) {
         h = gk_min(ladder[0], limit);
         for (int i = 0; i < (int)(sizeof ladder / sizeof *ladder); i++) {
@@ -123,6 +130,10 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
     if (h > period / 8.0) {
         snprintf(message, GK_MESSAGE, "h = %.3g s is more than 1/8 of the mesh period at speed_max; use h <= %.3g s", h, period / 8.0);
         return GK_STEP_TOO_LARGE;
+    }
+    if (h > stable) {
+        snprintf(message, GK_MESSAGE, "h = %.3g s is above the limit of stability of central for this model at this level; use h <= %.3g s", h, WITHIN * stable);
+        if (h > BEYOND * stable) return GK_STEP_TOO_LARGE;
     }
     setup->h = h;
     setup->gamma = variational ? gamma_for(model, setup, h) : 0.0;

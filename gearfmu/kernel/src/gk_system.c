@@ -233,7 +233,7 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     memset(s->D, 0, 3 * size * sizeof(double));
     for (int g = 0; g < 2; g++) {
         gather(setup, work, g, work->y[g], work->read[g]);
-        gram(setup, work, g, k->flow[g].mobility, setup->modal[g].pairs, s->D);
+        gram(setup, work, g, k->flow[g].mobility, k->timeless ? 0 : setup->modal[g].pairs, s->D);
         if (setup->on.residual) residual(setup, &model->gear[g], work, g, work->attitude[g]);
         gram(setup, work, g, k->flow[g].kappa, k->flow[g].exact, s->K);
     }
