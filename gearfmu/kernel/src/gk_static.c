@@ -63,14 +63,15 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
         work->speed[d] = 2.0 * work->frame[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
     work->y[0] = work->zero[0], work->y[1] = work->zero[1];
-    work->places = gk_flank_find(model, rest, work->frame, SEE, work->place);
+    work->places = gk_flank_find(model, rest, data->x, SEE, work->place);
     if (work->places < 0) return work->places = 0, NAN;
     for (int p = 0; p < work->places; p++) {
+        for (int d = 0; d < 6; d++) work->place[p].gap += work->place[p].gradient[d] * (work->frame[d] - data->x[d]); /* given forces move the frame, not the place */
         work->place[p].memory = -1;
         for (int m = 0; m < data->pairs; m++)
             if (data->memory[m].key.flank == work->place[p].key.flank && data->memory[m].key.tooth == work->place[p].key.tooth) work->place[p].memory = m;
     }
-    gk_rows_form(model, rest, work->frame, work);
+    gk_rows_form(model, rest, data->x, work);
     gk_system_form(model, rest, data, &work->at_rest, work);
     gk_step_recall(rest, data, s);
     gk_solve_plain(s);
