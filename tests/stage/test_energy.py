@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gearfmu.body import ReducedBody
+from gearfmu.scenes.light_rattle import run, statistics
 from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, simulate
@@ -18,6 +19,7 @@ from gearfmu.stage import StageModel, Steady, simulate
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 import energy  # noqa: E402  (found through the line above)
+import light_rattle  # noqa: E402
 from kernel_variants import WITHOUT_ETA, double_states, variant  # noqa: E402
 
 FAST = 1
@@ -130,3 +132,20 @@ def test_central_is_the_same_physics_and_drifts(pair_free: StageModel, relieved:
     assert np.std(te - reference) < 0.02 * np.std(reference) and runs[1].meta["outcome"] == "completed"
     rattle = started(pair_free, Rattle(position=0.3), {"level": FAST, "h": 2e-6, "integrator": CENTRAL})
     assert 1e-6 < energies(rattle, 2e-6, 0.02).drift < 0.03
+
+
+@pytest.mark.parametrize("name", light_rattle.SCENES)
+def test_light_load_rattle_has_the_statistics_of_the_converged_run(relieved: StageModel, name: str) -> None:
+    """Some 40 % of the time open; one start, 0.1 s (all: `python benchmarks/light_rattle.py`)."""
+    scene = light_rattle.start(light_rattle.SCENES[name], 1)
+    found, wanted = (
+        statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, light_rattle.CONVERGED)
+    )
+    line = light_rattle.line(name, 1, 7.5e-6, found, wanted)
+    assert 0.35 < wanted["open_share"] < 0.45 and not light_rattle.missed(line)
+
+
+@pytest.mark.full
+def test_light_load_rattle_from_four_starts(relieved: StageModel) -> None:
+    lines = light_rattle.table(relieved, 0.3, FAST)
+    assert not [light_rattle.missed(line) for line in lines if line["start"] == -1 and light_rattle.missed(line)]
