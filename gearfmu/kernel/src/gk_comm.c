@@ -353,7 +353,7 @@ gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const vo
     if (setup->magic != GK_SETUP_MAGIC || size != setup->state_size || size > gk_data_size(model) || size < sizeof head) return GK_BAD_VALUE;
     memcpy(&head, bytes, sizeof head);
     int good = head.magic == GK_DATA_MAGIC && head.phase >= PHASE_NEW && head.phase <= PHASE_FAILED && head.pairs >= 0 && head.pairs <= MAX_PAIRS && head.count >= 0 &&
-               all_small(head.value, GK_VARS) && all_small(head.x, RIGID) && all_small(head.v, RIGID) && all_small(head.f, RIGID) && all_small(head.link, LINKS) &&
+               all_small(head.value, GK_VARS) && all_small(head.x, RIGID) && all_small(head.v, RIGID) && all_small(head.f, RIGID) && all_small(head.f_rate, RIGID) && all_small(head.still, RIGID) && all_small(head.link, LINKS) &&
                gk_finite(head.time_base) && gk_finite(head.step_H) && gk_finite(head.reach);
     for (int p = 0; good && p < head.pairs; p++)
         good = (head.memory[p].key.flank == 0 || head.memory[p].key.flank == 1) && all_small(head.memory[p].force, MAX_SLICES) && all_small(head.memory[p].gap, MAX_SLICES);

@@ -160,6 +160,7 @@ struct gk_data {
     int32_t phase, pairs, locked[2];
     double value[GK_VARS];
     double x[RIGID], v[RIGID], f[RIGID];
+    double f_rate[RIGID];        /* change of f in the last step over h */
     double link[LINKS];          /* λ0 of the bilateral rows (clutch: the constant torque of the last step) */
     double time_base, step_H, time_last; /* time = time_base + count·H */
     int64_t count;

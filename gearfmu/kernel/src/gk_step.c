@@ -6,7 +6,10 @@ static const double PAYABLE = 1e-4; /* of the energy of the massless part: what 
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
-/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays. At rest κ = 0. */
+/* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
+static double speed_lead(double h, double gamma) { return h * h * (2.0 * gamma - 1.0) / 12.0; }
+
+/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the speed of free masses. At rest κ = 0. */
 static void express(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
 {
     if (data->state_h == k->h && data->state_gamma == k->gamma) return;
@@ -17,6 +20,8 @@ static void express(const gk_setup *setup, gk_data *data, const gk_coefficients 
         for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
         q += 3 * n;
     }
+    const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma) : 0.0;
+    for (int d = 0; d < RIGID; d++) data->v[d] += lead * setup->inverse_mass[d] * data->f_rate[d];
     for (int d = 0; d < RIGID; d++) data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_mass[d] * data->f[d];
     data->state_h = k->h;
     data->state_gamma = k->gamma;
@@ -176,6 +181,7 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
         const double before = data->x[d];
         data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
         data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_mass[d] * z;
+        data->f_rate[d] = (force - data->f[d]) / k->h;
         data->f[d] = force;
         work->moved[d] = data->x[d] - before;
     }
