@@ -78,6 +78,7 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_data
     if (overlaps(model, work)) return GK_PENETRATION;
     arrive(setup, data, h);
     gk_step_remember(setup, data);
+    gk_rk45_angles(setup, data);
     data->rounds += work->system.rounds;
     data->steps++;
     memcpy(work->system.force0, work->system.z, sizeof work->system.z); /* reported force: that of the end */

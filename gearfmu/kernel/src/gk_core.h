@@ -1,8 +1,9 @@
 /* Inside of the kernel: what model, setup and data are made of. One reading direction:
  *   gk_model.c  blob → gk_model          gk_setup.c  level, effects, h → gk_setup      gk_vars.c   variables by reference
  *   gk_strips.c slices → contact rows    gk_limit.c  which h, which γ                  gk_flow.c   modal coefficients of h
- *   gk_flank.c  where teeth may touch (gk_still.c: may not move)  gk_rows.c   displacement rows at those places gk_system.c the small system of a step
- *   gk_law.c    local line contact       gk_solve.c  its solution                       gk_step.c   one step; gk_comm.c many; gk_static.c none */
+ *   gk_flank.c  where teeth may touch    gk_rows.c   displacement rows at those places gk_system.c the small system of a step
+ *   gk_law.c    local line contact       gk_solve.c  its solution                       gk_step.c   one step; gk_comm.c many; gk_static.c none
+ *   gk_rk45.c, gk_central.c  explicit integrators    gk_still.c  places that do not move, for conservation tests */
 #ifndef GK_CORE_H
 #define GK_CORE_H
 #include <math.h>
@@ -250,6 +251,7 @@ struct gk_work {
 gk_effects gk_effects_of(const gk_data *data);
 /* gk_rk45.c */
 int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int i, const double outer[2]);
+void gk_rk45_angles(const gk_setup *setup, gk_data *data);
 gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data *data, double h);
 /* gk_central.c */
 gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);

@@ -54,17 +54,17 @@ static oscillator linear_force(double omega, double zeta, double h)
     return o;
 }
 
-/* The flow in gk_real: a11 − 1, a12, a21, a22 − 1, which keeps frequencies to 1e-7 at any h, with the determinant of the exact one, e^(−2ζωh). Rounded one by one to single precision the four
- * numbers let an undamped mode grow or fade by up to 1e-7 of its energy every step, always the same way; so among the nearest values and their neighbours, each with the a21 that belongs
- * to it, those with the best determinant are taken, some 1e-10. */
+/* The flow in gk_real: a11 − 1, a12, a21, a22 − 1, which keeps frequencies to 1e-7 at any h. Rounded one by one to single precision the four numbers let a mode grow or fade by up to 1e-7 of its
+ * energy every step, always the same way. Where damping does not cover that, the nearest values and their next neighbours, each with the a21 that belongs to it, are searched for the best
+ * determinant: some 1e-9 off the exact one, e^(−2ζωh). */
 static void round_flow(const oscillator *o, gk_real out[4])
 {
-    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, d11 = o->a11 - 1.0, d22 = o->a22 - 1.0;
+    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, d11 = o->a11 - 1.0, d22 = o->a22 - 1.0, covered = 1e-5;
     double least = INFINITY;
     out[0] = (gk_real)d11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)d22;
-    if (sizeof(gk_real) > sizeof(float)) return;
-    for (int choice = 0; choice < 75; choice++) {
-        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 5 - 2))), (gk_real)(o->a12 * (1.0 + ulp * (choice / 25 - 1))), (gk_real)(d22 * (1.0 + ulp * (choice / 5 % 5 - 2)))};
+    if (sizeof(gk_real) > sizeof(float) || 1.0 - wanted > covered) return;
+    for (int choice = 0; choice < 27; choice++) {
+        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 3 - 1))), (gk_real)(o->a12 * (1.0 + ulp * (choice / 9 - 1))), (gk_real)(d22 * (1.0 + ulp * (choice / 3 % 3 - 1)))};
         const double product = (1.0 + (double)a[0]) * (1.0 + (double)a[2]) - wanted; /* what a12·a21 should be */
         const gk_real a21 = (gk_real)(product / a[1]);
         const double error = fabs(product - (double)a[1] * a21);

@@ -134,6 +134,14 @@ static void keep(const gk_setup *setup, gk_data *data)
     }
 }
 
+/* angles of the bores with a given torque, massless part included */
+void gk_rk45_angles(const gk_setup *setup, gk_data *data)
+{
+    const gk_system *s = &setup->work->system;
+    for (int i = s->contacts; i < s->n; i++)
+        if (s->kind[i] == ROW_TORQUE) data->angle[s->link_of[i] - PORT_0] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+}
+
 /* Over h, in as many inner steps as the error control wants; outer ends move linearly between outer_before and outer. GK_OK or GK_DIVERGED. */
 gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
 {
@@ -164,6 +172,7 @@ gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data
     }
     for (int g = 0; g < 2; g++) work->outer_before[g] = from[g], work->outer[g] = to[g];
     gk_step_remember(setup, data);
+    gk_rk45_angles(setup, data);
     memcpy(work->system.force0, work->system.z, sizeof work->system.z); /* the mean over so short a time is its end */
     return GK_OK;
 }
