@@ -4,7 +4,7 @@ VENV   ?= .venv
 RUN     = $(VENV)/bin/python
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
-BENCHMARKS ?= phases fmu_overhead levels
+BENCHMARKS ?= phases fmu_overhead harness levels coupling
 OUT    ?= out
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -27,6 +27,22 @@ test-full: $(STAMP)
 ## make bench       speed and error on this machine: the tables beside the benchmarks and the stages' price lists
 bench: $(STAMP)
 	for benchmark in $(BENCHMARKS); do echo "== $$benchmark"; $(RUN) benchmarks/$$benchmark.py || exit 1; done
+
+## make stability   the hard cases at every level and step: benchmarks/stability.csv and .json, docs/stability.md
+stability: $(STAMP)
+	$(RUN) -m gearfmu.cli stability --out benchmarks/stability.csv --jobs $(JOBS); failures=$$?; \
+	$(RUN) -m gearfmu.stability.page benchmarks/stability.csv docs/stability.md && exit $$failures
+
+## make study       what accuracy costs: tables and charts of docs/study.md in benchmarks/study (bodies alone: make study-bodies)
+study: $(STAMP)
+	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --jobs $(JOBS)
+	$(RUN) -m gearfmu.cli study pair_loaded pair_light --out benchmarks/study --table cuts
+	$(RUN) -m gearfmu.cli study pair_loaded --out benchmarks/study --table order --table limits
+	$(RUN) benchmarks/levels.py
+
+## make study-bodies  how far the shipped bodies are from refined ones (reduces six gears: up to an hour)
+study-bodies: $(STAMP)
+	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --table bodies
 
 ## make wheel       dist/*.whl with the linux64 and win64 kernels
 wheel: $(STAMP)
@@ -56,4 +72,4 @@ $(STAMP): $(VENV)/.base
 	$(RUN) -m pip install --quiet -e ".[test]"
 	@touch $@
 
-.PHONY: help demo test test-full bench wheel models docs lint
+.PHONY: help demo test test-full bench study study-bodies stability wheel models docs lint

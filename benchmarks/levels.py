@@ -1,77 +1,63 @@
-"""The price list of the fidelity levels: error and processor time of each, on the loaded and on the lightly loaded
-pair.
+"""The price list of the fidelity levels, which every report shows: error and processor time of each at its default
+step, from a study (gearfmu/study) of the loaded and the lightly loaded pair.
 
-    python benchmarks/levels.py [pair_loaded pair_light]
+    python benchmarks/levels.py [--study DIR] [pair_loaded pair_light]
 
-Every level runs with its default step. The reference is level `full` with a fifth of its own default step. Error:
-rms of the difference over rms of the
-alternating part, after settling, means compared apart. Time: processor seconds in the stage per simulated second, as
-measured on this machine now.
-Writes levels.csv beside the stage file, where the report looks for it.
+DIR: folder of `gearfmu study`, benchmarks/study when not given; rows that are not there yet, or not of this kernel and
+these bodies, are measured and added. Writes levels_<stage>.csv beside the stage file, where the report looks for it.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+from pathlib import Path
 
 import numpy as np
 
-from gearfmu.cosim import run
+from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.report.levels import COLUMNS, fingerprint, levels_path, read_levels
-from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.trace import Trace, write_columns
-
-LEVELS = ("rigid", "fast", "standard", "full")
-SIGNALS = {"te": "mesh.te", "force": "mesh.force_mean", "bearing": "bearing.pinion.fy"}
-REFINED = 5
+from gearfmu.stage.trace import write_columns
+from gearfmu.study import Job, Row, default_rows
+from gearfmu.study.norm import Signals
 
 
-def at(scene: SceneSpec, level: str, h: float = 0.0) -> Trace:
-    """Settled part of the scene at this level and step (0: the default)."""
-    stage = scene.stage.model_copy(update={"level": level, "h": h})
-    return run(scene.model_copy(update={"stage": stage}), unit="kernel").window(scene.settle)
-
-
-def row(scene: SceneSpec, trace: Trace, reference: Trace) -> dict[str, object]:
-    """One line of the list."""
-    meta = trace.meta
-    found: dict[str, object] = {
-        "scene": scene.name,
-        "level": meta["level"],
-        "n_dyn": meta["n_dyn"],
-        "slices": meta["slices"],
-        "h_us": 1e6 * meta["h"],
+def price(row: Row, reference: Signals, bodies: str) -> dict[str, object]:
+    """One line of the list from a row of the study."""
+    size = rms(alternating(reference.te, reference.interval, reference.steady))
+    return {
+        "scene": row.scene,
+        "level": row.level,
+        "n_dyn": row.n_dyn,
+        "slices": row.slices,
+        "h_us": 1e6 * row.h_s,
+        "te_error": row.te_error,
+        "force_error": row.force_error,
+        "bearing_error": row.bearing_error,
+        "te_mean_error_um": 1e6 * row.te_mean_error * size,
+        "time_per_second": row.realtime_factor,
+        "bodies": bodies,
     }
-    for name, channel in SIGNALS.items():
-        wanted, got = reference[channel], trace[channel]
-        found[f"{name}_error"] = float(np.std(got - wanted) / np.std(wanted))
-    found["te_mean_error_um"] = 1e6 * float(np.mean(trace["mesh.te"]) - np.mean(reference["mesh.te"]))
-    found["time_per_second"] = meta["stage_realtime_factor"]
-    found["bodies"] = fingerprint(text for name, text in meta["hashes"].items() if name.startswith("body "))
-    return found
 
 
-def main(scenes: list[str]) -> None:
-    """Measure the scenes and write one list a stage."""
-    for name in scenes:
-        scene = load_scene(name)
-        full = at(scene, "full")
-        reference = at(scene, "full", full.meta["h"] / REFINED)
-        rows = [row(scene, full if level == "full" else at(scene, level), reference) for level in LEVELS]
-        path = levels_path(load_stage(scene.stage.name))
-        kept = [old for old in read_levels(path) if old["scene"] != name]
-        table = kept + rows
+def main() -> None:
+    """Measure what is missing and write one list a stage."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", default=["pair_loaded", "pair_light"])
+    parser.add_argument("--study", type=Path, default=Path(__file__).parent / "study")
+    chosen = parser.parse_args()
+    for name in chosen.scenes:
+        found = default_rows(Job(load_scene(name), chosen.study))
+        bodies = fingerprint(found.model.body_hashes)
+        rows = [price(row, found.reference.signals, bodies) for row in found.rows]
+        path = levels_path(load_stage(found.scene.stage.name))
+        table = [old for old in read_levels(path) if old["scene"] != name] + rows
         write_columns(path, {column: np.array([line[column] for line in table]) for column in COLUMNS})
         for line in rows:
-            print(
-                "  ".join(
-                    f"{line[column]:.3g}" if isinstance(line[column], float) else str(line[column])
-                    for column in COLUMNS
-                ),
-                flush=True,
-            )
+            shown = (f"{value:.3g}" if isinstance(value, float) else str(value) for value in line.values())
+            print("  ".join(shown), flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or ["pair_loaded", "pair_light"])
+    main()

@@ -30,6 +30,10 @@ VERBS = {
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
     "study": ("gearfmu.commands.study:study", "What accuracy costs: error against time of the fidelity levels."),
+    "stability": (
+        "gearfmu.commands.stability:stability",
+        "Run the hard cases at every level; exit code = number of failures.",
+    ),
     "inspect": ("gearfmu.commands.files:inspect", "Say what one of our files holds."),
     "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; table of FMU variables."),
 }

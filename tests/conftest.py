@@ -12,6 +12,7 @@ REMEDY = {
     "wine": "apt-get install wine wine64",
     "gcc": "apt-get install gcc",
     "clang": "apt-get install clang",
+    "ccx": "apt-get install calculix-ccx",
 }
 
 

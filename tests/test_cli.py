@@ -98,7 +98,7 @@ def test_wrong_usage_is_100(arguments: list[str], capsys: pytest.CaptureFixture[
         (["inspect", "fzg_x"], "fzg_c"),
         (["new", "mine", "--like", "fzg_k"], "fzg_c"),
         (["run", "clutch_closur"], "clutch_closure"),
-        (["report", "no/such"], "no such file"),
+        (["report", "no/such"], "no such trace file"),
         (["te", "fzg_k", "--torque", "1 N*m"], "fzg_c"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -221,3 +221,72 @@ def test_reduce_tells_degrees_of_freedom_time_and_memory(tmp_path: Path, capsys:
         size, cost = made["mesh"], made["provenance"]
         assert f"{size['dof_body']} DOF, {made['facts']['teeth']} sectors of {size['dof_sector']}" in out
         assert f"{cost['cpu_s']:g} s CPU time and {cost['peak_memory_GB']:g} GB" in out
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo terminals")
+def test_long_work_shows_a_progress_bar_on_a_terminal_and_only_there(tmp_path: Path) -> None:
+    import pty
+
+    line = "simulate fzg_c --torque 80~N*m --speed 2000~rpm --duration 4~ms --settle 1~ms --set level=rigid".split()
+    command = [sys.executable, "-m", "gearfmu.cli", *(word.replace("~", " ") for word in line)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "COLUMNS": "100"}
+    near, far = pty.openpty()
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=far, env=environment, cwd=tmp_path, check=True)
+    os.close(far)
+    shown = os.read(near, 1 << 16).decode(errors="replace")
+    os.close(near)
+    plain = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, check=True)
+    assert "fzg_c" in shown and "━" in shown and "━" not in done.stdout.decode()
+    assert plain.stderr == b""
+
+
+@pytest.fixture
+def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with a file of every kind in it that cannot be used."""
+    stage = (ROOT / "reduced_models" / "fzg_c" / "stage.toml").read_text(encoding="utf-8")
+    (tmp_path / "stage.toml").write_text(stage.replace("teeth = 16", 'teeth = "many"'), encoding="utf-8")
+    scene = (ROOT / "gearfmu" / "scenes" / "pair_light.toml").read_text(encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(scene.replace('"20 us"', '"30 us"'), encoding="utf-8")
+    small_trace(tmp_path / "trace.h5")
+    (tmp_path / "trace.h5").write_bytes((tmp_path / "trace.h5").read_bytes()[:-1])
+    body = (ROOT / "reduced_models" / "fzg_c" / "wheel.h5").read_bytes()
+    (tmp_path / "body.h5").write_bytes(body[:9999] + b"?" + body[10000:])
+    (tmp_path / "damaged.fmu").write_bytes(b"PK\x03\x04 cut")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "reduce stage.toml",
+        "mesh stage.toml",
+        "export stage.toml -o new.fmu",
+        "export fzg_c -o new.fmu --port sun=fixed",
+        "export fzg_c -o stage.toml/new.fmu",
+        "te stage.toml --torque 1_N*m",
+        "te fzg_c --torque 1e9_N*m",
+        "simulate stage.toml --torque 1_N*m --speed 1_rpm",
+        "simulate fzg_c --torque 1_N*m --speed 1_rpm --set level=superb",
+        "simulate fzg_c --torque 1_N*m --speed 1_rpm --set h=1",
+        "run scene.toml",
+        "run pair_light --fmu damaged.fmu",
+        "run pair_light --fmu body.h5",
+        "report trace.h5",
+        "report body.h5",
+        "inspect trace.h5",
+        "inspect body.h5",
+        "inspect damaged.fmu",
+        "inspect stage.toml",
+        "validate damaged.fmu",
+        "new fzg_c/../x",
+    ],
+)
+def test_bad_input_is_one_clear_error_and_nothing_half_written(
+    line: str, wreckage: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.read_bytes() for path in wreckage.rglob("*") if path.is_file()}
+    code, out, err = call(*(word.replace("_N", " N").replace("_r", " r") for word in line.split()), capsys=capsys)
+    assert code in (1, cli.USAGE_ERROR) and out == "" and "Traceback" not in err and "internal" not in err
+    assert len(err.strip()) > 20 and (code == cli.USAGE_ERROR or len(err.strip().splitlines()) == 1), err
+    assert {path: path.read_bytes() for path in wreckage.rglob("*") if path.is_file()} == before

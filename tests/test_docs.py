@@ -38,6 +38,19 @@ def test_verbs_it_shows_are_real(page: Path) -> None:
     assert not set(shown) - set(cli.VERBS)
 
 
+def test_every_tick_names_what_shows_it() -> None:
+    """A ticked sentence of docs/status.md ends with "→" and existing tests, files or commands."""
+    lines = (ROOT / "docs" / "status.md").read_text(encoding="utf-8").splitlines()
+    ticked = [line for line in lines if line.startswith("- [x] ")]
+    assert len(ticked) > 90
+    for line in ticked:
+        shown = re.findall(r"`([^`]+)`", line.rpartition("→")[2])
+        assert shown, f"nothing shows: {line}"
+        for name in shown:
+            path, _, test = name.partition("::")
+            assert name.startswith("make ") or _exists(ROOT / path, test), f"{name} does not exist: {line}"
+
+
 def test_make_targets_named_in_the_readme_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for page in PAGES:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 FORMAT = "gearfmu-body"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 ALGORITHM_VERSION = 1  # raise it when the numbers of a body change: every stored body is then stale
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -14,19 +13,17 @@ import numpy as np
 from gearfmu.body.layout import ENTRIES, FORMAT, FORMAT_VERSION, TEXTS, Entry
 from gearfmu.body.reduced import ReducedBody, value_of
 from gearfmu.errors import BodyError
-from gearfmu.files import written_whole
+from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.display import Display
 from gearfmu.reduction.frf import FrfError
 
-_REMEDY = "make it again with 'gearfmu reduce STAGE'"
+FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, "make it again with 'gearfmu reduce STAGE'")
 _PACKED = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "fletcher32": True}
 
 
 def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
     """Write a body under a temporary name, then rename it to `path`."""
-    with written_whole(path) as temporary, h5py.File(temporary, "w") as file:
-        file.attrs["format"] = FORMAT
-        file.attrs["format_version"] = body.format_version
+    with writing(path, FILE) as file:
         file.attrs["algorithm_version"] = body.algorithm_version
         file.attrs["name"] = body.name
         file.attrs["input_hash"] = body.input_hash
@@ -43,29 +40,12 @@ def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
 
 def load_body(path: str | os.PathLike[str]) -> ReducedBody:
     """Read and check a body file. Raises BodyError: missing, damaged, of another kind or version, or not sound."""
-    source = Path(path)
-    if not source.is_file():
-        raise BodyError(f"{source}: no such body file; {_REMEDY}")
-    try:
-        with h5py.File(source, "r") as file:
-            _check_version(file)
-            values = {entry.field: _read(file, entry) for entry in ENTRIES}
-            heads = {name: str(file.attrs[name]) for name in ("name", "input_hash")}
-            texts = {name: json.loads(file.attrs[name]) for name in TEXTS}
-            versions = {name: int(file.attrs[name]) for name in ("format_version", "algorithm_version")}
+    with reading(path, FILE) as file:
+        values = {entry.field: _read(file, entry) for entry in ENTRIES}
+        heads = {name: str(file.attrs[name]) for name in ("name", "input_hash")}
+        texts = {name: json.loads(file.attrs[name]) for name in TEXTS}
+        versions = {name: int(file.attrs[name]) for name in ("format_version", "algorithm_version")}
         return _body(values, {**heads, **texts, **versions})
-    except BodyError as error:
-        raise BodyError(f"{source}: {error}; {_REMEDY}") from None
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError) as error:
-        raise BodyError(f"{source}: damaged or no body file ({error}); {_REMEDY}") from error
-
-
-def _check_version(file: h5py.File) -> None:
-    if file.attrs.get("format") != FORMAT:
-        raise BodyError("this HDF5 file is not a gearfmu body; 'gearfmu inspect' says what it is")
-    version = int(file.attrs["format_version"])
-    if version != FORMAT_VERSION:
-        raise BodyError(f"body format {version}, this gearfmu reads {FORMAT_VERSION}")
 
 
 def _read(file: h5py.File, entry: Entry) -> Any:

@@ -83,17 +83,13 @@ def _shipped(name: Path) -> Path:
 
 
 def _hdf5(path: Path) -> dict[str, Any]:
-    import h5py
+    from gearfmu.body import inspect_file
+    from gearfmu.body.layout import FORMAT
+    from gearfmu.hdf5 import format_of
+    from gearfmu.stage.trace import Trace
 
-    from gearfmu.stage.trace import FORMAT, Trace
-
-    if h5py.is_hdf5(path):
-        with h5py.File(path, "r") as file:
-            kind = file.attrs.get("format")
-        if kind != FORMAT:
-            from gearfmu.body import inspect_file
-
-            return inspect_file(path)
+    if format_of(path) == FORMAT:
+        return inspect_file(path)
     trace = Trace.load(path)
     channels = {
         name: {"unit": c.unit, "min": float(c.values.min()), "max": float(c.values.max())}

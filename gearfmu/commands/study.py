@@ -1,37 +1,61 @@
-"""The verb study: what accuracy costs, as a table, CSV files and a chart."""
+"""The verb study: what accuracy costs, as tables, CSV files and charts."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.shared import Progress, progress_bar
 
 ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
 
 
 @click.command()
-@click.argument("scene")
+@click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
 @click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),
     required=True,
-    help="Folder of study.csv, references.csv, transient.csv and the chart; a study that is there goes on.",
+    help="Folder of the CSV files and charts; a study that is there goes on.",
+)
+@click.option(
+    "--table",
+    "tables",
+    type=click.Choice(["errors", "cuts", "order", "limits", "bodies"]),
+    multiple=True,
+    default=("errors",),
+    show_default=True,
+    help="errors: study.csv and the chart; cuts: over the cut frequency; order: observed order of the integrators; "
+    "limits: default, too large and refused steps; bodies: distance to refined bodies (reduces them: up to an hour). "
+    "May repeat.",
 )
 @click.option("--quick", is_flag=True, help="Few points on a short window.")
-@click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes.")
-def study(scene: str, out: Path, quick: bool, jobs: int) -> int:
+@click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes, for table errors.")
+def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bool, jobs: int) -> None:
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.report.study import write_chart
     from gearfmu.spec.scene import load_scene
+
+    specs = [load_scene(scene) for scene in scenes]
+    for spec in specs:
+        bodies_of(spec.stage.name)
+    for table in dict.fromkeys(tables):
+        if table == "errors":
+            for spec in specs:
+                _errors(spec, out, quick, jobs)
+        else:
+            _other(table, specs, out, quick)
+
+
+def _errors(spec: Any, out: Path, quick: bool, jobs: int) -> None:
+    """Measure the scene's points and write table and chart."""
+    from gearfmu.report.study import write_chart
     from gearfmu.study import Job
     from gearfmu.study import study as run_study
 
-    spec = load_scene(scene)
-    bodies_of(spec.stage.name)
     with progress_bar(spec.name) as progress:
         found = run_study(Job(spec, out, quick, workers=jobs), progress)
     click.echo(error_table(found.rows))
@@ -39,7 +63,48 @@ def study(scene: str, out: Path, quick: bool, jobs: int) -> int:
         click.echo(f"- {note}")
     written = write_chart(found.rows, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
     click.echo(", ".join(map(str, [out / "study.csv", *written])))
-    return 0
+
+
+def _other(table: str, specs: Sequence[Any], out: Path, quick: bool) -> None:
+    """Measure and write one of the other tables; rows of other scenes in the file stay."""
+    from gearfmu.study.table import read_rows, tidy, write_rows
+
+    path = out / f"{table}.csv"
+    with progress_bar(table) as progress:
+        rows = _rows(table, specs, quick, progress)
+    names = {spec.name for spec in specs}
+    kept = [row for row in read_rows(path, type(rows[0])) if getattr(row, "scene", None) not in {None, *names}]
+    write_rows(path, type(rows[0]), [*kept, *rows])
+    click.echo(tidy(rows, [name for name in vars(rows[0]) if name != "message"]))
+    for message in dict.fromkeys(row.message for row in rows if getattr(row, "message", "")):
+        click.echo(f"- {message}")
+    written = [path]
+    if table == "bodies":
+        from gearfmu.report.study import write_bodies_chart
+
+        written += write_bodies_chart([*kept, *rows], path)
+    click.echo(", ".join(map(str, written)))
+
+
+def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | None) -> list[Any]:
+    from gearfmu.study import cuts, limits, order, refined
+    from gearfmu.study.ladder import quick_scene
+
+    windows = [quick_scene(spec) if quick or table in ("order", "limits") else spec for spec in specs]
+    if table == "cuts":
+        return [row for scene in windows for row in cuts.cut_rows(scene, quick, progress)[0]]
+    if table == "limits":
+        levels = ("fast",) if quick else limits.LEVELS
+        return [row for scene in windows for row in limits.limit_rows(scene, levels, progress=progress)]
+    if table == "bodies":
+        stages = {spec.stage.name for spec in specs}
+        if len(stages) > 1:
+            raise click.UsageError(f"--table bodies takes scenes of one stage, not of {' and '.join(sorted(stages))}")
+        return refined.body_rows(windows, refined.cheap(windows[0]) if quick else None, progress)
+    levels = ("rigid",) if quick else order.LEVELS
+    return order.constant_stiffness() + [
+        row for scene in windows for row in order.gear_mesh(scene, levels, progress=progress)
+    ]
 
 
 def error_table(rows: Any) -> str:
@@ -47,10 +112,7 @@ def error_table(rows: Any) -> str:
     lines = [ERRORS] + [
         (
             *(row.level, row.integrator, str(row.slices), str(row.n_dyn), f"{1e6 * row.h_s:.3g}"),
-            *(
-                f"{100 * getattr(row, f'{name}_error'):.2g}"
-                for name in ("te", "te_mean", "force", "bearing")
-            ),
+            *(f"{100 * getattr(row, f'{name}_error'):.2g}" for name in ("te", "te_mean", "force", "bearing")),
             *(f"{row.realtime_factor:.3g}", f"{row.cpu_ratio:.3g}"),
         )
         for row in rows

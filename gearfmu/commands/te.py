@@ -20,7 +20,7 @@ from gearfmu.commands.shared import Quantity
     multiple=True,
     required=True,
     type=Quantity("N*m"),
-    help='Torque on the pinion, "302 N*m"; may repeat.',
+    help='Torque on the pinion, "302 N*m"; "0 N*m" for the unloaded pair; may repeat.',
 )
 @click.option(
     "--positions",

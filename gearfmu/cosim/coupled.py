@@ -20,14 +20,15 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """How a cut is stepped: master, communication step H in s, number of steps, what to record; progress is told the
-    done fraction."""
+    """How a cut is stepped: master, communication step H in s, number of steps, what to record and what of it to leave
+    out; progress is told the done fraction."""
 
     master: str
     step: float
     steps: int
     record: tuple[str, ...] = ("*",)
     progress: Progress | None = None
+    omit: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,10 @@ def run_coupled(cut: Cut, plan: Plan) -> Result:
         if not coupled.recorder.count:
             raise
         outcome, message = getattr(error, "outcome", STOPPED), str(error)
-    facts, exchange = coupled.facts(), coupled.master.exchange
-    cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
+    facts, ports = coupled.facts(), coupled.master.ports
     trace = coupled.recorder.trace({})
-    return Result(
-        trace, outcome, message, cpu, cpu * share, exchange.work, exchange.throughput, coupled.master.order, facts
-    )
+    cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
+    return Result(trace, outcome, message, cpu, cpu * share, ports.work, ports.throughput, coupled.master.order, facts)
 
 
 class _Timed:
@@ -81,7 +80,7 @@ class _Timed:
 
     def __init__(self, unit: Unit) -> None:
         self.unit, self.seconds = unit, 0.0
-        for name in ("outputs", "initialize", "resolve", "set", "get", "save", "restore"):
+        for name in ("outputs", "initialize", "resolve", "set", "get", "log", "save", "restore"):
             setattr(self, name, getattr(unit, name))
 
     def step(self, time: float, h: float) -> None:
@@ -94,7 +93,7 @@ class _Run:
     def __init__(self, cut: Cut, plan: Plan) -> None:
         self.cut, self.plan = cut, plan
         self.master: Master = master(plan.master, cut)
-        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1)
+        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, plan.omit)
         known = cut.stage.outputs()
         self._fact_names = [
             name

@@ -107,6 +107,12 @@ def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
     }
 
 
+def stage_joints(scene: SceneSpec, shafts: Shafts) -> tuple[str, ...]:
+    """Patterns of stage outputs that say nothing: of the clutch that only joins two inertias."""
+    in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
+    return (f"{shafts.wheel}.clutch.*", f"{shafts.wheel}.disc.*") if in_stage else ()
+
+
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
     """Torque of a four-stroke four-cylinder engine, N·m, over the crank angle: mean and orders 2, 4, 6 (cosines, all
     at their maximum at angle zero)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from ctypes import CFUNCTYPE, c_double, c_int, c_size_t, c_void_p, cast
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,6 @@ from fmpy.fmi2 import (
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
-    fmi2Component,
     fmi2Discard,
     fmi2Integer,
     fmi2LastSuccessfulTime,
@@ -41,7 +41,11 @@ KINDS = {
     "Enumeration": ("Integer", fmi2Integer),
     "Boolean": ("Boolean", fmi2Boolean),
 }
+TYPES = dict(KINDS.values())
 MESSAGES_KEPT = 200
+# calls at every communication step, by address and number: fmpy's own declarations cost three times as much
+_ACCESS = CFUNCTYPE(c_int, c_void_p, c_void_p, c_size_t, c_void_p)
+_STEP = CFUNCTYPE(c_int, c_void_p, c_double, c_double, c_int)
 
 
 @dataclass(frozen=True)
@@ -50,17 +54,46 @@ class _Group:
 
     call: str  # Real, Integer or Boolean
     references: Any  # ctypes array of value references
-    values: Any  # ctypes array that the FMU reads or fills
+    values: Any  # address of the memory that the FMU reads or fills
     view: np.ndarray  # the same memory
     places: np.ndarray  # positions in the handle's buffer
 
 
 @dataclass(frozen=True)
 class FmuHandle:
-    """Resolved variables and their buffers."""
+    """Resolved variables and their buffers; when all are Real, the one group's memory is the buffer."""
 
     groups: tuple[_Group, ...]
     buffer: np.ndarray
+    real: bool
+
+
+class FmuLog:
+    """Rows that the FMU writes itself, one table for each FMI type."""
+
+    def __init__(self, unit: FmuUnit, names: Sequence[str], points: int) -> None:
+        self._unit, self._width, self._points, self._count = unit, len(names), points, 0
+        self._groups = unit.resolve(names).groups
+        self._tables = [np.zeros((points, len(group.places)), dtype=group.view.dtype) for group in self._groups]
+        self._writes = [
+            (group, len(group.places), table.ctypes.data, table.strides[0])
+            for group, table in zip(self._groups, self._tables, strict=True)
+        ]
+
+    def take(self) -> None:
+        """Keep the present outputs."""
+        if self._count == self._points:
+            raise CouplingError(f"the log holds {self._count} times and no more")
+        for group, width, address, stride in self._writes:
+            self._unit.read(group.call, group.references, width, address + self._count * stride)
+        self._count += 1
+
+    def rows(self) -> np.ndarray:
+        """(times, names) kept so far."""
+        found = np.zeros((self._count, self._width))
+        for group, table in zip(self._groups, self._tables, strict=True):
+            found[:, group.places] = table[: self._count]
+        return found
 
 
 class FmuUnit:
@@ -117,11 +150,11 @@ class FmuUnit:
     def instantiate(self, parameters: Mapping[str, float | bool | str]) -> None:
         """A fresh instance with these start values."""
         self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
-        self._component = fmi2Component(self._fmu.component)
+        self._component = c_void_p(self._fmu.component)
         dll = self._fmu.dll
-        self._step = dll.fmi2DoStep
-        self._getters = {"Real": dll.fmi2GetReal, "Integer": dll.fmi2GetInteger, "Boolean": dll.fmi2GetBoolean}
-        self._setters = {"Real": dll.fmi2SetReal, "Integer": dll.fmi2SetInteger, "Boolean": dll.fmi2SetBoolean}
+        self._step = _STEP(_address(dll.fmi2DoStep))
+        self._getters = {kind: _ACCESS(_address(getattr(dll, f"fmi2Get{kind}"))) for kind in TYPES}
+        self._setters = {kind: _ACCESS(_address(getattr(dll, f"fmi2Set{kind}"))) for kind in TYPES}
         if parameters:
             self.set(self.resolve(list(parameters)), [self._number(name, value) for name, value in parameters.items()])
 
@@ -164,44 +197,49 @@ class FmuUnit:
             raise CouplingError(
                 f"{self.path}: no variable {', '.join(unknown)}; take an FMU exported with the ports that this needs"
             )
-        groups = []
-        for call, kind in dict.fromkeys(KINDS.values()):
+        buffer, groups = np.zeros(len(names)), []
+        for call, kind in TYPES.items():
             places = [k for k, name in enumerate(names) if KINDS.get(self.variables[name].type) == (call, kind)]
             if places:
-                values = (kind * len(places))()
+                real = len(places) == len(names) and call == "Real"
+                view = buffer if real else np.zeros(len(places), dtype=np.dtype(kind))
                 references = (fmi2ValueReference * len(places))(
                     *[self.variables[names[k]].valueReference for k in places]
                 )
-                groups.append(
-                    _Group(call, references, values, np.frombuffer(values, dtype=np.dtype(kind)), np.array(places))
-                )
-        return FmuHandle(tuple(groups), np.zeros(len(names)))
+                groups.append(_Group(call, references, c_void_p(view.ctypes.data), view, np.array(places)))
+        return FmuHandle(tuple(groups), buffer, len(groups) == 1 and groups[0].view is buffer)
 
     def set(self, handle: FmuHandle, values: Sequence[float]) -> None:
         """Set variables, one call a type. Raises FmuError when the FMU refuses a value."""
         handle.buffer[:] = values
         for group in handle.groups:
-            group.view[:] = handle.buffer[group.places]
-            if (
-                self._setters[group.call](self._component, group.references, len(group.places), group.values)
-                > fmi2Warning
-            ):
+            if not handle.real:
+                group.view[:] = handle.buffer[group.places]
+            setter = self._setters[group.call]
+            if setter(self._component, group.references, len(group.places), group.values) > fmi2Warning:
                 raise FmuError(f"{self.path}: fmi2Set{group.call} refused. {self._last_message()}")
 
     def get(self, handle: FmuHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer, one call a type."""
         for group in handle.groups:
-            if (
-                self._getters[group.call](self._component, group.references, len(group.places), group.values)
-                > fmi2Warning
-            ):
-                raise FmuError(f"{self.path}: fmi2Get{group.call} refused. {self._last_message()}")
-            handle.buffer[group.places] = group.view
+            self.read(group.call, group.references, len(group.places), group.values)
+            if not handle.real:
+                handle.buffer[group.places] = group.view
         return handle.buffer
+
+    def read(self, call: str, references: Any, count: int, address: Any) -> None:
+        """Values of variables of one type (Real, Integer, Boolean) to an address, which must have room for them.
+        Raises FmuError when the FMU refuses."""
+        if self._getters[call](self._component, references, count, address) > fmi2Warning:
+            raise FmuError(f"{self.path}: fmi2Get{call} refused. {self._last_message()}")
+
+    def log(self, names: Sequence[str], points: int) -> FmuLog:
+        """Keeps these outputs at up to `points` times."""
+        return FmuLog(self, names, points)
 
     def step(self, time: float, h: float) -> None:
         """fmi2DoStep. Raises SimulationError with outcome and last successful time on discard, FmuError on error."""
-        status = self._step(self._component, fmi2Real(time), fmi2Real(h), fmi2True)
+        status = self._step(self._component, time, h, fmi2True)
         if status <= fmi2Warning:
             return
         if status == fmi2Discard:
@@ -257,3 +295,7 @@ def outcome_of(message: str) -> str:
     "discarded" for another FMU's words."""
     texts = {name: load().gk_outcome_text(number).decode() for number, name in enumerate(OUTCOMES)}
     return next((name for name, text in texts.items() if message.rstrip().endswith(text)), "discarded")
+
+
+def _address(function: Any) -> int:
+    return cast(function, c_void_p).value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,32 @@ from gearfmu.kernel import Kernel
 
 
 class KernelHandle(NamedTuple):
-    """Value references of resolved names, the buffer of their values and its single numbers for the kernel to fill."""
+    """Value references of resolved names, and the buffer of their values."""
 
     names: tuple[str, ...]
-    references: tuple[int, ...]
-    buffer: np.ndarray
-    cells: tuple[ctypes.c_double, ...]
+    references: Any  # ctypes array of unsigned 32-bit integers
+    values: Any  # ctypes array that the kernel reads and fills
+    buffer: np.ndarray  # the same memory
+
+
+class KernelLog:
+    """Rows that the kernel writes itself."""
+
+    def __init__(self, kernel: Kernel, references: Any, points: int) -> None:
+        self._get, self._references, self._count = kernel.get_many, references, 0
+        self._table = np.zeros((points, len(references)))
+        self._address, self._stride = self._table.ctypes.data, self._table.strides[0]
+
+    def take(self) -> None:
+        """Keep the present outputs."""
+        if self._count == len(self._table):
+            raise CouplingError(f"the log holds {self._count} times and no more")
+        self._get(self._references, self._address + self._count * self._stride)
+        self._count += 1
+
+    def rows(self) -> np.ndarray:
+        """(times, names) kept so far."""
+        return self._table[: self._count]
 
 
 class KernelUnit:
@@ -57,24 +77,34 @@ class KernelUnit:
         unknown = [name for name in names if name not in known]
         if unknown:
             raise CouplingError(f"{self.kernel.name}: no variable {', '.join(unknown)}; it has {', '.join(known)}")
-        memory = (ctypes.c_double * max(len(names), 1))()
-        cells = tuple(ctypes.c_double.from_buffer(memory, 8 * k) for k in range(len(names)))
-        buffer = np.frombuffer(memory, count=len(names))
-        return KernelHandle(tuple(names), tuple(known[name].reference for name in names), buffer, cells)
+        values = (ctypes.c_double * max(len(names), 1))()
+        references = (ctypes.c_uint32 * len(names))(*[known[name].reference for name in names])
+        return KernelHandle(tuple(names), references, values, np.frombuffer(values, count=len(names)))
 
     def set(self, handle: KernelHandle, values: Sequence[float]) -> None:
         """Inputs for the next step."""
-        set_one = self.kernel.set_reference
-        for name, reference, value in zip(handle.names, handle.references, values, strict=True):
-            if set_one(reference, value):
-                self.kernel.set(name, float(value))  # raises with the kernel's reason
+        handle.buffer[:] = values
+        if self.kernel.set_many(handle.references, handle.values):
+            self._refused(handle)
+
+    def _refused(self, handle: KernelHandle) -> None:
+        """Set one by one, which raises with the kernel's reason, and leave all as they were."""
+        before = [self.kernel.get(name) for name in handle.names]
+        try:
+            for name, value in zip(handle.names, handle.buffer.tolist(), strict=True):
+                self.kernel.set(name, value)
+        finally:
+            for name, value in zip(handle.names, before, strict=True):
+                self.kernel.set(name, value)
 
     def get(self, handle: KernelHandle) -> np.ndarray:
         """Values (k,) in the handle's buffer."""
-        get_one = self.kernel.get_reference
-        for reference, cell in zip(handle.references, handle.cells, strict=True):
-            get_one(reference, cell)
+        self.kernel.get_many(handle.references, handle.values)
         return handle.buffer
+
+    def log(self, names: Sequence[str], points: int) -> KernelLog:
+        """Keeps these outputs at up to `points` times."""
+        return KernelLog(self.kernel, self.resolve(names).references, points)
 
     def step(self, time: float, h: float) -> None:
         """One communication step."""

@@ -5,20 +5,36 @@ gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion o
          acceleration that ends at the predicted angle. (3) Step the drivetrain with the stage's mean torque of this
          very step. The momentum that crosses the cut is exact; the motion errs by O(H³) in a step: second order, no
          rollback of the stage, stable for ωH < 2, ω of the softest spring of the cut against the inertia behind it.
-jacobi   What importers do: all outputs are exchanged at the communication points and held. First order.
+jacobi   What importers do: all outputs are exchanged at the communication points and held. First order; second with
+         `tau_next` held instead of `tau` (Wiring).
+
+Signals, which are known beforehand, reach the stage as value at the start and rate over the step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gearfmu.cosim.ports import KEYS, ports_of
 from gearfmu.cosim.signals import Signal
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
+
+RATE = "_rate"  # a signal's rate is the input of its name with this ending
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What an importer connects: motion inputs of the stage, rates of its signals, and the torque output that jacobi
+    holds over a step ("tau" or "tau_next"). Start values of φ and w are given in any case; after them an input that is
+    not connected stays as it is."""
+
+    motion: tuple[str, ...] = KEYS
+    rates: bool = True
+    held: str = "tau"
 
 
 @dataclass(frozen=True)
@@ -30,106 +46,111 @@ class Cut:
     drive: Unit
     shafts: tuple[str, ...]
     signals: tuple[tuple[str, Signal], ...] = ()
+    wiring: Wiring = Wiring()
 
 
 class _Exchange:
-    """Handles and buffers of a cut, and the work that crosses it on the drivetrain's side."""
+    """Handles and buffers of a cut: `motion` is what the ports write, φ, w, a shaft by shaft."""
 
     def __init__(self, cut: Cut) -> None:
-        self.cut, self.work, self.throughput = cut, 0.0, 0.0
-        motion = [f"{shaft}.{key}" for shaft in cut.shafts for key in ("phi", "w", "a")]
-        self.stage_motion: Any = cut.stage.resolve(motion)
-        self.stage_signals: Any = cut.stage.resolve([name for name, _ in cut.signals])
-        self.stage_tau: Any = cut.stage.resolve([f"{shaft}.tau" for shaft in cut.shafts])
-        self.stage_mean: Any = cut.stage.resolve([f"{shaft}.tau_mean" for shaft in cut.shafts])
-        self.drive_motion: Any = cut.drive.resolve(motion)
-        self.drive_phi_w: Any = cut.drive.resolve([f"{shaft}.{key}" for key in ("phi", "w") for shaft in cut.shafts])
-        self.drive_phi: Any = cut.drive.resolve([f"{shaft}.phi" for shaft in cut.shafts])
-        self.drive_tau: Any = cut.drive.resolve([f"{shaft}.tau" for shaft in cut.shafts])
+        self.cut, self.stage, wiring = cut, cut.stage, cut.wiring
+        self.ports = ports_of(cut.drive, cut.shafts)
+        self.signals = [signal for _, signal in cut.signals]
+        self.rates = len(self.signals) if wiring.rates else 0
+        known = [name for name, _ in cut.signals] + [name + RATE for name, _ in cut.signals][: self.rates]
+        self._values = np.zeros(3 * len(cut.shafts) + len(known))
+        self.motion, self._known = self._values[: 3 * len(cut.shafts)], self._values[3 * len(cut.shafts) :]
+        self._start = self._some(tuple(dict.fromkeys(("phi", "w", *wiring.motion))), known)
+        self._inputs = self._some(wiring.motion, known)
 
-    def set_signals(self, ends: Callable[[float, float], float], t0: float, t1: float) -> None:
-        if self.cut.signals:
-            self.cut.stage.set(self.stage_signals, [ends(*signal.ends(t0, t1)) for _, signal in self.cut.signals])
+    def _some(self, keys: tuple[str, ...], known: list[str]) -> tuple[Any, np.ndarray | slice]:
+        """Handle of these motions of every shaft and all known inputs, and their places among the values."""
+        shafts = self.cut.shafts
+        names = [f"{shaft}.{key}" for shaft in shafts for key in keys]
+        places = [3 * k + KEYS.index(key) for k in range(len(shafts)) for key in keys]
+        places += range(3 * len(shafts), len(self._values))
+        whole = places == list(range(len(self._values)))
+        return self.stage.resolve(names + known), slice(None) if whole else np.array(places)
 
     def begin(self, time: float) -> None:
         """Initialise the drivetrain, then the stage at the drivetrain's motion."""
-        cut = self.cut
-        cut.drive.initialize(time)
-        cut.stage.set(self.stage_motion, cut.drive.get(self.drive_motion))
-        self.set_signals(lambda first, _: first, time, time)
-        cut.stage.initialize(time)
+        self.ports.begin(time)
+        self.ports.now(self.motion)
+        self._know(time, 0.0)
+        self._send(self._start)
+        self.stage.initialize(time)
 
-    def step_drive(self, tau: np.ndarray, phi: np.ndarray, time: float, h: float) -> None:
-        """Step the drivetrain from the angles phi under torques that are held, and count their work."""
-        drive = self.cut.drive
-        drive.set(self.drive_tau, tau)
-        drive.step(time, h)
-        work = tau * (drive.get(self.drive_phi) - phi)
-        self.work += float(work.sum())
-        self.throughput += float(np.abs(work).sum())
+    def send(self, time: float, h: float) -> None:
+        """`motion` and the signals of the step to the stage."""
+        if self.signals:
+            self._know(time, h)
+        self._send(self._inputs)
+
+    def _know(self, time: float, h: float) -> None:
+        for k, signal in enumerate(self.signals):
+            first, last = signal.ends(time, time + h)
+            self._known[k] = first
+            if self.rates:
+                self._known[len(self.signals) + k] = (last - first) / h if h else 0.0
+
+    def _send(self, inputs: tuple[Any, np.ndarray | slice]) -> None:
+        handle, places = inputs
+        self.stage.set(handle, self._values[places])
+
+    def torque(self, key: str) -> Any:
+        """Handle of one torque output of every shaft."""
+        return self.stage.resolve([f"{shaft}.{key}" for shaft in self.cut.shafts])
 
 
 class GsMean:
     """Master `gs_mean`."""
 
-    order = 2
-
     def __init__(self, cut: Cut) -> None:
+        self.order = 2 if _everything(cut.wiring) else 1
         self.exchange = _Exchange(cut)
-        self._tau, self._motion = np.zeros(len(cut.shafts)), np.zeros((3, len(cut.shafts)))
+        self.ports, self.stage = self.exchange.ports, cut.stage
+        self._tau, self._mean = self.exchange.torque("tau"), self.exchange.torque("tau_mean")
 
     def begin(self, time: float) -> None:
         """Initialise both units."""
         self.exchange.begin(time)
-        self._tau[:] = self.exchange.cut.stage.get(self.exchange.stage_tau)
-        self.exchange.cut.drive.set(self.exchange.drive_tau, self._tau)
+        self.ports.hold(self.stage.get(self._tau).tolist())
 
     def step(self, time: float, h: float) -> None:
         """One communication step of both units."""
-        x, stage = self.exchange, self.exchange.cut.stage
-        motion = self._predict(time, h)
-        stage.set(x.stage_motion, motion.T.ravel())
-        x.set_signals(lambda first, last: 0.5 * (first + last), time, time + h)
-        stage.step(time, h)
-        self._tau[:] = stage.get(x.stage_mean)
-        x.step_drive(self._tau, motion[0], time, h)
-
-    def _predict(self, time: float, h: float) -> np.ndarray:
-        """(3, shafts) φ, w at the start of the step, and the constant acceleration that leads to the predicted
-        angle."""
-        x, drive = self.exchange, self.exchange.cut.drive
-        motion = self._motion
-        motion[:2].flat = drive.get(x.drive_phi_w)
-        state = drive.save()
-        drive.set(x.drive_tau, self._tau)
-        drive.step(time, h)
-        motion[2] = 2.0 * (drive.get(x.drive_phi) - motion[0] - motion[1] * h) / h**2
-        drive.restore(state)
-        return motion
+        self.ports.ahead(time, h, self.exchange.motion)
+        self.exchange.send(time, h)
+        self.stage.step(time, h)
+        self.ports.step(self.stage.get(self._mean).tolist(), time, h)
 
 
 class Jacobi:
     """Master `jacobi`."""
 
-    order = 1
-
     def __init__(self, cut: Cut) -> None:
         self.exchange = _Exchange(cut)
+        self.ports, self.stage = self.exchange.ports, cut.stage
+        self._held = self.exchange.torque(cut.wiring.held)
+        self.order = 2 if _everything(cut.wiring) and cut.wiring.held == "tau_next" else 1
 
     def begin(self, time: float) -> None:
         """Initialise both units."""
-        x = self.exchange
-        x.begin(time)
-        x.cut.drive.set(x.drive_tau, x.cut.stage.get(x.stage_tau))
+        self.exchange.begin(time)
+        self.ports.hold(self.stage.get(self._held).tolist())
 
     def step(self, time: float, h: float) -> None:
         """One communication step of both units."""
-        x, cut = self.exchange, self.exchange.cut
-        tau, motion = cut.stage.get(x.stage_tau).copy(), cut.drive.get(x.drive_motion).copy()
-        cut.stage.set(x.stage_motion, motion)
-        x.set_signals(lambda first, _: first, time, time + h)
-        cut.stage.step(time, h)
-        x.step_drive(tau, motion[0::3], time, h)
+        tau = self.stage.get(self._held).tolist()
+        self.ports.hold(tau)
+        self.ports.now(self.exchange.motion)
+        self.exchange.send(time, h)
+        self.stage.step(time, h)
+        self.ports.step(tau, time, h)
+
+
+def _everything(wiring: Wiring) -> bool:
+    """Whether all inputs of the stage are connected."""
+    return wiring.motion == KEYS and wiring.rates
 
 
 Master = GsMean | Jacobi

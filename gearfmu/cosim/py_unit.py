@@ -4,9 +4,7 @@ exact instants."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,36 +12,11 @@ import numpy as np
 from gearfmu.cosim.dynamics import Dynamics, Mode
 from gearfmu.cosim.events import Attempt, Event, first_event, initial_mode, switch
 from gearfmu.cosim.network import Network
+from gearfmu.cosim.py_outputs import NetworkLog, Outputs, State
 from gearfmu.cosim.units import Variable
 from gearfmu.errors import CouplingError
 
 MAX_EVENTS = 200  # within one micro-step; more means that the parts have no solution or the step is absurdly long
-
-
-@dataclass
-class _State:
-    """Everything that changes."""
-
-    time: float
-    x: np.ndarray  # (states,); replaced, never changed in place, so that states may share it
-    mode: Mode
-    torque: np.ndarray  # (n,) port torques, N·m, held over the step
-    motion: np.ndarray  # (d, 3) φ, w, a of the driven nodes at the start of the step
-    tau_mean: np.ndarray  # (d,) N·m
-    work: float  # J, of the motion ports on the network since the start
-    events: tuple[Event, ...]
-
-    def copy(self) -> _State:
-        return _State(
-            self.time,
-            self.x,
-            self.mode,
-            self.torque.copy(),
-            self.motion.copy(),
-            self.tau_mean.copy(),
-            self.work,
-            self.events,
-        )
 
 
 class Handle(NamedTuple):
@@ -71,6 +44,20 @@ KEYS = {
 }
 
 
+Loads = list[tuple[int, tuple[int, ...], tuple[Callable[[float, float, float], float], ...]]]
+
+
+def _loads(network: Network, numbers: Mapping[str, int]) -> Loads:
+    """(node, torque ports, sources) of every node that has any."""
+    ports, found = list(network.torque_ports.values()), []
+    for name, node in numbers.items():
+        on = tuple(k for k, port in enumerate(ports) if port == name)
+        sources = tuple(source.torque for source in network.sources if source.node == name)
+        if on or sources:
+            found.append((node, on, sources))
+    return found
+
+
 def _variable(name: str) -> Variable:
     part, key = name.rsplit(".", 1)
     about = KEYS[key]
@@ -84,7 +71,7 @@ class PyUnit:
     motion port: the node moves with constant acceleration; a difference between the given angle and the one it has
     reached is blended over the step. Outputs: `.phi`, `.w`, `.a` of ports and nodes, `.tau` (torque on the outside)
     and `.tau_mean` of motion ports, `.tau` and `.extension` of springs, `.tau`, `.slip`, `.locked` of clutches,
-    `.tau` of sources, `energy.work`, `energy.stored`.
+    `.tau` of sources, `energy.work`, `energy.stored`. `log` keeps them for many times at once.
 
     micro_step : s, largest step between evaluations of sources and events; None: the communication step. Sources are
     taken linear over a micro-step between their values at its ends (predictor and corrector, second order);
@@ -94,15 +81,18 @@ class PyUnit:
     def __init__(self, network: Network, micro_step: float | None = None) -> None:
         self.network, self.dynamics, self.micro_step = network, Dynamics(network), micro_step
         d = self.dynamics
-        self._torque_ports = {port: d.node[node] for port, node in network.torque_ports.items()}
+        self._torque_ports = {port: k for k, port in enumerate(network.torque_ports)}
         self._motion_ports = {port: d.driven.index(d.node[node]) for port, node in network.motion_ports.items()}
-        self._sources = [(d.node[source.node], source.torque) for source in network.sources]
+        self._loads = _loads(network, d.node)
         self._clutches = slice(d.n, d.n + d.n_clutches)
         self._hybrid = bool(d.n_clutches or d.gaps)
-        self._outputs = self._name_outputs()
+        self.is_smooth = not self._hybrid and not self._motion_ports
+        self._outputs = Outputs(d)
         self._output_rows: dict[tuple[tuple[str, ...], Mode], np.ndarray] = {}
         self._z = np.zeros(d.states + 2 * d.inputs)
         self._x0, self._u0, self._u1 = np.split(self._z, [d.states, d.states + d.inputs])
+        self._u0[-1] = self._u1[-1] = 1.0
+        self._port_nodes = [d.node[node] for node in network.torque_ports.values()]
         self._state = self._start(0.0)
 
     # -- life ----------------------------------------------------------------------------------------------------------
@@ -111,20 +101,24 @@ class PyUnit:
         replaces that of their nodes."""
         d, given = self.dynamics, self._state
         self._state = state = self._start(time)
-        state.torque[:] = given.torque
+        state.torque, state.motion = given.torque, given.motion
         for k in self._motion_ports.values():
             node = d.driven[k]
-            state.motion[k] = given.motion[k]
             state.x[node], state.x[d.n + node] = given.motion[k, :2]
         state.mode = initial_mode(d, state.x, self._inputs(time, state.x), self._capacity(time, time)[0])
 
-    def save(self) -> _State:
+    def save(self) -> State:
         """A copy of everything that changes."""
         return self._state.copy()
 
-    def restore(self, state: _State) -> None:
+    def restore(self, state: State) -> None:
         """Back to a saved state."""
         self._state = state.copy()
+
+    @property
+    def state(self) -> State:
+        """Everything that changes; not to be changed from outside."""
+        return self._state
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -137,34 +131,38 @@ class PyUnit:
         inputs = {f"{port}.tau": ("torque", k) for port, k in self._torque_ports.items()}
         for port, k in self._motion_ports.items():
             inputs |= {f"{port}.{key}": ("motion", 3 * k + i) for i, key in enumerate(("phi", "w", "a"))}
-        unknown = [name for name in names if name not in self._outputs and name not in inputs]
+        position = self._outputs.position
+        unknown = [name for name in names if name not in position and name not in inputs]
         if unknown:
-            known = f"inputs: {', '.join(sorted(inputs))}; outputs: {', '.join(sorted(self._outputs))}"
+            known = f"inputs: {', '.join(sorted(inputs))}; outputs: {', '.join(sorted(position))}"
             raise CouplingError(f"no variable {', '.join(unknown)}; {known}")
         outputs = (
-            np.array([self._outputs[name] for name in names], dtype=int)
-            if all(name in self._outputs for name in names)
-            else None
+            np.array([position[name] for name in names], dtype=int) if all(name in position for name in names) else None
         )
         places = tuple(inputs[name] for name in names) if all(name in inputs for name in names) else None
-        special = (
-            np.flatnonzero(outputs >= len(self.dynamics.output_names))
-            if outputs is not None
-            else np.zeros(0, dtype=int)
-        )
+        special = np.flatnonzero(outputs >= self._outputs.linear) if outputs is not None else np.zeros(0, dtype=int)
         return Handle(tuple(names), outputs, places, special, np.zeros(len(names)))
 
     def outputs(self) -> dict[str, Variable]:
         """All outputs by name."""
-        return {name: _variable(name) for name in self._outputs}
+        return {name: _variable(name) for name in self._outputs.position}
+
+    def log(self, names: Sequence[str], points: int) -> NetworkLog:
+        """Keeps these outputs at up to `points` times."""
+        return NetworkLog(self._outputs, names, lambda: self._state)
 
     def set(self, handle: Handle, values: Sequence[float]) -> None:
         """Inputs for the next step."""
         if handle.inputs is None:
             raise CouplingError(f"not all of {', '.join(handle.names)} are inputs")
         state = self._state
+        torque, motion = list(state.torque), state.motion.copy()
         for (kind, k), value in zip(handle.inputs, values, strict=True):
-            (state.torque if kind == "torque" else state.motion.reshape(-1))[k] = value
+            if kind == "torque":
+                torque[k] = float(value)
+            else:
+                motion.flat[k] = value
+        state.torque, state.motion = tuple(torque), motion
 
     def get(self, handle: Handle) -> np.ndarray:
         """Values (k,) at the current time, in the handle's buffer."""
@@ -176,7 +174,7 @@ class PyUnit:
         else:
             np.dot(rows, state.x, out=handle.buffer)
         for place in handle.special:
-            handle.buffer[place] = self._special[handle.outputs[place]]()
+            handle.buffer[place] = self._outputs.special(handle.outputs[place], state)
         return handle.buffer
 
     def _rows(self, handle: Handle) -> np.ndarray:
@@ -213,27 +211,51 @@ class PyUnit:
 
     def _end_motion(self, h: float) -> None:
         state, d = self._state, self.dynamics
-        state.tau_mean[:] = state.x[2 * d.n :] / h
+        state.tau_mean = state.x[2 * d.n :] / h
         for k in self._motion_ports.values():
             _, w, a = state.motion[k]
             state.x[d.n + d.driven[k]] = w + a * h
 
     def _smooth_step(self, time: float, h: float) -> None:
         """One micro-step without clutches and backlash: straight through preset memory."""
+        self._advance(self._foreseen(time, h).dot(self._z))
+
+    def _foreseen(self, time: float, h: float) -> np.ndarray:
+        """Preset memory [x, u at the start, u at the end] of a step under the held torques, sources at its end by
+        predictor and corrector, and the matrix that makes the state at its end of it."""
         state, d = self._state, self.dynamics
-        s = d.transition(state.mode, h)
-        self._u0[d.n :] = self._u1[d.n :] = 0.0
-        self._u0[-1] = self._u1[-1] = 1.0
-        if d.n_driven:
-            self._u0[d.n : -1] = self._u1[d.n : -1] = state.motion[:, 2]
+        s, n = d.transition(state.mode, h), d.n
         self._x0[:] = state.x
-        self._node_torques(self._u0, time, state.x)
-        self._u1[: d.n] = self._u0[: d.n]
-        x1 = s.dot(self._z)
-        if self._sources:
-            self._node_torques(self._u1, time + h, x1)
-            x1 = s.dot(self._z)
-        self._advance(x1)
+        if d.n_driven:
+            self._u0[n:-1] = self._u1[n:-1] = state.motion[:, 2]
+        self._node_torques(self._u0, time, state.x.tolist())
+        self._u1[:n] = self._u0[:n]
+        if self.network.sources:
+            self._node_torques(self._u1, time + h, s.dot(self._z).tolist())
+        return s
+
+    def in_one_step(self, h: float) -> bool:
+        """Whether a step of h s is one product with a matrix: `foresee`, then `complete`."""
+        return self.is_smooth and not (self.micro_step and h > self.micro_step * (1.0 + 1e-9))
+
+    def foresee(self, time: float, h: float) -> np.ndarray:
+        """[x, u at the start, u at the end] (memory of the unit) of the step from `time` under the held torques."""
+        self._foreseen(time, h)
+        if self.dynamics.n_driven:
+            self._x0[2 * self.dynamics.n :] = 0.0
+        return self._z
+
+    def complete(self, tau: Sequence[float], time: float, h: float) -> None:
+        """The step just foreseen, under these torques of the torque ports instead of the held ones."""
+        state, d = self._state, self.dynamics
+        for node, new, held in zip(self._port_nodes, tau, state.torque, strict=True):
+            change = new - held
+            self._u0[node] += change
+            self._u1[node] += change
+        state.torque = tuple(tau)
+        state.x, state.time = d.transition(state.mode, h).dot(self._z), time + h
+        if d.n_driven:
+            state.tau_mean = state.x[2 * d.n :] / h
 
     def _hybrid_step(self, time: float, h: float) -> None:
         state, d, done = self._state, self.dynamics, 0.0
@@ -265,8 +287,8 @@ class PyUnit:
         s = (d.transition if keep else d.transition_once)(self._state.mode, h)
         self._x0[:], self._u0[:], self._u1[:] = self._state.x, u0, u1
         x1 = s.dot(self._z)
-        if self._sources:
-            self._node_torques(u1, time + h, x1)
+        if self.network.sources:
+            self._node_torques(u1, time + h, x1.tolist())
             self._u1[:] = u1
             x1 = s.dot(self._z)
         return x1, u1
@@ -279,29 +301,40 @@ class PyUnit:
         state.x = x1
 
     # -- inputs and outputs --------------------------------------------------------------------------------------------
-    def _start(self, time: float) -> _State:
+    def _start(self, time: float) -> State:
         d, nodes = self.dynamics, self.network.nodes
         x = np.array([p.phi for p in nodes] + [p.w for p in nodes] + [0.0] * d.n_driven, dtype=float)
         motion = np.array([[nodes[k].phi, nodes[k].w, 0.0] for k in d.driven], dtype=float).reshape(-1, 3)
-        state = _State(
-            time, x, ((0,) * d.n_clutches, (0,) * len(d.gaps)), np.zeros(d.n), motion, np.zeros(d.n_driven), 0.0, ()
+        state = State(
+            time,
+            x,
+            ((0,) * d.n_clutches, (0,) * len(d.gaps)),
+            (0.0,) * len(self._torque_ports),
+            motion,
+            np.zeros(d.n_driven),
+            0.0,
+            (),
         )
         self._state = state
         state.mode = initial_mode(d, x, self._inputs(time, x), self._capacity(time, time)[0])
         return state
 
-    def _node_torques(self, u: np.ndarray, time: float, x: np.ndarray) -> None:
-        """Port torques and sources into the first n places of u."""
-        n = self.dynamics.n
-        u[:n] = self._state.torque
-        for node, function in self._sources:
-            u[node] += function(time, x.item(node), x.item(n + node))
+    def _node_torques(self, u: np.ndarray, time: float, x: Sequence[float]) -> None:
+        """Port torques and sources into the first n places of u (zero where there are none)."""
+        n, torque = self.dynamics.n, self._state.torque
+        for node, ports, sources in self._loads:
+            total = 0.0
+            for port in ports:
+                total += torque[port]
+            for source in sources:
+                total += source(time, x[node], x[n + node])
+            u[node] = total
 
     def _inputs(self, time: float, x: np.ndarray, capacity: np.ndarray | None = None) -> np.ndarray:
         d = self.dynamics
         u = np.zeros(d.inputs)
         u[-1] = 1.0
-        self._node_torques(u, time, x)
+        self._node_torques(u, time, x.tolist())
         if d.n_driven:
             u[self._clutches.stop : -1] = self._state.motion[:, 2]
         if d.n_clutches:
@@ -314,42 +347,4 @@ class PyUnit:
 
     def energy(self) -> float:
         """Kinetic energy of the inertias and potential energy of the springs, J."""
-        x, d = self._state.x, self.dynamics
-        energy = sum(0.5 * x[d.n + k] ** 2 / m for k, m in enumerate(d.inverse_inertia) if m > 0)
-        for row, spring in zip(d.extension, self.network.springs, strict=True):
-            s = float(row @ x[: d.n])
-            stretched = s if s > 0 or not spring.backlash else min(s + spring.backlash, 0.0)
-            energy += 0.5 * spring.k * stretched**2
-        return float(energy)
-
-    def _special_outputs(self) -> dict[str, Callable[[], float]]:
-        """Outputs that are not linear in state and input."""
-        network, d = self.network, self.dynamics
-        found = {f"{network.nodes[node].name}.tau_mean": partial(self._mean, k) for k, node in enumerate(d.driven)}
-        found |= {f"{clutch.name}.locked": partial(self._locked, k) for k, clutch in enumerate(network.clutches)}
-        found |= {
-            f"{source.name}.tau": partial(self._source, d.node[source.node], source.torque)
-            for source in network.sources
-        }
-        return found | {"energy.work": lambda: self._state.work, "energy.stored": self.energy}
-
-    def _mean(self, k: int) -> float:
-        return float(self._state.tau_mean[k])
-
-    def _locked(self, k: int) -> float:
-        return float(self._state.mode[0][k] == 0)
-
-    def _source(self, node: int, torque: Callable[[float, float, float], float]) -> float:
-        return torque(self._state.time, float(self._state.x[node]), float(self._state.x[self.dynamics.n + node]))
-
-    def _name_outputs(self) -> dict[str, int]:
-        """Position of every output: the linear ones, then the special ones, then the ports' names for some of both."""
-        network, names, special = self.network, dict(self.dynamics.output_names), self._special_outputs()
-        first = len(names)
-        names |= {name: first + k for k, name in enumerate(special)}
-        self._special = dict(enumerate(special.values(), start=first))
-        for port, node in network.torque_ports.items():
-            names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("phi", "w", "a")}
-        for port, node in network.motion_ports.items():
-            names |= {f"{port}.{key}": names[f"{node}.{key}"] for key in ("tau", "tau_mean")}
-        return names
+        return self._outputs.special(self._outputs.position["energy.stored"], self._state)

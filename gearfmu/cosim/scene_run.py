@@ -12,8 +12,8 @@ from gearfmu import fmu
 from gearfmu.body import load_stage_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
-from gearfmu.cosim.drivetrain import build, shafts_of, stage_ports, stage_signals, stage_start
-from gearfmu.cosim.masters import Cut
+from gearfmu.cosim.drivetrain import build, shafts_of, stage_joints, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.source import Source
 from gearfmu.cosim.summary import summary
@@ -23,6 +23,8 @@ from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.trace import Trace
+
+WHOLE = Wiring()
 
 
 def run(
@@ -76,8 +78,10 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))
 
 
-def run_once(scene: SceneSpec, source: Source, progress: Progress | None = None) -> Result:
-    """One run of the scene with fresh units."""
+def run_once(
+    scene: SceneSpec, source: Source, progress: Progress | None = None, wiring: Wiring = WHOLE
+) -> Result:
+    """One run of the scene with fresh units; wiring: what of the stage is connected."""
     shafts, choice = shafts_of(source.model.spec), scene.stage
     parameters = {
         "level": choice.level,
@@ -89,8 +93,9 @@ def run_once(scene: SceneSpec, source: Source, progress: Progress | None = None)
     stage = source.unit(parameters)
     try:
         drive = PyUnit(build(scene, shafts), scene.coupling.micro_step or None)
-        cut = Cut(stage, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts))
-        return run_coupled(cut, Plan(scene.coupling.master, scene.coupling.step, scene.steps, scene.record, progress))
+        cut = Cut(stage, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts), wiring)
+        coupling, omit = scene.coupling, stage_joints(scene, shafts)
+        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
     finally:
         stage.close()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 TIME_NOISE = 1e-9  # s: two times closer than this are one (communication points carry rounding noise)
@@ -45,11 +46,15 @@ class Ramp:
 
     points: tuple[tuple[float, float], ...]
 
+    @cached_property
+    def _times(self) -> list[float]:
+        return [time for time, _ in self.points]
+
     def ends(self, t0: float, t1: float) -> tuple[float, float]:
         return self._limit(t0 + TIME_NOISE, t0, bisect_right), self._limit(t1 - TIME_NOISE, t1, bisect_left)
 
     def _limit(self, near: float, time: float, bisect: Callable) -> float:
-        k = bisect([t for t, _ in self.points], near)
+        k = bisect(self._times, near)
         if k == 0:
             return self.points[0][1]
         if k == len(self.points):

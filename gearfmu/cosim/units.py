@@ -17,12 +17,23 @@ class Variable(NamedTuple):
     whole: bool = False
 
 
+class Log(Protocol):
+    """Chosen outputs of a unit at many times."""
+
+    def take(self) -> None:
+        """Keep the present outputs."""
+
+    def rows(self) -> np.ndarray:
+        """(times, names) kept so far."""
+
+
 class Unit(Protocol):
     """One side of a coupling.
 
     `resolve` is called once for each set of names and returns a handle with its own buffers; `get` fills and returns
-    the handle's buffer (k,), which the next `get` with that handle overwrites. `save` returns a state that `restore`
-    takes back any number of times, bit for bit. `step` raises SimulationError when the unit cannot go on.
+    the handle's buffer (k,), which the next `get` with that handle overwrites. `log` keeps outputs at up to `points`
+    times. `save` returns a state that `restore` takes back any number of times, bit for bit. `step` raises
+    SimulationError when the unit cannot go on.
     """
 
     def outputs(self) -> Mapping[str, Variable]: ...
@@ -30,6 +41,7 @@ class Unit(Protocol):
     def resolve(self, names: Sequence[str]) -> Any: ...
     def set(self, handle: Any, values: Sequence[float]) -> None: ...
     def get(self, handle: Any) -> np.ndarray: ...
+    def log(self, names: Sequence[str], points: int) -> Log: ...
     def step(self, time: float, h: float) -> None: ...
     def save(self) -> Any: ...
     def restore(self, state: Any) -> None: ...

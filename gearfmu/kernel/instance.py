@@ -54,6 +54,7 @@ class Kernel:
             raise ModelError(message.value.decode(errors="replace"))
         self._setup_keep, self._setup = aligned(self._lib.gk_setup_size(self._model))
         self._data_keep, self._data = aligned(self._lib.gk_data_size(self._model))
+        self._set_many, self._get_many = self._lib.gk_set_many, self._lib.gk_get_many
         self._lib.gk_defaults(self._model, self._data)
         self.variables = {v.name: v for v in self._read_variables()}
         self.warning = ""
@@ -110,6 +111,14 @@ class Kernel:
     def get_reference(self, reference: int, out: ctypes.c_double) -> int:
         """Fast road: outcome number of gk_get, the value in `out`."""
         return self._lib.gk_get(self._model, self._data, reference, ctypes.byref(out))
+
+    def set_many(self, references: ctypes.Array, values: ctypes.Array) -> int:
+        """Inputs by value reference (c_uint32) and number (c_double), all or none: outcome number."""
+        return self._set_many(self._model, self._data, references, len(references), values)
+
+    def get_many(self, references: ctypes.Array, values: ctypes.Array | int) -> int:
+        """Values by reference into an array of doubles or to an address: outcome number."""
+        return self._get_many(self._model, self._data, references, len(references), values)
 
     def prepare(self) -> None:
         """Fix level, effects and step. ModelError when the wished h is too large; `warning` holds what the kernel wants said."""

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib import rc_context
+
 from gearfmu.files import written_whole
 from gearfmu.report.style import COLOURS, MUTED, panels, styled
 
 QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
 MARKS = {"rk45": "s", "dg4": "o"}
-LABELLED = 3  # steps of a line that are written beside it
 
 
 def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -> list[Path]:
@@ -20,7 +21,7 @@ def write_chart(rows: Sequence[Any], slices: int, path: Path, title: str = "") -
     rows: of gearfmu.study, one scene; slices: of the scene, drawn full, others thin.
     """
     written = []
-    with styled():
+    with styled(), rc_context({"svg.hashsalt": "study"}):
         figure, axes = panels((2.7, 2.4, 2.4))
         for name, panel in zip(QUANTITIES, axes, strict=True):
             draw(panel, rows, slices, name)
@@ -51,13 +52,15 @@ def draw(panel: Any, rows: Sequence[Any], slices: int, name: str) -> None:
         panel.loglog(time, error, color=colour, linewidth=1.2 if own else 0.7, **style)
         if own and name == "te":
             _write_steps(panel, line, time, error)
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
     panel.set_ylabel(f"{QUANTITIES[name]}, %")
 
 
 def _write_steps(panel: Any, line: list[Any], time: list[float], error: list[float]) -> None:
-    """The step beside the first, a middle and the last point of a line."""
-    chosen = sorted({0, len(line) // 2, len(line) - 1})[:LABELLED]
-    for k in chosen:
+    """The step beside the first and the last point of a line."""
+    for k in sorted({0, len(line) - 1}):
         panel.annotate(
             f"{1e6 * line[k].h_s:.3g} µs",
             (time[k], error[k]),
@@ -83,3 +86,27 @@ def _rank(level: str) -> int:
 def _undated(suffix: str) -> dict[str, str | None]:
     """No date in the file: the same rows give the same bytes."""
     return {"Date": None} if suffix == ".svg" else {}
+
+
+def write_bodies_chart(rows: Sequence[Any], path: Path) -> list[Path]:
+    """Distance of level full to refined bodies as bars, SVG and PNG beside each other; rows: BodyRow of
+    gearfmu.study.refined."""
+    refined, scenes = list(dict.fromkeys(r.refined for r in rows)), list(dict.fromkeys(r.scene for r in rows))
+    written, width = [], 0.8 / len(scenes)
+    with styled(), rc_context({"svg.hashsalt": "bodies"}):
+        figure, axes = panels((1.7,) * len(QUANTITIES))
+        for name, panel in zip(QUANTITIES, axes, strict=True):
+            for k, scene in enumerate(scenes):
+                found = {r.refined: 100 * getattr(r, f"{name}_error") for r in rows if r.scene == scene}
+                place = [i + width * (k - (len(scenes) - 1) / 2) for i, text in enumerate(refined) if text in found]
+                panel.bar(place, [found[text] for text in refined if text in found], width, label=scene)
+            panel.set_yscale("log")
+            panel.yaxis.set_major_formatter("{x:g}")
+            panel.set_ylabel(f"{QUANTITIES[name]}, %")
+            panel.set_xticks(range(len(refined)), refined)
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        for suffix in (".svg", ".png"):
+            with written_whole(path.with_suffix(suffix)) as temporary:
+                figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=_undated(suffix))
+            written.append(path.with_suffix(suffix))
+    return written

@@ -11,11 +11,15 @@ from pydantic import Field
 from gearfmu.spec.base import Quantity, Spec
 
 ASSUMED = "assumed"
+Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
+Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
+Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
+Amplitude = Annotated[float, Quantity("N*m", at_least=0)]
 
 
-def _about(meaning: str, source: str = ASSUMED) -> Any:
-    """Meaning of a value and where it comes from."""
-    return Field(description=meaning, json_schema_extra={"source": source})
+def _value(default: Any, meaning: str, source: str = ASSUMED) -> Any:
+    """A value with its meaning and where it comes from; `...` where the scene must give it."""
+    return Field(default=default, description=meaning, json_schema_extra={"source": source})
 
 
 class PassengerCar(Spec):
@@ -31,80 +35,44 @@ class PassengerCar(Spec):
     chain_in_fmu: Annotated[
         bool, Field(description="secondary mass, clutch and input shaft are computed inside the FMU")
     ] = True
-    crank_inertia: Annotated[
-        float, Quantity("kg*m^2", above=0), _about("crankshaft with rods' share, four cylinders, 2 l")
-    ] = 0.05
-    dmf_primary_inertia: Annotated[float, Quantity("kg*m^2", above=0), _about("dual-mass flywheel, primary mass")] = (
-        0.11
+    crank_inertia: Inertia = _value(0.05, "crankshaft with rods' share, four cylinders, 2 l")
+    dmf_primary_inertia: Inertia = _value(0.11, "dual-mass flywheel, primary mass")
+    dmf_stiffness: Stiffness = _value(
+        573.0, "dual-mass flywheel, arc springs, linear", "assumed: 10 N·m/°, free mode at 18 Hz"
     )
-    dmf_stiffness: Annotated[
-        float,
-        Quantity("N*m/rad", above=0),
-        _about("dual-mass flywheel, arc springs, linear", "assumed: 10 N·m/°, free mode at 18 Hz"),
-    ] = 573.0
-    dmf_damping: Annotated[
-        float,
-        Quantity("N*m*s/rad", at_least=0),
-        _about("dual-mass flywheel, viscous substitute of its friction", "assumed: 10 % of critical"),
-    ] = 1.0
-    secondary_inertia: Annotated[
-        float, Quantity("kg*m^2", above=0), _about("dual-mass flywheel, secondary mass, with cover and pressure plate")
-    ] = 0.06
-    disc_inertia: Annotated[
-        float, Quantity("kg*m^2", above=0), _about("clutch disc with its share of the input shaft")
-    ] = 0.006
-    input_shaft_stiffness: Annotated[
-        float,
-        Quantity("N*m/rad", above=0),
-        _about("clutch disc to pinion", "computed: solid steel, G = 79.3 GPa, d = 28 mm, l = 0.2 m"),
-    ] = 2.39e4
-    input_shaft_damping: Annotated[
-        float, Quantity("N*m*s/rad", at_least=0), _about("input shaft with splines", "assumed: 2 % of critical")
-    ] = 0.5
-    output_shaft_stiffness: Annotated[
-        float,
-        Quantity("N*m/rad", above=0),
-        _about("wheel gear to final drive", "computed: solid steel, G = 79.3 GPa, d = 30 mm, l = 0.25 m"),
-    ] = 2.52e4
-    output_shaft_damping: Annotated[
-        float, Quantity("N*m*s/rad", at_least=0), _about("output shaft", "assumed: 2 % of critical")
-    ] = 0.6
-    final_drive_ratio: Annotated[float, Quantity(above=0), _about("final drive, rigid")] = 4.0
-    final_drive_inertia: Annotated[
-        float, Quantity("kg*m^2", above=0), _about("final drive and differential, referred to the output shaft")
-    ] = 0.01
-    half_shaft_stiffness: Annotated[
-        float,
-        Quantity("N*m/rad", above=0),
-        _about("both half shafts, at the road wheels", "computed: 2 × solid steel, G = 79.3 GPa, d = 25 mm, l = 0.6 m"),
-    ] = 1.01e4
-    half_shaft_damping: Annotated[
-        float,
-        Quantity("N*m*s/rad", at_least=0),
-        _about("both half shafts, at the road wheels", "assumed: 3 % of critical"),
-    ] = 8.0
-    road_wheel_inertia: Annotated[
-        float, Quantity("kg*m^2", above=0), _about("one road wheel with tyre and brake disc")
-    ] = 0.9
-    road_wheel_radius: Annotated[float, Quantity("m", above=0), _about("rolling radius")] = 0.3
-    tyre_slip_stiffness: Annotated[
-        float,
-        Quantity("N", above=0),
-        _about("longitudinal force per unit slip, both driven tyres; a linear damper at the scene's initial speed"),
-    ] = 1.0e5
-    vehicle_mass: Annotated[float, Quantity("kg", above=0), _about("vehicle with two persons")] = 1400.0
-    drag_area: Annotated[float, Quantity("m^2", at_least=0), _about("drag coefficient times frontal area")] = 0.65
-    rolling_resistance: Annotated[float, Quantity(at_least=0), _about("rolling resistance coefficient")] = 0.012
-    air_density: Annotated[float, Quantity("kg/m^3", at_least=0), _about("air at sea level, 15 °C", "ISO 2533")] = 1.225
-    gravity: Annotated[float, Quantity("m/s^2", at_least=0), _about("standard gravity", "ISO 80000-3")] = 9.80665
-    engine_torque: Annotated[float, Quantity("N*m"), _about("mean torque")] = 120.0
-    order_2: Annotated[
-        float,
-        Quantity("N*m", at_least=0),
-        _about("torque amplitude, engine order 2 (firing order of four cylinders, four-stroke)"),
-    ] = 150.0
-    order_4: Annotated[float, Quantity("N*m", at_least=0), _about("torque amplitude, engine order 4")] = 45.0
-    order_6: Annotated[float, Quantity("N*m", at_least=0), _about("torque amplitude, engine order 6")] = 15.0
+    dmf_damping: Damping = _value(
+        1.0, "dual-mass flywheel, viscous substitute of its friction", "assumed: 10 % of critical"
+    )
+    secondary_inertia: Inertia = _value(0.06, "dual-mass flywheel, secondary mass, with cover and pressure plate")
+    disc_inertia: Inertia = _value(0.006, "clutch disc with its share of the input shaft")
+    input_shaft_stiffness: Stiffness = _value(
+        2.39e4, "clutch disc to pinion", "computed: solid steel, G = 79.3 GPa, d = 28 mm, l = 0.2 m"
+    )
+    input_shaft_damping: Damping = _value(0.5, "input shaft with splines", "assumed: 2 % of critical")
+    output_shaft_stiffness: Stiffness = _value(
+        2.52e4, "wheel gear to final drive", "computed: solid steel, G = 79.3 GPa, d = 30 mm, l = 0.25 m"
+    )
+    output_shaft_damping: Damping = _value(0.6, "output shaft", "assumed: 2 % of critical")
+    final_drive_ratio: Annotated[float, Quantity(above=0)] = _value(4.0, "final drive, rigid")
+    final_drive_inertia: Inertia = _value(0.01, "final drive and differential, referred to the output shaft")
+    half_shaft_stiffness: Stiffness = _value(
+        1.01e4, "both half shafts, at the road wheels", "computed: 2 × solid steel, G = 79.3 GPa, d = 25 mm, l = 0.6 m"
+    )
+    half_shaft_damping: Damping = _value(8.0, "both half shafts, at the road wheels", "assumed: 3 % of critical")
+    road_wheel_inertia: Inertia = _value(0.9, "one road wheel with tyre and brake disc")
+    road_wheel_radius: Annotated[float, Quantity("m", above=0)] = _value(0.3, "rolling radius")
+    tyre_slip_stiffness: Annotated[float, Quantity("N", above=0)] = _value(
+        1.0e5, "longitudinal force per unit slip, both driven tyres; a linear damper at the scene's initial speed"
+    )
+    vehicle_mass: Annotated[float, Quantity("kg", above=0)] = _value(1400.0, "vehicle with two persons")
+    drag_area: Annotated[float, Quantity("m^2", at_least=0)] = _value(0.65, "drag coefficient times frontal area")
+    rolling_resistance: Annotated[float, Quantity(at_least=0)] = _value(0.012, "rolling resistance coefficient")
+    air_density: Annotated[float, Quantity("kg/m^3", at_least=0)] = _value(1.225, "air at sea level, 15 °C", "ISO 2533")
+    gravity: Annotated[float, Quantity("m/s^2", at_least=0)] = _value(9.80665, "standard gravity", "ISO 80000-3")
+    engine_torque: Annotated[float, Quantity("N*m")] = _value(120.0, "mean torque")
+    order_2: Amplitude = _value(150.0, "torque amplitude, engine order 2 (firing order of four cylinders, four-stroke)")
+    order_4: Amplitude = _value(45.0, "torque amplitude, engine order 4")
+    order_6: Amplitude = _value(15.0, "torque amplitude, engine order 6")
 
 
 class TestRig(Spec):
@@ -116,23 +84,17 @@ class TestRig(Spec):
 
     __test__ = False  # not a test class, whatever its name
 
-    torque: Annotated[float, Quantity("N*m"), _about("mean torque of the drive on the pinion", "scene")]
-    drive_inertia: Annotated[float, Quantity("kg*m^2", above=0), _about("rotor of the drive")] = 0.02
-    speed_droop: Annotated[
-        float, Quantity("N*m*s/rad", at_least=0), _about("controller of the drive", "assumed: half of critical")
-    ] = 14.0
-    pinion_shaft_stiffness: Annotated[
-        float,
-        Quantity("N*m/rad", above=0),
-        _about("drive to pinion", "computed: solid steel, G = 79.3 GPa, d = 28 mm, l = 0.24 m"),
-    ] = 2.0e4
-    pinion_shaft_damping: Annotated[float, Quantity("N*m*s/rad", at_least=0), _about("pinion's shaft")] = 0.2
-    wheel_shaft_stiffness: Annotated[
-        float,
-        Quantity("N*m/rad", above=0),
-        _about("wheel to the shaft of constant speed", "computed: solid steel, G = 79.3 GPa, d = 35 mm, l = 0.23 m"),
-    ] = 5.0e4
-    wheel_shaft_damping: Annotated[float, Quantity("N*m*s/rad", at_least=0), _about("wheel's shaft")] = 0.5
+    torque: Annotated[float, Quantity("N*m")] = _value(..., "mean torque of the drive on the pinion", "scene")
+    drive_inertia: Inertia = _value(0.02, "rotor of the drive")
+    speed_droop: Damping = _value(14.0, "controller of the drive", "assumed: half of critical")
+    pinion_shaft_stiffness: Stiffness = _value(
+        2.0e4, "drive to pinion", "computed: solid steel, G = 79.3 GPa, d = 28 mm, l = 0.24 m"
+    )
+    pinion_shaft_damping: Damping = _value(0.2, "pinion's shaft")
+    wheel_shaft_stiffness: Stiffness = _value(
+        5.0e4, "wheel to the shaft of constant speed", "computed: solid steel, G = 79.3 GPa, d = 35 mm, l = 0.23 m"
+    )
+    wheel_shaft_damping: Damping = _value(0.5, "wheel's shaft")
 
 
 class Row(NamedTuple):

@@ -131,5 +131,6 @@ def _default(field: FieldInfo, unit: str) -> str:
 
 def _toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items()) + " }"
+        entries = ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items())
+        return f"{{ {entries} }}" if entries else "{}"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool, int)) else repr(value)

@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -15,13 +14,14 @@ import numpy as np
 
 from gearfmu.errors import GearfmuError
 from gearfmu.files import written_whole
-
-FORMAT = "gearfmu-trace"
-FORMAT_VERSION = 1
+from gearfmu.hdf5 import Format, reading, writing
 
 
 class TraceError(GearfmuError):
     """A trace, or a file that should hold one, is not valid."""
+
+
+FILE = Format("gearfmu-trace", 2, "trace", TraceError, "make it again with 'gearfmu run' or 'gearfmu simulate'")
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,7 @@ class Trace:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the HDF5 file (docs/file-formats.md) under a temporary name, then rename it to `path`."""
-        with written_whole(path) as temporary, h5py.File(temporary, "w") as file:
-            file.attrs["format"] = FORMAT
-            file.attrs["format_version"] = FORMAT_VERSION
+        with writing(path, FILE) as file:
             file.attrs["meta"] = json.dumps(self.meta, sort_keys=True, default=_plain)
             _write(file, "time", Channel(self.time, "s", "time"))
             group = file.create_group("channels", track_order=True)
@@ -84,16 +82,8 @@ class Trace:
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Trace:
         """Read a file written by `save`; raises TraceError when it is missing, damaged or of another kind."""
-        source = Path(path)
-        if not source.is_file():
-            raise TraceError(f"{source}: no such file; 'gearfmu run' and 'gearfmu simulate' write traces")
-        try:
-            with h5py.File(source, "r") as file:
-                return _read(file)
-        except TraceError as error:
-            raise TraceError(f"{source}: {error}") from None
-        except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
-            raise TraceError(f"{source}: damaged or no trace file ({error}); run the scene again") from error
+        with reading(path, FILE) as file:
+            return _read(file)
 
     def to_csv(self, path: str | os.PathLike[str], names: Iterable[str] | None = None) -> None:
         """Write time and the channels `names` (all when None) as CSV with one header row "name_[unit]"."""
@@ -159,11 +149,6 @@ def _write(group: h5py.Group, name: str, channel: Channel) -> None:
 
 
 def _read(file: h5py.File) -> Trace:
-    if file.attrs.get("format") != FORMAT:
-        raise TraceError("this HDF5 file is not a gearfmu trace; 'gearfmu inspect' says what it is")
-    version = int(file.attrs["format_version"])
-    if version > FORMAT_VERSION:
-        raise TraceError(f"trace format {version} is newer than this gearfmu reads ({FORMAT_VERSION}); update gearfmu")
     channels = {
         name: Channel(dataset[()], str(dataset.attrs["unit"]), str(dataset.attrs["description"]))
         for name, dataset in file["channels"].items()

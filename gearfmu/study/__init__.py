@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.study.run import Job, Study, study
+from gearfmu.study.run import Defaults, Job, Study, default_rows, study
 from gearfmu.study.table import ReferenceRow, Row, TransientRow
 
-__all__ = ["Job", "ReferenceRow", "Row", "Study", "TransientRow", "study"]
+__all__ = ["Defaults", "Job", "ReferenceRow", "Row", "Study", "TransientRow", "default_rows", "study"]

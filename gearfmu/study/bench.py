@@ -23,6 +23,7 @@ from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.tables import ROLLS
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
@@ -57,7 +58,7 @@ class Recording:
 @dataclass(frozen=True)
 class Run:
     """A finished run: what integrated it, signals, internal step (s; rk45: mean accepted step), dynamic modes,
-    outcome, what the kernel said, recording (None where it was left behind)."""
+    outcome, bits of solver.status, what the kernel said, recording (None where it was left behind)."""
 
     point: Point
     integrator: str
@@ -65,6 +66,7 @@ class Run:
     h: float
     n_dyn: int
     outcome: str
+    status: int
     warning: str
     recording: Recording | None = field(repr=False)
 
@@ -115,12 +117,14 @@ class _KeptSource:
         return self.unit_made
 
 
-def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, **changes: Any) -> StageModel:
-    """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; changes: of the
-    StageSpec."""
+def models_for(
+    scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int = ROLLS, **changes: Any
+) -> StageModel:
+    """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
+    along a flank; changes: of the StageSpec."""
     spec = load_stage(scene.stage.name).model_copy(update=changes)
     spec = spec.model_copy(update={"ports": stage_ports(scene, shafts_of(spec))})
-    return assemble(spec, bodies or load_stage_bodies(spec))
+    return assemble(spec, bodies or load_stage_bodies(spec), rolls)
 
 
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
@@ -149,6 +153,7 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
         end / facts["solver.steps"] if integrator == "rk45" else facts["solver.h"],
         int(facts["solver.n_dyn"]),
         result.outcome,
+        int(result.trace["solver.status"][-1]),
         kept.kernel.warning,
         recording,
     )
@@ -165,7 +170,7 @@ def default_step(scene: SceneSpec, model: StageModel, point: Point) -> float:
     return measure(scene.model_copy(update={"duration": scene.coupling.step, "settle": 0.0}), model, point).h
 
 
-class _Replay:
+class Replay:
     """A kernel at the settled state of a recording, stepped in chunks."""
 
     def __init__(self, recording: Recording) -> None:
@@ -214,7 +219,7 @@ def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
     processor seconds. Both ran the same scene; NaN for a run that stopped early."""
     if run.outcome != OK or base.outcome != OK:
         return Price(float("nan"), float("nan"))
-    one, other = _Replay(run.recording), _Replay(base.recording)
+    one, other = Replay(run.recording), Replay(base.recording)
     spent, steps = np.zeros(2), 0
     while one.left and spent[0] < looked_at:
         count = min(CHUNK, one.left)

@@ -23,11 +23,11 @@ from gearfmu.stage import StageModel
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
 from gearfmu.study.ladder import LEVELS, base_point, points, quick_scene
 from gearfmu.study.norm import band_error, errors, lock_time
+from gearfmu.study.notes import notes
 from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
-from gearfmu.study.table import ReferenceRow, Row, TransientRow, read_rows, write_rows
+from gearfmu.study.table import KeptTable, ReferenceRow, Row, TransientRow
 
 FORMAT = 1  # of what is kept: a study of another format is measured anew
-GROWTH = 1.1  # an error that grows by more than this factor as the step shrinks is told
 Progress = Callable[..., None]
 
 
@@ -40,6 +40,17 @@ class Study:
     references: tuple[ReferenceRow, ...]
     transients: tuple[TransientRow, ...]
     notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """The levels at their default steps with the scene's slices: rows from rigid to full, and what they are measured
+    against."""
+
+    scene: SceneSpec
+    model: StageModel
+    rows: tuple[Row, ...]
+    reference: Reference
 
 
 @dataclass(frozen=True)
@@ -90,11 +101,9 @@ def _reference_of(text: str, slices: int, quick: bool) -> Reference:
     return make_reference(bench.scene, bench.model, slices, quick)
 
 
-def identity(scene: SceneSpec, model: StageModel) -> str:
-    """Hex digest of what decides the numbers: scene, kernel library, bodies and stage (the model), format."""
-    digest = hashlib.sha256(f"{FORMAT} {scene.hash} {model.hash}".encode())
-    digest.update(library_path().read_bytes())
-    return digest.hexdigest()
+def identity(scene: SceneSpec, model: StageModel, kernel: str) -> str:
+    """Hex digest of what decides the numbers: scene, stage with bodies (the model), kernel library, format."""
+    return hashlib.sha256(f"{FORMAT} {scene.hash} {model.hash} {kernel}".encode()).hexdigest()
 
 
 def study(job: Job, progress: Progress | None = None) -> Study:
@@ -106,33 +115,44 @@ def study(job: Job, progress: Progress | None = None) -> Study:
     return _Study(job, progress or (lambda fraction, text="": None)).go()
 
 
+def default_rows(job: Job, progress: Progress | None = None) -> Defaults:
+    """The rows of the levels at their default steps from the folder of a study, measured where they are missing."""
+    work = _Study(replace(job, defaults=True), progress or (lambda fraction, text="": None))
+    found, slices = work.go(), work.scene.stage.slices
+    at_default = [next(row for row in found.rows if _is_at(row, point)) for point in work.wanted()]
+    return Defaults(work.scene, work.model, tuple(at_default), work.references([slices])[slices])
+
+
 class _Study:
     def __init__(self, job: Job, tell: Progress) -> None:
         self.job, self.tell, self.scene = job, tell, job.window
         self.text = self.scene.model_dump_json()
         self.model = models_for(self.scene)
-        self.identity = identity(self.scene, self.model)
-        self.tables = {kind: _Table(job.out / name, kind) for name, kind in FILES.items()}
-        if self._kept_identity() != self.identity:
+        self.kernel = hashlib.sha256(library_path().read_bytes()).hexdigest()
+        self.identity = identity(self.scene, self.model, self.kernel)
+        self.tables = {kind: KeptTable(job.out / name, kind) for name, kind in FILES.items()}
+        kept = _facts(job.out).get(self.scene.name, {})
+        self.said: list[str] = kept.get("said", [])
+        if kept.get("identity") != self.identity:
+            self.said = []
             for table in self.tables.values():
                 table.drop(self.scene.name)
-        self.refused: list[str] = []
 
     def go(self) -> Study:
         """References first, then the points."""
-        wanted = self._wanted()
+        wanted = self.wanted()
         slices = sorted({point.slices for point in wanted})
         missing = [point for point in wanted if not self._known(point)]
-        self._write_identity()
-        references = self._references(slices)
+        self._write_facts()
+        references = self.references(slices)
         for done, (point, found) in enumerate(self._each(_price_of, missing)):
             self.tell((done + 1) / (len(missing) + 1), f"{point.level} {point.integrator}, {point.slices} slices")
             self._keep(point, found, references[point.slices])
         kinds = (Row, ReferenceRow, TransientRow)
         found = [tuple(self.tables[kind].of(self.scene.name)) for kind in kinds]
-        return Study(self.scene, *found, tuple([*notes(found[0], found[1]), *self.refused]))
+        return Study(self.scene, *found, tuple([*notes(found[0], found[1]), *self.said]))
 
-    def _wanted(self) -> list[Point]:
+    def wanted(self) -> list[Point]:
         """Points with their default steps as numbers, each once."""
         all_points = points(self.scene, self.job.quick)
         if self.job.defaults:
@@ -148,7 +168,8 @@ class _Study:
         rows = self.tables[Row].of(self.scene.name)
         return any(_is_at(row, point) for row in rows)
 
-    def _references(self, slices: list[int]) -> dict[int, Reference]:
+    def references(self, slices: list[int]) -> dict[int, Reference]:
+        """Reference by number of slices, made or taken from the folder."""
         folder = self.job.out / "reference"
         paths = {count: folder / f"{self.scene.name}_{count}.h5" for count in slices}
         found = {count: kept_reference(path, self.identity) for count, path in paths.items()}
@@ -157,7 +178,7 @@ class _Study:
             found[count] = reference
             keep_reference(reference, paths[count], self.identity)
         table = self.tables[ReferenceRow]
-        table.drop(self.scene.name)
+        table.drop(self.scene.name, slices)
         for count, r in found.items():
             moved = (r.moved.te, r.moved.force, r.moved.bearing)
             table.add(ReferenceRow(self.scene.name, count, r.h, r.n_dyn, *moved, r.reached))
@@ -176,62 +197,39 @@ class _Study:
                 yield waiting[future], future.result()
 
     def _keep(self, point: Point, found: tuple[Run, Price] | str, reference: Reference) -> None:
+        where = f"{point.level}, {point.slices} slices"
         if isinstance(found, str):
-            self.refused.append(f"{point.level}, {1e6 * point.h:.3g} µs, {point.slices} slices: refused: {found}")
-            return
+            return self._say(f"{where}, {1e6 * point.h:.3g} µs: refused: {found}")
         run, price = found
         if run.outcome != OK:
-            self.refused.append(f"{point.level}, {1e6 * run.h:.3g} µs: stopped: {run.outcome}")
+            self._say(f"{where}, {1e6 * run.h:.3g} µs: stopped: {run.outcome}")
         if run.warning:
-            self.refused.append(f"{point.level}, {1e6 * run.h:.3g} µs, {point.slices} slices: {run.warning}")
+            self._say(f"{where}: {run.warning}")
         self.tables[Row].add(_row(self.scene, run, price, reference))
         if not reference.signals.steady:
             self.tables[TransientRow].add(_transient(self.scene, run, reference))
 
-    def _kept_identity(self) -> str | None:
-        return _facts(self.job.out).get(self.scene.name, {}).get("identity")
+    def _say(self, text: str) -> None:
+        """Kept beside the tables: a study that goes on says it again."""
+        self.said = list(dict.fromkeys([*self.said, text]))
+        self._write_facts()
 
-    def _write_identity(self) -> None:
+    def _write_facts(self) -> None:
         facts = _facts(self.job.out)
         facts[self.scene.name] = {
             "identity": self.identity,
             "model": self.model.hash,
             "bodies": list(self.model.body_hashes),
-            "kernel": hashlib.sha256(library_path().read_bytes()).hexdigest(),
+            "kernel": self.kernel,
             "duration_s": self.scene.duration,
             "settle_s": self.scene.settle,
             "machine": platform.machine(),
+            "said": self.said,
         }
         write_text(self.job.out / "study.json", json.dumps(facts, indent=1, sort_keys=True) + "\n")
 
 
-class _Table:
-    """A CSV file of rows, written after every change."""
-
-    def __init__(self, path: Path, kind: type) -> None:
-        self.path, self.kind, self.rows = path, kind, read_rows(path, kind)
-
-    def of(self, scene: str) -> list:
-        """The scene's rows."""
-        return [row for row in self.rows if row.scene == scene]
-
-    def add(self, row: object) -> None:
-        """One more; the file is sorted by its columns but the measured ones."""
-        self.rows = sorted([*self.rows, row], key=_order)
-        write_rows(self.path, self.kind, self.rows)
-
-    def drop(self, scene: str) -> None:
-        """Forget the scene's rows."""
-        if self.of(scene):
-            self.rows = [row for row in self.rows if row.scene != scene]
-            write_rows(self.path, self.kind, self.rows)
-
-
 FILES = {"study.csv": Row, "references.csv": ReferenceRow, "transient.csv": TransientRow}
-
-
-def _order(row: Row | ReferenceRow | TransientRow) -> tuple:
-    return (row.scene, row.slices, getattr(row, "level", ""), getattr(row, "integrator", ""), -row.h_s)
 
 
 def _is_at(row: Row, point: Point) -> bool:
@@ -263,30 +261,3 @@ def _transient(scene: SceneSpec, run: Run, reference: Reference) -> TransientRow
     bands = [band_error(run.signals, wanted, part) for part in (slice(0, at), slice(at, None))]
     head = (scene.name, run.point.level, run.integrator, run.h, run.point.slices)
     return TransientRow(*head, lock_time(run.signals) - locked, *bands)
-
-
-def notes(rows: tuple[Row, ...], references: tuple[ReferenceRow, ...]) -> Iterator[str]:
-    """What the numbers alone do not say: errors that grow as the step shrinks, references that are not fine enough."""
-    lines: dict[tuple, list[Row]] = {}
-    for row in rows:
-        lines.setdefault((row.level, row.integrator, row.slices), []).append(row)
-    for (level, integrator, slices), line in lines.items():
-        line.sort(key=lambda row: -row.h_s)
-        for name in ("te", "force", "bearing"):
-            least = min(line, key=lambda row: getattr(row, f"{name}_error"))
-            last, low = getattr(line[-1], f"{name}_error"), getattr(least, f"{name}_error")
-            if last > GROWTH * low:
-                yield (
-                    f"{level} ({integrator}), {slices} slices: {name} error grows from {100 * low:.2g} % at "
-                    f"{1e6 * least.h_s:.3g} µs to {100 * last:.2g} % at {1e6 * line[-1].h_s:.3g} µs: the errors of "
-                    "time and of modes cancel in part"
-                )
-    for r in references:
-        if not r.reached:
-            yield (
-                f"reference, {r.slices} slices: at {1e6 * r.h_s:.3g} µs it still moves by {100 * r.te_moved:.2g} % (te), "
-                f"{100 * r.force_moved:.2g} % (force), more than a fifth of the smallest error of level full"
-            )
-        small = [row for row in rows if row.slices == r.slices and row.te_error < 5 * r.te_moved]
-        if small:
-            yield f"reference, {r.slices} slices: {len(small)} errors are smaller than five times what it moved"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -73,7 +73,8 @@ def read_rows(path: Path, kind: type[AnyRow]) -> list[AnyRow]:
         reader = csv.DictReader(file)
         found = list(reader)
     if list(reader.fieldnames or ()) != names or any(None in line.values() for line in found):
-        raise SpecError([Problem(str(path), "header", ",".join(reader.fieldnames or ()), f"remove it: {names} is read")])
+        columns = ",".join(reader.fieldnames or ())
+        raise SpecError([Problem(str(path), "header", columns, f"remove it, or give another folder: {names} is read")])
     return [kind(**{f.name: _value(str(f.type), line[f.name]) for f in fields(kind)}) for line in found]
 
 
@@ -95,6 +96,29 @@ def tidy(rows: Sequence[Any], columns: Sequence[str] | None = None) -> str:
     return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in cells)
 
 
+class KeptTable:
+    """A CSV file of rows, written after every change."""
+
+    def __init__(self, path: Path, kind: type) -> None:
+        self.path, self.kind, self.rows = path, kind, read_rows(path, kind)
+
+    def of(self, scene: str) -> list:
+        """The scene's rows."""
+        return [row for row in self.rows if row.scene == scene]
+
+    def add(self, row: object) -> None:
+        """One more; the file is sorted by its columns but the measured ones."""
+        self.rows = sorted([*self.rows, row], key=_order)
+        write_rows(self.path, self.kind, self.rows)
+
+    def drop(self, scene: str, slices: Collection[int] | None = None) -> None:
+        """Forget the scene's rows, or those with these numbers of slices."""
+        kept = [row for row in self.rows if row.scene != scene or (slices is not None and row.slices not in slices)]
+        if len(kept) < len(self.rows):
+            self.rows = kept
+            write_rows(self.path, self.kind, self.rows)
+
+
 def _value(kind: str, text: str) -> Any:
     if kind == "bool":
         return text == "true"
@@ -102,8 +126,15 @@ def _value(kind: str, text: str) -> Any:
 
 
 def _plain(values: tuple) -> list[Any]:
-    return [("true" if v else "false") if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in values]
+    texts = {True: "true", False: "false"}
+    return [texts[v] if isinstance(v, bool) else f"{v:.6g}" if isinstance(v, float) else v for v in values]
 
 
 def _shown(value: Any) -> str:
-    return ("yes" if value else "no") if isinstance(value, bool) else f"{value:.3g}" if isinstance(value, float) else str(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _order(row: Row | ReferenceRow | TransientRow) -> tuple:
+    return (row.scene, row.slices, getattr(row, "level", ""), getattr(row, "integrator", ""), -row.h_s)

@@ -132,6 +132,32 @@ def test_a_car_without_clutch_and_a_peak_inside_the_fmu(tmp_path):
             load_scene(tmp_path / f"{name}.toml")
 
 
+VALUES = ["1", "-1", "0.0", "nan", "inf", "1e400", "99999999999999999999", "true", '""', '"1"', '"1 s"', '"-5 N*m"',
+          '"1e9 rad/s"', '"1e-30 s"', '"nan s"', '"a\\u0000b"', "[]", "[[]]", '[["0 s", "1 N*m"]]', '[["1 s"]]',
+          "{}", "{ a = 1 }", "1979-05-27"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", shipped_scenes())
+def test_whatever_stands_in_a_field_it_loads_or_lists_problems(tmp_path, name):
+    """Every value of every shipped scene replaced by everything that does not belong there."""
+    lines = (SHIPPED / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    refused = tried = 0
+    for number, line in enumerate(lines):
+        key, sign, _ = line.partition(" = ")
+        if not sign or key.startswith("#"):
+            continue
+        for value in VALUES:
+            changed = [*lines[:number], f"{key} = {value}", *lines[number + 1 :]]
+            (tmp_path / "scene.toml").write_text("\n".join(changed), encoding="utf-8")
+            tried += 1
+            try:
+                load_scene(tmp_path / "scene.toml")
+            except SpecError as error:
+                refused += 1
+                assert all(problem.file and problem.remedy for problem in error.problems)
+    assert tried > 200 and 0.7 * tried < refused < tried
+
+
 def test_unknown_scene_names_the_shipped_ones():
     with pytest.raises(SpecError, match="clutch_closure, clutch_dump"):
         load_scene("clutch_clousre")

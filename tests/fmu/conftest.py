@@ -7,6 +7,7 @@ import pytest
 from small_stage import small_model, unpack
 
 from gearfmu.fmu import export
+from gearfmu.spec.stage import ChainSpec
 
 
 @pytest.fixture(scope="session")
@@ -19,6 +20,13 @@ def model():
 def other_model():
     """Another stage: no relief, torque port on the wheel."""
     return small_model("fzg_c", wheel={"kind": "torque"})
+
+
+@pytest.fixture(scope="session")
+def chain_model():
+    """A third: secondary mass, clutch and input shaft compiled into the pinion's port."""
+    chain = ChainSpec(inertia=0.06, disc_inertia=0.006, shaft_k=2.39e4, shaft_c=0.5)
+    return small_model(pinion={"chain": chain, "k": 573.0, "c": 1.0})
 
 
 @pytest.fixture(scope="session")
@@ -40,6 +48,11 @@ def python(model, folder) -> Path:
 @pytest.fixture(scope="session")
 def other(other_model, folder) -> Path:
     return export(other_model, folder / "other.fmu")
+
+
+@pytest.fixture(scope="session")
+def unpacked_chain(chain_model, folder) -> str:
+    return unpack(export(chain_model, folder / "chain.fmu"), folder / "chain")
 
 
 @pytest.fixture(scope="session")

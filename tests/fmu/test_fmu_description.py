@@ -1,7 +1,9 @@
 """What lies in the FMU: XML from the kernel's table, units, terminals, library, licences; the same bytes every time."""
 from __future__ import annotations
 
+import ast
 import os
+import sys
 import time
 import zipfile
 from xml.etree import ElementTree as ET
@@ -9,6 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from small_stage import small_model
 
 from gearfmu.errors import FmuError
 from gearfmu.fmu import export
@@ -101,6 +104,21 @@ def test_identifiers_are_c_names_that_tell_contents_apart():
     assert all(name.isidentifier() and name.isascii() and len(name) < 64 for name in names)
     contents = ([b"a"], [b"b"], [b"a", b""], [b"", b"a"], [b"ab"], [b"a", b"b"])
     assert len({content_identifier("s", content) for content in contents}) == len(contents)
+
+
+def test_python_slave_needs_no_numpy_and_its_module_carries_its_content(model, python, tmp_path):
+    def slave(fmu):
+        with zipfile.ZipFile(fmu) as archive:
+            name = archive.read("resources/slavemodule.txt").decode().strip()
+            return name, archive.read(f"resources/{name}.py").decode()
+
+    name, text = slave(python)
+    imported = {node.module if isinstance(node, ast.ImportFrom) else alias.name for node in ast.walk(ast.parse(text))
+                if isinstance(node, (ast.Import, ast.ImportFrom)) for alias in node.names}
+    assert {module.split(".")[0] for module in imported} <= {"__future__", "pythonfmu", *sys.stdlib_module_names}
+    renamed = slave(export(small_model(), tmp_path / "same.fmu", runtime="python"))[0]
+    other = slave(export(small_model("fzg_c"), tmp_path / "other.fmu", runtime="python"))[0]
+    assert renamed == name != other and name.isidentifier()
 
 
 def test_licences_travel_along(native, python):

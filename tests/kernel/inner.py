@@ -61,6 +61,10 @@ class Inner:
         self._lib.probe_law(*self._handles(), ctypes.c_double(curvature), ctypes.c_double(force), out)
         return tuple(out)
 
+    def force_gamma(self, gamma: float) -> None:
+        """Keep this γ whatever the limit of the step says; after `kernel.initialize`."""
+        self._lib.probe_set_gamma(self._handles()[1], ctypes.c_double(gamma))
+
     def mu(self, h: float, gamma: float = 1.0) -> float:
         """μ′ at step h (s)."""
         return self._lib.probe_mu(*self._handles(), ctypes.c_double(h), ctypes.c_double(gamma))

@@ -29,3 +29,6 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
 }
 
 GK_API double probe_mu(const gk_model *model, const gk_setup *setup, double h, double gamma) { return gk_limit_mu(model, setup, h, gamma); }
+
+/* a prepared setup keeps this γ, whatever its limit is */
+GK_API void probe_set_gamma(gk_setup *setup, double gamma) { setup->gamma = gamma; }

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from inner import Inner, Place, compile_inner
-from small_model import BASE, PSI, TEETH, TIP, WORKING, pair_blob
+from small_model import BASE, PSI, TEETH, TIP, WORKING, _coast_shift, pair_blob
 
 from gearfmu.stage.blob import read_blob, write_blob
 
@@ -30,6 +30,14 @@ def plain(library: Path) -> Inner:
     return Inner(library, pair_blob(), {"effect.tip_relief": 0})
 
 
+@pytest.fixture(scope="module")
+def misplaced(library: Path) -> Inner:
+    """Every tooth of both gears out of its place by up to 1.4 mrad (50 µm), either flank by an amount of its own."""
+    angles = np.random.default_rng(3).uniform(-1.4e-3, 1.4e-3, (2, sum(TEETH)))
+    index = {"index0": angles[:, :TEETH[0]], "index1": angles[:, TEETH[0]:]}
+    return Inner(library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 1})
+
+
 def turned(phi: float, dx: float = 0.0, dy: float = 0.0, lead: float = 0.0) -> np.ndarray:
     """Pinion at φ, wheel following without load and ahead by `lead` (m along the line of action); pinion shifted."""
     return np.array([dx, dy, phi, 0.0, 0.0, -phi * BASE[0] / BASE[1] - lead / BASE[1], 0, 0, 0, 0])
@@ -49,6 +57,26 @@ def test_unmodified_drive_flanks_touch_at_every_angle_and_the_coast_gap_is_the_b
         assert coast and np.allclose(coast, nominal + 1e-4 * np.cos(WORKING), atol=1e-12)
 
 
+def test_a_tooth_out_of_its_place_closes_its_own_gap_by_base_radius_times_angle(library: Path, plain: Inner):
+    """Pinion tooth 2 by 1 mrad, and wheel tooth −2 that meets it by −0.4 mrad: the drive gap of this pair shrinks by
+    r_b1·1e-3 − r_b2·0.4e-3, the coast gaps of both teeth grow by as much, all others stay."""
+    index = {f"index{g}": np.zeros((2, z)) for g, z in enumerate(TEETH)}
+    index["index0"][:, 2], index["index1"][:, -2] = 1e-3, -4e-4
+    changed = Inner(library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 0})
+    phi, closer = -2 * 2 * np.pi / TEETH[0] + 0.02, (BASE[0] * 1e-3, -BASE[1] * 4e-4)
+    seen = set()
+    for place in changed.places(turned(phi), 2e-3):
+        nominal = one(plain.places(turned(phi), 2e-3), place.flank, place.tooth)
+        if nominal is None or max(r - t for p in (place, nominal) for r, t in zip(p.roll, TIP, strict=True)) > -1e-5:
+            continue
+        sg = 1 if place.flank == DRIVE else -1
+        teeth = (place.tooth == 2, place.tooth == (2 if place.flank == DRIVE else 2 + _coast_shift()))
+        expected = -sg * sum(c for c, moved in zip(closer, teeth, strict=True) if moved)
+        assert place.gap - nominal.gap == pytest.approx(expected, abs=1e-12)
+        seen.add((place.flank, *teeth))
+    assert {(DRIVE, True, True), (DRIVE, False, False)} <= seen and any(flank == COAST and any(t) for flank, *t in seen)
+
+
 def test_number_of_pairs_in_contact_is_the_contact_ratio_on_average(plain: Inner):
     count = [sum(p.flank == DRIVE and abs(p.gap) < 1e-12 for p in plain.places(turned(phi))) for phi in np.linspace(0, 2 * np.pi / TEETH[0], 400, endpoint=False)]
     length = (sum(BASE) * np.tan(WORKING))
@@ -56,8 +84,10 @@ def test_number_of_pairs_in_contact_is_the_contact_ratio_on_average(plain: Inner
     assert np.mean(count) == pytest.approx(ratio, abs=5e-3)
 
 
+@pytest.mark.parametrize("gears", ["relieved", "misplaced"])
 @pytest.mark.parametrize("dx, dy, lead", [(0, 0, 0), (3e-5, -2e-5, 1e-5), (-1e-4, 5e-5, -2e-5)])
-def test_gradients_are_derivatives_of_the_gaps(relieved: Inner, dx: float, dy: float, lead: float):
+def test_gradients_are_derivatives_of_the_gaps(gears: str, dx: float, dy: float, lead: float, request: pytest.FixtureRequest):
+    relieved: Inner = request.getfixturevalue(gears)
     step, kinds = np.array([1e-7, 1e-7, 1e-6, 1e-7, 1e-7, 1e-6]), set()
     for phi in np.linspace(0, 2 * np.pi / TEETH[0], 57, endpoint=False):
         frame = turned(phi, dx, dy, lead)
@@ -77,9 +107,12 @@ def test_gradients_are_derivatives_of_the_gaps(relieved: Inner, dx: float, dy: f
     assert kinds >= {(f, a, b) for f in (DRIVE, COAST) for a, b in ((False, False), (True, False), (False, True))}
 
 
+@pytest.mark.parametrize("gears", ["relieved", "misplaced"])
 @pytest.mark.parametrize("tooth_end", [0, 1])
 @pytest.mark.parametrize("flank", [DRIVE, COAST])
-def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(relieved: Inner, flank: int, tooth_end: int):
+def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(gears: str, flank: int, tooth_end: int, request: pytest.FixtureRequest):
+    relieved: Inner = request.getfixturevalue(gears)
+
     def at(phi: float) -> tuple[Place | None, Place | None]:
         places = relieved.places(turned(phi, 2e-5, 1e-5), 2e-3)
         return next((p for p in places if p.flank == flank and p.roll[tooth_end] >= TIP[tooth_end]), None), None

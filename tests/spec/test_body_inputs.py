@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.gear import BodySpec
 from gearfmu.spec.stage import StageSpec, load_stage
 
 STAGE = load_stage("fzg_c")
@@ -96,6 +97,12 @@ def test_tip_relief_shares_the_bodies() -> None:
     relieved = load_stage("fzg_c/stage_relief")
     assert [fingerprint(relieved, k) for k in (0, 1)] == [fingerprint(STAGE, k) for k in (0, 1)]
     assert fingerprint(STAGE, 0) != fingerprint(STAGE, 1)
+
+
+def test_default_counts_are_those_of_the_shipped_bodies() -> None:
+    """A stage file that says nothing but the strip gets the mesh on which the shipped pair is converged."""
+    bare = with_field("gears.0.body", BodySpec(strip_half_width=STAGE.gears[0].body.strip_half_width))
+    assert fingerprint(bare) == fingerprint(STAGE)
 
 
 def test_hash_is_of_the_values_not_of_their_spelling() -> None:

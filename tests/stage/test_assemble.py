@@ -34,6 +34,16 @@ def test_static_table_is_the_body_s_polynomial_on_an_even_grid(spec):
     assert np.linalg.eigvalsh(0.5 * (block + block.T)).min() > -1e-14 * np.abs(block).max()
 
 
+def test_bearings_are_damped_by_their_ratio_and_the_mass_of_the_body(spec):
+    """c = 2 D √(k m)."""
+    bodies = load_stage_bodies(spec)
+    sections = read_blob(assemble(spec, bodies).blob)
+    for index, body in enumerate(bodies):
+        k, c = sections[f"gear{index}"][16:18]
+        assert k == 3e8 and c == pytest.approx(2 * 0.03 * np.sqrt(3e8 * body.mass), rel=1e-12)
+    assert [body.mass for body in bodies] == pytest.approx([0.381, 0.885], rel=2e-3)
+
+
 def test_resampling_is_exact_for_polynomials():
     roll = 0.5 + 0.5 * np.cos(np.pi * (np.arange(9)[::-1] + 0.5) / 9)
     weights = resampling(roll, 0.0, 1.0, 33)

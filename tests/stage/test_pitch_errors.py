@@ -3,16 +3,24 @@ the other gear on one side and away from it on the other."""
 
 from __future__ import annotations
 
+import csv
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gearfmu import cli
 from gearfmu.body import ReducedBody
+from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
+from gearfmu.kernel import Kernel
 from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.blob import read_blob, write_blob
 
 LIGHT, LOAD, POSITIONS = 1e-3, 302.0, 64
 DEVIATION = 50e-6
@@ -27,7 +35,9 @@ def with_deviations(spec: StageSpec, *tables: dict[int, float]) -> StageSpec:
     return spec.model_copy(update={"gears": gears})
 
 
-def light_te(spec: StageSpec, bodies: list[ReducedBody], *tables: dict[int, float], torque: float = LIGHT) -> np.ndarray:
+def light_te(
+    spec: StageSpec, bodies: list[ReducedBody], *tables: dict[int, float], torque: float = LIGHT
+) -> np.ndarray:
     return loaded_te(assemble(with_deviations(spec, *tables), bodies), [torque], POSITIONS).te[0]
 
 
@@ -101,3 +111,28 @@ def test_bodies_and_models_without_deviations_are_what_they_were(
     assert [body_hash(body_inputs(changed, i)) for i in (0, 1)] == [body_hash(body_inputs(spec, i)) for i in (0, 1)]
     assert assemble(changed, bodies).hash != plain.hash
     assert assemble(with_deviations(spec, {3: 0.0}, {}), bodies).blob == plain.blob
+
+
+def test_the_kernel_refuses_what_are_no_index_deviations(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    sections = read_blob(assemble(with_deviations(spec, {3: DEVIATION}, {}), bodies).blob)
+    angles = sections["index0"]
+    for wrong in (angles[:-1], np.append(angles, 0.0), np.full(angles.size, 0.1)):
+        with pytest.raises(ModelError, match="index deviations are not two small angles a tooth"):
+            Kernel(write_blob(sections | {"index0": wrong}))
+    assert Kernel(write_blob(sections | {"index0": -angles})).hash
+
+
+def test_gearfmu_te_of_a_stage_file_with_a_pitch_error(tmp_path: Path) -> None:
+    """The bodies are those of the stage without it: nothing is reduced again."""
+    shipped = find_stage("fzg_c").parent
+    for name in ("pinion.h5", "wheel.h5"):
+        shutil.copy(shipped / name, tmp_path / name)
+    base = f'base = "{(shipped / "stage.toml").as_posix()}"'
+    table = '[gears.pinion]\nindex_deviation = { "0" = "50 µm", "3" = "-5 µm" }'
+    (tmp_path / "stage.toml").write_text(f'{base}\nname = "worn"\n{table}\n', encoding="utf-8")
+    out = tmp_path / "te.csv"
+    order = ["te", str(tmp_path / "stage.toml"), "--torque", "1 mN*m", "--positions", "4", "--out", str(out)]
+    assert cli.outcome(order) == 0
+    found = [float(row["te_um"]) for row in csv.DictReader(out.open())]
+    assert found[0] == pytest.approx(-50 * math.cos(math.radians(20)), abs=2e-3)
+    assert found[3] == pytest.approx(0, abs=2e-3)

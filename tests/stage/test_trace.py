@@ -6,6 +6,7 @@ import csv
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -15,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from gearfmu.hdf5 import seal
 from gearfmu.stage.trace import Channel, Trace, TraceError
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -88,22 +90,49 @@ def test_window_keeps_both_ends() -> None:
     assert (part.time[0], part.time[-1], part.time.size) == (pytest.approx(1e-3), pytest.approx(2e-3), 11)
 
 
-@pytest.mark.parametrize("damage", ["missing", "text", "truncated", "other", "newer", "no_unit"])
-def test_bad_files_give_one_clear_error(tmp_path: Path, damage: str) -> None:
+def rewritten(path: Path, change: Callable[[h5py.File], None]) -> Path:
+    """The file changed, and its seal made good again."""
+    with h5py.File(path, "a") as file:
+        change(file)
+    seal(path)
+    return path
+
+
+def test_bad_files_give_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "trace.h5"
-    if damage != "missing":
-        example(5000).save(path)
-    if damage == "text":
-        path.write_text("time,force\n")
-    elif damage == "truncated":
-        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    elif damage in ("other", "newer", "no_unit"):
-        with h5py.File(path, "a") as file:
-            file.attrs.update({"other": {"format": "x"}, "newer": {"format_version": 99}, "no_unit": {}}[damage])
-            if damage == "no_unit":
-                del file["channels/mesh.force"].attrs["unit"]
-    with pytest.raises(TraceError, match="trace.h5"):
+    with pytest.raises(TraceError, match="trace.h5: no such trace file; make it again with 'gearfmu run'"):
         Trace.load(path)
+    path.write_text("time,force\n")
+    with pytest.raises(TraceError, match="trace.h5: no trace file"):
+        Trace.load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda file: file.attrs.__setitem__("format", "x"), "not a gearfmu trace"),
+        (lambda file: file.attrs.__setitem__("format_version", 99), "trace format 99, this gearfmu reads"),
+        (lambda file: file["channels/mesh.force"].attrs.__delitem__("unit"), "no sound trace file"),
+        (lambda file: file.__delitem__("time"), "no sound trace file"),
+        (lambda file: file["time"].__setitem__(3, np.nan), "time is not strictly increasing and finite"),
+    ],
+    ids=["other", "newer", "no_unit", "no_time", "nan"],
+)
+def test_files_that_say_something_else_are_refused_by_name(tmp_path: Path, change: Callable, words: str) -> None:
+    example(5000).save(tmp_path / "trace.h5")
+    with pytest.raises(TraceError, match=f"trace.h5: .*{words}"):
+        Trace.load(rewritten(tmp_path / "trace.h5", change))
+
+
+def test_every_damaged_byte_is_noticed(tmp_path: Path) -> None:
+    example(300).save(tmp_path / "trace.h5")
+    whole, dice = (tmp_path / "trace.h5").read_bytes(), np.random.default_rng(1)
+    for place in (*range(0, 600, 7), *dice.integers(0, len(whole), 100)):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(dice.integers(8))
+        (tmp_path / "trace.h5").write_bytes(damaged)
+        with pytest.raises(TraceError, match="trace.h5"):
+            Trace.load(tmp_path / "trace.h5")
 
 
 def test_every_truncation_is_refused(tmp_path: Path) -> None:

@@ -183,6 +183,7 @@ static int side(const gk_model *model, const gk_setup *setup, const double *fram
         p->tooth[1] = modulo(shift - k, B->z);
         const double closer = misplaced > 0.0 ? misplace(model, sg, p, beta) : 0.0;
         int corner = p->roll[0] > A->s_tip ? 0 : p->roll[1] > B->s_tip ? 1 : -1;
+        if (corner >= 0 && !setup->on.corner) continue; /* a loaded pair reaches past the end by its deflection */
         if (corner < 0) flank_contact(model, setup, &l, g - closer, p);
         else if (!corner_contact(model, setup, frame, &l, corner, beta, p)) continue;
         else p->gap += allowance;

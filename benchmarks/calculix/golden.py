@@ -1,0 +1,50 @@
+"""Collect the tables of this folder into tests/reference/calculix_fzg_c.json, which the tests read.
+
+    python benchmarks/calculix/golden.py
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from ccx import require_ccx
+from gearfmu.files import written_whole
+from positions import POSITIONS, read
+
+HERE = Path(__file__).parent
+GOLDEN = HERE.parents[1] / "tests" / "reference" / "calculix_fzg_c.json"
+
+
+def collected(version: str) -> dict[str, Any]:
+    """The goldens: secants at the pitch point and te by torque over the positions, µm."""
+    stiffness = {row["case"]: float(row["secant_N_per_mm_um"]) for row in read(HERE / "pitch_point.csv")}
+    te: dict[str, dict[int, float]] = {}
+    for row in read(HERE / "positions.csv"):
+        te.setdefault(row["torque_Nm"], {})[round(POSITIONS * float(row["position"]))] = float(row["te_um"])
+    return {
+        "made_by": "python benchmarks/calculix/pitch_point.py; python benchmarks/calculix/positions.py; "
+        "python benchmarks/calculix/golden.py",
+        "solver": version,
+        "stage": "fzg_c",
+        "pitch_point_secant_N_per_mm_um": stiffness,
+        "line_load_N_per_mm": 300,
+        "positions_per_pitch": POSITIONS,
+        "te_um_by_torque_Nm_and_position": te,
+    }
+
+
+def main() -> None:
+    require_ccx()
+    words = subprocess.run(["ccx", "-v"], capture_output=True, text=True, check=False).stdout
+    version = re.search(r"Version\s+(\S+)", words)
+    with written_whole(GOLDEN) as temporary:
+        text = json.dumps(collected(f"CalculiX {version[1] if version else '?'}"), indent=1)
+        Path(temporary).write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""Loaded transmission error over one pitch by CalculiX: 12 positions, three torques, beside what `gearfmu te` says.
+
+    python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--work DIR] [--out positions.csv] [--compare]
+
+The bores' mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does). The pinion is turned
+to where gearfmu expects the torque; from the torque that comes out (within a few per cent) te is moved to the one asked
+by gearfmu's tangent stiffness. What the table has is not run again unless its position is named. `--compare` runs
+nothing: it prints both codes side by side. Needs CalculiX's ccx (Debian: calculix-ccx); half a minute to some minutes a
+run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from case import Case, Load, solve
+from ccx import require_ccx
+from gearfmu.body import load_stage_bodies
+from gearfmu.files import written_whole
+from gearfmu.geometry import PairGeometry, hertz
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage import TeResult, assemble, loaded_te
+from section import Fineness
+
+POSITIONS = 12
+TORQUES = (80.0, 302.0, 600.0)  # N·m on the pinion
+MARGIN = 2.5e-3  # m: pairs as far beyond the ends of the path may touch with their tip edges
+PATCH, SIZE = 1.35, 0.3  # fine zone and its elements, in Hertz half-widths of one pair that carries everything
+PENALTY = 1e16  # Pa/m: two pairs do not converge at 3e16; costs 0.3 % of stiffness at the pitch point
+HERE = Path(__file__).parent
+
+
+def te_of_gearfmu(spec: StageSpec) -> TeResult:
+    """Transmission error and tangent stiffness at all torques and positions."""
+    model = assemble(spec, load_stage_bodies(spec))
+    return loaded_te(model, TORQUES, POSITIONS, rigid_bearings=True)
+
+
+def case_at(spec: StageSpec, pair: PairGeometry, torque: float) -> Case:
+    """Averaged bores; fine zone as wide as contact at this torque (N·m) needs it."""
+    materials = [gear.material for gear in spec.gears]
+    e_star = hertz.contact_modulus(
+        (materials[0].youngs_modulus, materials[1].youngs_modulus),
+        (materials[0].poisson_ratio, materials[1].poisson_ratio),
+    )
+    radius = hertz.largest_relative_radius(pair.length, pair.path["A"], pair.path["E"])
+    load = torque / pair.gears[0].r_b / spec.gears[0].face_width
+    half_width = hertz.half_width(load, radius, e_star)
+    fine = Fineness(patch=PATCH * half_width, size=SIZE * half_width)
+    return Case("positions", bores="averaged", fine=fine, penalty=PENALTY)
+
+
+def solved(spec: StageSpec, ours: TeResult, torque: float, position: int, work: Path) -> dict[str, Any]:
+    """The table's row of one torque and position."""
+    pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES.index(torque)
+    turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
+    load = Load(turn, ours.te[row, position], MARGIN)
+    folder = work / f"position_{position:02d}_{torque:g}"
+    solution = solve(case_at(spec, pair, torque), pair, width, [load], folder)
+    force, wheel = solution.line_load[0] * width
+    te = load.te + (torque / pair.gears[0].r_b - force) / ours.stiffness[row, position]
+    return {
+        "torque_Nm": f"{torque:g}",
+        "position": f"{position / POSITIONS:.6f}",
+        "te_um": f"{1e6 * te:.4f}",
+        "solved_te_um": f"{1e6 * load.te:.4f}",
+        "solved_torque_Nm": f"{force * pair.gears[0].r_b:.3f}",
+        "wheel_torque_over_ratio_Nm": f"{wheel * pair.gears[0].r_b:.3f}",
+        "seconds": f"{solution.seconds:.0f}",
+    }
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """The table's rows, none where there is no table."""
+    if not path.exists():
+        return []
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def write(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The table in the order of torque and position."""
+    rows = sorted(rows, key=lambda row: (float(row["torque_Nm"]), float(row["position"])))
+    with written_whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def compare(spec: StageSpec, rows: list[dict[str, Any]]) -> None:
+    """Print te of both codes, and mean and peak to peak over the positions that there are."""
+    ours = 1e6 * te_of_gearfmu(spec).te
+    print("torque_Nm,position,calculix_um,gearfmu_um,difference_%")
+    for torque, curve in zip(TORQUES, ours, strict=True):
+        here = [row for row in rows if float(row["torque_Nm"]) == torque]
+        index = [round(POSITIONS * float(row["position"])) for row in here]
+        te = np.array([float(row["te_um"]) for row in here])
+        for k, value in zip(index, te, strict=True):
+            print(f"{torque:g},{k / POSITIONS:.4f},{value:.3f},{curve[k]:.3f},{100 * (curve[k] / value - 1):+.2f}")
+        if here:
+            mine = curve[index]
+            print(
+                f"# {torque:g} N·m, {len(here)} positions: mean {100 * (mine.mean() / te.mean() - 1):+.2f} %, "
+                f"peak to peak {100 * (np.ptp(mine) / max(np.ptp(te), 1e-9) - 1):+.2f} %"
+            )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("positions", nargs="*", type=int, metavar="POSITION", help=f"0 … {POSITIONS - 1}")
+    parser.add_argument("--torque", type=float, action="append", choices=TORQUES, help="N·m on the pinion; may repeat")
+    parser.add_argument("--stage", default="fzg_c")
+    parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
+    parser.add_argument("--out", type=Path, default=HERE / "positions.csv")
+    parser.add_argument("--compare", action="store_true")
+    chosen = parser.parse_args()
+    spec, rows = load_stage(chosen.stage), read(chosen.out)
+    if chosen.compare:
+        return compare(spec, rows)
+    require_ccx()
+    ours = te_of_gearfmu(spec)
+    done, failed = {_place(row) for row in rows}, []
+    for torque in chosen.torque or TORQUES:
+        for position in chosen.positions or [k for k in range(POSITIONS) if (torque, k) not in done]:
+            try:
+                fresh = solved(spec, ours, torque, position, chosen.work)
+            except RuntimeError as failure:
+                failed.append(f"{torque:g} N·m, position {position}: {failure}")
+                continue
+            rows = [row for row in rows if _place(row) != (torque, position)] + [fresh]
+            write(chosen.out, rows)
+            print(f"{torque:g} N·m, position {position}: {fresh['te_um']} µm", file=sys.stderr, flush=True)
+    if failed:
+        raise SystemExit("\n".join(failed))
+
+
+def _place(row: dict[str, Any]) -> tuple[float, int]:
+    """Torque (N·m) and number of the position of a row."""
+    return float(row["torque_Nm"]), round(POSITIONS * float(row["position"]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,185 @@
+"""Plane mesh of a whole gear for a contact solution: one tooth, or a few, with fine surface elements where they touch.
+
+Three blocks of eight-node quadrilaterals per half tooth (tooth, root, rim), transfinite between exact boundary curves.
+The counts across the thickness and the rim are those of every sector, so that sectors fit at their cuts; elements
+along the surface are each sector's own. The tip edge rounding is meshed as an arc: it takes part in contact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.femesh.section import graded, root_curve, transfinite
+from gearfmu.geometry import GearGeometry, involute
+
+EDGE_TURN = 0.5  # part of the tip edge's arc that is meshed; a chamfer closes the tooth (150° instead of 180° corners)
+CORE_DEPTH = 0.6  # depth of the root block under the root circle, modules
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """Elements of a section. patch: (m) half length of the fine surface zone; size: (m) of its elements; coarse: (m)
+    largest surface element; growth from the patch outwards. thickness, depth_growth: elements from surface to tooth
+    middle. rim: from the root block to the bore. root: along half a space, far_root and far_flank in sectors without
+    contact. toothed: so many sectors beside a touched one have their tooth; farther ones end at the root circle."""
+
+    patch: float = 0.25e-3
+    size: float = 0.042e-3
+    coarse: float = 1.5e-3
+    growth: float = 1.6
+    thickness: int = 6
+    depth_growth: float = 1.9
+    rim: int = 3
+    root: int = 6
+    far_root: int = 2
+    far_flank: int = 2
+    toothed: int = 1
+
+
+@dataclass(frozen=True)
+class Plane:
+    """nodes (N, 2) m, body frame. quads (E, 8) counter-clockwise, mid nodes last. bore: (B, 3) start, end, middle of
+    its edges. flank, patch: by touched tooth the edges (F, 3) of its sg = +1 surface from root form point to tip edge,
+    and those of them in the fine zone."""
+
+    nodes: np.ndarray
+    quads: np.ndarray
+    bore: np.ndarray
+    flank: dict[int, np.ndarray]
+    patch: dict[int, np.ndarray]
+
+
+def surface(gear: GearGeometry, u: np.ndarray) -> np.ndarray:
+    """Points (N, 2) of tooth 0's sg = +1 surface at the arc length u (m) from the root form point: involute up to the
+    tip form point, then the arc of the tip edge."""
+    start, end = involute.arc_length(np.array([gear.s_form, gear.s_tip]), gear.r_b)
+    flank = gear.flank_point(involute.roll_at_arc_length(start + np.minimum(u, end - start), gear.r_b))
+    turn = np.maximum(u - (end - start), 0.0) / gear.tip_edge
+    normal = gear.flank_normal(gear.s_tip)
+    along = np.array([normal[1], -normal[0]])
+    arc = gear.tip_edge_centre() + gear.tip_edge * (
+        np.cos(turn)[:, None] * normal + np.sin(turn)[:, None] * along * np.sign(along[0])
+    )
+    return np.where((turn > 0)[:, None], arc, flank)
+
+
+def lengths(gear: GearGeometry) -> tuple[float, float]:
+    """Arc length (m) of the flank, and of flank and meshed tip edge together."""
+    start, end = involute.arc_length(np.array([gear.s_form, gear.s_tip]), gear.r_b)
+    full_turn = math.acos(float(gear.flank_normal(gear.s_tip) @ _radial(gear.tip_edge_centre())))
+    return float(end - start), float(end - start) + EDGE_TURN * full_turn * gear.tip_edge
+
+
+def surface_stations(gear: GearGeometry, centre: float | None, fine: Fineness) -> np.ndarray:
+    """Arc lengths (2F + 1,) of surface nodes, corner and mid: fine around the roll `centre` (m), `far_flank` equal
+    elements and one on the edge where that is None. The tip form point is always a corner."""
+    flank, total = lengths(gear)
+    if centre is None:
+        corners = np.append(np.linspace(0, flank, fine.far_flank + 1), total)
+    else:
+        middle = float(involute.arc_length(centre, gear.r_b) - involute.arc_length(gear.s_form, gear.r_b))
+        low, high = max(middle - fine.patch, 0.0), min(middle + fine.patch, total)
+        inner = np.linspace(low, high, max(2, round((high - low) / fine.size)) + 1)
+        corners = np.concatenate([_outwards(low, 0.0, fine)[::-1], inner, _outwards(high, total, fine)])
+        free = corners[1:-1]
+        free[np.argmin(np.abs(free - flank))] = flank
+    return np.interp(np.arange(2 * len(corners) - 1) / 2, np.arange(len(corners)), corners)
+
+
+def _outwards(start: float, end: float, fine: Fineness) -> np.ndarray:
+    """Corners from `start` (left out) to `end`, growing."""
+    span, sizes = abs(end - start), []
+    while sum(sizes) < span - 1e-9:
+        sizes.append(min(fine.coarse, fine.size * fine.growth ** (len(sizes) + 1)))
+    return start + math.copysign(1, end - start) * np.cumsum(sizes) * (span / sum(sizes)) if sizes else np.empty(0)
+
+
+def _radial(point: np.ndarray) -> np.ndarray:
+    return point / np.linalg.norm(point)
+
+
+def half_tooth(gear: GearGeometry, stations: np.ndarray, root: int, fine: Fineness) -> list[np.ndarray]:
+    """Lattices (·, ·, 2) of tooth, root and rim block of the half tooth at positive angles; the first row of the tooth
+    block's second index is the surface."""
+    across = graded(fine.thickness, fine.depth_growth)[:, None]
+    share = graded(root, 1.0)
+    flank, fillet = surface(gear, stations), root_curve(gear, share)
+    space = np.array([math.cos(gear.half_pitch), math.sin(gear.half_pitch)])
+    fillet[0], fillet[-1] = flank[0], gear.r_f * space
+    depth = CORE_DEPTH * gear.m
+    middle = flank[0, 0] - flank[0, 1] / math.sqrt(3)
+    radius = gear.r_f - depth + (middle - gear.r_f + depth) * (1 - share) ** 2
+    core = radius[:, None] * np.stack([np.cos(share * gear.half_pitch), np.sin(share * gear.half_pitch)], axis=1)
+    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(flank, axis=0), axis=1))])
+    centre = core[0] + (gear.r_a - middle) * (run / run[-1])[:, None] * [1, 0]
+    tip = flank[-1] + across * (centre[-1] - flank[-1])
+    neck = flank[0] + across * (core[0] - flank[0])
+    bore = gear.r_bore * np.stack([np.cos(share * gear.half_pitch), np.sin(share * gear.half_pitch)], axis=1)
+    down = graded(fine.rim, 1.3)[:, None]
+    return [
+        transfinite(neck, tip, flank, centre),
+        transfinite(neck, fillet[-1] - across * depth * space, fillet, core),
+        transfinite(core[0] + down * (bore[0] - core[0]), core[-1] + down * (bore[-1] - core[-1]), core, bore),
+    ]
+
+
+def quadrilaterals(lattice: np.ndarray) -> np.ndarray:
+    """Coordinates (E, 8, 2) of the counter-clockwise quadrilaterals of a lattice (2a + 1, 2b + 1, 2)."""
+    rows, columns = lattice.shape[0] - 1, lattice.shape[1] - 1
+    steps = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
+    quads = np.stack([lattice[i : i + rows - 1 : 2, j : j + columns - 1 : 2] for i, j in steps], axis=2)
+    quads = quads.reshape(-1, 8, 2)
+    first, last = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
+    clockwise = np.median(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]) < 0
+    return quads[:, [0, 3, 2, 1, 7, 6, 5, 4]] if clockwise else quads
+
+
+def gear_plane(gear: GearGeometry, contacts: Mapping[int, float], teeth: range, fine: Fineness) -> Plane:
+    """The section of the sectors `teeth`; contacts: roll (m) at which a tooth of this gear is touched."""
+    cells, bore, flank, patch = [], [], {}, {}
+    for tooth in teeth:
+        near = min(abs((tooth - loaded + gear.z // 2) % gear.z - gear.z // 2) for loaded in contacts) <= fine.toothed
+        turn = _turning(2 * math.pi * tooth / gear.z)
+        stations = surface_stations(gear, contacts.get(tooth), fine)
+        blocks = half_tooth(gear, stations, fine.root if tooth in contacts else fine.far_root, fine)
+        upper = np.concatenate([quadrilaterals(block) for block in blocks[0 if near else 1 :]])
+        cells += [upper @ turn, (upper * [1, -1])[:, [0, 3, 2, 1, 7, 6, 5, 4]] @ turn]
+        edge = _edges(blocks[2][-1])
+        bore += [edge @ turn, (edge * [1, -1]) @ turn]
+        if tooth in contacts:
+            flank[tooth] = _edges(surface(gear, stations)) @ turn
+            patch[tooth] = flank[tooth][np.diff(stations[::2]) < 1.2 * fine.size]
+    nodes, (quads, bore_edges, *zones) = _joined(cells, bore, *flank.values(), *patch.values())
+    return Plane(
+        nodes=nodes,
+        quads=quads,
+        bore=bore_edges,
+        flank=dict(zip(flank, zones[: len(flank)], strict=True)),
+        patch=dict(zip(patch, zones[len(flank) :], strict=True)),
+    )
+
+
+def _joined(*groups: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Nodes (N, 2), and each group's points (…, 2) as node numbers (…). Points within 10 nm of each other are one node;
+    the bins are shifted off the axes, where the rounding of turned points has either sign."""
+    groups = [np.concatenate(group) if isinstance(group, list) else group for group in groups]
+    points = np.concatenate([group.reshape(-1, 2) for group in groups])
+    bins = np.floor(points / 1e-8 + 0.37).astype(np.int64)
+    _, first, index = np.unique(bins, axis=0, return_index=True, return_inverse=True)
+    ends = np.cumsum([group.size // 2 for group in groups])[:-1]
+    parts = np.split(index.ravel(), ends)
+    return points[first], [part.reshape(group.shape[:-1]) for part, group in zip(parts, groups, strict=True)]
+
+
+def _turning(angle: float) -> np.ndarray:
+    """points @ matrix turns points about the axis by `angle`."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s], [-s, c]])
+
+
+def _edges(line: np.ndarray) -> np.ndarray:
+    return np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1)

@@ -1,0 +1,112 @@
+"""HDF5 files of ours: written whole, named by format and version, sealed with a SHA-256 of their bytes.
+
+The seal stands in the user block, 512 bytes before the HDF5 part that HDF5 leaves to its users, and is checked before
+the HDF5 library reads anything. Its own checksums cover no more than the data of a chunk: from a damaged index chunks
+vanish, and read as zeros; damaged heaps can keep the library busy for ever.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import h5py
+
+from gearfmu.errors import GearfmuError
+from gearfmu.files import written_whole
+
+USER_BLOCK = 512  # bytes, the smallest that HDF5 allows
+_MARK = b"gearfmu "
+_DAMAGE = (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file: `name` and `version` as they stand in it, `noun` for people, the error and the remedy when it
+    cannot be read."""
+
+    name: str
+    version: int
+    noun: str
+    error: type[GearfmuError]
+    remedy: str
+
+
+@contextmanager
+def writing(path: str | os.PathLike[str], kind: Format) -> Iterator[h5py.File]:
+    """An open file under a temporary name; sealed and renamed to `path` when the block succeeds."""
+    with written_whole(path) as temporary:
+        with h5py.File(temporary, "w", userblock_size=USER_BLOCK) as file:
+            file.attrs["format"] = kind.name
+            file.attrs["format_version"] = kind.version
+            yield file
+        seal(temporary)
+
+
+@contextmanager
+def reading(path: str | os.PathLike[str], kind: Format) -> Iterator[h5py.File]:
+    """The open file, its seal, format and version checked.
+
+    Raises kind.error, with the file's name and the remedy, when it is missing, damaged, or of another kind or version,
+    and for whatever goes wrong in the block because of what the file holds.
+    """
+    source = Path(path)
+    try:
+        _check_seal(source, kind.noun)
+        with h5py.File(source, "r") as file:
+            _check_format(file, kind)
+            yield file
+    except GearfmuError as error:
+        raise kind.error(f"{source}: {error}; {kind.remedy}") from None
+    except _DAMAGE as error:
+        raise kind.error(f"{source}: no sound {kind.noun} file ({error}); {kind.remedy}") from error
+
+
+def format_of(path: str | os.PathLike[str]) -> str:
+    """Name of the format of one of our HDF5 files. Raises GearfmuError for a file that is none, or damaged."""
+    try:
+        _check_seal(Path(path), "gearfmu HDF5")
+    except GearfmuError as error:
+        raise GearfmuError(f"{path}: {error}") from None
+    with h5py.File(path, "r") as file:
+        return str(file.attrs["format"])
+
+
+def seal(path: str | os.PathLike[str]) -> None:
+    """Write the SHA-256 of a file's HDF5 part into its user block."""
+    with open(path, "r+b") as file:
+        file.seek(USER_BLOCK)
+        text = _MARK + _hash_of_rest(file)
+        file.seek(0)
+        file.write(text.ljust(USER_BLOCK, b"\n"))
+
+
+def _check_seal(path: Path, noun: str) -> None:
+    if not path.is_file():
+        raise GearfmuError(f"no such {noun} file")
+    with path.open("rb") as file:
+        head = file.read(USER_BLOCK)
+        if not head.startswith(_MARK):
+            raise GearfmuError(f"no {noun} file, or one of an earlier gearfmu")
+        if head != (_MARK + _hash_of_rest(file)).ljust(USER_BLOCK, b"\n"):
+            raise GearfmuError("damaged, or changed by another program: its bytes do not match their SHA-256")
+
+
+def _hash_of_rest(file: BinaryIO) -> bytes:
+    digest = hashlib.sha256()
+    while piece := file.read(1 << 20):
+        digest.update(piece)
+    return digest.hexdigest().encode()
+
+
+def _check_format(file: h5py.File, kind: Format) -> None:
+    if file.attrs.get("format") != kind.name:
+        raise kind.error(f"not a {kind.name.replace('-', ' ')}; 'gearfmu inspect' says what it is")
+    version = int(file.attrs["format_version"])
+    if version != kind.version:
+        raise kind.error(f"{kind.noun} format {version}, this gearfmu reads {kind.version}")

@@ -1,0 +1,115 @@
+"""What every scene must pass, and the pieces scenes build their own checks from. A complaint is one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.geometry import PairGeometry
+from gearfmu.stability.case import COMPLETED, Finding
+from gearfmu.stability.record import Record, overlap
+
+ENERGY = 1e-4  # of the energy through the ports and the largest stored one: the balance of a loaded damped run
+SOFTEST = 1.2e8  # N/m: one tooth pair in the corner of its path; 12.5 N/(mm µm) × 14 mm = 1.75e8 at the pitch point
+BANDS = ((200.0, 1000.0), (1000.0, 4000.0))  # Hz
+CLEARANCE = 30e-6  # m: twice the tip relief, which separates flanks whose involutes overlap
+
+
+def finding(
+    record: Record,
+    pair: PairGeometry,
+    complaints: Iterable[str] = (),
+    facts: Mapping[str, float] | None = None,
+    energy: float = ENERGY,
+) -> Finding:
+    """The finding of a recorded run; complaints: the scene's own. energy: limit of the energy residual."""
+    depth = float(overlap(record, pair).max())
+    found = lost(record)
+    found |= {"trouble": float(record["solver.trouble"][-1]), "status": float(record["solver.status"][-1])}
+    said = [*common(record, depth, energy), *complaints]
+    outcome = record.outcome
+    if outcome != COMPLETED:
+        outcome = f"{outcome}@{record.time[-1]:.6g}"
+    elif said:
+        outcome = "failed"
+    return Finding(
+        outcome,
+        record.h,
+        record.energy_residual,
+        depth,
+        record.realtime_factor,
+        tuple(said),
+        found | dict(facts or {}),
+    )
+
+
+def common(record: Record, depth: float, energy: float) -> list[str]:
+    """Finite everywhere, energy balance closed, overlap no deeper than forces press it."""
+    said = [f"{name} is not finite" for name, values in record.values.items() if not np.all(np.isfinite(values))]
+    if not record.energy_residual <= energy:
+        said.append(f"energy balance leaves {record.energy_residual:.2g} of the exchanged energy (limit {energy:g})")
+    deepest = 2.0 * record["mesh.force_max"].max() / SOFTEST + CLEARANCE
+    if not depth <= deepest:
+        pressed = f"twice what the largest force presses is {1e6 * deepest:.0f} µm"
+        said.append(f"flanks overlap by {1e6 * depth:.0f} µm, {pressed}")
+    return said
+
+
+def lost(record: Record) -> dict[str, float]:
+    """Contact-loss share and impacts per second."""
+    return {"open_share": record.open_share, "impact_rate": record.impact_rate} if record.time.size > 1 else {}
+
+
+def near(what: str, value: float, wanted: float, relative: float) -> list[str]:
+    """A complaint when value is off by more than the relative limit."""
+    off = abs(value / wanted - 1.0)
+    return [] if off <= relative else [f"{what} is {value:.5g} instead of {wanted:.5g} (limit {relative:.2%})"]
+
+
+def at_least(what: str, value: float, least: float) -> list[str]:
+    """A complaint when value is smaller."""
+    return [] if value >= least else [f"{what} is {value:.4g}, at least {least:.4g} must be seen"]
+
+
+def at_most(what: str, value: float, most: float) -> list[str]:
+    """A complaint when value is larger."""
+    return [] if value <= most else [f"{what} is {value:.4g}, more than {most:.4g}"]
+
+
+def mean_torque(record: Record, pair: PairGeometry) -> float:
+    """Mean moment of the mesh force about the pinion's axis, N·m."""
+    steps = np.diff(record.time)
+    return float(pair.gears[0].r_b * (record["mesh.force_mean"][1:] * steps).sum() / steps.sum())
+
+
+def levels(record: Record) -> dict[str, float]:
+    """Level of the mean mesh force in BANDS, dB re 1 N rms, Hann window; equal communication steps."""
+    force = record["mesh.force_mean"][1:]
+    step = float(np.mean(np.diff(record.time)))
+    window = np.hanning(force.size + 1)[:-1]
+    power = 2.0 * np.abs(np.fft.rfft((force - force.mean()) * window)) ** 2 / (window**2).sum() / force.size
+    line = np.fft.rfftfreq(force.size, step)
+    found = {}
+    for low, high in BANDS:
+        share = power[(line >= low) & (line < high)].sum()
+        found[f"level_{low:g}_{high:g}_Hz_dB"] = float(10.0 * np.log10(max(share, 1e-12)))
+    return found
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A statistic of a chaotic scene: value of the finest run, and how far another may lie from it."""
+
+    value: float
+    limit: float
+
+
+def statistics(facts: Mapping[str, float], expected: Mapping[str, Expected]) -> list[str]:
+    """Complaints about statistics that are not those of the scene."""
+    return [
+        f"{name} is {facts[name]:.4g} instead of {wanted.value:.4g} ± {wanted.limit:.2g}"
+        for name, wanted in expected.items()
+        if not abs(facts[name] - wanted.value) <= wanted.limit
+    ]

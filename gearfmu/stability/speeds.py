@@ -1,0 +1,51 @@
+"""Scenes of speed: through the mesh resonance up and down."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearfmu.stability.bench import PLAIN, Variant, geometry, kernel, model
+from gearfmu.stability.case import Case, Finding
+from gearfmu.stability.checks import Expected, at_least, finding, statistics
+from gearfmu.stability.loads import NOMINAL, H
+from gearfmu.stability.motion import RPM, UpAndDown, loaded
+from gearfmu.stability.record import Record, run
+
+LOW, HIGH, DURATION = 5000.0, 18000.0, 2.0  # rpm, rpm, s
+RESONANCE = (8500.0, 11500.0)  # rpm: mesh frequency 2.3 … 3.1 kHz about the mode of mesh and bearings
+BINS = 60
+EXPECTED = {"open_share_up": Expected(0.0093, 0.0015), "open_share_down": Expected(0.034, 0.005)}  # as in loads.py
+
+
+def run_up_and_down(case: Case) -> Finding:
+    """5 000 to 18 000 rpm in 2 s and back, 302 N·m, no relief: contact is lost in the mesh resonance, a softening one.
+    Running up the force jumps up at a higher speed than the one at which it falls back on the way down."""
+    variant = Variant(PLAIN)
+    pair = geometry(variant)
+    motion = UpAndDown(LOW * RPM, HIGH * RPM, DURATION)
+    made = run(kernel(model(variant), case), loaded(variant, motion, NOMINAL), 2 * DURATION, H)
+    up, down = _lost(made, made.time < DURATION), _lost(made, made.time >= DURATION)
+    said, facts = [], {}
+    for name, lost in (("up", up), ("down", down)):
+        facts[f"open_share_{name}"] = float(lost.mean())
+        facts[f"jump_{name}_rpm"] = _onset(lost)
+        said += at_least(f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 0.05)
+    said += statistics(facts, EXPECTED)
+    apart = facts["jump_up_rpm"] - facts["jump_down_rpm"]
+    said += at_least("distance of the jumps up and down (rpm)", apart, 2.0 * (HIGH - LOW) / BINS)
+    return finding(made, pair, said, facts)
+
+
+def _lost(record: Record, part: np.ndarray) -> np.ndarray:
+    """(BINS,) contact-loss share by speed, rising."""
+    time, open_time = record.time[part], record["mesh.open_time"][part]
+    edges = np.linspace(time[0], time[-1], BINS + 1)
+    lost = np.diff(np.interp(edges, time, open_time)) / np.diff(edges)
+    return lost if time[0] < DURATION else lost[::-1]
+
+
+def _onset(lost: np.ndarray) -> float:
+    """Lowest speed (rpm) in the resonance at which contact is lost."""
+    speed = LOW + (HIGH - LOW) * (np.arange(BINS) + 0.5) / BINS
+    seen = (lost > 0.02) & (speed > RESONANCE[0]) & (speed < RESONANCE[1])
+    return float(speed[seen].min()) if seen.any() else float("nan")

@@ -1,0 +1,102 @@
+"""Scenes of stepping: any communication steps, many rollbacks, very many steps."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import replace
+
+import numpy as np
+
+from gearfmu.stability.bench import Variant, geometry, kernel, model
+from gearfmu.stability.case import Case, Finding
+from gearfmu.stability.checks import at_most, finding, mean_torque, near
+from gearfmu.stability.loads import DRIVEN, LOOSE, NOMINAL, RELIEVED, H, swinging
+from gearfmu.stability.motion import RPM, Constant, loaded
+from gearfmu.stability.record import Run, run, run_times
+
+SPEED = 2000 * RPM
+MESH_PERIOD = 60.0 / 2000 / 16  # s
+INTERNAL_STEPS = 10_000_000
+ROLLBACKS, ROLLBACK_STEP, LONGEST_WANDER = 10_000, 2e-5, 3
+SHORTEST, LONGEST, EQUAL = 1e-6, 1e-3, 2e-5  # s, communication steps
+
+
+def random_communication_steps(case: Case) -> Finding:
+    """302 N·m at 2000 rpm with communication steps drawn between 1 µs and 1 ms (log-uniform): mean torque to 1 %,
+    transmission error to 5 % of its alternating part what equal steps give; energy balance over all changes of step."""
+    pair, duration = geometry(RELIEVED), 0.3
+    random = np.random.default_rng(1)
+    steps = np.exp(random.uniform(np.log(SHORTEST), np.log(LONGEST), 5000))
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    times = times[times <= duration]
+    turning = loaded(RELIEVED, Constant(SPEED), NOMINAL)
+    made = run_times(kernel(model(RELIEVED), case), turning, times)
+    equal = run(kernel(model(RELIEVED), case), turning, duration, EQUAL)
+    later = made.after(0.05)
+    expected = np.interp(later.time, equal.time, equal["mesh.te"])
+    off = float(np.sqrt(np.mean((later["mesh.te"] - expected) ** 2)) / equal.after(0.05)["mesh.te"].std())
+    carried = mean_torque(later, pair)
+    said = near("mean torque", carried, NOMINAL, 0.01)
+    said += at_most("transmission error against equal steps, of its alternating part", off, 0.05)
+    return finding(made, pair, said, {"mean_torque_Nm": carried, "te_off": off})
+
+
+def rollbacks(case: Case) -> Finding:
+    """Rattle; at every step the state is saved, the run goes astray for 1 to 3 steps under other inputs and returns:
+    10⁴ times, and the end is bit for bit that of the straight run."""
+    variant = Variant(ports=(DRIVEN, LOOSE))
+    inputs, start = swinging(1500 * RPM, 53.0, 6000.0, 5.0)
+    straight = kernel(model(variant), case, start)
+    calm = run(straight, inputs, ROLLBACKS * ROLLBACK_STEP, ROLLBACK_STEP)
+    random, astray = np.random.default_rng(2), kernel(model(variant), case, start)
+    going, started = Run(astray, ROLLBACKS), clock.process_time()
+    going.set(inputs(0.0))
+    astray.initialize(0.0)
+    going.take(0.0)
+    for i in range(ROLLBACKS):
+        now = i * ROLLBACK_STEP
+        saved = astray.save()
+        for k in range(int(random.integers(1, LONGEST_WANDER + 1))):
+            going.set({"pinion.w": 1500 * RPM + random.normal(0.0, 5.0), "wheel.tau": random.normal(0.0, 20.0)})
+            astray.step(now + k * ROLLBACK_STEP, ROLLBACK_STEP)
+        astray.restore(saved)
+        going.set(inputs(now))
+        astray.step(now, ROLLBACK_STEP)
+        going.take(now + ROLLBACK_STEP)
+    made = going.record(calm.outcome, clock.process_time() - started)
+    same = astray.save() == straight.save() and all(np.array_equal(made[name], calm[name]) for name in made.values)
+    said = [] if same else [f"the run with {ROLLBACKS} rollbacks does not end in the state of the straight run"]
+    made = replace(made, throughput=calm.throughput)
+    return finding(made, geometry(variant), said, {"rollbacks": float(ROLLBACKS)})
+
+
+def ten_million_steps(case: Case) -> Finding:
+    """302 N·m at 2000 rpm for 1e7 internal steps, sampled once a mesh period: force and transmission
+    error may not drift by more than 1e-4, memory not grow."""
+    pair = geometry(RELIEVED)
+    turning = loaded(RELIEVED, Constant(SPEED), NOMINAL)
+    inner = run(kernel(model(RELIEVED), case), turning, 4 * MESH_PERIOD, MESH_PERIOD).h
+    periods = int(INTERNAL_STEPS * inner / MESH_PERIOD) + 1
+    before = _memory()
+    made = run(kernel(model(RELIEVED), case), turning, periods * MESH_PERIOD, MESH_PERIOD)
+    grown = _memory() - before - 2 * made.time.size * 8 * (len(made.values) + 4)
+    tenth, said, facts = made.time.size // 10, [], {"internal_steps": float(made["solver.steps"][-1])}
+    for name in ("mesh.force_mean", "mesh.force_max", "mesh.te"):
+        values = made[name][tenth:]
+        drift = float(abs(values[-tenth:].mean() / values[:tenth].mean() - 1.0))
+        facts[f"drift_of_{name}"] = drift
+        facts[f"scatter_of_{name}"] = float(values.std() / abs(values.mean()))
+        said += at_most(f"drift of {name}", drift, 1e-4)
+    facts["memory_grown_MB"] = grown / 1e6
+    said += at_most("growth of memory beyond the record (MB)", grown / 1e6, 8.0)
+    said += near("mean torque", mean_torque(made.after(0.05), pair), NOMINAL, 0.01)
+    return finding(made, pair, said, facts)
+
+
+def _memory() -> float:
+    """Largest resident memory of this process so far, bytes; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -1,0 +1,115 @@
+"""Ports and logs of drivetrains: two roads, one answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from analytic_stage import Plant
+
+from gearfmu.cosim.drivetrain import Shafts, build
+from gearfmu.cosim.network import Clutch, Inertia, Network, Spring
+from gearfmu.cosim.ports import Ports, SmoothPorts, ports_of
+from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.signals import Ramp
+from gearfmu.spec.scene import load_scene
+
+SHAFTS = ("pinion", "wheel")
+
+
+def drivetrain(name: str) -> PyUnit:
+    return PyUnit(build(load_scene(name), Shafts("pinion", "wheel", 1.5)))
+
+
+def torques(n: int) -> list[float]:
+    """As a stage might give them: smooth, different at both shafts."""
+    return [-80.0 + 30.0 * np.sin(0.2 * n), 100.0 - 20.0 * np.cos(0.3 * n)]
+
+
+def driven(ports: Ports, h: float, steps: int) -> np.ndarray:
+    """(steps, 8): motion ahead, then port torque work and throughput so far."""
+    ports.begin(0.0)
+    ports.hold(torques(0))
+    rows, motion = [], np.zeros(6)
+    for n in range(steps):
+        ports.ahead(n * h, h, motion)
+        ports.step(torques(n), n * h, h)
+        rows.append([*motion, ports.work, ports.throughput])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", ["clutch_closure", "pair_loaded"])
+def test_products_give_what_steps_give(name):
+    """One product a step against set, save, step, restore, step: the same but for the sources' end values, O(h³)."""
+    h, steps = 1e-4, 300
+    fast, plain = ports_of(drivetrain(name), SHAFTS), Ports(drivetrain(name), SHAFTS)
+    assert isinstance(fast, SmoothPorts)
+    a, b = driven(fast, h, steps), driven(plain, h, steps)
+    assert np.abs(a - b).max(axis=0) == pytest.approx(np.zeros(8), abs=1e-7 * np.abs(b).max())
+
+
+def test_ahead_changes_nothing():
+    for unit in (drivetrain("clutch_closure"), PyUnit(clutch_network())):
+        ports = ports_of(unit, ("in",) if "in" in unit.network.torque_ports else SHAFTS)
+        ports.begin(0.0)
+        before, motion = unit.state.x.copy(), np.zeros(3 * len(ports.tau))
+        ports.ahead(0.0, 1e-3, motion)
+        assert np.array_equal(unit.state.x, before) and unit.state.time == 0.0 and unit.events == ()
+
+
+def test_ahead_ends_where_the_step_ends():
+    """φ + wH + ½aH² is the angle after the step under the held torque, with micro-steps too."""
+    for micro_step in (None, 1e-4):
+        unit = PyUnit(build(load_scene("clutch_closure"), Shafts("pinion", "wheel", 1.5)), micro_step)
+        ports, motion, h = ports_of(unit, SHAFTS), np.zeros(6), 1e-3
+        ports.begin(0.0)
+        ports.hold([-50.0, 70.0])
+        ports.ahead(0.0, h, motion)
+        phi, w, a = motion[0::3], motion[1::3], motion[2::3]
+        ports.step([-50.0, 70.0], 0.0, h)
+        reached = unit.get(unit.resolve(["pinion.phi", "wheel.phi"]))
+        assert reached == pytest.approx(phi + w * h + 0.5 * a * h**2, rel=1e-12)
+
+
+def clutch_network() -> Network:
+    """An inertia behind a clutch that locks after some milliseconds."""
+    return Network(
+        (Inertia("in", 0.1, w=20.0), Inertia("out", 0.2)),
+        (Spring("ground", {"out": 1.0}, 500.0, 0.3),),
+        (Clutch("clutch", "in", "out", Ramp(((0.0, 0.0), (5e-3, 300.0)))),),
+        torque_ports={"in": "in"},
+    )
+
+
+@pytest.mark.parametrize("kind", ["car", "rig", "clutch", "stage"])
+def test_log_gives_what_get_gives(kind):
+    """Every output of every kind of network at every instant, through stick and slip, sources and motion ports."""
+    unit = {
+        "car": lambda: drivetrain("clutch_closure"),
+        "rig": lambda: drivetrain("pair_light"),
+        "clutch": lambda: PyUnit(clutch_network()),
+        "stage": lambda: PyUnit(Plant(chain=True, engine_w=160.0).stage(), 1e-4),
+    }[kind]()
+    names = list(unit.outputs())
+    log, handle, rows = unit.log(names, 50), unit.resolve(names), []
+    unit.initialize(0.0)
+    for n in range(50):
+        log.take()
+        rows.append(unit.get(handle).copy())
+        unit.step(n * 2e-4, 2e-4)
+    assert kind != "clutch" or unit.events
+    scale = np.abs(rows).max(axis=0)
+    assert np.all(np.abs(log.rows() - rows) <= 1e-12 * (1.0 + scale))  # accelerations: rounding of terms that cancel
+
+
+def test_rows_of_a_log_do_not_depend_on_their_number():
+    """A run that stops early has the bits of the whole one."""
+    tables = []
+    for steps in (7, 40):
+        unit = drivetrain("clutch_closure")
+        log = unit.log(list(unit.outputs()), steps)
+        unit.initialize(0.0)
+        for n in range(steps):
+            log.take()
+            unit.step(n * 1e-4, 1e-4)
+        tables.append(log.rows())
+    assert np.array_equal(tables[0], tables[1][:7])

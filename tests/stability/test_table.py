@@ -1,0 +1,35 @@
+"""The committed table: whole, without failures, and what docs/stability.md shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gearfmu.stability.case import LEVELS, STEPS
+from gearfmu.stability.page import page
+from gearfmu.stability.scenes import SCENES
+from gearfmu.stability.suite import Task, read, table, tasks
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLE = ROOT / "benchmarks" / "stability.csv"
+REMEDY = "run `make stability`"
+
+
+def test_every_scene_ran_through_at_level_fast() -> None:
+    rows = read(TABLE)
+    seen = {row.scene for row in rows if (row.case.level, row.case.step) == ("fast", "default")}
+    assert seen == set(SCENES), REMEDY
+    assert not [row for row in rows if row.failed]
+
+
+@pytest.mark.full
+def test_the_table_is_whole() -> None:
+    seen = [Task(row.scene, row.case) for row in read(TABLE)]
+    assert set(tasks(tuple(SCENES), LEVELS, tuple(STEPS))) == set(seen), REMEDY
+
+
+def test_table_facts_and_page_are_of_one_run() -> None:
+    rows = read(TABLE)
+    assert TABLE.read_text(encoding="utf-8") == table(rows), REMEDY
+    assert (ROOT / "docs" / "stability.md").read_text(encoding="utf-8") == page(rows), REMEDY

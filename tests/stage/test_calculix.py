@@ -1,0 +1,101 @@
+"""Tooth pair and loaded transmission error against CalculiX, an independent finite-element code with its own contact.
+
+The goldens come from static contact solutions of the whole gears with a fine mesh where the teeth touch
+(benchmarks/calculix). The bores' mean displacement and rotation are held in both codes where they are compared.
+"""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu.geometry import PairGeometry
+from gearfmu.stage import StageModel, loaded_te
+from gearfmu.stage.te import on_rigid_bearings
+
+ROOT = Path(__file__).resolve().parents[2]
+TABLES = ROOT / "benchmarks" / "calculix"
+GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))
+SECANT = GOLDEN["pitch_point_secant_N_per_mm_um"]
+LINE_LOAD = 1e3 * GOLDEN["line_load_N_per_mm"]  # N/m
+
+
+def test_pair_stiffness_at_the_pitch_point(plain: StageModel, pair: PairGeometry) -> None:
+    """One pair, 300 N/mm, neighbours off, bores averaged: the kernel on the reduced bodies against CalculiX."""
+    kernel = on_rigid_bearings(plain).kernel(**{"level": 0.0, "effect.tip_contact": 0.0})
+    kernel.prepare()
+    pinion, wheel = pair.gears
+    turn = pair.path["C"] / pinion.r_b - pinion.psi_b - pair.alpha_wt
+    torque = LINE_LOAD * plain.spec.gears[0].face_width * pinion.r_b
+    secant = 1e-9 * LINE_LOAD / kernel.transmission(-turn * pinion.r_b / wheel.r_b, torque).te
+    print(f"kernel {secant:.3f}, CalculiX {SECANT['half_width_averaged']:.3f} N/(mm µm)")
+    assert secant == pytest.approx(SECANT["half_width_averaged"], rel=0.015)
+
+
+@pytest.mark.parametrize("torque", GOLDEN["te_um_by_torque_Nm_and_position"])
+def test_transmission_error_over_one_pitch(plain: StageModel, torque: str) -> None:
+    """Mean and peak to peak within 3 % of CalculiX, tip contact included."""
+    golden = GOLDEN["te_um_by_torque_Nm_and_position"][torque]
+    ours = 1e6 * loaded_te(plain, [float(torque)], GOLDEN["positions_per_pitch"], rigid_bearings=True).te[0]
+    here = ours[[int(k) for k in golden]]
+    theirs = np.array(list(golden.values()))
+    print(
+        f"{torque} N·m: mean {here.mean():.3f} / {theirs.mean():.3f} µm, peak to peak {np.ptp(here):.3f} / "
+        f"{np.ptp(theirs):.3f} µm"
+    )
+    assert here.mean() == pytest.approx(theirs.mean(), rel=0.03)
+    assert np.ptp(here) == pytest.approx(np.ptp(theirs), rel=0.03)
+
+
+def test_goldens_are_those_of_the_tables() -> None:
+    with open(TABLES / "pitch_point.csv", newline="", encoding="utf-8") as file:
+        assert {row["case"]: float(row["secant_N_per_mm_um"]) for row in csv.DictReader(file)} == SECANT
+    with open(TABLES / "positions.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == sum(len(curve) for curve in GOLDEN["te_um_by_torque_Nm_and_position"].values())
+    for row in rows:
+        place = str(round(GOLDEN["positions_per_pitch"] * float(row["position"])))
+        assert GOLDEN["te_um_by_torque_Nm_and_position"][row["torque_Nm"]][place] == float(row["te_um"])
+
+
+def test_meshes_are_whole_and_bore_weights_are_areas(pair: PairGeometry, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Section with every tooth: its area is the gear's but for the tip chamfers, every inner edge has two elements;
+    bore weights average a linear field exactly."""
+    monkeypatch.syspath_prepend(str(TABLES))
+    section, solid = (importlib.import_module(name) for name in ("section", "solid"))
+    gear, roll = pair.gears[0], pair.path["C"]
+    plane = section.gear_plane(gear, {0: roll}, range(-8, 8), section.Fineness(toothed=8))
+    corners = plane.nodes[plane.quads[:, [0, 4, 1, 5, 2, 6, 3, 7]]]
+    x, y = corners[..., 0], corners[..., 1]
+    area = 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    assert area.min() > 0 and area.sum() == pytest.approx(gear.z * gear.sector_area, rel=2e-3)
+    edges = np.sort(np.stack([plane.quads[:, :4], np.roll(plane.quads[:, :4], -1, axis=1)], axis=-1), axis=-1)
+    _, shared = np.unique(edges.reshape(-1, 2), axis=0, return_counts=True)
+    assert shared.max() == 2 and (shared == 1).sum() > len(plane.bore)
+    body = solid.extruded(plane, np.array([0.0, 3e-3, 7e-3]))
+    place = body.weights @ body.nodes[body.bore]
+    assert body.weights.sum() == pytest.approx(1) and np.allclose(place, [0, 0, 3.5e-3], atol=1e-9)
+    contact = plane.nodes[plane.patch[0]]
+    assert np.abs(np.linalg.norm(contact, axis=-1) - np.hypot(gear.r_b, roll)).max() < 0.3e-3
+
+
+@pytest.mark.full
+@pytest.mark.needs("ccx")
+def test_calculix_gives_its_golden_again(tmp_path: Path) -> None:
+    """The pitch point in plane strain, deck written and solved anew: half a minute to a minute."""
+    out = tmp_path / "pitch_point.csv"
+    script = [sys.executable, str(TABLES / "pitch_point.py"), "plane_strain"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    subprocess.run([*script, "--work", str(tmp_path), "--out", str(out)], env=environment, cwd=tmp_path, check=True)
+    with open(out, newline="", encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert float(row["secant_N_per_mm_um"]) == pytest.approx(SECANT["plane_strain"], rel=1e-4)
+    assert abs(float(row["torque_imbalance"])) < 1e-3

@@ -1,0 +1,188 @@
+"""The study itself on a few milliseconds of a scene: rows, resuming, staleness, price, chart."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu import cli
+from gearfmu.errors import SpecError
+from gearfmu.report.study import write_bodies_chart, write_chart
+from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.study import Job, ReferenceRow, Row, study
+from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
+from gearfmu.study.cuts import cut_rows
+from gearfmu.study.ladder import SLICES, STEPS, fitting, points
+from gearfmu.study.limits import limit_rows
+from gearfmu.study.notes import notes
+from gearfmu.study.refined import BodyRow, body_rows, cheap
+from gearfmu.study.table import read_rows, tidy, write_rows
+
+COLUMNS = (
+    "scene,level,integrator,h_s,n_dyn,slices,te_error,te_mean_error,force_error,bearing_error,realtime_factor,cpu_ratio"
+)
+ROW = Row("s", "fast", "dg4", 5e-6, 51, 5, 0.02, -0.001, 0.07, 0.03, 0.5, 1.0)
+
+
+@pytest.fixture(scope="module")
+def scene() -> SceneSpec:
+    """6 ms of the loaded pair."""
+    return load_scene("pair_loaded").model_copy(update={"duration": 6e-3, "settle": 2e-3})
+
+
+@pytest.fixture(scope="module")
+def made(scene: SceneSpec, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[Row, ...]]:
+    out = tmp_path_factory.mktemp("study")
+    return out, study(Job(scene, out, defaults=True)).rows
+
+
+def test_every_level_once_and_finer_is_better(made: tuple[Path, tuple[Row, ...]]) -> None:
+    out, rows = made
+    by_level = {row.level: row for row in rows}
+    assert sorted(by_level) == ["fast", "full", "rigid", "standard"] and len(rows) == 4
+    errors = [by_level[level].te_error for level in ("rigid", "fast", "full")]
+    assert errors[0] > 3 * errors[1] > 3 * errors[2] > 0
+    assert by_level["rigid"].n_dyn == 0 < by_level["fast"].n_dyn < by_level["full"].n_dyn
+    assert all(0 < row.realtime_factor < 100 and row.slices == 5 for row in rows)
+    assert by_level["full"].cpu_ratio > 1.5 * by_level["rigid"].cpu_ratio
+    assert (out / "study.csv").read_text().splitlines()[0] == COLUMNS
+    reference = read_rows(out / "references.csv", ReferenceRow)[0]
+    assert reference.h_s < min(row.h_s for row in rows) / 3 and reference.n_dyn == by_level["full"].n_dyn
+
+
+def test_a_study_goes_on_where_it_stopped(made: tuple[Path, tuple[Row, ...]], scene: SceneSpec) -> None:
+    """Kept rows keep their times, which no second measurement would repeat; the missing one has the same errors."""
+    out, rows = made
+    write_rows(out / "study.csv", Row, [row for row in rows if row.level != "rigid"])
+    again = study(Job(scene, out, defaults=True)).rows
+    for before, after in zip(rows, again, strict=True):
+        same = before.realtime_factor == pytest.approx(after.realtime_factor, rel=1e-5)
+        assert same == (before.level != "rigid")
+        assert after.te_error == pytest.approx(before.te_error, rel=1e-5)
+
+
+def test_rows_of_another_kernel_are_measured_anew(scene: SceneSpec, tmp_path: Path) -> None:
+    """In two processes."""
+    other = Row(scene.name, "rigid", "dg4", fitting(20e-6, 7.5e-6), 0, 5, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0)
+    write_rows(tmp_path / "study.csv", Row, [other, ROW])
+    (tmp_path / "study.json").write_text(json.dumps({scene.name: {"identity": "of before"}}))
+    short = scene.model_copy(update={"duration": 3e-3, "settle": 1e-3})
+    rows = study(Job(short, tmp_path, defaults=True, workers=2)).rows
+    assert len(rows) == 4 and all(row.te_error < 1.0 for row in rows)
+    assert ROW in read_rows(tmp_path / "study.csv", Row), "rows of other scenes stay"
+
+
+def test_a_replay_is_the_run(scene: SceneSpec) -> None:
+    """What is timed is what was measured: the replay ends in the state of the run."""
+    model = models_for(scene)
+    run = measure(scene, model, Point("fast", h=5e-6))
+    replay = Replay(run.recording)
+    steps = replay.left
+    replay.chunk(steps)
+    assert steps == round((scene.duration - scene.settle) / scene.coupling.step) and replay.left == 0
+    assert replay.kernel.get("mesh.te") == run.signals.te[-1]
+
+
+def test_half_the_step_costs_about_twice(scene: SceneSpec) -> None:
+    model = models_for(scene)
+    whole, half = (measure(scene, model, Point("fast", h=h)) for h in (5e-6, 2.5e-6))
+    price = paired_price(half, whole)
+    assert 1.4 < price.cpu_ratio < 2.6 and price.realtime_factor > 0
+
+
+def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
+    found = points(load_scene("pair_loaded"))
+    assert {p.level for p in found} == {"rigid", "fast", "standard", "full", "paper"}
+    assert {p.slices for p in found} == set(SLICES) and ("full", "rk45") in {(p.level, p.integrator) for p in found}
+    assert all(20e-6 / p.h == pytest.approx(round(20e-6 / p.h)) for p in found if p.h)
+    assert min(p.h for p in found if p.h) == pytest.approx(min(STEPS))
+    assert not [p for p in points(load_scene("clutch_closure")) if p.integrator == "rk45"]
+
+
+def test_errors_that_grow_as_the_step_shrinks_are_told() -> None:
+    found = ((1e-5, 0.008), (5e-6, 0.016))
+    rows = [Row("s", "fast", "dg4", h, 51, 5, e, 0.0, 0.07, 0.03, 1.0, 1.0) for h, e in found]
+    coarse = ReferenceRow("s", 5, 1e-7, 400, 0.01, 0.0, 0.0, False)
+    told = list(notes(tuple(rows), (coarse,)))
+    assert any("te error grows from 0.8 % at 10 µs to 1.6 % at 5 µs" in text for text in told)
+    assert not any("force error grows" in text for text in told)
+    assert any("still moves" in text for text in told) and any("2 errors are smaller" in text for text in told)
+
+
+def test_rows_read_back_and_other_files_are_refused(tmp_path: Path) -> None:
+    nan = Row("s", "full", "dg4", 1e-5, 400, 5, *([float("nan")] * 6))
+    write_rows(tmp_path / "t.csv", Row, [ROW, nan])
+    read = read_rows(tmp_path / "t.csv", Row)
+    assert read[0] == ROW and np.isnan(read[1].te_error) and read_rows(tmp_path / "none.csv", Row) == []
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(SpecError, match="remove it"):
+        read_rows(tmp_path / "other.csv", Row)
+    assert "5e-06" in tidy([ROW]) and tidy([]) == "(no rows)"
+
+
+def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
+    rows = [Row("s", level, "dg4", h, 1, n, 1e4 * h, 0.0, 1e4 * h, 1e4 * h, 1e-6 / h, 1.0)
+            for level in ("rigid", "fast") for h in (1e-5, 5e-6) for n in (1, 5)]
+    rows += [Row("s", "full", "rk45", 1e-6, 400, 5, 1e-3, 0.0, 0.02, 0.01, 90.0, 70.0)]
+    first = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "a", "title")]
+    again = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "b", "title")]
+    text = first[0].decode()
+    assert first == again and first[1][:4] == b"\x89PNG"
+    assert "full, rk45" in text and "rigid" in text and "5 µs" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["pair_loaded"], cli.USAGE_ERROR, "--out"),
+        (["--out", "x"], cli.USAGE_ERROR, "SCENE"),
+        (["pair_loaded", "--out", "x", "--table", "costs"], cli.USAGE_ERROR, "bodies"),
+        (["pair_loadet", "--out", "x"], 1, "pair_loaded"),
+    ],
+)
+def test_wrong_usage_names_what_there_is(
+    arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.outcome(["study", *arguments]) == code and words in capsys.readouterr().err
+    assert not Path("x").exists()
+
+
+def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
+    rows = [BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
+            for scene in ("one", "other") for text in ("slices 10", "mesh × 1.3")]
+    svg, png = write_bodies_chart(rows, tmp_path / "bodies.csv")
+    text = svg.read_text(encoding="utf-8")
+    assert png.stat().st_size > 1000 and all(word in text for word in ("one", "other", "slices 10", "mesh × 1.3"))
+
+
+def test_cheap_refinements_of_a_few_milliseconds(scene: SceneSpec) -> None:
+    """Ten slices and a finer roll grid move level full by less than the level fast is off."""
+    rows = body_rows([scene], cheap(scene), h=5e-6)
+    assert [row.refined for row in rows] == ["slices 10", "rolls 64", "rolls 128"]
+    assert all(0 < row.te_error < 0.05 and row.n_dyn == rows[0].n_dyn and row.cpu_s == 0 for row in rows)
+
+
+def test_a_higher_cut_has_more_modes_and_less_error(scene: SceneSpec) -> None:
+    rows, _ = cut_rows(scene, quick=True)
+    low, high = (min(rows, key=lambda r: r.n_dyn), max(rows, key=lambda r: r.n_dyn))
+    assert low.n_dyn < high.n_dyn and low.te_error > 3 * high.te_error and low.h_default_s >= high.h_default_s
+
+
+def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
+    rows = limit_rows(scene, ("fast",), (12, 6, 4, 1))
+    kinds = [row.kind for row in rows]
+    assert kinds == ["default", "above", "above", "above", "refused"] and "use h <=" in rows[-1].message
+    assert [row.gamma_lowered for row in rows] == [False, False, True, True, True]
+    assert rows[2].gamma > rows[3].gamma and rows[3].te_error > rows[0].te_error
+
+
+def test_committed_tables_have_the_columns(tmp_path: Path) -> None:
+    """benchmarks/study holds what the documentation shows."""
+    folder = Path(__file__).parents[2] / "benchmarks" / "study"
+    with (folder / "study.csv").open(encoding="utf-8", newline="") as file:
+        assert ",".join(next(csv.reader(file))) == COLUMNS
+    assert {row.scene for row in read_rows(folder / "study.csv", Row)} >= {"pair_loaded"}
