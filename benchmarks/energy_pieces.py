@@ -3,7 +3,7 @@
     python benchmarks/energy_pieces.py [--duration 0.05] [--out benchmarks/energy_pieces.csv]
 
 Loaded pair, 302 N·m, 2000 rpm, level fast, everything damped as shipped. Left: what energy.residual gained after 10 ms,
-over the energy that passed through the pinion's shaft and over the net work of both ports. Held still, by kernels that
+over the energy that passed through the pinion's shaft and over what dampers took. Held still, by kernels that
 differ in one place: rows and residual (taken at one roll all along the flank), curvature in the local law, both; and,
 by parameters, tip corners, load-dependent law, bearings. Changes of h: frozen undamped rattle in which the
 communication step alternates, every step between 5 and 7.5 µs, and between 50 and 60 µs (h = 7.14 and 7.5 µs).
@@ -34,7 +34,7 @@ from gearfmu.stage.trace import write_columns  # noqa: E402
 STEP, SETTLE, LOAD, SPEED, FAST = 60e-6, 0.01, 302.0, 2000 * math.pi / 30, 1
 ROWS_STILL = {r"grid\(&model->gear\[i\], p->roll\[i\]": "grid(&model->gear[i], 0.5 * (model->gear[i].s_form + model->gear[i].s_tip)"}
 CURVATURE_STILL = {r"gk_law_set\(model, setup, place->curvature": "gk_law_set(model, setup, 1.0 / 0.007 + 1.0 / 0.009"}
-COLUMNS = ("stage", "piece", "h_s", "through_J", "work_J", "dissipated_J", "left_J", "left_of_through", "left_of_work")
+COLUMNS = ("stage", "piece", "h_s", "through_J", "work_J", "dissipated_J", "left_J", "left_of_through", "left_of_dissipated")
 
 
 def balance(model: StageModel, library: Path | None, parameters: Mapping[str, float], duration: float) -> dict[str, float]:
@@ -53,7 +53,7 @@ def balance(model: StageModel, library: Path | None, parameters: Mapping[str, fl
         through += abs(kernel.get("pinion.tau_mean")) * SPEED * STEP
     work, lost, left = np.array([kernel.get(name) for name in names]) - first
     return {"h_s": kernel.get("solver.h"), "through_J": through, "work_J": work, "dissipated_J": lost, "left_J": left,
-            "left_of_through": left / through, "left_of_work": left / work}
+            "left_of_through": left / through, "left_of_dissipated": left / lost}
 
 
 def changes_of_h(free: StageModel, library: Path | None, steps: tuple[float, float]) -> float:
@@ -97,7 +97,7 @@ def main() -> None:
             lines.append(line)
             print(f"{line['stage']:13} {piece:32} h {1e6 * line['h_s']:.2f} µs  through {line['through_J']:.0f} J  work {line['work_J']:.4f} J  "
                   f"dissipated {line['dissipated_J']:.4f} J  left {line['left_J']:+.1e} J = {line['left_of_through']:+.1e} of through, "
-                  f"{line['left_of_work']:+.1%} of work", flush=True)
+                  f"{line['left_of_dissipated']:+.1%} of the losses", flush=True)
         free = free_pair(spec, bodies)
         for steps in ((5e-6, 5e-6), (5e-6, 7.5e-6), (50e-6, 60e-6)):
             changed = changes_of_h(free, double, steps)
