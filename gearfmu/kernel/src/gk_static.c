@@ -53,6 +53,24 @@ static void balance_rotation(const gk_model *model, const gk_setup *setup, const
     }
 }
 
+/* a train that nothing holds stays where it is: take its common rotation out of the last move; returns what it moved else */
+static double unroll(const gk_model *model, const gk_setup *setup, const gk_boundary b[2], const double *before, double *x, double moved)
+{
+    const double ratio = model->gear[0].r_b / model->gear[1].r_b;
+    const int coordinate[4] = {PHIA, DISC_0, PHIB, DISC_1};
+    double momentum = 0.0, inertia = 0.0;
+    if (!floats(model, setup, b) || !gk_finite(moved)) return moved;
+    for (int c = 0; c < 4; c++) {
+        const double turn = c < 2 ? 1.0 : -ratio, mobile = setup->inverse_mass[coordinate[c]];
+        if (mobile > 0.0) momentum += turn * (x[coordinate[c]] - before[coordinate[c]]) / mobile, inertia += turn * turn / mobile;
+    }
+    moved = 0.0;
+    for (int c = 0; c < 4; c++)
+        if (setup->inverse_mass[coordinate[c]] > 0.0) x[coordinate[c]] -= (c < 2 ? 1.0 : -ratio) * momentum / inertia;
+    for (int d = 0; d < RIGID; d++) moved = gk_max(moved, fabs(x[d] - before[d]) * (d == XA || d == YA || d == XB || d == YB ? 1.0 : model->gear[0].r_b));
+    return moved;
+}
+
 static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, const double *given)
 {
     gk_work *work = rest->work;
@@ -141,7 +159,9 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
         work->at_rest.rigid_mobility = mobility;
         double moved = INFINITY;
         for (int round = 0; round < REST_ROUNDS && moved > 1e-14; round++) {
-            moved = relax(model, &rest, data, given);
+            double before[RIGID];
+            memcpy(before, data->x, sizeof before);
+            moved = unroll(model, &rest, b, before, data->x, relax(model, &rest, data, given));
             balance_rotation(model, &rest, b, given);
         }
         if (moved * (MOBILITY / mobility) <= AT_REST) {
