@@ -4,7 +4,7 @@ VENV   ?= .venv
 RUN     = $(VENV)/bin/python
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
-BENCHMARKS ?= phases fmu_overhead harness levels coupling
+BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
 OUT    ?= out
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -53,9 +53,10 @@ wheel: $(STAMP)
 models: $(STAMP)
 	$(RUN) -m gearfmu.cli reduce fzg_c --force
 
-## make docs        regenerate docs/variables.md from the kernel's table
+## make docs        regenerate docs/variables.md and docs/effects.md from the tables in the code
 docs: $(VENV)/.base
 	$(RUN) -m gearfmu.cli schema variables --out docs/variables.md
+	$(RUN) -m gearfmu.cli schema effects --out docs/effects.md
 
 ## make lint        ruff, where it is installed
 lint: $(STAMP)

@@ -34,8 +34,9 @@ VERBS = {
         "gearfmu.commands.stability:stability",
         "Run the hard cases at every level; exit code = number of failures.",
     ),
+    "effects": ("gearfmu.commands.effects:effects", "What effects there are, what each costs, how to switch it."),
     "inspect": ("gearfmu.commands.files:inspect", "Say what one of our files holds."),
-    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; table of FMU variables."),
+    "schema": ("gearfmu.commands.files:schema", "JSON schema of stage or scene files; tables of variables, effects."),
 }
 
 

@@ -58,7 +58,8 @@ def _bore(plane: Plane, number: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, 
     """Bore nodes and ∫N dA/A of eight-node faces: −1/12 of a face at its corners, 1/3 at its mid nodes."""
     weight = np.zeros(number.max() + 1)
     start, end, middle = plane.bore.T
-    span = np.linalg.norm(plane.nodes[end] - plane.nodes[start], axis=1)
+    radius = np.linalg.norm(plane.nodes[start[0]])
+    span = 2 * radius * np.arcsin(np.linalg.norm(plane.nodes[end] - plane.nodes[start], axis=1) / (2 * radius))
     for k in range(0, len(z) - 2, 2):
         area = span * (z[k + 2] - z[k])
         for level in (k, k + 2):

@@ -24,10 +24,11 @@ def inspect(path: Path, as_json: bool) -> None:
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["stage", "scene", "variables"]))
+@click.argument("kind", type=click.Choice(["stage", "scene", "variables", "effects"]))
 @click.option("--out", type=click.Path(path_type=Path), help="File to write; standard output when not given.")
 def schema(kind: str, out: Path | None) -> None:
-    """JSON schema of stage.toml or scene.toml; or the table of FMU variables (docs/variables.md)."""
+    """JSON schema of stage.toml or scene.toml; or the table of FMU variables (docs/variables.md) or effects
+    (docs/effects.md)."""
     from gearfmu.files import write_text
 
     text = _schema_text(kind)
@@ -42,6 +43,10 @@ def _schema_text(kind: str) -> str:
         from gearfmu.commands.variables import variables_page
 
         return variables_page()
+    if kind == "effects":
+        from gearfmu.commands.effects import effects_page
+
+        return effects_page()
     from gearfmu.spec.scene import SceneSpec
     from gearfmu.spec.schema import file_schema, stage_schema
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, Strict
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, read_toml, validate
@@ -17,6 +17,17 @@ from gearfmu.spec.drivetrain import PassengerCar, TestRig
 SHIPPED = Path(__file__).parent.parent / "scenes"
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
+Switch = Literal[
+    "elastic",
+    "residual",
+    "hertz",
+    "coast_flank",
+    "contact_damping",
+    "tip_relief",
+    "tip_contact",
+    "bearings",
+    "modal_damping",
+]
 Seconds = Annotated[float, Quantity("s", at_least=0)]
 Capacity = Annotated[float, Quantity("N*m", at_least=0)]
 
@@ -29,6 +40,9 @@ class StageChoice(Spec):
     integrator: Integrator = "dg4"
     slices: Annotated[Count, Field(ge=1, le=10)] = 5
     h: Seconds = 0.0
+    effects: dict[Switch, Annotated[bool, Strict()]] = Field(
+        default={}, description="effects switched off, e.g. tip_contact = false; all others are on"
+    )
 
 
 class CouplingChoice(Spec):
@@ -75,7 +89,10 @@ class SceneSpec(Spec):
     @property
     def hash(self) -> str:
         """SHA-256, hex, over all values in SI; the text of the file does not matter."""
-        return hashlib.sha256(json.dumps(self.model_dump(), sort_keys=True).encode()).hexdigest()
+        values = self.model_dump()
+        if not self.stage.effects:
+            del values["stage"]["effects"]
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     @property
     def steps(self) -> int:

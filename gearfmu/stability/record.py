@@ -95,7 +95,8 @@ class Run:
         self._cells = [ctypes.c_double.from_buffer(memory, 8 * k) for k in range(len(self.names))]
         self._references = [kernel.variables[name].reference for name in self.names]
         self._buffer = np.frombuffer(memory)
-        self._time, self._samples, self._count = np.zeros(capacity + 1), np.zeros((capacity + 1, len(self.names))), 0
+        self._time, self._samples = np.full(capacity + 1, 0.0), np.full((capacity + 1, len(self.names)), 0.0)
+        self._count = 0
         self._set: dict[str, int] = {}
 
     def set(self, values: Mapping[str, float]) -> None:
@@ -134,7 +135,7 @@ def run(kernel: Kernel, inputs: Inputs, duration: float, step: float) -> Record:
 def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarray) -> Record:
     """`run` with communication points `times` (s), the first of which is the start."""
     going, outcome, started = Run(kernel, len(times)), COMPLETED, clock.process_time()
-    speeds = np.zeros((len(times), 2))
+    speeds = np.full((len(times), 2), 0.0)
     going.set(inputs(times[0]))
     kernel.initialize(times[0])
     going.take(times[0])

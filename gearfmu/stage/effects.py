@@ -1,0 +1,210 @@
+"""The effects that a scene may call for: one table. docs/effects.md, `gearfmu effects` and the tests are made from it.
+
+What an effect costs is measured (benchmarks/effects_cost.py) and lies beside this file in effects_cost.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+
+COSTS = "effects_cost.csv"
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect. title: in words; formula and equation: what it computes, and where docs/theory.md derives it.
+
+    matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
+    turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
+    the stage decide; build: name in -DGK_WITHOUT of a kernel that has no code for it, "" where there is none; test: the
+    test by hand calculation.
+    """
+
+    name: str
+    title: str
+    formula: str
+    equation: str
+    matters: str
+    off: str
+    code: str
+    switch: str
+    test: str
+    off_setting: Mapping[str, float]
+    on_setting: Mapping[str, float]
+    build: str = ""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Instructions of an internal step: effect on, off, and in a build without its code (nan: no such build)."""
+
+    effect: str
+    on: float
+    off: float
+    without: float
+
+    @property
+    def share(self) -> float:
+        """What the effect costs, as part of the step with it."""
+        return 1.0 - self.off / self.on
+
+    @property
+    def price_of_off(self) -> float:
+        """What a step pays for the effect being there and off: off / without − 1."""
+        return self.off / self.without - 1.0
+
+
+def _switched(name: str, **words: str) -> Effect:
+    """An effect with a boolean parameter of its own, effect.<name>."""
+    variable = f"effect.{name}"
+    return Effect(
+        name=name,
+        switch=f"variable `{variable}`; in a scene `[stage.effects] {name} = false`; `--set {variable}=false`",
+        off_setting={variable: 0.0},
+        on_setting={variable: 1.0},
+        build=name,
+        test=f"tests/stage/test_effects.py::test_{name}",
+        **words,
+    )
+
+
+EFFECTS: tuple[Effect, ...] = (
+    _switched(
+        "elastic",
+        title="elastic bodies",
+        formula="m ẍ = F, J φ̈ = M and q̈ + 2ζω q̇ + ω² q = Σ Nλ; C_static",
+        equation="1 (eqs. 1, 2)",
+        matters="always, but for first estimates of rigid-body motion: without it teeth are three to four times too stiff",
+        off="rigid gears; a contact yields by its local law alone, bearings and ports as before",
+        code="gk_setup.c (choose): no modes, no tables of compliance",
+    ),
+    Effect(
+        name="modes",
+        title="number of dynamic modes",
+        formula="modes below the cut are states, those above are compliance; cut in the widest gap within 15 %",
+        equation="1 (eq. 2)",
+        matters="where body resonances lie in the band of interest, or mesh harmonics reach the tooth modes (40–60 kHz on fzg_c)",
+        off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
+        code="gk_setup.c (modes_below, fill_modes), gk_rows.c, gk_flow.c, gk_step.c (predict, correct_modes)",
+        switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
+        off_setting={"level": 0.0},
+        on_setting={"level": 1.0},
+        build="modes",
+        test="tests/stage/test_effects.py::test_modes",
+    ),
+    Effect(
+        name="residual",
+        title="residual",
+        formula="C_res = C_static − Σ N Nᵀ/ω² over the dynamic modes",
+        equation="1 (eq. 2)",
+        matters="always: it holds 15–40 % of a tooth's compliance even behind 400 modes",
+        off="truncated modes, as in the paper; allowed at level `paper` alone, with a warning",
+        code="gk_table.c (gk_table_residual, gk_table_for), gk_system.c (gk_system_form)",
+        switch="level `paper`; `effect.residual` = false is refused at every other level",
+        off_setting={"level": 4.0, "integrator": 2.0},
+        on_setting={"level": 3.0, "integrator": 2.0},
+        build="residual",
+        test="tests/stage/test_effects.py::test_residual",
+    ),
+    _switched(
+        "hertz",
+        title="load-dependent local compliance",
+        formula="δ(λ) = λ(c − ½ a ln βλ)",
+        equation="2.4 (eqs. 7, 8)",
+        matters="when the load changes much: light load, rattle, engagement; 5 % of mesh stiffness from 80 to 600 N·m",
+        off="its secant at `torque_max`: a linear law",
+        code="gk_law.c; the balance of closed steps in gk_balance.c",
+    ),
+    Effect(
+        name="slices",
+        title="slices across the face width",
+        formula="tₐ = (2a + 1) × mean of P_a over the slice; one force a slice (mirrored slices: one row)",
+        equation="1 (load strip and slices)",
+        matters="wide or misaligned teeth, load distribution over the width; on fzg_c 1 slice is stiffer by less than 1 %",
+        off="1 slice: load uniform over the width",
+        code="gk_strips.c, gk_system.c (list_contacts)",
+        switch="parameter `slices` (1 … 10); `[contact] slices` in stage.toml, `[stage] slices` in a scene",
+        off_setting={"slices": 1.0},
+        on_setting={"slices": 5.0},
+        build="slices",
+        test="tests/stage/test_effects.py::test_slices",
+    ),
+    _switched(
+        "coast_flank",
+        title="coast flank",
+        formula="g of the other side, sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt",
+        equation="2.1 (eq. 4)",
+        matters="rattle, load reversal, engagement and every start; not where the drive flanks stay closed",
+        off="teeth pass through the backlash",
+        code="gk_flank.c (gk_flank_find)",
+    ),
+    _switched(
+        "contact_damping",
+        title="contact damping",
+        formula="F = max(0, F_c + min(F_c, F_d)), F_d = c b × rate of the deflection of the contact's own path",
+        equation="2.5, 3.4",
+        matters="level of the mesh resonance and its side bands; dissipation: never leave it out to save time",
+        off="the mesh mode is damped by modal damping, bearings and ports alone",
+        code="gk_system.c (take_paths), gk_solve.c (limit_dashpots), gk_tangent.c",
+    ),
+    _switched(
+        "tip_relief",
+        title="tip relief",
+        formula="g → g + δ_A(s_A) + δ_B(s_B), δ(s) = c (s − s₀)²₊, slope in the gradient",
+        equation="2.2 (eq. 5)",
+        matters="wherever the stage has it: it is the size of the transmission error",
+        off="unmodified involutes",
+        code="gk_flank.c (relief)",
+    ),
+    _switched(
+        "tip_contact",
+        title="tip corners",
+        formula="g = ℓ − s′ − ρ + δ_c + δ_c′ u/(1 + u/ρ) + δ_o: tip edge of radius ρ on the other involute",
+        equation="2.3 (eq. 6)",
+        matters="whenever a loaded pair reaches the end of a flank: without relief always",
+        off="teeth end at their tip roll; right only where relief has taken the load off there",
+        code="gk_flank.c (corner_contact)",
+    ),
+    _switched(
+        "bearings",
+        title="bearings",
+        formula="λ/k at the bore node in x and y, c = 2D √(k m)",
+        equation="3.2",
+        matters="bearing forces, and the mesh mode itself: on fzg_c a third of the static compliance along the path",
+        off="axes held: the mean-axis frames stay, bearing forces read zero",
+        code="gk_setup.c (fill_links), gk_system.c (list_rows)",
+    ),
+    _switched(
+        "modal_damping",
+        title="modal damping",
+        formula="2ζω q̇",
+        equation="1 (eq. 1)",
+        matters="always; a switch for conservation tests",
+        off="ζ = 0 for every elastic mode",
+        code="gk_flow.c (fill)",
+    ),
+    Effect(
+        name="pitch_errors",
+        title="pitch errors",
+        formula="β → β + F_p/r, s → s + sg r_b F_p/r, g → g − sg F_p cos α of that tooth",
+        equation="2.1 (eq. 4a)",
+        matters="shaft orders and side bands; single teeth that come into mesh early or late",
+        off="all teeth in their places",
+        code="gk_flank.c (misplace)",
+        switch="data of the stage: `gears.X.index_deviation` in stage.toml",
+        off_setting={},
+        on_setting={},
+        build="pitch_errors",
+        test="tests/stage/test_pitch_errors.py::test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh",
+    ),
+)
+
+
+def costs() -> dict[str, Cost]:
+    """Measured costs by name of the effect."""
+    text = files("gearfmu.stage").joinpath(COSTS).read_text(encoding="utf-8")
+    rows = csv.DictReader(text.splitlines())
+    return {r["effect"]: Cost(r["effect"], float(r["on"]), float(r["off"]), float(r["without"])) for r in rows}

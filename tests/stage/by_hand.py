@@ -1,0 +1,170 @@
+"""The pair on paper: static deflection of one tooth pair, free motion of a gear, tip corners, from spec, geometry and
+reduced bodies alone, in numpy. No code of the kernel, no model of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.interpolate import BarycentricInterpolator
+from scipy.optimize import brentq, minimize_scalar, root
+
+from gearfmu.body import ReducedBody
+from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.spec.stage import StageSpec
+
+DRIVE = 0
+RZ = 5
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A spur pair with drive flanks in contact, both axes in their places; position p in pitches."""
+
+    spec: StageSpec
+    bodies: Sequence[ReducedBody]
+
+    @property
+    def geometry(self) -> PairGeometry:
+        return PairGeometry.of(self.spec)
+
+    @property
+    def width(self) -> float:
+        return min(gear.face_width for gear in self.spec.gears)
+
+    def rolls(self, position: float) -> dict[int, tuple[float, float]]:
+        """Rolls (m) on both gears of the tooth pairs whose flanks meet, by tooth number of the pinion."""
+        pinion, wheel = self.geometry.gears
+        found = {}
+        for tooth in range(-3, 4):
+            roll = pinion.r_b * (2 * math.pi * (position + tooth) / pinion.z + pinion.psi_b + self.geometry.alpha_wt)
+            if roll <= pinion.s_tip and self.geometry.length - roll <= wheel.s_tip:
+                found[tooth] = (roll, self.geometry.length - roll)
+        return found
+
+    def local_law(self, rolls: tuple[float, float]) -> tuple[float, float, float]:
+        """a, c, β of δ(f) = f (c − ½ a ln βf), f in N per metre of width (theory, eqs. 7 and 8)."""
+        yields = [2 * (1 - g.material.poisson_ratio**2) / (math.pi * g.material.youngs_modulus) for g in self.spec.gears]
+        c = sum(y * (math.log(4 * g.body.strip_half_width) - 1) for y, g in zip(yields, self.spec.gears, strict=True))
+        return sum(yields), c, 2 * sum(yields) / (1 / rolls[0] + 1 / rolls[1])
+
+    def secant(self, rolls: tuple[float, float]) -> float:
+        """δ/f (m²/N) at torque_max carried by this pair alone."""
+        a, c, beta = self.local_law(rolls)
+        return c - 0.5 * a * math.log(beta * self.spec.torque_max / self.geometry.gears[0].r_b / self.width)
+
+    def approach(self, rolls: tuple[float, float], load: np.ndarray, hertz: bool) -> np.ndarray:
+        """δ (m) under the line load (N/m)."""
+        a, c, beta = self.local_law(rolls)
+        return load * (c - 0.5 * a * np.log(beta * load)) if hertz else load * self.secant(rolls)
+
+    def compliance(self, rolls: tuple[float, float], slices: int, modes_only: bool = False) -> np.ndarray:
+        """(slices, slices) m/N: te of the bore nodes under slice forces at one tooth of either gear, held by the
+        torques at the bores. modes_only: what the stored modes alone give, Σ N Nᵀ/ω²."""
+        total = np.zeros((slices, slices))
+        for body, roll in zip(self.bodies, rolls, strict=True):
+            weights = slice_weights(slices, body.flank_rows.shape[2])
+            flank, cross, bore = (_modal if modes_only else _static)(body, roll)
+            side = body.r_b * (weights @ cross)
+            total += weights @ flank @ weights.T - side[:, None] - side[None, :] + body.r_b**2 * bore
+        return total
+
+    def te(self, position: float, torque: float, hertz: bool = True, elastic: np.ndarray | None = None) -> float:
+        """Transmission error (m) of a position with one pair in contact. elastic: from `compliance`; None: rigid."""
+        (rolls,) = self.rolls(position).values()
+        force = torque / self.geometry.gears[0].r_b
+        if elastic is None:
+            return float(self.approach(rolls, np.array([force / self.width]), hertz)[0])
+        count = len(elastic)
+
+        def unbalanced(unknown: np.ndarray) -> np.ndarray:
+            share = np.abs(unknown[1:])
+            deflection = self.approach(rolls, share * force * count / self.width, hertz) + force * elastic @ share
+            return np.append(1e5 * (unknown[0] - deflection), share.sum() - 1)
+
+        start = np.append(1e-5, np.full(count, 1 / count))
+        found = root(unbalanced, start, tol=1e-12)
+        assert found.success
+        return float(found.x[0])
+
+    def shared(self, all_rolls: Sequence[tuple[float, float]], gaps: Sequence[float], torque: float) -> float:
+        """te (m) of rigid gears whose pairs have these gaps at te = 0, by the load-dependent law."""
+        force = torque / self.geometry.gears[0].r_b
+
+        def missing(te: float) -> float:
+            carried = (self._force(rolls, te - gap) for rolls, gap in zip(all_rolls, gaps, strict=True))
+            return sum(carried) - force
+
+        return brentq(missing, 0.0, 1e-4, xtol=1e-12)
+
+    def _force(self, rolls: tuple[float, float], approach: float) -> float:
+        if approach <= 0:
+            return 0.0
+        law = lambda load: self.approach(rolls, np.array([load]), hertz=True)[0] - approach  # noqa: E731
+        return self.width * brentq(law, 1e-3, 1e7)
+
+    def corner_gap(self, position: float, tooth: int) -> float:
+        """Distance (m) of the pinion's tip edge from the wheel's involute, by search along the involute."""
+        pinion, wheel = self.geometry.gears
+        beta = 2 * math.pi * (position + tooth) / pinion.z + pinion.psi_b
+        turned = self.geometry.wheel_phase - 2 * math.pi * (position + tooth) / wheel.z + wheel.psi_b
+        edge = self.spec.gears[0].tip_edge_radius
+        centre = _on_tangent(pinion, beta, pinion.s_tip, pinion.s_tip - edge)
+        axis = np.array([self.geometry.a, 0.0])
+
+        def distance(roll: float) -> float:
+            return float(np.hypot(*(axis + _on_tangent(wheel, turned, roll, roll) - centre)))
+
+        return minimize_scalar(distance, (1e-4, wheel.s_tip), bounds=(1e-4, wheel.s_tip), method="bounded",
+                               options={"xatol": 1e-12}).fun - edge  # fmt: skip
+
+
+def _on_tangent(gear: GearGeometry, beta: float, roll: float, along: float) -> np.ndarray:
+    """Point `along` the base tangent that touches the flank with base angle β at `roll`."""
+    t = beta - roll / gear.r_b
+    return gear.r_b * np.array([math.cos(t), math.sin(t)]) + along * np.array([-math.sin(t), math.cos(t)])
+
+
+def slice_weights(slices: int, functions: int) -> np.ndarray:
+    """(slices, functions): (2a + 1) × mean of P_a over each slice of the face width."""
+    edges = np.linspace(-1, 1, slices + 1)
+    weights = np.empty((slices, functions))
+    for a in range(functions):
+        antiderivative = legendre.legint(np.eye(functions)[a])
+        weights[:, a] = (2 * a + 1) * np.diff(legendre.legval(edges, antiderivative)) / np.diff(edges)
+    return weights
+
+
+def _at(body: ReducedBody, roll: float, values: np.ndarray) -> np.ndarray:
+    """`values` (R, …) given at the body's Chebyshev rolls, at this roll."""
+    return np.asarray(BarycentricInterpolator(body.roll, values)(roll))
+
+
+def _static(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """(A, A) of a tooth's drive flank with itself, (A,) with the bore's rotation, rotation with itself, per N and N·m."""
+    flank = _at(body, roll, _at(body, roll, body.static_ff[DRIVE, DRIVE, 0]))
+    return flank, _at(body, roll, body.static_fb[DRIVE, :, :, RZ]), float(body.static_bb[RZ, RZ])
+
+
+def _modal(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, float]:
+    rows = _at(body, roll, body.flank_rows[DRIVE]) / (2 * math.pi * body.frequency)
+    bore = body.bore_rows[RZ] / (2 * math.pi * body.frequency)
+    return rows @ rows.T, rows @ bore, float(bore @ bore)
+
+
+def bore_angle(body: ReducedBody, time: np.ndarray, cut: float, damped: bool) -> np.ndarray:
+    """Angle (rad) of the bore node of a free gear under a unit torque there from t = 0 on: rigid body, static share of
+    the modes above `cut` (Hz), and every mode below it."""
+    omega, zeta = 2 * math.pi * body.frequency, body.damping_ratio * damped
+    flexible = (body.bore_rows[RZ] / omega) ** 2
+    dynamic = body.frequency < cut
+    angle = 0.5 * time**2 / body.inertia[2, 2] + body.static_bb[RZ, RZ] - flexible[dynamic].sum()
+    for k in np.flatnonzero(dynamic & (flexible > 0)):
+        root_ = math.sqrt(1 - zeta[k] ** 2)
+        phase = omega[k] * root_ * time
+        decay = np.exp(-zeta[k] * omega[k] * time)
+        angle = angle + flexible[k] * (1 - decay * (np.cos(phase) + zeta[k] / root_ * np.sin(phase)))
+    return angle
