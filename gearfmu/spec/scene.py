@@ -15,8 +15,8 @@ from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, read_toml, vali
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
 
 SHIPPED = Path(__file__).parent.parent / "scenes"
-Level = Literal["rigid", "fast", "standard", "full", "paper"]
-Integrator = Literal["dg4", "mix4", "em", "rk45"]
+Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
+Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
 Switch = Literal[
     "elastic",
     "residual",

@@ -24,10 +24,10 @@ static double share(const gk_system *s, int i) { return 0.5 * (s->force0[i] + s-
 
 static int takes_part(const gk_system *s, int i) { return s->kind[i] != ROW_CLUTCH && (s->force[i] != 0.0 || s->force0[i] != 0.0 || s->direction[i] != 0.0); }
 
-/* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀) */
+/* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀), and what earlier steps left of it: small defects of the same sign do not add up */
 static balance defect(const gk_system *s)
 {
-    balance b = {-s->stored0, 0.0, 0.0, fabs(s->stored0), 0.0};
+    balance b = {s->due - s->stored0, 0.0, 0.0, fabs(s->stored0), 0.0};
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
@@ -92,6 +92,13 @@ static void choose_direction(gk_system *s, int all_rows)
     }
 }
 
+/* the step is balanced but for b: the next ones make that good */
+static int leave(gk_system *s, const balance *b)
+{
+    s->owed += b->defect - s->due;
+    return 1;
+}
+
 /* α by Newton on the quadratic; 0 when the limit of rounds is reached or no direction is left */
 static int find_alpha(gk_system *s, balance b)
 {
@@ -108,7 +115,7 @@ static int find_alpha(gk_system *s, balance b)
         gk_solve_settle(s);
         gk_solve_contacts(s);
         b = defect(s);
-        if (!open_balance(&b, BALANCE)) return 1;
+        if (!open_balance(&b, BALANCE)) return leave(s, &b);
     }
     return 0;
 }
@@ -121,7 +128,10 @@ void gk_balance_solve(gk_system *s)
         const int changed = status_changed(s);
         if (!changed && !s->curved) return;
         const balance b = defect(s);
-        if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) return;
+        if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) {
+            leave(s, &b);
+            return;
+        }
         choose_direction(s, all_rows);
         if (find_alpha(s, b)) return;
     }

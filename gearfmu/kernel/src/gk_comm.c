@@ -120,13 +120,15 @@ static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data,
     v[V_M_NDYN] = setup->modal[0].count + setup->modal[1].count;
 }
 
+static int is_explicit(const gk_setup *setup) { return setup->integrator == RK45 || setup->integrator == CENTRAL; }
+
 /* stored energy and what the balance does not close; 0 when that is more than the model can mean; a new h is a new invariant: the balance goes on from there */
 static int balance(const gk_setup *setup, gk_data *data, double h)
 {
-    const gk_coefficients *k = setup->integrator == RK45 ? &setup->work->explicit_rows : gk_flow_for(setup, h, gk_limit_gamma(setup, h));
+    const gk_coefficients *k = is_explicit(setup) ? &setup->work->explicit_rows : gk_flow_for(setup, h, gk_limit_gamma(setup, h));
     double *v = data->value, stored = gk_step_energy(setup, data, k);
-    if (setup->integrator == RK45) { /* keeps no account of works: no balance */
-        v[V_M_ENERGY] = stored;
+    if (is_explicit(setup)) { /* keeps no account of works: no balance */
+        v[V_M_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(setup, data, h) : stored;
         return 1;
     }
     if (data->balance_h != h) {
@@ -228,7 +230,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
     const double before[2] = {work->outer[0], work->outer[1]};
     ports_at(data, work, c, model, tau, h);
     gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : setup->step(model, setup, data, h, gk_limit_gamma(setup, h));
-    if (outcome == GK_OK || setup->integrator == RK45) return outcome;
+    if (outcome == GK_OK || is_explicit(setup)) return outcome;
     data->trouble++;
     work->outer[0] = before[0], work->outer[1] = before[1];
     if (depth < HALVINGS) {
@@ -352,8 +354,9 @@ gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const vo
     if (setup->magic != GK_SETUP_MAGIC || size != setup->state_size || size > gk_data_size(model) || size < sizeof head) return GK_BAD_VALUE;
     memcpy(&head, bytes, sizeof head);
     int good = head.magic == GK_DATA_MAGIC && head.phase >= PHASE_NEW && head.phase <= PHASE_FAILED && head.pairs >= 0 && head.pairs <= MAX_PAIRS && head.count >= 0 &&
-               all_small(head.value, GK_VARS) && all_small(head.x, RIGID) && all_small(head.v, RIGID) && all_small(head.f, RIGID) && all_small(head.link, LINKS) &&
-               gk_finite(head.time_base) && gk_finite(head.step_H) && gk_finite(head.reach) && gk_finite(head.table_h) && all_small(head.link_end, LINKS) && all_small(head.link_dash, LINKS);
+               all_small(head.value, GK_VARS) && all_small(head.x, RIGID) && all_small(head.v, RIGID) && all_small(head.f, RIGID) && all_small(head.f_rate, RIGID) && all_small(head.still, RIGID) &&
+               all_small(head.link, LINKS) && all_small(head.link_end, LINKS) && all_small(head.link_dash, LINKS) &&
+               gk_finite(head.time_base) && gk_finite(head.step_H) && gk_finite(head.reach) && gk_finite(head.table_h);
     for (int p = 0; good && p < head.pairs; p++)
         good = (head.memory[p].key.flank == 0 || head.memory[p].key.flank == 1) && all_small(head.memory[p].force, MAX_SLICES) && all_small(head.memory[p].gap, MAX_SLICES) && all_small(head.memory[p].end, MAX_SLICES) &&
                all_small(head.memory[p].dash, MAX_SLICES);

@@ -3,7 +3,8 @@
  *   gk_strips.c slices → contact rows    gk_table.c  compliance between points         gk_flow.c   modal coefficients of h
  *   gk_limit.c  which h, which γ         gk_flank.c  where teeth may touch             gk_rows.c   displacement rows at those places
  *   gk_system.c the small system of a step   gk_law.c local line contact   gk_solve.c its solution   gk_tangent.c its matrix   gk_balance.c its energy
- *   gk_step.c   one step; gk_comm.c many; gk_static.c none */
+ *   gk_step.c   one step; gk_comm.c many; gk_static.c none
+ *   gk_rk45.c, gk_central.c  explicit integrators    gk_still.c  places that do not move, for conservation tests */
 #ifndef GK_CORE_H
 #define GK_CORE_H
 #include <math.h>
@@ -52,8 +53,8 @@ enum {
 #define GK_OF_SHAFT(ID, s) (V_0_##ID + (s) * (V_1_PHI_IN - V_0_PHI_IN))
 
 typedef enum { PORT_SPRING, PORT_TORQUE, PORT_FIXED } gk_port_kind;
-typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER } gk_level;
-typedef enum { DG4, MIX4, EM, RK45 } gk_integrator;
+typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER, LEVEL_EXPLICIT } gk_level;
+typedef enum { DG4, MIX4, EM, RK45, CENTRAL } gk_integrator;
 typedef enum { KIND_PAIR, KIND_FLAT } gk_kind;
 
 /* ---- constant: read from the blob -------------------------------------------------------------------------------------------------------------- */
@@ -109,7 +110,7 @@ typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | 
 } gk_modal;
 
 typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
-    gk_real *a11, *a12, *a21, *a22, *b0q, *b0v, *bq, *bv; /* flow; response to the force at the start and at the end of the step */
+    gk_real *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv; /* flow (d11 = a11 − 1, d22 = a22 − 1); response to the force at the start and at the end of the step */
     gk_real *mobility, *read_q, *read_v;                  /* what a force at the end does to a gap; the gap reads read_q q + read_v v */
     gk_real *kappa, *inverse_s2;
     int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
@@ -117,13 +118,14 @@ typedef struct gk_flow { /* coefficients of one gear's modes for one (h, γ) */
 
 typedef struct gk_coefficients {
     double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
+    int timeless;    /* forces move nothing in the step: D = 0 */
     int curved_read; /* mix4: the gap reads more than q */
     gk_flow flow[2];
     uint64_t age;
 } gk_coefficients;
 
 typedef struct gk_effects {
-    int residual, hertz, coast, damping, relief, corner, bearings, modal_damping;
+    int residual, hertz, coast, damping, relief, corner, bearings, modal_damping, roll_motion;
 } gk_effects;
 
 typedef struct gk_work gk_work;
@@ -160,13 +162,15 @@ typedef struct gk_memory { /* what a tooth pair remembers from the last step */
 
 typedef struct gk_motion { double phi, w, a; } gk_motion;
 
-typedef struct gk_ledger { double work, dissipated, baseline, lag; } gk_ledger; /* lag: energy that the dashpots' force holds in what it deflects */
+/* lag: energy that the dashpots' force holds in what it deflects; owed: defect of energy that the balance of contacts tolerated so far */
+typedef struct gk_ledger { double work, dissipated, baseline, lag, owed; } gk_ledger;
 
 struct gk_data {
     uint64_t magic;
     int32_t phase, pairs, locked[2];
     double value[GK_VARS];
     double x[RIGID], v[RIGID], f[RIGID];
+    double f_rate[RIGID];        /* change of f in the last step over h */
     double link[LINKS];          /* λ0 of the bilateral rows (clutch: the constant torque of the last step) */
     double link_dash[LINKS], link_end[LINKS];
     double time_base, step_H, time_last; /* time = time_base + count·H */
@@ -178,6 +182,7 @@ struct gk_data {
     double state_h, state_gamma; /* the step for which x and q are expressed; 0: physical */
     double table_h;              /* the internal step with tables of its own: that of the run's first communication step */
     double angle[2];             /* bore angle at a torque port, massless part included */
+    double still[RIGID];         /* frames of the start, where all is taken that depends on position when roll_motion is off */
     double reach;                /* largest interpenetration of undeformed flanks in the last step: how far to look for contacts */
     gk_ledger ledger;
     int64_t steps, rounds, trouble, impacts;
@@ -236,7 +241,8 @@ typedef struct gk_system {
     gk_approach law[MAX_CONTACTS];    /* at the present λ */
     double slope[MAX_CONTACTS];       /* δ′ in the tangent */
     double stored0;                   /* energy of the massless part at the start of the step */
-    double held0;                     /* energy that the dashpots' force holds in A at the start */
+    double held0;                     /* energy that the dashpots' force holds in Q at the start */
+    double owed, due;                 /* defect of energy that the steps before left; what of it this step should make good */
     int rounds, limit_reached, curved;
 } gk_system;
 
@@ -249,10 +255,11 @@ struct gk_work {
     gk_real *qp[2], *vp[2], *force[2], *zero[2], *scaled; /* predicted modal state; modal force of the rows; zeros; row times two coefficients */
     gk_real *reading[2];                      /* read_q q + read_v v where that is not q */
     const gk_real *y[2];                      /* displacement that the rows read: qp, reading, or zero at rest */
-    gk_real *stage[2][7], *trial[2];          /* rk45: derivatives (v, a) and trial state (q, v) */
+    gk_real *stage[2][7], *trial[2];          /* rk45, central: derivatives (v, a) and trial state (q, v) */
     double stage_rigid[7][2 * RIGID], trial_rigid[2 * RIGID];
     gk_real *basis[2];                        /* (MAX_BASIS, n): rows of the contacts, then bore rows in inertial axes */
     double frame[RIGID], speed[RIGID];        /* predicted */
+    double attitude[2];                       /* of the gears whose rows the system is formed with */
     double moved[RIGID];
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
     double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
@@ -268,11 +275,19 @@ typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
 /* gk_vars.c */
 gk_effects gk_effects_of(const gk_data *data);
 /* gk_rk45.c */
+int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int i, const double outer[2]);
+void gk_rk45_angles(const gk_setup *setup, gk_data *data);
 gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data *data, double h);
+/* gk_central.c */
+gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
+double gk_central_energy(const gk_setup *setup, const gk_data *data, double h);
+double gk_central_limit(const gk_model *model, const gk_setup *setup);
 /* gk_flow.c */
 const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma);
 /* gk_flank.c */
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *frame, double reach, gk_place *place);
+/* gk_still.c */
+int gk_still_find(const gk_model *model, const gk_setup *setup, const double *still, const double *frame, gk_place *place);
 /* gk_rows.c */
 void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work);
 /* gk_system.c */
@@ -309,11 +324,14 @@ int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, gk_setup *setup);
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out);
 /* gk_limit.c */
+int gk_limit_cholesky(double *a, int n);
+void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C);
+void gk_limit_solve(const double *L, double *x, int n);
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
 double gk_limit_gamma(const gk_setup *setup, double h);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);
 /* gk_wide.c */
-gk_step_function *gk_wide_step(int widest);
+gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
 /* gk_step.c */
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);

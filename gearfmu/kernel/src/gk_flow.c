@@ -54,9 +54,29 @@ static oscillator linear_force(double omega, double zeta, double h)
     return o;
 }
 
+/* The flow in gk_real: a11 − 1, a12, a21, a22 − 1, which keeps frequencies to 1e-7 at any h. Rounded one by one to single precision the four numbers let a mode grow or fade by up to 1e-7 of its
+ * energy every step, always the same way. Where damping does not cover that, the nearest values and their next neighbours, each with the a21 that belongs to it, are searched for the best
+ * determinant: some 1e-9 off the exact one, e^(−2ζωh). */
+static void round_flow(const oscillator *o, gk_real out[4])
+{
+    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, d11 = o->a11 - 1.0, d22 = o->a22 - 1.0, covered = 1e-5;
+    double least = INFINITY;
+    out[0] = (gk_real)d11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)d22;
+    if (sizeof(gk_real) > sizeof(float) || 1.0 - wanted > covered) return;
+    for (int choice = 0; choice < 27; choice++) {
+        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 3 - 1))), (gk_real)(o->a12 * (1.0 + ulp * (choice / 9 - 1))), (gk_real)(d22 * (1.0 + ulp * (choice / 3 % 3 - 1)))};
+        const double product = (1.0 + (double)a[0]) * (1.0 + (double)a[2]) - wanted; /* what a12·a21 should be */
+        const gk_real a21 = (gk_real)(product / a[1]);
+        const double error = fabs(product - (double)a[1] * a21);
+        if (error < least) least = error, out[0] = a[0], out[1] = a[1], out[2] = a21, out[3] = a[2];
+    }
+}
+
 static void store(gk_flow *f, int i, const oscillator *o)
 {
-    f->a11[i] = (gk_real)o->a11, f->a12[i] = (gk_real)o->a12, f->a21[i] = (gk_real)o->a21, f->a22[i] = (gk_real)o->a22;
+    gk_real a[4] = {0, 0, 0, 0};
+    if (o->a12 != 0.0) round_flow(o, a);
+    f->d11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->d22[i] = a[3];
     f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
     f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
@@ -95,6 +115,7 @@ const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma
     }
     oldest->h = h;
     oldest->gamma = gamma;
+    oldest->timeless = 0;
     oldest->curved_read = setup->integrator == MIX4;
     oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
     oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;

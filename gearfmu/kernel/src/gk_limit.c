@@ -4,11 +4,11 @@
 #include <stdio.h>
 #include "gk_core.h"
 
-static const double MU = 0.5;
+static const double MU = 0.5, WITHIN = 0.9, BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
 enum { POSITIONS = 8, POWER_ROUNDS = 60 };
 
 /* Cholesky of a (n, n), in place, lower; 0 when not positive */
-static int cholesky(double *a, int n)
+int gk_limit_cholesky(double *a, int n)
 {
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
@@ -21,6 +21,19 @@ static int cholesky(double *a, int n)
     return 1;
 }
 
+/* x ← (L Lᵀ)⁻¹ x */
+void gk_limit_solve(const double *L, double *x, int n)
+{
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++) x[i] -= L[i * n + k] * x[k];
+        x[i] /= L[i * n + i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) x[i] -= L[k * n + i] * x[k];
+        x[i] /= L[i * n + i];
+    }
+}
+
 /* largest eigenvalue of C⁻¹ K, C = L Lᵀ, K symmetric positive semidefinite */
 static double largest(const double *L, const double *K, int n)
 {
@@ -31,14 +44,7 @@ static double largest(const double *L, const double *K, int n)
             y[i] = 0.0;
             for (int j = 0; j < n; j++) y[i] += K[i * n + j] * x[j];
         }
-        for (int i = 0; i < n; i++) {
-            for (int k = 0; k < i; k++) y[i] -= L[i * n + k] * y[k];
-            y[i] /= L[i * n + i];
-        }
-        for (int i = n - 1; i >= 0; i--) {
-            for (int k = i + 1; k < n; k++) y[i] -= L[k * n + i] * y[k];
-            y[i] /= L[i * n + i];
-        }
+        gk_limit_solve(L, y, n);
         value = 0.0;
         for (int i = 0; i < n; i++) value = gk_max(value, fabs(y[i]));
         if (!(value > 0.0)) return 0.0;
@@ -61,27 +67,34 @@ static void yielding(const double *S, const double *damping, int n, double *X)
     for (int i = 0; i < n * n; i++) X[i] /= B[i / n * n + i / n];
 }
 
-/* C: what answers at once; K: κ part, both (n, n) */
-static void instant(const gk_system *s, double full, double *C, double *K)
+/* a row that no spring carries has no part in the limit */
+static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING; }
+
+/* C (n, n): compliance of the massless part with all contacts closed under the line load `full`; with dashpots what answers at once */
+void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C)
 {
     const int n = s->n, strips = s->strips;
-    for (int i = 0; i < n * n; i++) {
-        C[i] = s->Q[i / n * s->stride + i % n];
-        K[i] = C[i] - s->A[i / n * s->stride + i % n];
-    }
+    for (int i = 0; i < n * n; i++) C[i] = counts(s, i / n) && counts(s, i % n) ? s->Q[i / n * s->stride + i % n] : i / n == i % n;
     for (int p = 0; p * strips < s->contacts; p++) {
         const int first = p * strips;
         double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
         memcpy(S, s->path[p], (size_t)(strips * strips) * sizeof *S);
         for (int a = 0; a < strips; a++) S[a * strips + a] += gk_law_at(&s->local[p], s->width[first + a], full * s->width[first + a]).slope;
-        yielding(S, s->damping + first, strips, X);
+        if (dashpots) yielding(S, s->damping + first, strips, X);
+        else memcpy(X, S, (size_t)(strips * strips) * sizeof *X);
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
     }
-    for (int i = s->contacts; i < n; i++) {
-        C[i * n + i] += s->spring[i] / (1.0 + s->damping[i] * s->spring[i]);
-        if (s->kind[i] == ROW_SPRING) continue;
-        for (int j = 0; j < n; j++) C[i * n + j] = C[j * n + i] = K[i * n + j] = K[j * n + i] = 0.0;
-        C[i * n + i] = 1.0;
+    for (int i = s->contacts; i < n; i++)
+        if (counts(s, i)) C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? s->damping[i] * s->spring[i] : 0.0));
+}
+
+/* K (n, n): κ part */
+static void kappa_part(const gk_system *s, double *K)
+{
+    const int n = s->n;
+    for (int i = 0; i < n * n; i++) {
+        const int at = i / n * s->stride + i % n;
+        K[i] = counts(s, i / n) && counts(s, i % n) ? s->Q[at] - s->A[at] : 0.0;
     }
 }
 
@@ -101,8 +114,9 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data,
     for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
     gk_rows_form(model, setup, frame, work);
     gk_system_form(model, setup, data, gk_flow_for(setup, h, gamma), work);
-    instant(s, model->torque_max / (model->gear[0].r_b * setup->width), C, K);
-    return cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
+    gk_limit_compliance(s, model->torque_max / (model->gear[0].r_b * setup->width), 1, C);
+    kappa_part(s, K);
+    return gk_limit_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
 }
 
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
@@ -144,7 +158,8 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
     static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6, 4e-6, 3e-6, 2.5e-6, 2e-6, 1.5e-6, 1e-6, 0.5e-6};
     const double period = 2.0 * GK_PI / (model->speed_max * model->gear[0].teeth);
     const int variational = setup->integrator == DG4, rungs = (int)(sizeof ladder / sizeof *ladder);
-    double limit = gk_min(model->h_max, period / 40.0), h = wished;
+    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup) : INFINITY; /* explicit: a limit of stability */
+    double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
     if (!(wished > 0.0))
         for (int i = 0; i < rungs; i++) {
             h = gk_min(ladder[i], limit);
@@ -153,6 +168,10 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
     if (h > period / 8.0) {
         snprintf(message, GK_MESSAGE, "h = %.3g s is more than 1/8 of the mesh period at speed_max; use h <= %.3g s", h, period / 8.0);
         return GK_STEP_TOO_LARGE;
+    }
+    if (h > stable) {
+        snprintf(message, GK_MESSAGE, "h = %.3g s is above the limit of stability of central for this model at this level; use h <= %.3g s", h, WITHIN * stable);
+        if (h > BEYOND * stable) return GK_STEP_TOO_LARGE;
     }
     setup->h = h;
     double at = h;

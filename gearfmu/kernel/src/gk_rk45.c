@@ -37,8 +37,8 @@ static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate
     }
 }
 
-/* forces and accelerations at work->trial, trial_rigid; outer ends at `part` of the step; result in stage i */
-static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int i, const double outer[2])
+/* forces and accelerations at work->trial, trial_rigid; 0 when they are not finite; outer ends at `part` of the step; result in stage i */
+int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int i, const double outer[2])
 {
     gk_work *work = setup->work;
     gk_system *s = &work->system;
@@ -50,10 +50,11 @@ static int evaluate(const gk_model *model, const gk_setup *setup, const gk_data 
         speed[g] = work->trial[g] + setup->modal[g].n;
         work->outer[g] = outer[g];
     }
-    work->places = gk_flank_find(model, setup, work->frame, gk_max(data->reach, 50e-6), work->place);
+    const double *where = setup->on.roll_motion ? work->frame : data->still;
+    work->places = setup->on.roll_motion ? gk_flank_find(model, setup, where, gk_max(data->reach, 50e-6), work->place) : gk_still_find(model, setup, where, work->frame, work->place);
     if (work->places < 0) return work->places = 0, 0;
     for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
-    gk_rows_form(model, setup, work->frame, work);
+    gk_rows_form(model, setup, where, work);
     gk_system_form(model, setup, data, k, work);
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;
     gk_step_recall(setup, data, s);
@@ -148,6 +149,14 @@ static void keep(const gk_setup *setup, gk_data *data)
     }
 }
 
+/* angles of the bores with a given torque, massless part included */
+void gk_rk45_angles(const gk_setup *setup, gk_data *data)
+{
+    const gk_system *s = &setup->work->system;
+    for (int i = s->contacts; i < s->n; i++)
+        if (s->kind[i] == ROW_TORQUE) data->angle[s->link_of[i] - PORT_0] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+}
+
 /* Over h, in as many inner steps as the error control wants; outer ends move linearly between outer_before and outer. GK_OK or GK_DIVERGED. */
 gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data *data, double h)
 {
@@ -162,7 +171,7 @@ gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data
         for (int i = 0; i < STAGES && good; i++) {
             combine(setup, data, A[i], i, step);
             const double part = (done + NODE[i] * step) / h, outer[2] = {from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])};
-            good = evaluate(model, setup, data, k, i, outer);
+            good = gk_rk45_evaluate(model, setup, data, k, i, outer);
         }
         const double ratio = good ? error_ratio(setup, data, step) : 32.0;
         const double factor = gk_clamp(ratio > 0.0 ? 0.8 * gk_exp(-0.2 * gk_log(ratio)) : 5.0, 0.2, 5.0);
@@ -178,6 +187,7 @@ gk_outcome gk_rk45_advance(const gk_model *model, const gk_setup *setup, gk_data
     }
     for (int g = 0; g < 2; g++) work->outer_before[g] = from[g], work->outer[g] = to[g];
     gk_step_remember(setup, data);
+    gk_rk45_angles(setup, data);
     memcpy(work->system.force0, work->system.z, sizeof work->system.z); /* the mean over so short a time is its end */
     return GK_OK;
 }

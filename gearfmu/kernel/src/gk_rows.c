@@ -35,14 +35,15 @@ static void bore_rows(const gk_modal *modal, double attitude, gk_real *out)
     }
 }
 
-/* fills work->basis of both gears for the places found: a row a strip and place, then the three bore rows in inertial axes */
+/* fills work->attitude and work->basis of both gears for the places found: a row a strip and place, then the three bore rows in inertial axes */
 void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work)
 {
     for (int g = 0; g < 2; g++) {
         const gk_modal *modal = &setup->modal[g];
+        work->attitude[g] = frame[g ? PHIB : PHIA] + model->gear[g].phase;
         if (!modal->n) continue;
         size_t row = (size_t)setup->strips * modal->n;
         for (int p = 0; p < work->places; p++) place_rows(setup, &model->gear[g], g, &work->place[p], work->basis[g] + p * row);
-        bore_rows(modal, frame[g ? PHIB : PHIA] + model->gear[g].phase, work->basis[g] + work->places * row);
+        bore_rows(modal, work->attitude[g], work->basis[g] + work->places * row);
     }
 }

@@ -54,7 +54,7 @@ static void lay_out_flow(bump *b, const gk_setup *setup, gk_coefficients *k)
     for (int g = 0; g < 2; g++) {
         size_t bytes = (size_t)setup->modal[g].n * sizeof(gk_real);
         gk_flow *f = &k->flow[g];
-        gk_real **array[] = {&f->a11, &f->a12, &f->a21, &f->a22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+        gk_real **array[] = {&f->d11, &f->a12, &f->a21, &f->d22, &f->b0q, &f->b0v, &f->bq, &f->bv, &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = take(b, bytes);
     }
 }
@@ -210,7 +210,7 @@ static void fill_timeless(gk_setup *setup)
     gk_coefficients *both[2] = {&setup->work->at_rest, &setup->work->explicit_rows};
     for (int c = 0; c < 2; c++) {
         gk_coefficients *k = both[c];
-        k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = k->rigid_b0 = k->rigid_bq = 0.0, k->curved_read = 0;
+        k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = k->rigid_b0 = k->rigid_bq = 0.0, k->curved_read = 0, k->timeless = 1;
         for (int g = 0; g < 2; g++) {
             const gk_modal *m = &setup->modal[g];
             memset(setup->work->zero[g], 0, (size_t)m->n * sizeof(gk_real));
@@ -236,8 +236,9 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     setup->damping = data->value[V_M_DAMPING];
     if (model->kind == KIND_PAIR)
         setup->allowance = (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance;
-    if (setup->integrator == RK45 && clutch) {
-        snprintf(message, GK_MESSAGE, "integrator rk45 knows no clutch: use dg4, or export the stage without the chain");
+    if (setup->level == LEVEL_EXPLICIT && setup->integrator == DG4) setup->integrator = CENTRAL;
+    if ((setup->integrator == RK45 || setup->integrator == CENTRAL) && clutch) {
+        snprintf(message, GK_MESSAGE, "integrators rk45 and central (level explicit) know no clutch: use dg4, or export the stage without the chain");
         return GK_BAD_VALUE;
     }
     if (setup->level == LEVEL_PAPER) {
@@ -264,7 +265,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     const int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
     const uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
     lay_out(model, setup, (char *)base, modes);
-    setup->step = gk_wide_step(1);
+    setup->step = gk_wide_step(1, setup->integrator);
     gk_work *work = setup->work;
     work->clock = 0;
     for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;

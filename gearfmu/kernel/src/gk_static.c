@@ -53,6 +53,24 @@ static void balance_rotation(const gk_model *model, const gk_setup *setup, const
     }
 }
 
+/* a train that nothing holds stays where it is: take its common rotation out of the last move; returns what it moved else */
+static double unroll(const gk_model *model, const gk_setup *setup, const gk_boundary b[2], const double *before, double *x, double moved)
+{
+    const double ratio = model->gear[0].r_b / model->gear[1].r_b;
+    const int coordinate[4] = {PHIA, DISC_0, PHIB, DISC_1};
+    double momentum = 0.0, inertia = 0.0;
+    if (!floats(model, setup, b) || !gk_finite(moved)) return moved;
+    for (int c = 0; c < 4; c++) {
+        const double turn = c < 2 ? 1.0 : -ratio, mobile = setup->inverse_mass[coordinate[c]];
+        if (mobile > 0.0) momentum += turn * (x[coordinate[c]] - before[coordinate[c]]) / mobile, inertia += turn * turn / mobile;
+    }
+    moved = 0.0;
+    for (int c = 0; c < 4; c++)
+        if (setup->inverse_mass[coordinate[c]] > 0.0) x[coordinate[c]] -= (c < 2 ? 1.0 : -ratio) * momentum / inertia;
+    for (int d = 0; d < RIGID; d++) moved = gk_max(moved, fabs(x[d] - before[d]) * (d == XA || d == YA || d == XB || d == YB ? 1.0 : model->gear[0].r_b));
+    return moved;
+}
+
 static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, const double *given)
 {
     gk_work *work = rest->work;
@@ -63,14 +81,15 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
         work->speed[d] = 2.0 * work->frame[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
     work->y[0] = work->zero[0], work->y[1] = work->zero[1];
-    work->places = gk_flank_find(model, rest, work->frame, SEE, work->place);
+    work->places = gk_flank_find(model, rest, data->x, SEE, work->place);
     if (work->places < 0) return work->places = 0, NAN;
     for (int p = 0; p < work->places; p++) {
+        for (int d = 0; d < 6; d++) work->place[p].gap += work->place[p].gradient[d] * (work->frame[d] - data->x[d]); /* given forces move the frame, not the place */
         work->place[p].memory = -1;
         for (int m = 0; m < data->pairs; m++)
             if (data->memory[m].key.flank == work->place[p].key.flank && data->memory[m].key.tooth == work->place[p].key.tooth) work->place[p].memory = m;
     }
-    gk_rows_form(model, rest, work->frame, work);
+    gk_rows_form(model, rest, data->x, work);
     gk_system_form(model, rest, data, &work->at_rest, work);
     gk_step_recall(rest, data, s);
     gk_solve_plain(s);
@@ -117,6 +136,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
     gk_work *work = setup->work;
     double given[RIGID] = {0};
     rest.on.damping = 0;
+    rest.on.roll_motion = 1;
     for (int g = 0; g < 2; g++) {
         rest.given_torque[g] = !grounded(&b[g]);
         rest.link_c[PORT_0 + g] = b[g].kind == PORT_SPRING ? 1.0 / b[g].k : 0.0;
@@ -139,11 +159,14 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
         work->at_rest.rigid_mobility = mobility;
         double moved = INFINITY;
         for (int round = 0; round < REST_ROUNDS && moved > 1e-14; round++) {
-            moved = relax(model, &rest, data, given);
+            double before[RIGID];
+            memcpy(before, data->x, sizeof before);
+            moved = unroll(model, &rest, b, before, data->x, relax(model, &rest, data, given));
             balance_rotation(model, &rest, b, given);
         }
         if (moved * (MOBILITY / mobility) <= AT_REST) {
             spread(&rest, data);
+            memcpy(data->still, data->x, sizeof data->still);
             return GK_OK;
         }
         if (!gk_finite(moved)) break;

@@ -2,10 +2,14 @@
  * Until `correct` nothing of gk_data changes but its expression for another h, so a step that fails can be repeated with another h or scheme. */
 #include "gk_core.h"
 
+static const double PAYABLE = 1e-4; /* of the energy of the massless part: what a contact that only grazes cannot repay waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
-/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays. At rest κ = 0. */
+/* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
+static double speed_lead(double h, double gamma) { return h * h * (2.0 * gamma - 1.0) / 12.0; }
+
+/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the speed of free masses. At rest κ = 0. */
 static void express(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
 {
     if (data->state_h == k->h && data->state_gamma == k->gamma) return;
@@ -16,6 +20,8 @@ static void express(const gk_setup *setup, gk_data *data, const gk_coefficients 
         for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
         q += 3 * n;
     }
+    const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma) : 0.0;
+    for (int d = 0; d < RIGID; d++) data->v[d] += lead * setup->inverse_mass[d] * data->f_rate[d];
     for (int d = 0; d < RIGID; d++) data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_mass[d] * data->f[d];
     data->state_h = k->h;
     data->state_gamma = k->gamma;
@@ -31,8 +37,8 @@ static void predict(const gk_setup *setup, const gk_data *data, const gk_coeffic
         const gk_real *v = q + n, *f = v + n;
         const gk_flow *w = &k->flow[g];
         for (int i = 0; i < n; i++) {
-            work->qp[g][i] = w->a11[i] * q[i] + w->a12[i] * v[i] + w->b0q[i] * f[i];
-            work->vp[g][i] = w->a21[i] * q[i] + w->a22[i] * v[i] + w->b0v[i] * f[i];
+            work->qp[g][i] = q[i] + (w->d11[i] * q[i] + w->a12[i] * v[i] + w->b0q[i] * f[i]);
+            work->vp[g][i] = v[i] + (w->a21[i] * q[i] + w->d22[i] * v[i] + w->b0v[i] * f[i]);
         }
         work->y[g] = work->qp[g];
         if (k->curved_read) {
@@ -112,6 +118,8 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         given |= s->clip[i] != 2 && s->dash0[i] != 0.0;
     }
     if (given) gk_solve_settle(s);
+    s->owed = data->ledger.owed;
+    s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
 static int all_finite(const gk_system *s)
@@ -185,6 +193,7 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
         const double before = data->x[d];
         data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
         data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_mass[d] * z;
+        data->f_rate[d] = (force - data->f[d]) / k->h;
         data->f[d] = force;
         work->moved[d] = data->x[d] - before;
     }
@@ -257,14 +266,15 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;
     GK_LAP(work, PHASE_PREDICT);
-    work->places = gk_flank_find(model, setup, work->frame, data->reach, work->place);
+    const double *where = setup->on.roll_motion ? work->frame : data->still;
+    work->places = setup->on.roll_motion ? gk_flank_find(model, setup, where, data->reach, work->place) : gk_still_find(model, setup, where, work->frame, work->place);
     if (work->places < 0) return work->places = 0, GK_DIVERGED;
     for (int p = 0; p < work->places; p++) {
         work->place[p].memory = remembered(data, work->place[p].key);
         if (work->place[p].gap < -model->overlap_max) return GK_PENETRATION;
     }
     GK_LAP(work, PHASE_FIND);
-    gk_rows_form(model, setup, work->frame, work);
+    gk_rows_form(model, setup, where, work);
     GK_LAP(work, PHASE_ROWS);
     gk_system_form(model, setup, data, k, work);
     gk_step_recall(setup, data, s);
@@ -278,6 +288,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     account(setup, data);
     gk_step_remember(setup, data);
     data->rounds += s->rounds;
+    data->ledger.owed = s->owed;
     data->steps++;
     if (s->limit_reached) data->trouble++, data->status |= 4;
     GK_LAP(work, PHASE_REMEMBER);

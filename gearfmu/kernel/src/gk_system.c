@@ -13,23 +13,24 @@ static void gather(const gk_setup *setup, const gk_work *work, int g, const gk_r
 static int row_of(const gk_system *s, int g, int i) { return i < s->contacts ? i : s->bore[g][i - s->contacts]; }
 
 /* B diag(mobility) Bᵀ and −B diag(κ) Bᵀ, added to the upper triangles of D and A: for a step that has no table */
-static void gram(const gk_setup *setup, gk_work *work, int g, const gk_flow *flow, double *D, double *A)
+static void gram(const gk_setup *setup, gk_work *work, int g, const gk_coefficients *k, double *D, double *A)
 {
     const gk_system *s = &work->system;
     const int n = setup->modal[g].n, P = setup->modal[g].pairs, rows = s->contacts + BORE_ROWS;
+    const gk_flow *flow = &k->flow[g];
     gk_real *moves = work->scaled, *yields = moves + n;
-    if (!n) return;
+    if (!n || (k->timeless && !flow->exact)) return;
     for (int i = 0; i < rows; i++) {
         const gk_real *b = work->basis[g] + (size_t)i * n;
         const int row = row_of(s, g, i);
         if (row < 0) continue;
-        for (int k = 0; k < n; k++) moves[k] = b[k] * flow->mobility[k], yields[k] = b[k] * flow->kappa[k];
+        for (int l = 0; l < n; l++) moves[l] = b[l] * flow->mobility[l], yields[l] = b[l] * flow->kappa[l];
         for (int j = i; j < rows; j++) {
             const gk_real *other = work->basis[g] + (size_t)j * n;
             const int column = row_of(s, g, j);
             if (column < 0) continue;
             const double sign = (i < s->contacts) == (j < s->contacts) ? 1.0 : -1.0;
-            D[row * s->stride + column] += sign * gk_dot(moves, other, n);
+            if (!k->timeless) D[row * s->stride + column] += sign * gk_dot(moves, other, n);
             if (flow->exact) A[row * s->stride + column] -= sign * (gk_dot(yields, other, flow->exact) + gk_dot(yields + P, other + P, flow->exact));
         }
     }
@@ -93,17 +94,17 @@ static void elastic(const gk_system *s, double (*const read)[MAX_BASIS], double 
 }
 
 /* what a link reads of rigid coordinates x, and its derivatives as row i */
-static double link_reading(const gk_model *model, const gk_work *work, int link, const double *x, double (*rigid)[MAX_STRIDE], int i)
+static double link_reading(const gk_model *model, const gk_setup *setup, const gk_work *work, int link, const double *x, double (*rigid)[MAX_STRIDE], int i)
 {
     const int g = link <= BEARING_1Y ? link / 2 : (link - PORT_0) % 2, phi = g ? PHIB : PHIA, outer = INERTIA_0 + g, disc = DISC_0 + g;
     switch (link) {
     case BEARING_0X: case BEARING_1X:
         rigid[3 * g][i] = 1.0;
-        rigid[phi][i] = -work->read[g][work->system.contacts + BORE_Y]; /* the elastic bore displacement turns with the frame */
+        if (setup->on.roll_motion) rigid[phi][i] = -work->read[g][work->system.contacts + BORE_Y]; /* the elastic bore displacement turns with the frame */
         return x[3 * g];
     case BEARING_0Y: case BEARING_1Y:
         rigid[3 * g + 1][i] = 1.0;
-        rigid[phi][i] = work->read[g][work->system.contacts + BORE_X];
+        if (setup->on.roll_motion) rigid[phi][i] = work->read[g][work->system.contacts + BORE_X];
         return x[3 * g + 1];
     case PORT_0: case PORT_1:
         rigid[model->port[g].chain ? outer : phi][i] = 1.0;
@@ -118,7 +119,7 @@ static double link_reading(const gk_model *model, const gk_work *work, int link,
 }
 
 /* gaps at the predicted frames: undeformed gap minus outward elastic displacement; springs measure relative to their outer ends; clutches read half a step of slip */
-static void gaps(const gk_model *model, double h, gk_work *work)
+static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work *work)
 {
     gk_system *s = &work->system;
     for (int d = 0; d < RIGID; d++) memset(s->rigid[d], 0, (size_t)s->stride * sizeof(double));
@@ -130,8 +131,8 @@ static void gaps(const gk_model *model, double h, gk_work *work)
     }
     for (int i = s->contacts; i < s->n; i++) {
         const int port = s->link_of[i] - PORT_0;
-        if (s->kind[i] == ROW_CLUTCH) s->g[i] += 0.5 * h * link_reading(model, work, s->link_of[i], work->speed, s->rigid, i);
-        else s->g[i] += link_reading(model, work, s->link_of[i], work->frame, s->rigid, i);
+        if (s->kind[i] == ROW_CLUTCH) s->g[i] += 0.5 * h * link_reading(model, setup, work, s->link_of[i], work->speed, s->rigid, i);
+        else s->g[i] += link_reading(model, setup, work, s->link_of[i], work->frame, s->rigid, i);
         if (s->kind[i] == ROW_SPRING && port >= 0 && port < 2) s->g[i] -= work->outer[port];
     }
 }
@@ -217,10 +218,10 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
         double *const both[2] = {s->D, s->A}, *const residual[2] = {s->Q, NULL};
         gather(setup, work, g, work->y[g], work->read[g]);
         if (tables) gk_table_add(model, setup, g, &work->table[g], both);
-        else gram(setup, work, g, &k->flow[g], s->D, s->A);
+        else gram(setup, work, g, k, s->D, s->A);
         if (setup->on.residual) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
     }
-    gaps(model, k->h, work);
+    gaps(model, setup, k->h, work);
     mirror(s);
     add_rigid(setup, k, s);
     take_paths(model, setup, work);

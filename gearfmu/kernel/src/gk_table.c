@@ -218,7 +218,7 @@ void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_
     const gk_system *s = &work->system;
     const gk_gear *gear = &model->gear[g];
     const int strips = setup->strips, stride = s->stride, *row = s->bore[g];
-    const double attitude = work->frame[g ? PHIB : PHIA] + gear->phase;
+    const double attitude = work->attitude[g];
     for (int p = 0; p < work->places; p++) {
         const gk_place *place = &work->place[p];
         for (int q = p; q < work->places; q++) {

@@ -16,6 +16,7 @@
 #pragma GCC push_options
 #pragma GCC target("avx2")
 #endif
+#define GK_WIDE /* only what a step runs through */
 #define gk_flow_for gk_flow_for_avx2
 #define gk_flank_find gk_flank_find_avx2
 #define gk_rows_form gk_rows_form_avx2
@@ -44,6 +45,10 @@
 #define gk_step_remember gk_step_remember_avx2
 #define gk_step_scatter gk_step_scatter_avx2
 #define gk_step_energy gk_step_energy_avx2
+#define gk_rk45_evaluate gk_rk45_evaluate_avx2
+#define gk_rk45_angles gk_rk45_angles_avx2
+#define gk_rk45_advance gk_rk45_advance_avx2
+#define gk_central_step gk_central_step_avx2
 #include "gk_law.c"
 #include "gk_flow.c"
 #include "gk_flank.c"
@@ -54,14 +59,17 @@
 #include "gk_solve.c"
 #include "gk_balance.c"
 #include "gk_step.c"
+#include "gk_rk45.c"
+#include "gk_central.c"
 #undef gk_step_once
+#undef gk_central_step
 #if defined(__clang__)
 #pragma clang attribute pop
 #else
 #pragma GCC pop_options
 #endif
 
-gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
+gk_step_function gk_step_once, gk_central_step;
 
 /* AVX2 in the processor, and its registers kept by the system over a task switch */
 static int has_avx2(void)
@@ -72,13 +80,17 @@ static int has_avx2(void)
     return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & (1u << 5));
 }
 
-/* gk_step_once in the widest vectors of this processor; widest = 0: the baseline */
-gk_step_function *gk_wide_step(int widest) { return widest > 0 && has_avx2() ? gk_step_once_avx2 : gk_step_once; }
+/* the step of an integrator in the widest vectors of this processor; widest = 0: the baseline */
+gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
+{
+    if (widest > 0 && has_avx2()) return integrator == CENTRAL ? gk_central_step_avx2 : gk_step_once_avx2;
+    return integrator == CENTRAL ? gk_central_step : gk_step_once;
+}
 #else
 #include "gk_core.h"
-gk_step_function *gk_wide_step(int widest)
+gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
 {
     (void)widest;
-    return gk_step_once;
+    return integrator == CENTRAL ? gk_central_step : gk_step_once;
 }
 #endif

@@ -1,0 +1,67 @@
+"""Light-load rattle of a pair between springs: the pinion's shaft end swings while it turns, the teeth part for a good
+part of the time. Statistics of such a run, which repeat where the motion itself is chaotic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.stage import StageModel, Steady, Trace, simulate
+
+STEP = 60e-6  # s, communication step
+SETTLE = 0.05  # s
+
+
+@dataclass(frozen=True)
+class LightRattle:
+    """speed of the pinion, rad/s; torque: mean, N·m; swing: amplitude of the pinion's shaft end, rad; frequency, Hz;
+    phase of the swing at the start, rad: another phase is another start."""
+
+    speed: float = 2000 * math.pi / 30
+    torque: float = 8.0
+    swing: float = 2.7e-3
+    frequency: float = 127.0
+    phase: float = 0.0
+
+    def inputs(self, model: StageModel) -> Steady:
+        """Steady drive plus the swing, with speed and acceleration."""
+        return _Swinging(model, self.speed, self.torque, self)
+
+
+class _Swinging(Steady):
+    def __init__(self, model: StageModel, speed: float, torque: float, swing: LightRattle):
+        super().__init__(model, speed, torque)
+        object.__setattr__(self, "swing", swing)
+
+    def __call__(self, time: float) -> Mapping[str, float]:
+        values, s = dict(super().__call__(time)), self.swing
+        pinion, omega = self.model.spec.gears[0].name, 2 * math.pi * s.frequency
+        angle = omega * time + s.phase
+        values[f"{pinion}.phi"] += s.swing * math.sin(angle)
+        values[f"{pinion}.w"] += s.swing * omega * math.cos(angle)
+        values[f"{pinion}.a"] = -s.swing * omega**2 * math.sin(angle)
+        return values
+
+
+def run(model: StageModel, scene: LightRattle, duration: float, parameters: Mapping[str, float]) -> Trace:
+    """The scene for SETTLE + duration (s)."""
+    return simulate(model, scene.inputs(model), SETTLE + duration, STEP, parameters)
+
+
+def statistics(trace: Trace) -> dict[str, float]:
+    """After settling: open_share of the time, rms of the mesh force (means over STEP, N), std of the transmission error
+    (m), impulse a second (mean of the force's magnitude, N), share of the time on the coast flanks, impacts a second."""
+    settled = trace.time > SETTLE
+    seconds = trace.time[-1] - SETTLE
+    force, before = trace["mesh.force_mean"][settled], np.flatnonzero(~settled)[-1]
+    return {
+        "open_share": float(trace["mesh.open_time"][-1] - trace["mesh.open_time"][before]) / seconds,
+        "force_rms": float(np.sqrt(np.mean(force**2))),
+        "te_std": float(np.std(trace["mesh.te"][settled])),
+        "impulse": float(np.mean(np.abs(force))),
+        "coast_share": float(np.mean(force < -1.0)),
+        "impacts": float(trace["mesh.impacts"][-1] - trace["mesh.impacts"][before]) / seconds,
+    }

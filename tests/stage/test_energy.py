@@ -1,0 +1,151 @@
+"""Energy of the time step on the shipped bodies: with the mesh position frozen the invariant holds exactly, with damping
+it never grows, controls are seen to fail (benchmarks/energy.py: the whole table, 20 starts); order in closed contact;
+the balance of a loaded damped run closes; central is the same physics."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu.body import ReducedBody
+from gearfmu.scenes.light_rattle import run, statistics
+from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
+from gearfmu.spec.stage import StageSpec
+from gearfmu.stage import StageModel, Steady, simulate
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+import energy  # noqa: E402  (found through the line above)
+import light_rattle  # noqa: E402
+from kernel_variants import WITHOUT_ETA, double_states, variant  # noqa: E402
+
+FAST = 1
+LOAD = 302.0
+DG4, MIX4, EM, RK45, CENTRAL = range(5)
+SHORT = {"starts": 1, "duration": 0.01, "level": "fast"}
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path | None]:
+    folder = tmp_path_factory.mktemp("kernels")
+    return {"shipped": None, "double": double_states(folder), "no eta": variant(folder, "no_eta", WITHOUT_ETA)}
+
+
+@pytest.fixture(scope="module")
+def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+    return free_pair(relief_spec, bodies)
+
+
+@pytest.mark.parametrize("build", ["double", "shipped"])
+@pytest.mark.parametrize("name", [name for name, case in energy.CASES.items() if "double" in case.builds])
+def test_invariant_holds_and_damping_never_adds(
+    pair_free: StageModel, libraries: dict[str, Path | None], name: str, build: str
+) -> None:
+    """Cases T1 to T6 and T9, both laws, one start, another number of slices and another step each; the whole table is
+    `python benchmarks/energy.py`."""
+    case = energy.CASES[name]
+    if build not in case.builds:
+        pytest.skip("a case of the double build only")
+    for law in case.laws:
+        slices, h = case.slices[law % len(case.slices)], case.steps[law]
+        line = energy.row(pair_free, name, case, (build, law, slices, h), {**SHORT, "libraries": libraries})
+        print(f"{name}, {build}: drift {line['drift']:.1e} ≤ {line['limit']:.0e}, growth {line['growth']:.1e}")
+        assert energy.keeps(case, line)
+
+
+@pytest.mark.parametrize("slices", [1, 5, 10])
+def test_free_rattle_of_50_ms(
+    pair_free: StageModel, libraries: dict[str, Path | None], slices: int
+) -> None:
+    case = energy.CASES["free rattle"]
+    run = {**SHORT, "duration": 0.05, "libraries": libraries}
+    for build in ("double", "shipped"):
+        line = energy.row(pair_free, "free rattle", case, (build, 1, slices, 7.5e-6), run)
+        assert energy.keeps(case, line) and line["changes"] >= 20
+
+
+@pytest.mark.parametrize("name", [name for name, case in energy.CONTROLS.items() if case.builds != ("wrong",)])
+def test_controls_are_seen_to_fail(pair_free: StageModel, libraries: dict[str, Path | None], name: str) -> None:
+    case = energy.CONTROLS[name]
+    (build,) = case.builds
+    line = energy.row(pair_free, name, case, (build, 0, 5, 10e-6), {**SHORT, "duration": 0.02, "libraries": libraries})
+    assert line["drift"] > case.at_least
+
+
+@pytest.mark.full
+def test_the_whole_table_of_the_fast_level(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(sys, "argv", ["energy.py", "--starts", "5", "--out", str(tmp_path / "energy.csv")])
+    assert energy.main() == 0
+
+
+def speeds(model: StageModel, library: Path | None, h: float, integrator: int) -> np.ndarray:
+    """Speeds of both gears every 3.2 µs of 0.16 ms; loaded, linear law, no contact opens, place frozen."""
+    parameters = {"level": FAST, "h": h, "slices": 1, "effect.hertz": 0.0, "integrator": integrator}
+    kernel = started(model, Rattle(position=0.8, load=LOAD, speed=0.05), parameters, library)
+    inner, samples = round(3.2e-6 / h), []
+    for i in range(50):
+        for j in range(inner):
+            kernel.step((i * inner + j) * h, h)
+        samples.append([kernel.get(f"{shaft}.gear.w") for shaft in ("pinion", "wheel")])
+    assert kernel.get("mesh.pairs") > 0
+    return np.array(samples)
+
+
+@pytest.mark.parametrize("integrator, order", [(DG4, 4), (MIX4, 4), (EM, 2), (CENTRAL, 2)])
+def test_order_in_closed_contact(
+    pair_free: StageModel, libraries: dict[str, Path | None], integrator: int, order: int
+) -> None:
+    """T10: all modes below 50 kHz are exponential at these steps, the stiffness is constant."""
+    double = libraries["double"]
+    reference = speeds(pair_free, double, 0.1e-6, DG4)
+    errors = [
+        np.sqrt(np.mean((speeds(pair_free, double, h, integrator) - reference) ** 2)) for h in (1.6e-6, 0.8e-6, 0.4e-6)
+    ]
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    print(f"errors {errors} rad/s, orders {rates}")
+    assert rates[-1] == pytest.approx(order, abs=0.3)
+
+
+def test_balance_of_a_loaded_damped_run(relieved: StageModel) -> None:
+    """What is left of stored energy, port work and losses is below 1e-4 of the work: of the net work of the ports, which
+    is what goes into losses, and far below that of the energy that passes through."""
+    speed = 2000 * np.pi / 30
+    trace = simulate(relieved, Steady(relieved, speed, LOAD), 0.06, 60e-6, {"level": FAST})
+    stored, work, lost, left = (trace[f"energy.{name}"][1:] for name in ("stored", "work", "dissipated", "residual"))
+    through = float(np.trapezoid(np.abs(trace["pinion.tau"] * trace["pinion.gear.w"]), trace.time))
+    print(f"through {through:.1f} J, net work {work[-1]:.4f} J, lost {lost[-1]:.4f} J, left {np.ptp(left):.2e} J")
+    assert np.ptp(left) < 1e-4 * through
+    assert np.ptp(stored - work + lost - left) < 1e-9 * stored.max()
+
+
+def test_central_is_the_same_physics_and_drifts(pair_free: StageModel, relieved: StageModel) -> None:
+    """Loaded run against dg4, both at 0.94 µs; undamped rattle at 2 µs keeps its energy to a percent, not exactly."""
+    inputs = Steady(relieved, 2000 * np.pi / 30, LOAD)
+    runs = [
+        simulate(relieved, inputs, 0.01, 60e-6, {"level": FAST, "h": 60e-6 / 64, "integrator": scheme})
+        for scheme in (DG4, CENTRAL)
+    ]
+    te, reference = (run["mesh.te"][80:] for run in reversed(runs))
+    assert np.std(te - reference) < 0.02 * np.std(reference) and runs[1].meta["outcome"] == "completed"
+    rattle = started(pair_free, Rattle(position=0.3), {"level": FAST, "h": 2e-6, "integrator": CENTRAL})
+    assert 1e-6 < energies(rattle, 2e-6, 0.02).drift < 0.03
+
+
+@pytest.mark.parametrize("name", light_rattle.SCENES)
+def test_light_load_rattle_has_the_statistics_of_the_converged_run(relieved: StageModel, name: str) -> None:
+    """Some 40 % of the time open; one start, 0.1 s (all: `python benchmarks/light_rattle.py`)."""
+    scene = light_rattle.start(light_rattle.SCENES[name], 1)
+    found, wanted = (
+        statistics(run(relieved, scene, 0.1, {"level": FAST, "h": h})) for h in (7.5e-6, light_rattle.CONVERGED)
+    )
+    line = light_rattle.line(name, 1, 7.5e-6, found, wanted)
+    assert 0.35 < wanted["open_share"] < 0.45 and not light_rattle.missed(line)
+
+
+@pytest.mark.full
+def test_light_load_rattle_from_four_starts(relieved: StageModel) -> None:
+    lines = light_rattle.table(relieved, 0.3, FAST)
+    assert not [light_rattle.missed(line) for line in lines if line["start"] == -1 and light_rattle.missed(line)]
