@@ -137,7 +137,7 @@ class Reference:
         self.w = problem.rows * self.scale
         self.d = (self.w * self.bq) @ self.w.T
         self.c = problem.compliance - (self.w * self.kappa) @ self.w.T
-        self.a = self.c - problem.path
+        self.a, self.q = self.c - problem.path, problem.compliance - problem.path
         self.rounds = self.changes = self.failures = 0
 
     def mu(self) -> float:
@@ -168,14 +168,14 @@ class Reference:
         force, eta, dash, late = self._forces(gap, state)
         y = y + self.bq * (self.w.T @ (force + eta))
         v = v + self.bv * (self.w.T @ (force + eta))
-        reached = gap + self.d @ (force + eta) + self.c @ force + self.a @ late
+        reached = gap + self.d @ (force + eta) + self.c @ force + self._lag(dash, late)
         return State(y, v, outer + self.w.T @ force, force, reached, eta, dash, late)
 
     def energy(self, state: State) -> float:
         """The invariant of the undamped step without external work: ½v² + ½ω²y² + ½λᵀC′λ, J, and what the dashpots'
         force holds in the compliance outside their paths."""
         modal = 0.5 * state.v @ state.v + 0.5 * (self.problem.omega * state.y) @ (self.problem.omega * state.y)
-        held = state.late @ self.a @ (state.force + 0.5 * state.late)
+        held = self._lag(state.dash, state.late) @ (state.force + 0.5 * state.late)
         return float(modal + 0.5 * state.force @ self.c @ state.force + held)
 
     def displacement(self, state: State) -> np.ndarray:
@@ -203,8 +203,8 @@ class Reference:
         self.changes += changed
         eta = none
         if changed and s.energy:
-            late = self.d + self.a * _beta(state)
-            step = Step(gap - late @ lag @ state.force + self.a @ early, before, state.force, self.d + late @ lag)
+            late = self._late(state)
+            step = Step(gap - late @ lag @ state.force + self.q @ early, before, state.force, self.d + late @ lag)
             force, eta = self._conserve(step, force, active, was)
         elif not changed and s.epsilon:
             force, active = self._closed(gap, state, lag, early, was, 2 * s.epsilon)
@@ -212,11 +212,19 @@ class Reference:
         dash = lag @ (force - state.force)
         return force, eta + dash, dash, _beta(state) * dash + early
 
+    def _lag(self, dash: np.ndarray, late: np.ndarray) -> np.ndarray:
+        """What the dashpots' force deflects outside their paths: Q late − ½K dash, K = Q − A."""
+        return self.q @ (late - 0.5 * dash) + self.a @ (0.5 * dash)
+
+    def _late(self, state: State) -> np.ndarray:
+        """(m, m): what η_d does to the gaps."""
+        return self.d + 0.5 * self.a + self.q * (_beta(state) - 0.5)
+
     def _closed(self, gap: np.ndarray, state: State, lag: np.ndarray, early: np.ndarray,
                 start: np.ndarray, slow: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """λ₁ and active set for η = (lag + slow)(λ₁ − λ₀); what is outside the paths carries β lag Δλ + early too."""
-        lagged = (self.d + self.a * _beta(state)) @ lag + slow * self.d
-        shifted = gap - lagged @ state.force + self.a @ early
+        lagged = self._late(state) @ lag + slow * self.d
+        shifted = gap - lagged @ state.force + self.q @ early
         return solve_lcp(self.d + lagged + self.c, shifted, self.problem.bilateral, start)
 
     def _with_dashpot(self, gap: np.ndarray, state: State, was: np.ndarray) -> tuple:

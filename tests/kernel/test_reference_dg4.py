@@ -114,7 +114,7 @@ def test_damping_never_adds_energy(damping: str, load: float) -> None:
     assert reference.changes >= 10 and reference.failures == 0
     growth = np.maximum(np.diff(totals), 0.0)
     # a dashpot's force at the end of a step is extrapolated: its energy balances to second order (theory, 3.4)
-    assert growth.max() <= (2e-6 if "dashpot" in on else 1e-9) * kinetic
+    assert growth.max() <= (5e-6 if "dashpot" in on else 1e-9) * kinetic
     assert totals[0] - totals[-1] > 0.01 * kinetic  # and it does dissipate
     assert growth.sum() <= 1e-3 * (totals[0] - totals[-1])
 

@@ -88,7 +88,17 @@ def test_integrators_agree_at_small_steps(relieved: StageModel, fine: dict[int, 
         trace = run(relieved, 0.03, integrator=scheme, h=H / 64)
         te, force = error(trace, fine[FAST], "mesh.te"), error(trace, fine[FAST], "mesh.force")
         print(f"{name}: te {te:.2%}, force {force:.2%} of the alternating part")
-        assert te < 5e-3 and force < 2e-2
+        # rk45 reads the closing speed from the coordinates, the steps from the path's deflection: they differ by what the
+        # rows' own motion along the flank adds (decisions.md)
+        assert te < 5e-3 and force < (5e-2 if scheme == RK45 else 2e-2)
+
+
+def test_rk45_without_contact_dashpots_is_the_same_model(relieved: StageModel) -> None:
+    off = {"effect.contact_damping": 0.0}
+    step, paper_way = (run(relieved, 0.01, integrator=scheme, h=H / 64, **off) for scheme in (DG4, RK45))
+    te = error(paper_way, step, "mesh.te")
+    print(f"te {te:.3%}")
+    assert te < 1e-3
 
 
 @pytest.mark.parametrize("level", [RIGID, FAST])

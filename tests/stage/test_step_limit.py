@@ -65,12 +65,12 @@ def test_both_sides_of_the_limit(library: Path, relieved: StageModel, level: str
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_default_step_is_the_largest_up_to_which_the_limit_holds(
+def test_default_step_is_the_largest_that_meets_the_limit(
     library: Path, relieved: StageModel, level: str
 ) -> None:
     probe = Inner(library, relieved.blob, {"level": LEVELS[level]})
     good = np.array([probe.mu(h) <= MU for h in LADDER])
-    wanted = LADDER[-1] if good.all() else LADDER[np.argmin(good) - 1]
+    wanted = LADDER[np.flatnonzero(good)[-1]]
     kernel, calm = relieved.kernel(level=LEVELS[level]), Steady(relieved, 0.0, LOAD)(0.0)
     for name, value in calm.items():
         kernel.set(name, value)

@@ -334,6 +334,7 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
 /* gk_step.c */
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
+int gk_step_remembered(const gk_data *data, gk_key key);
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s);
 void gk_step_remember(const gk_setup *setup, gk_data *data);
 void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double *y, gk_real *out_x, gk_real *out_y);

@@ -18,6 +18,7 @@ static const double ERROR[STAGES] = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920
 static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate)
 {
     double y[MAX_STRIDE], path[MAX_ROWS];
+    gk_tangent_factorise(s); /* at the λ found */
     for (int i = 0; i < s->stride; i++) y[i] = i < s->n && s->active[i] ? -rate[i] : 0.0;
     gk_tangent_solve(s, y);
     for (int pass = 0; pass < 2; pass++) { /* y ← c S y, then S y */
@@ -53,7 +54,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data
     const double *where = setup->on.roll_motion ? work->frame : data->still;
     work->places = setup->on.roll_motion ? gk_flank_find(model, setup, where, gk_max(data->reach, 50e-6), work->place) : gk_still_find(model, setup, where, work->frame, work->place);
     if (work->places < 0) return work->places = 0, 0;
-    for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
+    for (int p = 0; p < work->places; p++) work->place[p].memory = gk_step_remembered(data, work->place[p].key);
     gk_rows_form(model, setup, where, work);
     gk_system_form(model, setup, data, k, work);
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;

@@ -63,7 +63,8 @@ static int passable(const gk_model *model, const gk_data *data, const gk_work *w
     return 1;
 }
 
-static int remembered(const gk_data *data, gk_key key)
+/* entry of the memory that a tooth pair has, −1: none */
+int gk_step_remembered(const gk_data *data, gk_key key)
 {
     for (int i = 0; i < data->pairs; i++)
         if (data->memory[i].key.flank == key.flank && data->memory[i].key.tooth == key.tooth) return i;
@@ -208,21 +209,19 @@ static void account(const gk_setup *setup, gk_data *data)
     for (int i = 0; i < s->n; i++) {
         const int link = s->link_of[i], port = link - PORT_0, clutch = link - CLUTCH_0;
         const double mean = 0.5 * (s->force0[i] + s->z[i]);
-        switch (s->kind[i]) {
-        case ROW_CLUTCH:
+        if (s->kind[i] == ROW_CLUTCH) {
             taken -= mean * (work->moved[INERTIA_0 + clutch] - work->moved[DISC_0 + clutch]);
             data->locked[clutch] = s->active[i];
-            break;
-        case ROW_TORQUE: {
+            continue;
+        }
+        taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->dash[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
+        held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
+        if (s->kind[i] == ROW_TORQUE) {
             const double angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
             data->ledger.work += mean * (angle - data->angle[port]);
             data->angle[port] = angle;
-            break;
-        }
-        default:
-            taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->dash[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
-            held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
-            if (link == PORT_0 || link == PORT_1) data->ledger.work += mean * (work->outer[port] - work->outer_before[port]);
+        } else if (link == PORT_0 || link == PORT_1) {
+            data->ledger.work += mean * (work->outer[port] - work->outer_before[port]);
         }
     }
     data->ledger.dissipated += taken - (held - s->held0);
@@ -270,7 +269,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     work->places = setup->on.roll_motion ? gk_flank_find(model, setup, where, data->reach, work->place) : gk_still_find(model, setup, where, work->frame, work->place);
     if (work->places < 0) return work->places = 0, GK_DIVERGED;
     for (int p = 0; p < work->places; p++) {
-        work->place[p].memory = remembered(data, work->place[p].key);
+        work->place[p].memory = gk_step_remembered(data, work->place[p].key);
         if (work->place[p].gap < -model->overlap_max) return GK_PENETRATION;
     }
     GK_LAP(work, PHASE_FIND);

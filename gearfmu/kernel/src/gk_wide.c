@@ -42,6 +42,7 @@
 #define gk_balance_solve gk_balance_solve_avx2
 #define gk_step_once gk_step_once_avx2
 #define gk_step_recall gk_step_recall_avx2
+#define gk_step_remembered gk_step_remembered_avx2
 #define gk_step_remember gk_step_remember_avx2
 #define gk_step_scatter gk_step_scatter_avx2
 #define gk_step_energy gk_step_energy_avx2
