@@ -115,7 +115,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data,
     v[V_M_STEPS] = (double)data->steps;
     v[V_M_ROUNDS] = (double)data->rounds;
     v[V_M_TROUBLE] = (double)data->trouble;
-    v[V_M_STATUS] = data->status | (h > 0.0 && setup->integrator == DG4 && gk_limit_gamma(setup, h) < 1.0 ? 8 : 0);
+    v[V_M_STATUS] = data->status | (h > 0.0 && setup->integrator == DG4 && gk_limit_gamma(setup, data, h) < 1.0 ? 8 : 0);
     v[V_M_STEP_USED] = h;
     v[V_M_NDYN] = setup->modal[0].count + setup->modal[1].count;
 }
@@ -125,7 +125,7 @@ static int is_explicit(const gk_setup *setup) { return setup->integrator == RK45
 /* stored energy and what the balance does not close; 0 when that is more than the model can mean; a new h is a new invariant: the balance goes on from there */
 static int balance(const gk_setup *setup, gk_data *data, double h)
 {
-    const gk_coefficients *k = is_explicit(setup) ? &setup->work->explicit_rows : gk_flow_for(setup, h, gk_limit_gamma(setup, h));
+    const gk_coefficients *k = is_explicit(setup) ? &setup->work->explicit_rows : gk_flow_for(setup, h, gk_limit_gamma(setup, data, h));
     double *v = data->value, stored = gk_step_energy(setup, data, k);
     if (is_explicit(setup)) { /* keeps no account of works: no balance */
         v[V_M_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(setup, data, h) : stored;
@@ -229,7 +229,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_data 
     gk_work *work = setup->work;
     const double before[2] = {work->outer[0], work->outer[1]};
     ports_at(data, work, c, model, tau, h);
-    gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : setup->step(model, setup, data, h, gk_limit_gamma(setup, h));
+    gk_outcome outcome = setup->integrator == RK45 ? gk_rk45_advance(model, setup, data, h) : setup->step(model, setup, data, h, gk_limit_gamma(setup, data, h));
     if (outcome == GK_OK || is_explicit(setup)) return outcome;
     data->trouble++;
     work->outer[0] = before[0], work->outer[1] = before[1];
@@ -308,6 +308,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, 
     }
     tally t = {0, {0, 0}, {0, 0, 0, 0}, 0};
     if (!(data->table_h > 0.0)) data->table_h = h;
+    gk_limit_run(model, setup, data);
     for (int64_t i = 0; i < steps; i++) {
         if (i + 1 == steps)
             for (int g = 0; g < 2; g++) data->v_bore[g] = bore_speed(setup, data, g);

@@ -268,6 +268,7 @@ struct gk_work {
     double matrix[5 * MAX_STRIDE * MAX_STRIDE];   /* D, A, Q, J, L */
     gk_table table[2];                            /* of each gear: D and −K of one step */
     double table_h, table_gamma;                  /* which step; 0: none yet */
+    double run_h, run_gamma;                      /* γ of the internal step of the run */
 };
 
 typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
@@ -328,7 +329,8 @@ int gk_limit_cholesky(double *a, int n);
 void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C);
 void gk_limit_solve(const double *L, double *x, int n);
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma);
-double gk_limit_gamma(const gk_setup *setup, double h);
+double gk_limit_gamma(const gk_setup *setup, const gk_data *data, double h);
+void gk_limit_run(const gk_model *model, const gk_setup *setup, const gk_data *data);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE]);
 /* gk_wide.c */
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator);

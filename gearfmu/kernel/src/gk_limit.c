@@ -143,14 +143,24 @@ static double gamma_for(const gk_model *model, const gk_setup *setup, double h)
 
 static const double QUARTER_OCTAVE = 0.84089641525371454; /* 2^(−1/4) */
 
-/* γ of any h: the smaller of its neighbours on the scale, so a pure function of the setup and h */
-double gk_limit_gamma(const gk_setup *setup, double h)
+/* γ of any h: exact for the internal step of the run, else the smaller of its neighbours on the scale; a pure function of setup, state and h */
+double gk_limit_gamma(const gk_setup *setup, const gk_data *data, double h)
 {
     double at = setup->h;
     int i = 0;
     if (setup->integrator != DG4) return 0.0;
+    if (h == data->table_h && h == setup->work->run_h) return setup->work->run_gamma;
     while (i < GAMMAS - 1 && h < at * (1.0 - 1e-9)) at *= QUARTER_OCTAVE, i++;
     return i && h > at * (1.0 + 1e-9) ? gk_min(setup->gamma_at[i - 1], setup->gamma_at[i]) : setup->gamma_at[i];
+}
+
+/* γ of the internal step of the run */
+void gk_limit_run(const gk_model *model, const gk_setup *setup, const gk_data *data)
+{
+    gk_work *work = setup->work;
+    if (setup->integrator != DG4 || work->run_h == data->table_h) return;
+    work->run_gamma = data->table_h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, data->table_h);
+    work->run_h = data->table_h;
 }
 
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE])

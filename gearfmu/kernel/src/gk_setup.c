@@ -280,7 +280,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
         setup->state_size += 3 * (size_t)setup->modal[g].n * sizeof(gk_real);
     }
     gk_table_residual(model, setup);
-    work->table_h = work->table_gamma = 0.0;
+    work->table_h = work->table_gamma = work->run_h = work->run_gamma = 0.0;
     fill_links(model, setup);
     fill_timeless(setup);
     outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);

@@ -260,7 +260,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_system *s = &work->system;
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
     GK_MARK(work);
-    if (h == data->table_h && gamma == gk_limit_gamma(setup, h) && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
+    if (h == data->table_h && gamma == gk_limit_gamma(setup, data, h) && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
     express(setup, data, k);
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;
