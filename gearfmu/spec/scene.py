@@ -34,6 +34,7 @@ class Effects(Spec):
     tip_contact: Switch = True
     bearings: Switch = True
     modal_damping: Switch = True
+    roll_motion: Switch = True
 
     @property
     def off(self) -> tuple[str, ...]:

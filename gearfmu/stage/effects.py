@@ -189,6 +189,15 @@ EFFECTS: tuple[Effect, ...] = (
         off="ζ = 0 for every elastic mode",
         code="gk_flow.c (fill)",
     ),
+    _switched(
+        "roll_motion",
+        title="motion of the contact along the flanks",
+        formula="places, rows, stiffness, normals and curvatures at the rolls of the moment",
+        equation="3.3",
+        matters="always; a switch for conservation tests: what moves with the roll is work of the mesh, not of the scheme",
+        off="all of it stays that of the start, gaps are linear in the coordinates",
+        code="gk_still.c, gk_step.c (gk_step_once)",
+    ),
     Effect(
         name="pitch_errors",
         title="pitch errors",
