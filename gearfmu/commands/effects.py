@@ -16,7 +16,8 @@ with the numbers of a stage. What is off is not evaluated.
 Costs are instructions of one internal step (callgrind, which repeats exactly; `benchmarks/effects_cost.py`): *cost* is
 the part of a step that goes when the effect is off, negative where off costs more; *off* is what a step with the effect
 off takes more than one of a kernel compiled without its code. Pair with relief, 302 N·m at 2000 rpm, level fast, 5 slices,
-but: residual at level full with `em` against level paper, bodies and modes against rigid ones, pitch errors on one tooth.
+but: residual at level full with `em` against level paper, bodies and modes against rigid ones, tip corners at 80 N·m, pitch
+errors on one tooth.
 """
 
 
@@ -80,10 +81,12 @@ def _numbers(stage: str) -> dict[str, str]:
     """What a stage has of each effect, by its name."""
     from gearfmu.commands.models import model_of
     from gearfmu.geometry import PairGeometry
+    from gearfmu.stage.effects import torque_on_flanks_alone
 
     model = model_of(stage)
     spec, pair = model.spec, PairGeometry.of(model.spec)
     stored, modes = _modes(model)
+    alone = torque_on_flanks_alone(model)
     reliefs = [1e6 * gear.tip_relief.amount if gear.tip_relief else 0.0 for gear in spec.gears]
     misplaced = [1e6 * max(map(abs, gear.index_deviation.values()), default=0.0) for gear in spec.gears]
     return {
@@ -95,7 +98,8 @@ def _numbers(stage: str) -> dict[str, str]:
         "coast_flank": f"{1e6 * pair.normal_backlash:.1f} µm of backlash along the normal",
         "contact_damping": f"{spec.contact.damping:g} N·s/m per metre of face width",
         "tip_relief": " and ".join(f"{amount:g} µm" for amount in reliefs) + _idle(not any(reliefs)),
-        "tip_contact": " and ".join(f"{1e3 * g.tip_edge_radius:g} mm" for g in spec.gears) + " edge radius",
+        "tip_contact": " and ".join(f"{1e3 * g.tip_edge_radius:g} mm" for g in spec.gears) 
+        + f" edge radius; flanks carry alone up to {alone:.3g} N·m",
         "bearings": " and ".join(f"{g.bearing.stiffness:g} N/m" for g in spec.gears),
         "modal_damping": " and ".join(f"{g.modal_damping:g}" for g in spec.gears) + " of critical",
         "pitch_errors": "up to " + " and ".join(f"{a:g} µm" for a in misplaced) + _idle(not any(misplaced)),

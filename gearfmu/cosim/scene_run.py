@@ -88,7 +88,7 @@ def run_once(
         "integrator": choice.integrator,
         "slices": choice.slices,
         "h": choice.h,
-        **{f"effect.{name}": float(on) for name, on in choice.effects.items()},
+        **{f"effect.{name}": 0.0 for name in choice.effects.off},
         **stage_start(scene, shafts),
     }
     stage = source.unit(parameters)

@@ -36,7 +36,7 @@ def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
         "level": scene.stage.level,
         "integrator": scene.stage.integrator,
         "slices": scene.stage.slices,
-        "effects_off": sorted(name for name, on in scene.stage.effects.items() if not on),
+        "effects_off": list(scene.stage.effects.off),
         "H": scene.coupling.step,
         "master": scene.coupling.master,
         "settle": scene.settle,

@@ -17,19 +17,29 @@ from gearfmu.spec.drivetrain import PassengerCar, TestRig
 SHIPPED = Path(__file__).parent.parent / "scenes"
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
-Switch = Literal[
-    "elastic",
-    "residual",
-    "hertz",
-    "coast_flank",
-    "contact_damping",
-    "tip_relief",
-    "tip_contact",
-    "bearings",
-    "modal_damping",
-]
+Switch = Annotated[bool, Strict()]
 Seconds = Annotated[float, Quantity("s", at_least=0)]
 Capacity = Annotated[float, Quantity("N*m", at_least=0)]
+
+
+class Effects(Spec):
+    """Effects of the stage, all on unless switched off: docs/effects.md."""
+
+    elastic: Switch = True
+    residual: Switch = True
+    hertz: Switch = True
+    coast_flank: Switch = True
+    contact_damping: Switch = True
+    tip_relief: Switch = True
+    tip_contact: Switch = True
+    bearings: Switch = True
+    modal_damping: Switch = True
+    roll_motion: Switch = True
+
+    @property
+    def off(self) -> tuple[str, ...]:
+        """Names of those that are off."""
+        return tuple(name for name, on in self if not on)
 
 
 class StageChoice(Spec):
@@ -40,9 +50,7 @@ class StageChoice(Spec):
     integrator: Integrator = "dg4"
     slices: Annotated[Count, Field(ge=1, le=10)] = 5
     h: Seconds = 0.0
-    effects: dict[Switch, Annotated[bool, Strict()]] = Field(
-        default={}, description="effects switched off, e.g. tip_contact = false; all others are on"
-    )
+    effects: Effects = Effects()
 
 
 class CouplingChoice(Spec):
@@ -90,7 +98,7 @@ class SceneSpec(Spec):
     def hash(self) -> str:
         """SHA-256, hex, over all values in SI; the text of the file does not matter."""
         values = self.model_dump()
-        if not self.stage.effects:
+        if not self.stage.effects.off:
             del values["stage"]["effects"]
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 

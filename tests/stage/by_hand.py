@@ -75,36 +75,31 @@ class Pair:
     def te(self, position: float, torque: float, hertz: bool = True, elastic: np.ndarray | None = None) -> float:
         """Transmission error (m) of a position with one pair in contact. elastic: from `compliance`; None: rigid."""
         (rolls,) = self.rolls(position).values()
-        force = torque / self.geometry.gears[0].r_b
         if elastic is None:
-            return float(self.approach(rolls, np.array([force / self.width]), hertz)[0])
-        count = len(elastic)
+            load = torque / self.geometry.gears[0].r_b / self.width
+            return float(self.approach(rolls, np.array([load]), hertz)[0])
+        return self.spread(position, torque, elastic, hertz)[0]
+
+    def spread(
+        self, position: float, torque: float, elastic: np.ndarray, hertz: bool = True
+    ) -> tuple[float, np.ndarray]:
+        """te (m) and the share of every slice: all slices of the one pair close the same distance."""
+        (rolls,) = self.rolls(position).values()
+        force, count = torque / self.geometry.gears[0].r_b, len(elastic)
 
         def unbalanced(unknown: np.ndarray) -> np.ndarray:
             share = np.abs(unknown[1:])
             deflection = self.approach(rolls, share * force * count / self.width, hertz) + force * elastic @ share
-            return np.append(1e5 * (unknown[0] - deflection), share.sum() - 1)
+            return np.append(unknown[0] - 1e5 * deflection, share.sum() - 1)
 
-        start = np.append(1e-5, np.full(count, 1 / count))
-        found = root(unbalanced, start, tol=1e-12)
-        assert found.success
-        return float(found.x[0])
+        found = root(unbalanced, np.append(1.0, np.full(count, 1 / count)))
+        assert np.abs(unbalanced(found.x)).max() < 1e-9
+        return 1e-5 * float(found.x[0]), found.x[1:]
 
-    def shared(self, all_rolls: Sequence[tuple[float, float]], gaps: Sequence[float], torque: float) -> float:
-        """te (m) of rigid gears whose pairs have these gaps at te = 0, by the load-dependent law."""
-        force = torque / self.geometry.gears[0].r_b
-
-        def missing(te: float) -> float:
-            carried = (self._force(rolls, te - gap) for rolls, gap in zip(all_rolls, gaps, strict=True))
-            return sum(carried) - force
-
-        return brentq(missing, 0.0, 1e-4, xtol=1e-12)
-
-    def _force(self, rolls: tuple[float, float], approach: float) -> float:
-        if approach <= 0:
-            return 0.0
-        law = lambda load: self.approach(rolls, np.array([load]), hertz=True)[0] - approach  # noqa: E731
-        return self.width * brentq(law, 1e-3, 1e7)
+    def touch_torque(self, rolls: tuple[float, float], gap: float) -> float:
+        """Torque (N·m) at which one pair of rigid gears approaches by `gap` (m), by the load-dependent law."""
+        load = brentq(lambda f: self.approach(rolls, np.array([f]), hertz=True)[0] - gap, 1.0, 1.5e6)
+        return load * self.width * self.geometry.gears[0].r_b
 
     def corner_gap(self, position: float, tooth: int) -> float:
         """Distance (m) of the pinion's tip edge from the wheel's involute, by search along the involute."""
@@ -153,6 +148,14 @@ def _modal(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, floa
     rows = _at(body, roll, body.flank_rows[DRIVE]) / (2 * math.pi * body.frequency)
     bore = body.bore_rows[RZ] / (2 * math.pi * body.frequency)
     return rows @ rows.T, rows @ bore, float(bore @ bore)
+
+
+def cut_near(body: ReducedBody, wish: float) -> float:
+    """Frequency (Hz) in the middle of the widest relative gap between modes within 15 % of the wished cut."""
+    near = body.frequency[(body.frequency < 1.2 * wish) & (body.frequency > 0.8 * wish)]
+    gaps = [(high / low, math.sqrt(low * high)) for low, high in zip(near, near[1:], strict=False)
+            if high > 0.85 * wish and low < 1.15 * wish]  # fmt: skip
+    return max(gaps)[1]
 
 
 def bore_angle(body: ReducedBody, time: np.ndarray, cut: float, damped: bool) -> np.ndarray:

@@ -38,7 +38,13 @@ def of_modes(sections: Sections) -> None:
         sections[name][:] *= 20
 
 
+def of_bodies(sections: Sections) -> None:
+    for name in ("c_ff0", "c_ff1"):
+        sections[name][:] *= 1.2
+
+
 DATA = {
+    "effect.elastic": of_bodies,
     "effect.tip_relief": of_gears(CURVE, 2.0),
     "effect.tip_contact": of_gears(EDGE, 1.001),  # more would leave a step between flank and edge
     "effect.contact_damping": of_pair(DASHPOT, 5.0),

@@ -1,0 +1,123 @@
+"""What every effect costs: instructions of an internal step with the effect, without it (off), and in a kernel that was
+compiled without its code. Callgrind counts, which repeat exactly.
+
+    python benchmarks/effects_cost.py [EFFECT …]
+
+Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; settings of each effect in gearfmu/stage/effects.py.
+Needs valgrind and cc. Prints a table and writes gearfmu/stage/effects_cost.csv, where docs/effects.md takes it from;
+with EFFECT only those rows are measured again. Aim (issue 3): off costs at most 5 % more than without.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from gearfmu.body import load_stage_bodies
+from gearfmu.files import write_text
+from gearfmu.kernel.build import build_library, compile_program
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
+
+ROOT = Path(__file__).resolve().parents[1]
+TABLE = ROOT / "gearfmu" / "stage" / COSTS
+STAGE, SPEED = "fzg_c/stage_relief", 2000 * math.pi / 30
+TORQUE, LIGHT = 302.0, {"tip_contact": 80.0}  # light: flanks carry alone, else off is another motion
+H, WARM, STEPS = 50e-6, 10, 38  # communication steps; 38 are one mesh period
+BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
+MISPLACED = {0: 5e-6}  # tooth → m
+WATCHED = ("mesh.te", "mesh.force", "energy.stored", "energy.dissipated")
+
+
+@dataclass(frozen=True)
+class Count:
+    """Instructions of an internal step, and the watched outputs at the end, bit for bit."""
+
+    instructions: float
+    outputs: tuple[str, ...]
+
+
+class Bench:
+    """Models, the host program and kernels in one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.host = compile_program(ROOT / "benchmarks" / "effects_host.c", folder / "host")
+        spec = load_stage(STAGE)
+        bodies = load_stage_bodies(spec)
+        pinion = spec.gears[0].model_copy(update={"index_deviation": MISPLACED})
+        self.plain = assemble(spec, bodies)
+        self.misplaced = assemble(spec.model_copy(update={"gears": (pinion, spec.gears[1])}), bodies)
+        self.whole = self.library("nothing")
+
+    def library(self, without: str) -> Path:
+        """A kernel compiled without the code of one effect."""
+        path = self.folder / f"without_{without}.so"
+        return path if path.exists() else build_library(out=path, compiler=("cc", f"-DGK_WITHOUT={without}"))
+
+    def count(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
+        """One run under callgrind. CalledProcessError when it fails."""
+        blob = self.folder / f"{model.hash[:12]}.blob"
+        blob.write_bytes(model.blob)
+        command = ["valgrind", "--tool=callgrind", "--toggle-collect=measured", "--callgrind-out-file=/dev/null",
+                   self.host, library, blob, WARM, STEPS, H, *arguments(model, settings, torque)]  # fmt: skip
+        done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
+        collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
+        internal, *outputs = done.stdout.split()
+        return Count(int(collected[1]) / float(internal), tuple(outputs))
+
+    def measure(self, effect: Effect) -> tuple[Cost, bool]:
+        """The three counts; and whether the kernel without the code computes the same bits as the effect off."""
+        with_it = self.misplaced if effect.name == "pitch_errors" else self.plain
+        torque = LIGHT.get(effect.name, TORQUE)
+        on = self.count(self.whole, with_it, {**BASE, **effect.on_setting}, torque)
+        off = self.count(self.whole, self.plain, {**BASE, **effect.off_setting}, torque)
+        without = self.count(self.library(effect.build), self.plain, {**BASE, **effect.off_setting}, torque)
+        cost = Cost(effect.name, on.instructions, off.instructions, without.instructions)
+        return cost, off.outputs == without.outputs
+
+
+def arguments(model: StageModel, settings: Mapping[str, float], torque: float) -> list[str]:
+    """Parameters, inputs of constant speed and load, and watched outputs, by reference."""
+    known = model.kernel().variables
+    steady = Steady(model, SPEED, torque)
+    start, later = steady(0.0), steady(1.0)
+    words = [f"p{known[name].reference}={value!r}+0" for name, value in settings.items()]
+    words += [f"i{known[name].reference}={start[name]!r}+{later[name] - start[name]!r}" for name in start]
+    return words + [f"w{known[name].reference}" for name in WATCHED]
+
+
+def table(rows: Mapping[str, Cost]) -> str:
+    """The CSV, in the order of the effects."""
+    lines = [f"{row.effect},{row.on:.1f},{row.off:.1f},{row.without:.1f}" for row in ordered(rows)]
+    return "\n".join(["effect,on,off,without", *lines, ""])
+
+
+def ordered(rows: Mapping[str, Cost]) -> list[Cost]:
+    return [rows[effect.name] for effect in EFFECTS if effect.name in rows]
+
+
+def main(names: list[str]) -> None:
+    """Measure the named effects, or all, and write the table."""
+    rows = costs()
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(Path(folder))
+        for effect in EFFECTS:
+            if names and effect.name not in names:
+                continue
+            row, same = bench.measure(effect)
+            rows[effect.name] = row
+            print(f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a step: "
+                  f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}, same bits: {same}", flush=True)
+    write_text(TABLE, table(rows))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,44 @@
+"""What is off costs nothing: at most 5 % more instructions than a kernel compiled without it, and the same bits."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import shutil
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from gearfmu.stage.effects import EFFECTS, costs
+
+ROOT = Path(__file__).resolve().parents[2]
+MOST = 0.05
+
+
+def test_every_effect_has_its_measured_cost() -> None:
+    """The table in the package, which the documentation shows."""
+    found = costs()
+    assert list(found) == [effect.name for effect in EFFECTS]
+    for cost in found.values():
+        assert math.isfinite(cost.share) and -MOST < cost.price_of_off <= MOST, cost
+
+
+@pytest.fixture(scope="module")
+def benchmark_() -> ModuleType:
+    """benchmarks/effects_cost.py as a module."""
+    spec = importlib.util.spec_from_file_location("effects_cost", ROOT / "benchmarks" / "effects_cost.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.full
+@pytest.mark.skipif(not (shutil.which("valgrind") and shutil.which("cc")), reason="needs valgrind and a C compiler")
+def test_off_costs_as_much_as_not_being_there(benchmark_: ModuleType, tmp_path: Path) -> None:
+    bench = benchmark_.Bench(tmp_path)
+    for effect in EFFECTS:
+        cost, same = bench.measure(effect)
+        print(f"{effect.name}: {cost.off:.0f} instructions a step off, {cost.without:.0f} in a kernel without it")
+        assert same, f"{effect.name}: off is not the same as not being there"
+        assert abs(cost.price_of_off) <= MOST, effect.name
