@@ -24,17 +24,19 @@ def double_states(folder: Path) -> Path:
 def variant(folder: Path, name: str, edits: Mapping[str, str]) -> Path:
     """The double kernel with every match of the regular expressions in `edits` replaced, as folder/name.so.
 
-    Raises ValueError when an expression matches nowhere: the sources have changed, adapt it here."""
+    Raises ValueError when an expression matches nowhere or its replacement changes nothing: the sources have changed,
+    adapt it here."""
     sources = folder / f"{name}-src"
     shutil.copytree(HERE / "src", sources, dirs_exist_ok=True)
     for pattern, replacement in edits.items():
-        matches = 0
+        changed = 0
         for path in sorted(sources.glob("*.c")):
-            text, count = re.subn(pattern, replacement, path.read_text(encoding="utf-8"))
-            path.write_text(text, encoding="utf-8")
-            matches += count
-        if not matches:
-            raise ValueError(f"no kernel source matches {pattern!r}: adapt benchmarks/kernel_variants.py")
+            before = path.read_text(encoding="utf-8")
+            after = re.sub(pattern, replacement, before)
+            path.write_text(after, encoding="utf-8")
+            changed += after != before
+        if not changed:
+            raise ValueError(f"{pattern!r} changes no kernel source: adapt benchmarks/kernel_variants.py")
     out = folder / f"{name}.so"
     files = [str(p) for p in sorted(sources.glob("*.c"))]
     command = ["cc", *FLAGS, "-DGK_DOUBLE_MODES", "-fPIC", "-shared", "-Wl,-Bsymbolic", f"-I{fmi_headers()}", "-o", str(out)]

@@ -23,7 +23,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.trace import write_columns
 
-SCENES = {"one flank": LightRattle(), "both flanks": LightRattle(swing=4e-3)}
+SCENES = {"one flank": LightRattle(), "both flanks": LightRattle(torque=9.0, swing=4e-3)}
 CONVERGED = STEP / 64
 STEPS = (5e-6, 7.5e-6)
 STARTS = 4

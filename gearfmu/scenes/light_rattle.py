@@ -22,7 +22,7 @@ class LightRattle:
 
     speed: float = 2000 * math.pi / 30
     torque: float = 8.0
-    swing: float = 2.7e-3
+    swing: float = 2.75e-3
     frequency: float = 127.0
     phase: float = 0.0
 
