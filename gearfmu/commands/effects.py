@@ -102,6 +102,7 @@ def _numbers(stage: str) -> dict[str, str]:
         + f" edge radius; flanks carry alone up to {alone:.3g} N·m",
         "bearings": " and ".join(f"{g.bearing.stiffness:g} N/m" for g in spec.gears),
         "modal_damping": " and ".join(f"{g.modal_damping:g}" for g in spec.gears) + " of critical",
+        "roll_motion": "on",
         "pitch_errors": "up to " + " and ".join(f"{a:g} µm" for a in misplaced) + _idle(not any(misplaced)),
     }
 

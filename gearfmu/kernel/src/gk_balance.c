@@ -126,7 +126,7 @@ void gk_balance_solve(gk_system *s)
     for (int all_rows = 0; all_rows < 2; all_rows++) {
         gk_solve_plain(s);
         const int changed = status_changed(s);
-        if (!changed && !s->curved) return;
+        if (!changed && !(GK_HAS(hertz) && s->curved)) return;
         const balance b = defect(s);
         if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) {
             leave(s, &b);

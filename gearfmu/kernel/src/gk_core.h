@@ -126,8 +126,21 @@ typedef struct gk_coefficients {
 } gk_coefficients;
 
 typedef struct gk_effects {
-    int residual, hertz, coast, damping, relief, corner, bearings, modal_damping, roll_motion;
+    int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping, roll_motion;
 } gk_effects;
+
+/* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is measured against it (benchmarks/effects_cost.py) */
+#ifndef GK_WITHOUT
+#define GK_WITHOUT nothing
+#endif
+enum { EFFECT_nothing, EFFECT_elastic, EFFECT_modes, EFFECT_residual, EFFECT_hertz, EFFECT_slices, EFFECT_coast_flank, EFFECT_contact_damping, EFFECT_tip_relief,
+       EFFECT_tip_contact, EFFECT_bearings, EFFECT_modal_damping, EFFECT_roll_motion, EFFECT_pitch_errors };
+#define GK_EFFECT(name) EFFECT_##name
+#define GK_EFFECT_OF(name) GK_EFFECT(name)
+#define GK_HAS(effect) (GK_EFFECT_OF(GK_WITHOUT) != EFFECT_##effect)
+#define GK_ON(setup, effect) (GK_HAS(effect) && (setup)->on.effect)
+#define GK_LANES(setup, g) (GK_HAS(modes) && GK_HAS(elastic) ? (setup)->modal[g].n : 0)
+#define GK_STRIPS(of) (GK_HAS(slices) ? (of)->strips : 1)
 
 typedef struct gk_work gk_work;
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma);
@@ -378,6 +391,15 @@ typedef double gk_quad __attribute__((vector_size(4 * sizeof(double)), may_alias
     case 3: f(__VA_ARGS__, 3); break;      \
     case 4: f(__VA_ARGS__, 4); break;      \
     default: f(__VA_ARGS__, quads);        \
+    }
+
+/* the same for the strips of a place: those of 1, 5 and 10 slices */
+#define GK_STRIPPED(strips, f, ...)           \
+    switch (strips) {                         \
+    case 1: f(__VA_ARGS__, 1); break;         \
+    case 3: f(__VA_ARGS__, 3); break;         \
+    case 5: f(__VA_ARGS__, 5); break;         \
+    default: f(__VA_ARGS__, strips);          \
     }
 
 /* y += f x over quads `from` … `to` − 1 */

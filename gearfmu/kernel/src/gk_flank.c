@@ -61,7 +61,7 @@ static void flank_contact(const gk_model *model, const gk_setup *setup, const li
     const double gradient[6] = {-l->nx, -l->ny, -l->sg * model->gear[0].r_b, l->nx, l->ny, -l->sg * model->gear[1].r_b};
     memcpy(p->gradient, gradient, sizeof gradient);
     for (int i = 0; i < 2; i++) {
-        double slope, depth = relief(&model->gear[i], setup->on.relief, p->roll[i], &slope);
+        double slope, depth = relief(&model->gear[i], GK_ON(setup, tip_relief), p->roll[i], &slope);
         p->gap += depth;
         if (slope != 0.0) add_roll(p, l, &model->gear[i], i, slope);
     }
@@ -87,7 +87,7 @@ static int corner_contact(const gk_model *model, const gk_setup *setup, const do
     double turn = gk_atan2(st * cosine - ct * sine, ct * cosine + st * sine);
     double s = other->r_b * l->sg * (beta[o] - nominal - turn);
     double mx = -l->sg * st, my = l->sg * ct; /* outward normal of the other's flank */
-    double slope_c, slope_o, relief_c = relief(tip, setup->on.relief, tip->s_tip, &slope_c), relief_o = relief(other, setup->on.relief, s, &slope_o);
+    double slope_c, slope_o, relief_c = relief(tip, GK_ON(setup, tip_relief), tip->s_tip, &slope_c), relief_o = relief(other, GK_ON(setup, tip_relief), s, &slope_o);
     double fade = 1.0 / (1.0 + over / tip->edge);
     p->gap = length - s - tip->edge + relief_c + slope_c * over * fade + relief_o;
     memset(p->gradient, 0, sizeof p->gradient);
@@ -162,9 +162,9 @@ static int side(const gk_model *model, const gk_setup *setup, const double *fram
     double pitch = 2.0 * GK_PI / A->teeth, pitch_b = 2.0 * GK_PI / B->teeth, p_b = A->r_b * pitch;
     double base_a = frame[PHIA] + A->phase + sg * A->psi_b, base_b = frame[PHIB] + B->phase + sg * B->psi_b + shift * pitch_b;
     double s_a = A->r_b * sg * (base_a - l.t), s_b = B->r_b * sg * (base_b - l.t - GK_PI);
-    double allowance = flank ? setup->allowance : 0.0, g = l.L - s_a - s_b + allowance, misplaced = A->index_most + B->index_most;
+    double allowance = flank ? setup->allowance : 0.0, g = l.L - s_a - s_b + allowance, misplaced = GK_HAS(pitch_errors) ? A->index_most + B->index_most : 0.0;
     if (!(g - misplaced < reach)) return 0; /* the whole side is open: it costs this one comparison */
-    double beyond = setup->on.corner ? 0.5 * p_b : 0.0;
+    double beyond = GK_ON(setup, tip_contact) ? 0.5 * p_b : 0.0;
     /* teeth whose roll on A lies between B's and A's ends */
     double first = l.L - B->s_tip - beyond, last = A->s_tip + beyond;
     double from = sg > 0 ? (first - s_a) / p_b : (s_a - last) / p_b, to = sg > 0 ? (last - s_a) / p_b : (s_a - first) / p_b;
@@ -183,7 +183,7 @@ static int side(const gk_model *model, const gk_setup *setup, const double *fram
         p->tooth[1] = modulo(shift - k, B->z);
         const double closer = misplaced > 0.0 ? misplace(model, sg, p, beta) : 0.0;
         int corner = p->roll[0] > A->s_tip ? 0 : p->roll[1] > B->s_tip ? 1 : -1;
-        if (corner >= 0 && !setup->on.corner) continue; /* a loaded pair reaches past the end by its deflection */
+        if (corner >= 0 && !GK_ON(setup, tip_contact)) continue; /* a loaded pair reaches past the end by its deflection */
         if (corner < 0) flank_contact(model, setup, &l, g - closer, p);
         else if (!corner_contact(model, setup, frame, &l, corner, beta, p)) continue;
         else p->gap += allowance;
@@ -212,7 +212,7 @@ int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *fr
     double dx = model->distance + frame[XB] - frame[XA], dy = frame[YB] - frame[YA], R = model->gear[0].r_b + model->gear[1].r_b;
     if (!(dx * dx + dy * dy > 1.0001 * R * R) || !(dx * dx + dy * dy < 1e4)) return -1;
     int found = side(model, setup, frame, 0, reach, place, MAX_PAIRS);
-    if (found < 0 || !setup->on.coast) return found;
+    if (found < 0 || !GK_ON(setup, coast_flank)) return found;
     int coast = side(model, setup, frame, 1, reach, place + found, MAX_PAIRS - found);
     return coast < 0 ? -1 : found + coast;
 }

@@ -87,7 +87,7 @@ static void fill(const gk_setup *setup, gk_coefficients *k, int g)
     const gk_modal *modal = &setup->modal[g];
     int exact = 0;
     for (int i = 0; i < modal->n; i++) {
-        double omega = modal->omega[i], zeta = setup->on.modal_damping ? modal->zeta[i] : 0.0;
+        double omega = modal->omega[i], zeta = GK_ON(setup, modal_damping) ? modal->zeta[i] : 0.0;
         oscillator o = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
         if (omega > 0.0 && omega * k->h >= EXPONENTIAL_BELOW) o = trapezoidal(omega, zeta, k->h);
         else if (omega > 0.0 && setup->integrator == MIX4) o = linear_force(omega, zeta, k->h);

@@ -15,7 +15,7 @@ void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, 
     law->beta = 2.0 * law->a / curvature; /* b² = 4 f R / (π E*), 1/E* = Σ (1−ν²)/E = Σ π·local/2 */
     law->low = setup->square_low / law->beta;
     law->high = setup->square_high / law->beta;
-    if (!setup->on.hertz) { /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
+    if (!GK_ON(setup, hertz)) { /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
         const double reference = model->torque_max / (A->r_b * setup->width);
         law->c -= 0.5 * law->a * gk_log(law->beta * gk_clamp(reference, law->low, law->high));
         law->a = law->low = law->high = 0.0;
@@ -47,12 +47,12 @@ gk_approach gk_law_at(const gk_local *law, double width, double force)
 {
     const double f = force / width;
     gk_approach at;
-    if (f <= law->low) {
+    if (GK_HAS(hertz) && f <= law->low) {
         const double q = f > 0.0 ? law->q_low : 0.0;
         at.delta = f * (law->c_low + q * f);
         at.slope = (law->c_low + 2.0 * q * f) / width;
         at.energy = width * f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f);
-    } else if (f >= law->high) {
+    } else if (!GK_HAS(hertz) || f >= law->high) {
         at.delta = law->delta_high + law->slope_high * (f - law->high);
         at.slope = law->slope_high / width;
         at.energy = width * (law->phi_high + 0.5 * law->slope_high * f * f);

@@ -25,7 +25,7 @@ static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate
         gk_solve_path(s, y, path);
         for (int i = 0; i < s->n; i++) {
             const int contact = s->kind[i] == ROW_CONTACT;
-            const double c = !s->active[i] ? 0.0 : contact ? (setup->on.damping ? setup->damping * setup->strip_width[i % s->strips] : 0.0) : setup->link_d[s->link_of[i]];
+            const double c = !s->active[i] ? 0.0 : contact ? (GK_ON(setup, contact_damping) ? setup->damping * setup->strip_width[i % s->strips] : 0.0) : setup->link_d[s->link_of[i]];
             y[i] = (path[i] + (contact ? s->slope[i] * y[i] : 0.0)) * (pass ? s->active[i] : c);
         }
     }
@@ -75,7 +75,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data
         gk_real *v = work->stage[g][i], *a = v + m->n;
         if (m->n) gk_step_scatter(setup, g, s->z, s->z, work->force[g], work->reading[g]);
         for (int j = 0; j < m->n; j++) {
-            const gk_real zeta = setup->on.modal_damping ? (gk_real)(2.0 * m->zeta[j] * m->omega[j]) : 0;
+            const gk_real zeta = GK_ON(setup, modal_damping) ? (gk_real)(2.0 * m->zeta[j] * m->omega[j]) : 0;
             v[j] = speed[g][j];
             a[j] = work->force[g][j] - zeta * speed[g][j] - m->omega2[j] * work->trial[g][j];
         }

@@ -5,7 +5,7 @@
 static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, gk_real *out)
 {
     const gk_modal *modal = &setup->modal[g];
-    const int n = 2 * modal->n / LANES, P = n / 2, strips = setup->strips; /* in halves of LANES */
+    const int n = 2 * modal->n / LANES, P = n / 2, strips = GK_STRIPS(setup); /* in halves of LANES */
     const gk_real w0 = (gk_real)p->weight[g][0], w1 = (gk_real)p->weight[g][1], w2 = (gk_real)p->weight[g][2], w3 = (gk_real)p->weight[g][3];
     const gk_half *t0 = (const gk_half *)modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * strips * n;
     const gk_half *t1 = t0 + strips * n, *t2 = t1 + strips * n, *t3 = t2 + strips * n;
@@ -20,18 +20,20 @@ static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const 
         }
 }
 
-static void bore_rows(const gk_modal *modal, double attitude, gk_real *out)
+/* x and y stay away where no bearing reads them */
+static void bore_rows(const gk_modal *modal, int radial, double attitude, gk_real *out)
 {
     double sine, cosine;
-    gk_sincos(attitude, &sine, &cosine);
     const int n = 2 * modal->n / LANES;
+    memcpy(out + BORE_RZ * modal->n, modal->bore + BORE_RZ * modal->n, (size_t)modal->n * sizeof *out);
+    if (!radial) return;
+    gk_sincos(attitude, &sine, &cosine);
     const gk_real c = (gk_real)cosine, s = (gk_real)sine;
-    const gk_half *x = (const gk_half *)modal->bore, *y = x + n, *rz = y + n;
+    const gk_half *x = (const gk_half *)modal->bore, *y = x + n;
     gk_half *to = (gk_half *)out;
     for (int k = 0; k < n; k++) {
         to[k] = c * x[k] - s * y[k];
         to[n + k] = s * x[k] + c * y[k];
-        to[2 * n + k] = rz[k];
     }
 }
 
@@ -41,9 +43,9 @@ void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *fr
     for (int g = 0; g < 2; g++) {
         const gk_modal *modal = &setup->modal[g];
         work->attitude[g] = frame[g ? PHIB : PHIA] + model->gear[g].phase;
-        if (!modal->n) continue;
-        size_t row = (size_t)setup->strips * modal->n;
+        if (!GK_LANES(setup, g)) continue;
+        size_t row = (size_t)GK_STRIPS(setup) * modal->n;
         for (int p = 0; p < work->places; p++) place_rows(setup, &model->gear[g], g, &work->place[p], work->basis[g] + p * row);
-        bore_rows(modal, work->attitude[g], work->basis[g] + work->places * row);
+        bore_rows(modal, GK_HAS(bearings) && setup->link[BEARING_0X + 2 * g], work->attitude[g], work->basis[g] + work->places * row);
     }
 }

@@ -186,7 +186,7 @@ static void fill_links(const gk_model *model, gk_setup *setup)
     for (int g = 0; g < 2; g++) {
         const gk_gear *gear = &model->gear[g];
         const gk_port *port = &model->port[g];
-        const int bearing = model->kind == KIND_PAIR && setup->on.bearings;
+        const int bearing = model->kind == KIND_PAIR && GK_ON(setup, bearings);
         for (int i = BEARING_0X + 2 * g; i <= BEARING_0Y + 2 * g; i++) setup->link[i] = bearing, setup->link_c[i] = 1.0 / gear->bearing_k, setup->link_d[i] = gear->bearing_c;
         setup->inverse_mass[3 * g] = bearing || model->kind == KIND_FLAT ? 1.0 / gear->mass : 0.0;
         setup->inverse_mass[3 * g + 1] = bearing ? 1.0 / gear->mass : 0.0;
@@ -234,6 +234,7 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     setup->slices = (int)data->value[V_M_SLICES];
     setup->strips = gk_strips_count(model, setup->slices);
     setup->damping = data->value[V_M_DAMPING];
+    if (setup->damping == 0.0) setup->on.contact_damping = 0;
     if (model->kind == KIND_PAIR)
         setup->allowance = (data->value[V_M_BACKLASH] - model->nominal_backlash) * (model->gear[0].r_b + model->gear[1].r_b) / model->distance;
     if (setup->level == LEVEL_EXPLICIT && setup->integrator == DG4) setup->integrator = CENTRAL;
@@ -245,6 +246,8 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
         setup->on.residual = 0;
         if (setup->integrator == DG4 && !clutch) setup->integrator = RK45;
         snprintf(message, GK_MESSAGE, "level paper leaves the static compliance of all higher modes out: tooth stiffness is 15 to 40 %% too high; use it for comparison only");
+    } else if (!setup->on.elastic) {
+        setup->on.residual = 0;
     } else if (!setup->on.residual) {
         snprintf(message, GK_MESSAGE, "effect.residual = false leaves the static compliance of all higher modes out: allowed at level paper only");
         return GK_BAD_VALUE;
@@ -262,7 +265,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(setup, 0, sizeof *setup);
     gk_outcome outcome = choose(model, data, setup, message);
     if (outcome) return outcome;
-    const int modes[2] = {modes_at_level(model, setup->level, 0), modes_at_level(model, setup->level, 1)};
+    const int modes[2] = {setup->on.elastic ? modes_at_level(model, setup->level, 0) : 0, setup->on.elastic ? modes_at_level(model, setup->level, 1) : 0};
     const uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
     lay_out(model, setup, (char *)base, modes);
     setup->step = gk_wide_step(1, setup->integrator);

@@ -42,16 +42,20 @@ void gk_solve_lag(const gk_system *s, const double *end, const double *dash, dou
     for (int i = 0; i < s->n; i++) lag[i] += part[i];
 }
 
-/* P x */
-void gk_solve_path(const gk_system *s, const double *x, double *y)
+GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const int strips)
 {
-    const int strips = s->strips;
     for (int first = 0, p = 0; first < s->contacts; first += strips, p++)
         for (int a = 0; a < strips; a++) {
             double sum = 0.0;
             for (int b = 0; b < strips; b++) sum += s->path[p][a * strips + b] * x[first + b];
             y[first + a] = sum;
         }
+}
+
+/* P x */
+void gk_solve_path(const gk_system *s, const double *x, double *y)
+{
+    GK_STRIPPED(GK_STRIPS(s), along_paths, s, x, y)
     for (int i = s->contacts; i < s->n; i++) y[i] = s->spring[i] * x[i];
 }
 
@@ -104,7 +108,7 @@ static int move(gk_system *s, const double *x, double *e, double *change)
         *change = gk_max(*change, fabs(x[i]));
         size = gk_max(size, fabs(s->force[i]));
     }
-    return s->curved && *change > SOLVED * size;
+    return GK_HAS(hertz) && s->curved && *change > SOLVED * size;
 }
 
 /* what the law's bend e leaves in the equations: −(e + B Γ e) */

@@ -135,7 +135,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
     gk_setup rest = *setup;
     gk_work *work = setup->work;
     double given[RIGID] = {0};
-    rest.on.damping = 0;
+    rest.on.contact_damping = 0;
     rest.on.roll_motion = 1;
     for (int g = 0; g < 2; g++) {
         rest.given_torque[g] = !grounded(&b[g]);

@@ -17,7 +17,7 @@ static double dynamic_energy(const gk_setup *setup, const gk_data *data, const g
     for (int d = 0; d < RIGID; d++)
         if (setup->inverse_mass[d] > 0.0) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
     for (int g = 0; g < 2; g++) {
-        const int n = setup->modal[g].n;
+        const int n = GK_LANES(setup, g);
         for (int i = 0; i < n; i++) {
             const double omega = setup->modal[g].omega[i], v = q[n + i], x = q[i];
             sum += 0.5 * k->flow[g].inverse_s2[i] * (v * v + omega * omega * x * x);
@@ -36,7 +36,7 @@ static void express(const gk_setup *setup, gk_data *data, const gk_coefficients 
     const double before = dynamic_energy(setup, data, old);
     gk_real *q = data->modal;
     for (int g = 0; g < 2; g++) {
-        const int n = setup->modal[g].n;
+        const int n = GK_LANES(setup, g);
         for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
         q += 3 * n;
     }
@@ -54,7 +54,7 @@ static void predict(const gk_setup *setup, const gk_data *data, const gk_coeffic
     gk_work *work = setup->work;
     const gk_real *q = data->modal;
     for (int g = 0; g < 2; g++) {
-        const int n = setup->modal[g].n;
+        const int n = GK_LANES(setup, g);
         const gk_real *v = q + n, *f = v + n;
         const gk_flow *w = &k->flow[g];
         for (int i = 0; i < n; i++) {
@@ -102,7 +102,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
     memset(s->direction, 0, (size_t)s->stride * sizeof *s->direction);
     for (int i = s->n; i < s->stride; i++) s->force[i] = s->z[i] = s->dash[i] = s->eta[i] = 0.0;
     memset(s->squeeze0, 0, (size_t)s->n * sizeof *s->squeeze0);
-    s->curved = setup->on.hertz && s->contacts > 0;
+    s->curved = GK_ON(setup, hertz) && s->contacts > 0;
     for (int i = 0; i < s->n; i++) {
         s->clip[i] = 2;
         s->beta[i] = s->dash0[i] != 0.0 ? 0.75 : 0.5;
@@ -124,7 +124,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         case ROW_CONTACT: {
             const gk_place *p = &work->place[s->place_of[i]];
             if (p->memory < 0) s->g0[i] = s->g[i];
-            else s->g0[i] += data->memory[p->memory].gap[i % s->strips];
+            else s->g0[i] += data->memory[p->memory].gap[i % GK_STRIPS(s)];
             s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
             if (s->force0[i] > 0.0 && s->damping[i] > 0.0) s->clip[i] = 0;
             break;
@@ -146,6 +146,19 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
     s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
+/* Tip corners off: did a pair that carried load end with its flank? */
+static int flank_ended(const gk_data *data, const gk_work *work, int strips)
+{
+    for (int m = 0; m < data->pairs; m++) {
+        double load = 0.0;
+        int there = 0;
+        for (int i = 0; i < strips; i++) load += data->memory[m].force[i];
+        for (int p = 0; p < work->places; p++) there |= work->place[p].memory == m;
+        if (load > 0.0 && !there) return 1;
+    }
+    return 0;
+}
+
 static int all_finite(const gk_system *s)
 {
     for (int i = 0; i < s->n; i++)
@@ -158,7 +171,7 @@ void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double
 {
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
-    const int n = setup->modal[g].n;
+    const int n = GK_LANES(setup, g);
     memset(out_x, 0, (size_t)n * sizeof *out_x);
     memset(out_y, 0, (size_t)n * sizeof *out_y);
     for (int r = 0; r < s->contacts + BORE_ROWS; r++) {
@@ -171,11 +184,11 @@ void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double
     }
 }
 
-/* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of energy, mode by mode */
-static double correct_modes(const gk_setup *setup, const gk_coefficients *k, int g, gk_real *q)
+/* modal state to the end of the step; returns what modal damping took, where it is on: work of the mean force minus change of energy, mode by mode */
+GK_INLINE double correct_modes(const gk_setup *setup, const gk_coefficients *k, int g, gk_real *q, const int damped)
 {
     const gk_work *work = setup->work;
-    const int n = setup->modal[g].n;
+    const int n = GK_LANES(setup, g);
     gk_real *v = q + n, lane[LANES] = {0};
     const gk_real *f = v + n, half = (gk_real)0.5;
     const gk_flow *w = &k->flow[g];
@@ -183,8 +196,10 @@ static double correct_modes(const gk_setup *setup, const gk_coefficients *k, int
         for (int l = 0; l < LANES; l++) {
             const int j = i + l;
             const gk_real z = work->force[g][j], q1 = work->qp[g][j] + w->bq[j] * z, v1 = work->vp[g][j] + w->bv[j] * z;
-            const gk_real energy = half * w->inverse_s2[j] * ((v1 - v[j]) * (v1 + v[j]) + setup->modal[g].omega2[j] * ((q1 - q[j]) * (q1 + q[j])));
-            lane[l] += half * (f[j] + z) * (q1 - q[j]) - energy;
+            if (damped) {
+                const gk_real energy = half * w->inverse_s2[j] * ((v1 - v[j]) * (v1 + v[j]) + setup->modal[g].omega2[j] * ((q1 - q[j]) * (q1 + q[j])));
+                lane[l] += half * (f[j] + z) * (q1 - q[j]) - energy;
+            }
             q[j] = q1;
             v[j] = v1;
         }
@@ -199,12 +214,12 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     const gk_system *s = &work->system;
     gk_real *q = data->modal;
     for (int g = 0; g < 2; g++) {
-        const int n = setup->modal[g].n;
+        const int n = GK_LANES(setup, g);
         if (n) {
             gk_real *next = work->reading[g];
             gk_step_scatter(setup, g, s->z, s->force, work->force[g], next);
-            double lost = correct_modes(setup, k, g, q);
-            if (setup->on.modal_damping) data->ledger.dissipated += lost;
+            if (GK_ON(setup, modal_damping)) data->ledger.dissipated += correct_modes(setup, k, g, q, 1);
+            else correct_modes(setup, k, g, q, 0);
             memcpy(q + 2 * n, next, (size_t)n * sizeof *next);
         }
         q += 3 * n;
@@ -268,12 +283,12 @@ void gk_step_remember(const gk_setup *setup, gk_data *data)
             continue;
         }
         gk_memory *m = &data->memory[s->place_of[i]];
-        m->force[i % s->strips] = s->force[i];
-        m->gap[i % s->strips] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-        m->dash[i % s->strips] = s->dash[i];
-        m->end[i % s->strips] = s->end[i];
+        m->force[i % GK_STRIPS(s)] = s->force[i];
+        m->gap[i % GK_STRIPS(s)] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+        m->dash[i % GK_STRIPS(s)] = s->dash[i];
+        m->end[i % GK_STRIPS(s)] = s->end[i];
         deepest = gk_max(deepest, -work->place[s->place_of[i]].gap);
-        if (setup->on.hertz && s->force[i] > s->local[s->place_of[i]].high * s->width[i]) data->status |= 1;
+        if (GK_ON(setup, hertz) && s->force[i] > s->local[s->place_of[i]].high * s->width[i]) data->status |= 1;
     }
     data->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
 }
@@ -285,14 +300,14 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_system *s = &work->system;
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
     GK_MARK(work);
-    if (h == data->table_h && gamma == gk_limit_gamma(setup, data, h) && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
+    if (GK_ON(setup, elastic) && h == data->table_h && gamma == gk_limit_gamma(setup, data, h) && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
     work->another = data->expressed_h != h || data->expressed_gamma != gamma;
     express(setup, data, k);
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;
     GK_LAP(work, PHASE_PREDICT);
-    const double *where = setup->on.roll_motion ? work->frame : data->still;
-    work->places = setup->on.roll_motion ? gk_flank_find(model, setup, where, data->reach, work->place) : gk_still_find(model, setup, where, work->frame, work->place);
+    const double *where = GK_ON(setup, roll_motion) ? work->frame : data->still;
+    work->places = GK_ON(setup, roll_motion) ? gk_flank_find(model, setup, where, data->reach, work->place) : gk_still_find(model, setup, where, work->frame, work->place);
     if (work->places < 0) return work->places = 0, GK_DIVERGED;
     for (int p = 0; p < work->places; p++) {
         work->place[p].memory = gk_step_remembered(data, work->place[p].key);
@@ -308,6 +323,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     else gk_balance_solve(s);
     if (!all_finite(s)) return GK_DIVERGED;
     GK_LAP(work, PHASE_SOLVE);
+    if (GK_HAS(tip_contact) && !setup->on.tip_contact && flank_ended(data, work, s->strips)) data->status |= 16;
     correct(setup, data, k);
     GK_LAP(work, PHASE_CORRECT);
     account(setup, data);

@@ -2,21 +2,21 @@
  * Rows: slices of all places, then the live bilateral rows (bearings, port springs, shafts, clutches). Contact forces press inward, rows measure outward: a contact row is −(flank row). */
 #include "gk_core.h"
 
+/* row of the system that basis row i of gear g stands in, −1: none */
+static int row_of(const gk_system *s, int g, int i) { return i < s->contacts ? i : s->bore[g][i - s->contacts]; }
+
 /* what every basis row reads of y, B·y */
 static void gather(const gk_setup *setup, const gk_work *work, int g, const gk_real *y, double *read)
 {
-    const int n = setup->modal[g].n, rows = work->system.contacts + BORE_ROWS;
-    for (int i = 0; i < rows; i++) read[i] = n ? gk_dot(work->basis[g] + (size_t)i * n, y, n) : 0.0;
+    const int n = GK_LANES(setup, g), rows = work->system.contacts + BORE_ROWS;
+    for (int i = 0; i < rows; i++) read[i] = n && row_of(&work->system, g, i) >= 0 ? gk_dot(work->basis[g] + (size_t)i * n, y, n) : 0.0;
 }
-
-/* row of the system that basis row i of gear g stands in, −1: none */
-static int row_of(const gk_system *s, int g, int i) { return i < s->contacts ? i : s->bore[g][i - s->contacts]; }
 
 /* B diag(mobility) Bᵀ and −B diag(κ) Bᵀ, added to the upper triangles of D and A: for a step that has no table */
 static void gram(const gk_setup *setup, gk_work *work, int g, const gk_coefficients *k, double *D, double *A)
 {
     const gk_system *s = &work->system;
-    const int n = setup->modal[g].n, P = setup->modal[g].pairs, rows = s->contacts + BORE_ROWS;
+    const int n = GK_LANES(setup, g), P = setup->modal[g].pairs, rows = s->contacts + BORE_ROWS;
     const gk_flow *flow = &k->flow[g];
     gk_real *moves = work->scaled, *yields = moves + n;
     if (!n || (k->timeless && !flow->exact)) return;
@@ -40,13 +40,13 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
 {
     gk_system *s = &work->system;
     for (int p = 0; p < work->places; p++)
-        for (int i = 0; i < s->strips; i++, s->n++) {
+        for (int i = 0; i < GK_STRIPS(s); i++, s->n++) {
             const gk_place *place = &work->place[p];
             s->kind[s->n] = ROW_CONTACT;
             s->link_of[s->n] = -1;
             s->place_of[s->n] = p;
             s->force0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].force[i];
-            s->damping[s->n] = setup->on.damping ? 2.0 * setup->damping * setup->strip_width[i] / h : 0.0;
+            s->damping[s->n] = GK_ON(setup, contact_damping) ? 2.0 * setup->damping * setup->strip_width[i] / h : 0.0;
             s->bound[s->n] = 0.0;
             s->end0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].end[i];
             s->dash0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].dash[i];
@@ -65,7 +65,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
     list_contacts(model, setup, data, h, work);
     for (int g = 0; g < 2; g++)
         for (int k = 0; k < BORE_ROWS; k++) s->bore[g][k] = -1;
-    for (int link = 0; link < LINKS; link++) {
+    for (int link = GK_HAS(bearings) ? 0 : PORT_0; link < LINKS; link++) {
         if (!setup->link[link]) continue;
         const int torque = (link == PORT_0 || link == PORT_1) && setup->given_torque[link - PORT_0];
         s->kind[s->n] = link >= CLUTCH_0 ? ROW_CLUTCH : torque ? ROW_TORQUE : ROW_SPRING;
@@ -188,7 +188,7 @@ static void add_rigid(const gk_setup *setup, const gk_coefficients *k, gk_system
 static void take_paths(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     gk_system *s = &work->system;
-    const int strips = s->strips;
+    const int strips = GK_STRIPS(s);
     for (int p = 0; p < work->places; p++) {
         gk_table_path(model, setup, &work->place[p], s->path[p]);
         for (int a = 0; a < strips; a++)
@@ -217,15 +217,17 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     for (int g = 0; g < 2; g++) {
         double *const all[KINDS] = {s->D, s->A, s->Q}, *const residual[KINDS] = {s->Q};
         gather(setup, work, g, work->y[g], work->read[g]);
+        if (!GK_ON(setup, elastic)) continue; /* rigid gears */
         if (tables) {
             gk_table_add(model, setup, g, &work->table[g], all);
             continue;
         }
         gram(setup, work, g, k, s->D, s->A);
-        if (setup->on.residual) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
+        if (GK_ON(setup, residual)) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
     }
     gaps(model, setup, k->h, work);
     mirror(s);
     add_rigid(setup, k, s);
-    take_paths(model, setup, work);
+    if (GK_ON(setup, residual) && GK_ON(setup, contact_damping)) take_paths(model, setup, work);
+    else memset(s->path, 0, (size_t)work->places * sizeof *s->path); /* no dashpot asks for it */
 }

@@ -125,13 +125,10 @@ static void fill_path(const gk_model *model, const gk_setup *setup, int g, const
 /* the static tables of a level; without the residual the path is the local law alone */
 void gk_table_residual(const gk_model *model, gk_setup *setup)
 {
+    if (!setup->on.residual) return;
     for (int g = 0; g < 2; g++) {
         const gk_gear *gear = &model->gear[g];
         double *flexibility = setup->flexibility;
-        if (!setup->on.residual) {
-            memset(setup->modal[g].path, 0, 2 * (size_t)(gear->rolls * ((setup->strips * setup->strips + 3) / 4 * 4)) * sizeof(double));
-            continue;
-        }
         for (int k = 0; k < gear->modes; k++) flexibility[k] = 1.0 / (gear->omega[k] * gear->omega[k]);
         const recipe r = {setup->modal[g].count, 1, {1}, {flexibility}};
         fill_table(model, setup, g, &r, &setup->modal[g].residual);
@@ -178,6 +175,13 @@ GK_INLINE void interpolate(const gk_place *p, const gk_place *q, int g, const gk
     memcpy(out, sum, (size_t)halves * sizeof *sum);
 }
 
+GK_INLINE void add_blocks(const gk_real *value, int kinds, double *const out[2], int stride, const int strips)
+{
+    for (int kind = 0; kind < kinds; kind++)
+        for (int a = 0; a < strips; a++)
+            for (int b = 0; b < strips; b++) out[kind][a * stride + b] += *value++;
+}
+
 /* between the strips of two places, added to the matrices of the table's kinds */
 static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const gk_place *p, const gk_place *q, int strips, double **out, int stride)
 {
@@ -186,10 +190,7 @@ static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const 
     if (offset < -3 || offset > 3) return;
     const gk_real *cells = table->ff + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + 3) * (size_t)(gear->rolls * gear->rolls * table->block);
     GK_SIZED(table->block / 8, interpolate, p, q, g, cells, gear->rolls, sum)
-    const gk_real *value = (const gk_real *)sum;
-    for (int kind = 0; kind < table->kinds; kind++)
-        for (int a = 0; a < strips; a++)
-            for (int b = 0; b < strips; b++) out[kind][a * stride + b] += *value++;
+    GK_STRIPPED(strips, add_blocks, (const gk_real *)sum, table->kinds, out, stride)
 }
 
 /* strips of a place to the bore, turned from the tooth's axes into inertial ones */
@@ -197,7 +198,7 @@ static void place_bore(const gk_system *s, const gk_gear *gear, int g, const gk_
 {
     double sine, cosine;
     gk_sincos(attitude + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
-    const int strips = s->strips, kinds = table->kinds, *row = s->bore[g];
+    const int strips = GK_STRIPS(s), kinds = table->kinds, *row = s->bore[g];
     for (int a = 0; a < strips; a++) {
         gk_quad c[KINDS] = {{0}, {0}, {0}};
         const gk_quad *t = (const gk_quad *)table->fb + (size_t)((place->flank * gear->rolls + place->index[g]) * strips + a) * (size_t)kinds;
@@ -218,7 +219,7 @@ void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
     const gk_gear *gear = &model->gear[g];
-    const int strips = setup->strips, stride = s->stride, *row = s->bore[g];
+    const int strips = GK_STRIPS(setup), stride = s->stride, *row = s->bore[g];
     const double attitude = work->attitude[g];
     for (int p = 0; p < work->places; p++) {
         const gk_place *place = &work->place[p];
@@ -239,7 +240,7 @@ void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_
 /* P of a place: both teeth */
 void gk_table_path(const gk_model *model, const gk_setup *setup, const gk_place *place, double *out)
 {
-    const int quads = (setup->strips * setup->strips + 3) / 4;
+    const int strips = GK_STRIPS(setup), quads = (strips * strips + 3) / 4;
     gk_quad sum[MAX_SLICES * MAX_SLICES / 4];
     for (int k = 0; k < quads; k++) sum[k] = (gk_quad){0};
     for (int g = 0; g < 2; g++) {

@@ -5,7 +5,7 @@
 /* column j: what λ_j does to all rows */
 GK_INLINE void form_column(const gk_system *s, int j, const double *mask, double *column, const int quads)
 {
-    const int strips = s->strips, contact = j < s->contacts;
+    const int strips = GK_STRIPS(s), contact = j < s->contacts;
     const int place = contact ? s->place_of[j] : 0, first = contact ? place * strips : j, count = contact ? strips : 1;
     const double limit = s->clip[j] == 2 ? 0.0 : s->clip[j];
     const gk_quad *D = (const gk_quad *)s->D, *A = (const gk_quad *)s->A, *Q = (const gk_quad *)s->Q, *on = (const gk_quad *)mask;

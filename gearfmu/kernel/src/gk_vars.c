@@ -132,7 +132,7 @@ gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference
 gk_effects gk_effects_of(const gk_data *data)
 {
     const double *v = data->value;
-    gk_effects on = {v[V_M_E_RESIDUAL] != 0, v[V_M_E_LOCAL] != 0,   v[V_M_E_COAST] != 0,   v[V_M_E_DAMPING] != 0,
+    gk_effects on = {v[V_M_E_ELASTIC] != 0,   v[V_M_E_RESIDUAL] != 0, v[V_M_E_LOCAL] != 0,   v[V_M_E_COAST] != 0,   v[V_M_E_DAMPING] != 0,
                      v[V_M_E_RELIEF] != 0,   v[V_M_E_CORNER] != 0,  v[V_M_E_BEARING] != 0, v[V_M_E_MODAL_DAMPING] != 0, v[V_M_E_ROLL_MOTION] != 0};
     return on;
 }
