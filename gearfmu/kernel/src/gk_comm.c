@@ -122,19 +122,17 @@ static void outputs(const gk_model *model, const gk_setup *setup, gk_data *data,
 
 static int is_explicit(const gk_setup *setup) { return setup->integrator == RK45 || setup->integrator == CENTRAL; }
 
-/* stored energy and what the balance does not close; 0 when that is more than the model can mean; a new h is a new invariant: the balance goes on from there */
+/* stored energy and what the balance does not close, from the first step on; 0 when that is more than the model can mean */
 static int balance(const gk_setup *setup, gk_data *data, double h)
 {
-    const gk_coefficients *k = is_explicit(setup) ? &setup->work->explicit_rows : gk_flow_for(setup, h, gk_limit_gamma(setup, data, h));
-    double *v = data->value, stored = gk_step_energy(setup, data, k);
+    double *v = data->value;
     if (is_explicit(setup)) { /* keeps no account of works: no balance */
-        v[V_M_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(setup, data, h) : stored;
+        data->ledger.massless = gk_solve_stored(&setup->work->system);
+        v[V_M_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(setup, data, h) : gk_step_energy(setup, data, &setup->work->explicit_rows);
         return 1;
     }
-    if (data->balance_h != h) {
-        data->ledger.baseline = stored - data->ledger.work + data->ledger.dissipated - v[V_M_RESIDUAL];
-        data->balance_h = h;
-    }
+    const double stored = gk_step_energy(setup, data, gk_flow_for(setup, data->state_h, data->state_gamma));
+    if (data->steps == 1) data->ledger.baseline = stored - data->ledger.work + data->ledger.dissipated;
     v[V_M_ENERGY] = stored;
     v[V_M_RESIDUAL] = stored - data->ledger.baseline - data->ledger.work + data->ledger.dissipated;
     return gk_finite(stored) && !(fabs(v[V_M_RESIDUAL]) > BROKEN * (stored + fabs(data->ledger.work) + data->ledger.dissipated) + 1e-6);

@@ -91,10 +91,11 @@ struct gk_model {
 };
 
 /* ---- chosen: level, effects, step ----------------------------------------------------------------------------------------------------------------- */
-typedef struct gk_table { /* compliances between the points of one gear, of one kind or of two side by side: what a force there displaces here */
+enum { KINDS = 3 }; /* of compliance: D, −K, Q */
+typedef struct gk_table { /* compliances between the points of one gear, of one kind or of all side by side: what a force there displaces here */
     gk_real *ff;   /* (2, 2, OFFSETS, rolls, rolls, block): from flank and roll to flank, tooth offset and roll; block: (kinds, strips, strips) padded to 8 */
     double *fb;    /* (2, rolls, strips, 4 a kind): strip of tooth 0 to the bore node (x, y, rz), body-fixed axes */
-    double bb[2][9];
+    double bb[KINDS][9];
     int kinds, block;
 } gk_table;
 
@@ -159,7 +160,7 @@ struct gk_setup {
     double link_c[LINKS];        /* compliance 1/k */
     double link_d[LINKS];        /* dashpot */
     gk_modal modal[2];
-    double *flexibility;         /* scratch of the tables: 2 + MAX_FUNCTIONS numbers a stored mode */
+    double *flexibility;         /* scratch of the tables: KINDS + MAX_FUNCTIONS numbers a stored mode */
     gk_step_function *step;      /* gk_step_once in the widest vectors of this processor */
     gk_work *work; /* scratch and coefficient cache: neither model nor state */
     size_t state_size;
@@ -175,8 +176,8 @@ typedef struct gk_memory { /* what a tooth pair remembers from the last step */
 
 typedef struct gk_motion { double phi, w, a; } gk_motion;
 
-/* lag: energy that the dashpots' force holds in what it deflects; owed: defect of energy that the balance of contacts tolerated so far */
-typedef struct gk_ledger { double work, dissipated, baseline, lag, owed; } gk_ledger;
+/* massless: energy of the massless part at the end of the last step; owed: defect of energy that the balance of contacts tolerated so far */
+typedef struct gk_ledger { double work, dissipated, baseline, massless, owed; } gk_ledger;
 
 struct gk_data {
     uint64_t magic;
@@ -191,8 +192,9 @@ struct gk_data {
     gk_motion input[2], blend[2]; /* outer ends at the start of the communication step; jump that is blended away */
     double hold[2];              /* angle a port is referred to */
     double v_bore[2];            /* speed of the bore nodes before the last internal step */
-    double balance_h, rk_h;
+    double rk_h;
     double state_h, state_gamma; /* the step for which x and q are expressed; 0: physical */
+    double expressed_h, expressed_gamma; /* the last step that was made */
     double table_h;              /* the internal step with tables of its own: that of the run's first communication step */
     double angle[2];             /* bore angle at a torque port, massless part included */
     double still[RIGID];         /* frames of the start, where all is taken that depends on position when roll_motion is off */
@@ -274,12 +276,13 @@ struct gk_work {
     double frame[RIGID], speed[RIGID];        /* predicted */
     double attitude[2];                       /* of the gears whose rows the system is formed with */
     double moved[RIGID];
+    int another;                              /* this step is of another h or γ than the last */
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
     double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
     double matrix[5 * MAX_STRIDE * MAX_STRIDE];   /* D, A, Q, J, L */
-    gk_table table[2];                            /* of each gear: D and −K of one step */
+    gk_table table[2];                            /* of each gear: D, −K and Q of one step */
     double table_h, table_gamma;                  /* which step; 0: none yet */
     double run_h, run_gamma;                      /* γ of the internal step of the run */
 };
@@ -310,7 +313,7 @@ void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const 
 /* gk_table.c */
 void gk_table_residual(const gk_model *model, gk_setup *setup);
 void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coefficients *k);
-void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[2]);
+void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[KINDS]);
 void gk_table_path(const gk_model *model, const gk_setup *setup, const gk_place *place, double *out);
 /* gk_law.c */
 void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);

@@ -78,11 +78,11 @@ static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const 
         for (int i = 0; i < 7; i++) work->stage[g][i] = take(&b, 2 * n * sizeof(gk_real));
         work->trial[g] = take(&b, 2 * n * sizeof(gk_real));
         work->basis[g] = take(&b, (size_t)(MAX_PAIRS * setup->strips + BORE_ROWS) * n * sizeof(gk_real));
-        lay_out_table(&b, setup, &model->gear[g], 2, &work->table[g]);
+        lay_out_table(&b, setup, &model->gear[g], KINDS, &work->table[g]);
         if (setup->modal[g].n > widest) widest = setup->modal[g].n;
     }
     work->scaled = take(&b, 2 * (size_t)widest * sizeof(gk_real));
-    setup->flexibility = take(&b, (2 + MAX_FUNCTIONS) * (size_t)(model->gear[0].modes > model->gear[1].modes ? model->gear[0].modes : model->gear[1].modes) * sizeof(double));
+    setup->flexibility = take(&b, (KINDS + MAX_FUNCTIONS) * (size_t)(model->gear[0].modes > model->gear[1].modes ? model->gear[0].modes : model->gear[1].modes) * sizeof(double));
     for (int i = 0; i < CACHE; i++) lay_out_flow(&b, setup, &work->cache[i]);
     lay_out_flow(&b, setup, &work->at_rest);
     lay_out_flow(&b, setup, &work->explicit_rows);

@@ -9,11 +9,31 @@ static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
 static double speed_lead(double h, double gamma) { return h * h * (2.0 * gamma - 1.0) / 12.0; }
 
-/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the speed of free masses. At rest κ = 0. */
+/* energy of the dynamic coordinates in a state expressed for k */
+static double dynamic_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
+{
+    const gk_real *q = data->modal;
+    double sum = ENERGY_SMALL;
+    for (int d = 0; d < RIGID; d++)
+        if (setup->inverse_mass[d] > 0.0) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
+    for (int g = 0; g < 2; g++) {
+        const int n = GK_LANES(setup, g);
+        for (int i = 0; i < n; i++) {
+            const double omega = setup->modal[g].omega[i], v = q[n + i], x = q[i];
+            sum += 0.5 * k->flow[g].inverse_s2[i] * (v * v + omega * omega * x * x);
+        }
+        q += 3 * n;
+    }
+    return sum;
+}
+
+/* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the speed of free masses. At rest κ = 0.
+ * Another expression has another energy: the balance goes on from there. */
 static void express(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
 {
     if (data->state_h == k->h && data->state_gamma == k->gamma) return;
     const gk_coefficients *old = data->state_h > 0.0 ? gk_flow_for(setup, data->state_h, data->state_gamma) : &setup->work->explicit_rows;
+    const double before = dynamic_energy(setup, data, old);
     gk_real *q = data->modal;
     for (int g = 0; g < 2; g++) {
         const int n = GK_LANES(setup, g);
@@ -23,6 +43,7 @@ static void express(const gk_setup *setup, gk_data *data, const gk_coefficients 
     const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma) : 0.0;
     for (int d = 0; d < RIGID; d++) data->v[d] += lead * setup->inverse_mass[d] * data->f_rate[d];
     for (int d = 0; d < RIGID; d++) data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_mass[d] * data->f[d];
+    data->ledger.baseline += dynamic_energy(setup, data, k) - before;
     data->state_h = k->h;
     data->state_gamma = k->gamma;
 }
@@ -75,7 +96,7 @@ int gk_step_remembered(const gk_data *data, gk_key key)
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
 {
     const gk_work *work = setup->work;
-    int given = 0; /* forces that act already */
+    int given = 0, goes_on = 0; /* forces that act already: given ones, dashpots' */
     s->limit_reached = s->rounds = 0;
     s->alpha = 0.0;
     memset(s->direction, 0, (size_t)s->stride * sizeof *s->direction);
@@ -116,9 +137,11 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
             break;
         case ROW_CLUTCH: s->g0[i] = s->g[i];
         }
-        given |= s->clip[i] != 2 && s->dash0[i] != 0.0;
+        s->end[i] = s->clip[i] == 2 ? 0.0 : (0.5 - s->beta[i]) * s->dash0[i];
+        goes_on |= s->end[i] != 0.0;
     }
     if (given) gk_solve_settle(s);
+    else if (goes_on) gk_solve_lag(s, s->end, s->dash, s->lag);
     s->owed = data->ledger.owed;
     s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
@@ -240,7 +263,8 @@ static void account(const gk_setup *setup, gk_data *data)
         }
     }
     data->ledger.dissipated += taken - (held - s->held0);
-    data->ledger.lag = held;
+    if (setup->work->another) data->ledger.baseline += s->stored0 + s->held0 - data->ledger.massless;
+    data->ledger.massless = gk_solve_stored(s) + held;
 }
 
 void gk_step_remember(const gk_setup *setup, gk_data *data)
@@ -264,6 +288,7 @@ void gk_step_remember(const gk_setup *setup, gk_data *data)
         m->dash[i % GK_STRIPS(s)] = s->dash[i];
         m->end[i % GK_STRIPS(s)] = s->end[i];
         deepest = gk_max(deepest, -work->place[s->place_of[i]].gap);
+        if (GK_ON(setup, hertz) && s->force[i] > s->local[s->place_of[i]].high * s->width[i]) data->status |= 1;
     }
     data->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
 }
@@ -276,6 +301,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     const gk_coefficients *k = gk_flow_for(setup, h, gamma);
     GK_MARK(work);
     if (GK_ON(setup, elastic) && h == data->table_h && gamma == gk_limit_gamma(setup, data, h) && !(h == work->table_h && gamma == work->table_gamma)) gk_table_for(model, setup, k);
+    work->another = data->expressed_h != h || data->expressed_gamma != gamma;
     express(setup, data, k);
     predict(setup, data, k);
     if (!passable(model, data, work)) return GK_DIVERGED;
@@ -304,27 +330,12 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *d
     gk_step_remember(setup, data);
     data->rounds += s->rounds;
     data->ledger.owed = s->owed;
+    data->expressed_h = h, data->expressed_gamma = gamma;
     data->steps++;
     if (s->limit_reached) data->trouble++, data->status |= 4;
     GK_LAP(work, PHASE_REMEMBER);
     return GK_OK;
 }
 
-/* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the system of the last step; with what dashpots hold */
-double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
-{
-    const gk_system *s = &setup->work->system;
-    const gk_real *q = data->modal;
-    double sum = ENERGY_SMALL;
-    for (int d = 0; d < RIGID; d++)
-        if (setup->inverse_mass[d] > 0.0) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
-    for (int g = 0; g < 2; g++) {
-        const int n = GK_LANES(setup, g);
-        for (int i = 0; i < n; i++) {
-            const double omega = setup->modal[g].omega[i], v = q[n + i], x = q[i];
-            sum += 0.5 * k->flow[g].inverse_s2[i] * (v * v + omega * omega * x * x);
-        }
-        q += 3 * n;
-    }
-    return sum + gk_solve_stored(s) + data->ledger.lag;
-}
+/* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the end of the last step; with what dashpots hold */
+double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k) { return dynamic_energy(setup, data, k) + data->ledger.massless; }

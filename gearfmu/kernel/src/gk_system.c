@@ -215,11 +215,14 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     s->L = s->J + size;
     memset(s->D, 0, 3 * size * sizeof(double));
     for (int g = 0; g < 2; g++) {
-        double *const both[2] = {s->D, s->A}, *const residual[2] = {s->Q, NULL};
+        double *const all[KINDS] = {s->D, s->A, s->Q}, *const residual[KINDS] = {s->Q};
         gather(setup, work, g, work->y[g], work->read[g]);
         if (!GK_ON(setup, elastic)) continue; /* rigid gears */
-        if (tables) gk_table_add(model, setup, g, &work->table[g], both);
-        else gram(setup, work, g, k, s->D, s->A);
+        if (tables) {
+            gk_table_add(model, setup, g, &work->table[g], all);
+            continue;
+        }
+        gram(setup, work, g, k, s->D, s->A);
         if (GK_ON(setup, residual)) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
     }
     gaps(model, setup, k->h, work);

@@ -4,7 +4,7 @@
 #include "gk_core.h"
 
 /* flexibilities of a table's sums over modes, in the order of the stored modes: cell = base − Σ N Nᵀ flexibility */
-typedef struct recipe { int modes, kinds, is_static[2]; const double *flexibility[2]; } recipe;
+typedef struct recipe { int modes, kinds, is_static[KINDS]; const double *flexibility[KINDS]; } recipe;
 
 /* row on tooth `offset`, times the flexibility of each mode, so that a dot product with a tooth-0 row gives the sum over modes */
 static void turned_row(const gk_gear *gear, int modes, const double *row, int offset, const double *flexibility, double *out)
@@ -99,8 +99,8 @@ static void fill_table(const gk_model *model, const gk_setup *setup, int g, cons
     memset(table->ff, 0, 4 * OFFSETS * (size_t)(gear->rolls * gear->rolls * table->block) * sizeof(gk_real));
     for (int to = 0; to < 2; to++)
         for (int o = 0; o < OFFSETS; o++)
-            for (int j = 0; j < gear->rolls; j++) fill_column(gear, r, setup->strips, weight, to, o, (size_t)j, setup->flexibility + 2 * gear->modes, table->ff);
-    fill_bore(gear, r, setup->strips, weight, setup->flexibility + 2 * gear->modes, table);
+            for (int j = 0; j < gear->rolls; j++) fill_column(gear, r, setup->strips, weight, to, o, (size_t)j, setup->flexibility + KINDS * gear->modes, table->ff);
+    fill_bore(gear, r, setup->strips, weight, setup->flexibility + KINDS * gear->modes, table);
 }
 
 /* residual of a tooth's own strips beyond all stored modes */
@@ -109,7 +109,7 @@ static void fill_path(const gk_model *model, const gk_setup *setup, int g, const
     const gk_gear *gear = &model->gear[g];
     const gk_modal *m = &setup->modal[g];
     const size_t R = (size_t)gear->rolls, A = (size_t)gear->functions, N = (size_t)gear->modes, cells = (size_t)(setup->strips * setup->strips + 3) / 4 * 4;
-    double *turned = setup->flexibility + 2 * gear->modes, cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
+    double *turned = setup->flexibility + KINDS * gear->modes, cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
     gk_strip_weights weight;
     gk_strips_rows(model, setup, g, weight);
     for (size_t f = 0; f < 2; f++)
@@ -130,27 +130,28 @@ void gk_table_residual(const gk_model *model, gk_setup *setup)
         const gk_gear *gear = &model->gear[g];
         double *flexibility = setup->flexibility;
         for (int k = 0; k < gear->modes; k++) flexibility[k] = 1.0 / (gear->omega[k] * gear->omega[k]);
-        const recipe r = {setup->modal[g].count, 1, {1, 0}, {flexibility, NULL}};
+        const recipe r = {setup->modal[g].count, 1, {1}, {flexibility}};
         fill_table(model, setup, g, &r, &setup->modal[g].residual);
         fill_path(model, setup, g, flexibility);
     }
 }
 
-/* D and −K of the step k */
+/* D, −K and Q of the step k */
 void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coefficients *k)
 {
     for (int g = 0; g < 2; g++) {
         const gk_gear *gear = &model->gear[g];
         const gk_modal *m = &setup->modal[g];
         const gk_flow *f = &k->flow[g];
-        double *moves = setup->flexibility, *yields = moves + gear->modes;
+        double *moves = setup->flexibility, *yields = moves + gear->modes, *flexibility = yields + gear->modes;
         for (int i = 0, lane = -1; i < m->count; i++) {
             if (gear->part[i] != 2) lane++;
             const int at = gear->part[i] == 2 ? m->pairs + lane : lane;
             moves[i] = -(double)f->mobility[at];
             yields[i] = (double)f->kappa[at];
+            flexibility[i] = setup->on.residual ? 1.0 / (gear->omega[i] * gear->omega[i]) : 0.0;
         }
-        const recipe r = {m->count, 2, {0, 0}, {moves, yields}};
+        const recipe r = {m->count, KINDS, {0, 0, setup->on.residual}, {moves, yields, flexibility}};
         fill_table(model, setup, g, &r, &setup->work->table[g]);
     }
     setup->work->table_h = k->h;
@@ -158,7 +159,7 @@ void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coeffic
 }
 
 /* ---- reading ------------------------------------------------------------------------------------------------------------------------------------------- */
-enum { HALVES = (2 * MAX_SLICES * MAX_SLICES + 7) / 8 };
+enum { HALVES = (KINDS * MAX_SLICES * MAX_SLICES + 7) / 8 };
 
 /* Σ w_i w_j cell_ij over the 4 × 4 grid rolls around two places */
 GK_INLINE void interpolate(const gk_place *p, const gk_place *q, int g, const gk_real *cells, int rolls, gk_half *out, const int halves)
@@ -182,7 +183,7 @@ GK_INLINE void add_blocks(const gk_real *value, int kinds, double *const out[2],
 }
 
 /* between the strips of two places, added to the matrices of the table's kinds */
-static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const gk_place *p, const gk_place *q, int strips, double *const out[2], int stride)
+static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const gk_place *p, const gk_place *q, int strips, double **out, int stride)
 {
     const int offset = q->number[g] - p->number[g];
     gk_half sum[HALVES];
@@ -193,13 +194,13 @@ static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const 
 }
 
 /* strips of a place to the bore, turned from the tooth's axes into inertial ones */
-static void place_bore(const gk_system *s, const gk_gear *gear, int g, const gk_table *table, const gk_place *place, int first, double attitude, double *const out[2])
+static void place_bore(const gk_system *s, const gk_gear *gear, int g, const gk_table *table, const gk_place *place, int first, double attitude, double *const out[KINDS])
 {
     double sine, cosine;
     gk_sincos(attitude + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
     const int strips = GK_STRIPS(s), kinds = table->kinds, *row = s->bore[g];
     for (int a = 0; a < strips; a++) {
-        gk_quad c[2] = {{0}, {0}};
+        gk_quad c[KINDS] = {{0}, {0}, {0}};
         const gk_quad *t = (const gk_quad *)table->fb + (size_t)((place->flank * gear->rolls + place->index[g]) * strips + a) * (size_t)kinds;
         for (int i = 0; i < 4; i++, t += strips * kinds)
             for (int kind = 0; kind < kinds; kind++) c[kind] += place->weight[g][i] * t[kind];
@@ -213,7 +214,7 @@ static void place_bore(const gk_system *s, const gk_gear *gear, int g, const gk_
 }
 
 /* flank–flank, flank–bore and bore–bore compliance of gear g into the upper triangles of out[kind] */
-void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[2])
+void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[KINDS])
 {
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
@@ -224,7 +225,8 @@ void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_
         const gk_place *place = &work->place[p];
         for (int q = p; q < work->places; q++) {
             const int at = (p * stride + q) * strips;
-            double *const block[2] = {out[0] + at, table->kinds > 1 ? out[1] + at : NULL};
+            double *block[KINDS];
+            for (int kind = 0; kind < table->kinds; kind++) block[kind] = out[kind] + at;
             flank_pair(gear, g, table, place, &work->place[q], strips, block, stride);
         }
         place_bore(s, gear, g, table, place, p * strips, attitude, out);
