@@ -23,8 +23,8 @@ CLUTCHED = PortSpec(
     c=1.0,
     chain=ChainSpec(inertia=0.06, disc_inertia=0.006, shaft_k=23900.0, shaft_c=0.5),
 )  # the passenger car's (docs/drivetrain.md)
-DUMPED = {"open_share": Expected(0.0423, 0.003), "coast_share": Expected(0.333, 0.01)}  # as in loads.py
-LOCKED = {"open_share": Expected(0.304, 0.03), "impact_rate": Expected(1206.0, 120.0)}
+DUMPED = {"open_share": Expected(0.0406, 0.002), "coast_share": Expected(0.3336, 0.005)}  # as in loads.py
+LOCKED = {"open_share": Expected(0.2915, 0.01), "impact_rate": Expected(1148.0, 50.0)}
 OUTPUT = PortSpec(kind="spring", k=25200.0, c=0.6)
 
 

@@ -4,32 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearfmu.stability.bench import PLAIN, Variant, geometry, kernel, model
+from gearfmu.stability.bench import geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import Expected, at_least, finding, statistics
-from gearfmu.stability.loads import NOMINAL, H
+from gearfmu.stability.loads import RELIEVED, H
 from gearfmu.stability.motion import RPM, UpAndDown, loaded
 from gearfmu.stability.record import Record, run
 
 LOW, HIGH, DURATION = 5000.0, 18000.0, 2.0  # rpm, rpm, s
-RESONANCE = (8500.0, 11500.0)  # rpm: mesh frequency 2.3 … 3.1 kHz about the mode of mesh and bearings
+TORQUE = 15.0  # N·m: so little that tip relief excites far more than the stiffness does
+RESONANCE = (11000.0, 14000.0)  # rpm: mesh frequency 2.9 … 3.7 kHz about a mode of mesh and bearings
 BINS = 60
-EXPECTED = {"open_share_up": Expected(0.0093, 0.0015), "open_share_down": Expected(0.034, 0.005)}  # as in loads.py
+LOST = 0.05  # contact-loss share of a bin in which the resonance has jumped
+EXPECTED = {"open_share_up": Expected(0.0585, 0.003), "open_share_down": Expected(0.1005, 0.007)}  # as in loads.py
 
 
 def run_up_and_down(case: Case) -> Finding:
-    """5 000 to 18 000 rpm in 2 s and back, 302 N·m, no relief: contact is lost in the mesh resonance, a softening one.
-    Running up the force jumps up at a higher speed than the one at which it falls back on the way down."""
-    variant = Variant(PLAIN)
-    pair = geometry(variant)
+    """5 000 to 18 000 rpm in 2 s and back, 15 N·m, for which the tip relief is far too much: contact is lost in the
+    mesh resonances, softening ones. Near 3.5 kHz the teeth begin to part at a higher speed on the way up than the one at
+    which they stay together again on the way down."""
+    pair = geometry(RELIEVED)
     motion = UpAndDown(LOW * RPM, HIGH * RPM, DURATION)
-    made = run(kernel(model(variant), case), loaded(variant, motion, NOMINAL), 2 * DURATION, H)
+    made = run(kernel(model(RELIEVED), case), loaded(RELIEVED, motion, TORQUE), 2 * DURATION, H)
     up, down = _lost(made, made.time < DURATION), _lost(made, made.time >= DURATION)
     said, facts = [], {}
     for name, lost in (("up", up), ("down", down)):
         facts[f"open_share_{name}"] = float(lost.mean())
         facts[f"jump_{name}_rpm"] = _onset(lost)
-        said += at_least(f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 0.05)
+        said += at_least(f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 4 * LOST)
     said += statistics(facts, EXPECTED)
     apart = facts["jump_up_rpm"] - facts["jump_down_rpm"]
     said += at_least("distance of the jumps up and down (rpm)", apart, 2.0 * (HIGH - LOW) / BINS)
@@ -47,5 +49,5 @@ def _lost(record: Record, part: np.ndarray) -> np.ndarray:
 def _onset(lost: np.ndarray) -> float:
     """Lowest speed (rpm) in the resonance at which contact is lost."""
     speed = LOW + (HIGH - LOW) * (np.arange(BINS) + 0.5) / BINS
-    seen = (lost > 0.02) & (speed > RESONANCE[0]) & (speed < RESONANCE[1])
+    seen = (lost > LOST) & (speed > RESONANCE[0]) & (speed < RESONANCE[1])
     return float(speed[seen].min()) if seen.any() else float("nan")

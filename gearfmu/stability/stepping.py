@@ -13,7 +13,7 @@ import numpy as np
 from gearfmu.stability.bench import Variant, geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import at_most, finding, mean_torque, near
-from gearfmu.stability.loads import DRIVEN, LOOSE, NOMINAL, RELIEVED, H, swinging
+from gearfmu.stability.loads import DRAG, DRIVEN, LOOSE, NOMINAL, RELIEVED, SWING, H, swinging
 from gearfmu.stability.motion import RPM, Constant, loaded
 from gearfmu.stability.record import Run, run, run_times
 
@@ -48,7 +48,7 @@ def rollbacks(case: Case) -> Finding:
     """Rattle; at every step the state is saved, the run goes astray for 1 to 3 steps under other inputs and returns:
     10⁴ times, and the end is bit for bit that of the straight run."""
     variant = Variant(ports=(DRIVEN, LOOSE))
-    inputs, start = swinging(1500 * RPM, 53.0, 6000.0, 5.0)
+    inputs, start = swinging(1500 * RPM, 53.0, SWING, DRAG)
     straight = kernel(model(variant), case, start)
     calm = run(straight, inputs, ROLLBACKS * ROLLBACK_STEP, ROLLBACK_STEP)
     random, astray = np.random.default_rng(2), kernel(model(variant), case, start)
