@@ -21,7 +21,7 @@ from pathlib import Path
 
 from gearfmu.body import load_stage_bodies
 from gearfmu.files import write_text
-from gearfmu.kernel.build import build_library, compile_program
+from gearfmu.kernel.build import build_library, source_hash, sources
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
@@ -49,25 +49,26 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.host = compile_program(ROOT / "benchmarks" / "effects_host.c", folder / "host")
+        self.host = folder / "host"
+        program = ROOT / "benchmarks" / "effects_host.c"
+        subprocess.run(["cc", "-std=gnu99", "-O2", f"-I{ROOT / 'gearfmu' / 'kernel' / 'src'}", "-o", self.host, program, "-ldl"], check=True)
         spec = load_stage(STAGE)
         bodies = load_stage_bodies(spec)
         pinion = spec.gears[0].model_copy(update={"index_deviation": MISPLACED})
         self.plain = assemble(spec, bodies)
         self.misplaced = assemble(spec.model_copy(update={"gears": (pinion, spec.gears[1])}), bodies)
-        self.whole = self.library("nothing")
 
     def library(self, without: str) -> Path:
-        """A kernel compiled without the code of one effect."""
-        path = self.folder / f"without_{without}.so"
+        """A kernel of the sources of the moment, compiled without the code of one effect."""
+        path = self.folder / f"without_{without}_{source_hash(sources())[:8]}.so"
         return path if path.exists() else build_library(out=path, compiler=("cc", f"-DGK_WITHOUT={without}"))
 
     def count(self, library: Path, model: StageModel, settings: Mapping[str, float], torque: float) -> Count:
         """One run under callgrind. CalledProcessError when it fails."""
         blob = self.folder / f"{model.hash[:12]}.blob"
         blob.write_bytes(model.blob)
-        command = ["valgrind", "--tool=callgrind", "--toggle-collect=measured", "--callgrind-out-file=/dev/null",
-                   self.host, library, blob, WARM, STEPS, H, *arguments(model, settings, torque)]  # fmt: skip
+        command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--toggle-collect=measured",
+                   "--callgrind-out-file=/dev/null", self.host, library, blob, WARM, STEPS, H, *arguments(model, settings, torque)]  # fmt: skip
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
         collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
         internal, *outputs = done.stdout.split()
@@ -76,10 +77,10 @@ class Bench:
     def measure(self, effect: Effect) -> tuple[Cost, bool]:
         """The three counts; and whether the kernel without the code computes the same bits as the effect off."""
         with_it = self.misplaced if effect.name == "pitch_errors" else self.plain
-        torque = LIGHT.get(effect.name, TORQUE)
-        on = self.count(self.whole, with_it, {**BASE, **effect.on_setting}, torque)
-        off = self.count(self.whole, self.plain, {**BASE, **effect.off_setting}, torque)
-        without = self.count(self.library(effect.build), self.plain, {**BASE, **effect.off_setting}, torque)
+        whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
+        on = self.count(whole, with_it, {**BASE, **effect.on_setting}, torque)
+        off = self.count(whole, self.plain, {**BASE, **effect.off_setting}, torque)
+        without = self.count(lacking, self.plain, {**BASE, **effect.off_setting}, torque)
         cost = Cost(effect.name, on.instructions, off.instructions, without.instructions)
         return cost, off.outputs == without.outputs
 

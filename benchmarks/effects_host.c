@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <valgrind/callgrind.h>
 
 enum { MOST = 64 };
 typedef struct entry { char kind; uint32_t reference; double base, slope; } entry;
@@ -119,7 +120,9 @@ int main(int count, char **text)
     must(initialize(r.model, r.setup, r.data, 0.0) == GK_OK, "no equilibrium");
     advance(&r, 0, warm);
     const double before = steps_done(&r);
+    CALLGRIND_START_INSTRUMENTATION; /* what comes before is a preparation of seconds and need not be slow */
     measured(&r, warm, end);
+    CALLGRIND_STOP_INSTRUMENTATION;
     printf("%.0f", steps_done(&r) - before);
     for (int i = 0; i < r.entries; i++) {
         double value = 0.0;
