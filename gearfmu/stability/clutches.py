@@ -16,6 +16,7 @@ from gearfmu.stability.case import COMPLETED, Case, Finding
 from gearfmu.stability.checks import Expected, at_least, finding, lost, statistics
 from gearfmu.stability.record import NAMES, Record, Stopped, run
 
+DUMP = "clutch_dump"  # the shipped scene
 LOCKINGS, PERIOD = 100, 5e-3  # number, s
 CLUTCHED = PortSpec(
     kind="spring",
@@ -31,7 +32,7 @@ OUTPUT = PortSpec(kind="spring", k=25200.0, c=0.6)
 def clutch_dump(case: Case) -> Finding:
     """The shipped scene through the coupling: full capacity in 2 ms, the teeth hammer through the backlash.
     Contact-loss share and share of contact on the coast flanks repeat; the clutch is locked at the end."""
-    scene = load_scene("clutch_dump")
+    scene = load_scene(DUMP)
     h = internal_step(stage_model(scene), case)
     scene = scene.model_copy(update={"stage": scene.stage.model_copy(update={"level": case.level, "h": h})})
     trace = run_scene(scene, unit="kernel")

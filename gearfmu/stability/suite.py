@@ -16,11 +16,11 @@ from typing import Any
 from gearfmu.errors import GearfmuError, ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import library_path
-from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.stage import load_stage
-from gearfmu.stability.bench import PLAIN, Variant, geometry
+from gearfmu.spec.scene import scene_path
+from gearfmu.stability.bench import PLAIN, RELIEVED, Variant, geometry, model
 from gearfmu.stability.case import COMPLETED, LEVELS, STEPS, Case, Finding
 from gearfmu.stability.checks import finding
+from gearfmu.stability.clutches import DUMP
 from gearfmu.stability.record import Stopped
 from gearfmu.stability.scenes import SCENES
 
@@ -114,11 +114,12 @@ def _nothing(outcome: str, case: Case, message: str) -> Finding:
 
 
 def fingerprint() -> str:
-    """SHA-256 (12 hex digits) over the kernel library, the inputs of the bodies and the scenes with their checks."""
+    """SHA-256 (12 hex digits) over the kernel library, the assembled stages (bodies, damping, cuts), the clutch scene
+    and the scenes with their checks."""
     digest = hashlib.sha256(library_path().read_bytes())
-    spec = load_stage(PLAIN)
-    for index in (0, 1):
-        digest.update(body_hash(body_inputs(spec, index)).encode())
+    for stage in (PLAIN, RELIEVED):
+        digest.update(model(Variant(stage)).blob)
+    digest.update(scene_path(DUMP).read_bytes())
     for name in JUDGES:
         digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
     return digest.hexdigest()[:12]
