@@ -55,6 +55,17 @@ def test_a_table_is_written_and_gone_on_with(tmp_path: Path, capsys: pytest.Capt
     assert float(next(csv.DictReader(out.open()))["penetration_m"]) < 1e-3
 
 
+def test_a_table_is_of_its_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Contact damping changes no body, and yet the rows are others."""
+    (tmp_path / "stage.toml").write_text(
+        f'base = "{bench.model(bench.Variant(bench.PLAIN)).spec.source}"\n[contact]\ndamping = "100e3 N*s/m^2"\n'
+    )
+    before = suite.fingerprint()
+    assert suite.fingerprint() == before
+    monkeypatch.setattr(suite, "PLAIN", str(tmp_path / "stage.toml"))
+    assert suite.fingerprint() != before
+
+
 def test_failures_are_counted_and_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     bad = replace(GOOD, outcome="failed", complaints=("the mesh sings",))
     monkeypatch.setattr(suite, "run_suite", lambda *_: [row(bad), row(GOOD), row(bad)])
@@ -124,8 +135,9 @@ def test_judges_hear_what_is_wrong(calm: record.Record) -> None:
     leak = 2e-4 * calm["energy.stored"].max() * calm.time / calm.time[-1]
     leaking = dict(calm.values) | {"energy.stored": calm["energy.stored"] + leak}
     assert "energy" in checks.finding(replace(calm, values=leaking), pair).complaints[0]
-    sunk = dict(calm.values) | {"pinion.gear.phi": calm["pinion.gear.phi"] + 0.01}
-    assert "overlap" in checks.finding(replace(calm, values=sunk), pair).complaints[0]
+    deeper = calm["pinion.gear.phi"] + np.where(calm.time > 0.00995, 60e-6 / pair.gears[0].r_b, 0.0)
+    sunk = dict(calm.values) | {"pinion.gear.phi": deeper}
+    assert "overlap by 102.0 µm at 0.01 s" in checks.finding(replace(calm, values=sunk), pair).complaints[0]
     assert checks.finding(calm, pair, ["too quiet"]).outcome == "failed"
     assert checks.finding(replace(calm, outcome="diverged"), pair).outcome == "diverged@0.01"
 
