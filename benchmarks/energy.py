@@ -1,17 +1,18 @@
 """Energy of the time step on the shipped bodies: what conservation tests T1–T9 leave of it, and what controls do.
 
-    python benchmarks/energy.py [--starts 20] [--duration 0.05] [--level fast] [--out benchmarks/energy.csv]
+    python benchmarks/energy.py [--starts 20] [--duration 0.05] [--level fast] [--cases NAME …] [--out benchmarks/energy.csv]
 
 Undamped free rattle of ±30 µm along the line of action and its harder relatives, mesh position frozen
 (effect.roll_motion off), random starts: place in the mesh, place in the backlash, speed. Drift: largest change of
 stored energy minus work of the ports, over the larger of kinetic and stored energy at the start; growth: largest growth
 in one step, same scale. Prints a table and writes it as CSV: one row a case, build, local law, number of slices and
-step, largest values over all starts.
+step, largest values over all starts. With --cases only the lines of those cases are made anew.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -37,7 +38,7 @@ LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
 DG4, MIX4, EM = 0, 1, 2
 DOUBLE, FLOAT, CURVED = 1e-8, 1e-5, 1e-6  # limits of the drift: double, as shipped, double with the load-dependent law
 DAMPED = {"effect.contact_damping": 1.0, "effect.modal_damping": 1.0}
-COLUMNS = ("test", "case", "build", "law", "slices", "h_s", "starts", "drift", "limit", "growth", "changes", "trouble")
+COLUMNS = ("test", "case", "build", "law", "slices", "h_s", "starts", "duration_s", "drift", "limit", "growth", "changes", "trouble")
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def row(model: StageModel, name: str, case: Case, chosen: tuple[str, int, int, f
         worst["trouble"] += found.trouble
     limit = case.limit if case.limit is not None else FLOAT if build == "shipped" else CURVED if law else DOUBLE
     return {"test": case.test, "case": name, "build": build, "law": ("linear", "hertz")[law], "slices": slices, "h_s": h,
-            "starts": run["starts"], "limit": limit if not case.at_least else case.at_least, **worst}
+            "starts": run["starts"], "duration_s": run["duration"], "limit": limit if not case.at_least else case.at_least, **worst}
 
 
 def combinations(case: Case) -> Iterator[tuple[str, int, int, float]]:
@@ -134,29 +135,49 @@ def keeps(case: Case, line: Mapping) -> bool:
     return line["drift"] <= line["limit"] and not line["trouble"] and (case.test != "T9" or line["growth"] <= line["limit"])
 
 
+def kept(file: Path, anew: list[str]) -> list[dict[str, object]]:
+    """Lines of the table in `file` that belong to no case in `anew`."""
+    with open(file, newline="", encoding="utf-8") as lines:
+        return [line for line in csv.DictReader(lines) if line["case"] not in anew]
+
+
+def write(file: Path, lines: list[dict[str, object]]) -> None:
+    """The table in the order of the cases."""
+    order = [*CASES, *CONTROLS]
+    lines = sorted(lines, key=lambda line: order.index(str(line["case"])))
+    write_columns(file, {column: np.array([line[column] for line in lines]) for column in COLUMNS})
+
+
 def main() -> int:
     """Print and write the table; exit code: number of lines that are not as they should be."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--duration", type=float, default=0.05)
     parser.add_argument("--level", default="fast", choices=LEVELS)
+    parser.add_argument("--cases", nargs="+", default=[], choices=[*CASES, *CONTROLS], metavar="NAME")
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec = load_stage("fzg_c/stage_relief")
-    model, lines, bad = free_pair(spec, load_stage_bodies(spec)), [], 0
+    model, bad = free_pair(spec, load_stage_bodies(spec)), 0
+    lines = kept(chosen.out, chosen.cases) if chosen.cases else []
     with tempfile.TemporaryDirectory() as folder:
         run = {"libraries": kernels(Path(folder)), "starts": chosen.starts, "duration": chosen.duration, "level": chosen.level}
-        for name, case in {**CASES, **CONTROLS}.items():
+        for name in chosen.cases or [*CASES, *CONTROLS]:
+            case = {**CASES, **CONTROLS}[name]
             for combination in combinations(case):
-                line = row(model, name, case, combination, run)
-                lines.append(line)
-                good = keeps(case, line)
-                bad += not good
-                print(f"{line['test']:9} {name:31} {line['build']:8} {line['law']:7} {line['slices']:3d} {1e6 * line['h_s']:5.1f} µs  "
-                      f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth {line['growth']:.1e}  "
-                      f"{line['changes']:6d} changes {line['trouble']:3d} trouble{'' if good else '   ← NOT KEPT'}", flush=True)
-    write_columns(chosen.out, {column: np.array([line[column] for line in lines]) for column in COLUMNS})
+                lines.append(row(model, name, case, combination, run))
+                bad += not shown(case, lines[-1])
+            write(chosen.out, lines)
     return bad
+
+
+def shown(case: Case, line: Mapping) -> bool:
+    """Print a line; returns whether it is as it should be."""
+    good = keeps(case, line)
+    print(f"{line['test']:9} {line['case']:31} {line['build']:8} {line['law']:7} {line['slices']:3d} {1e6 * line['h_s']:5.1f} µs  "
+          f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth {line['growth']:.1e}  "
+          f"{line['changes']:6d} changes {line['trouble']:3d} trouble{'' if good else '   ← NOT KEPT'}", flush=True)
+    return good
 
 
 if __name__ == "__main__":
