@@ -28,7 +28,7 @@ from gearfmu.stage.tables import ROLLS
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
-LOOKED_AT = 2.0  # s of processor time after which a replay has said enough
+LOOKED_AT = 1.0  # s of processor time after which a replay has said enough
 
 
 @dataclass(frozen=True)
@@ -218,14 +218,27 @@ class Replay:
 
 
 def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
-    """Price of `run`, in turn with `base`, over the settled part of the scene or until it has taken `looked_at`
-    processor seconds. Both ran the same scene; NaN for a run that stopped early."""
+    """Price of `run`, in turn with `base`, over the settled part of the scene, again and again until it has taken
+    `looked_at` processor seconds: the least of the passes, the median of their quotients. Both ran the same scene; NaN
+    for a run that stopped early."""
     if run.outcome != OK or base.outcome != OK:
         return Price(float("nan"), float("nan"))
-    one, other = Replay(run.recording), Replay(base.recording)
+    one, other, left = Replay(run.recording), Replay(base.recording), looked_at
+    passes: list[tuple[float, float]] = []
+    while left > 0.0:
+        spent, steps = _one_pass(one, other, left)
+        passes.append((spent[0] / (steps * run.recording.step), spent[0] / spent[1]))
+        left -= spent[0]
+    return Price(float(min(time for time, _ in passes)), float(np.median([ratio for _, ratio in passes])))
+
+
+def _one_pass(one: Replay, other: Replay, looked_at: float) -> tuple[np.ndarray, int]:
+    """Processor seconds of both (2,) from the settled state to the end, or until `one` has taken `looked_at`; steps."""
+    one.rewind()
+    other.rewind()
     spent, steps = np.zeros(2), 0
     while one.left and spent[0] < looked_at:
         count = min(CHUNK, one.left)
         spent += one.chunk(count), other.chunk(count)
         steps += count
-    return Price(float(spent[0] / (steps * run.recording.step)), float(spent[0] / spent[1]))
+    return spent, steps

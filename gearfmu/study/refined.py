@@ -60,8 +60,8 @@ def variants(spec: StageSpec, slices: int, scale: float = SCALE, modes: int = MO
     both = [_refined(gear, scale, modes) for gear in spec.gears]
     return [
         Variant(f"slices {FINEST_SLICES}", None, FINEST_SLICES, ROLLS),
-        Variant(f"rolls {4 * ROLLS // 3}", None, slices, 4 * ROLLS // 3),
         Variant(f"rolls {2 * ROLLS}", None, slices, 2 * ROLLS),
+        Variant(f"rolls {4 * ROLLS}", None, slices, 4 * ROLLS),
         Variant(f"modes × {modes}", tuple(more), slices, ROLLS),
         Variant(f"mesh × {scale:g}", tuple(finer), slices, ROLLS),
         Variant("all of them", tuple(both), FINEST_SLICES, 2 * ROLLS),
