@@ -28,7 +28,8 @@ from gearfmu.stage.tables import ROLLS
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
-LOOKED_AT = 1.0  # s of processor time after which a replay has said enough
+LOOKED_AT = 0.3  # s of processor time after which passes of a replay have said enough
+LONGEST_PASS = 2.0  # s of processor time
 
 
 @dataclass(frozen=True)
@@ -226,18 +227,18 @@ def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
     one, other, left = Replay(run.recording), Replay(base.recording), looked_at
     passes: list[tuple[float, float]] = []
     while left > 0.0:
-        spent, steps = _one_pass(one, other, left)
+        spent, steps = _one_pass(one, other)
         passes.append((spent[0] / (steps * run.recording.step), spent[0] / spent[1]))
         left -= spent[0]
     return Price(float(min(time for time, _ in passes)), float(np.median([ratio for _, ratio in passes])))
 
 
-def _one_pass(one: Replay, other: Replay, looked_at: float) -> tuple[np.ndarray, int]:
-    """Processor seconds of both (2,) from the settled state to the end, or until `one` has taken `looked_at`; steps."""
+def _one_pass(one: Replay, other: Replay) -> tuple[np.ndarray, int]:
+    """Processor seconds of both (2,) from the settled state to the end, or until `one` has taken LONGEST_PASS; steps."""
     one.rewind()
     other.rewind()
     spent, steps = np.zeros(2), 0
-    while one.left and spent[0] < looked_at:
+    while one.left and spent[0] < LONGEST_PASS:
         count = min(CHUNK, one.left)
         spent += one.chunk(count), other.chunk(count)
         steps += count

@@ -48,7 +48,7 @@ def test_every_level_once_and_finer_is_better(made: tuple[Path, tuple[Row, ...]]
     assert errors[0] > 3 * errors[1] > 3 * errors[2] > 0
     assert by_level["rigid"].n_dyn == 0 < by_level["fast"].n_dyn < by_level["full"].n_dyn
     assert all(0 < row.realtime_factor < 100 and row.slices == 5 for row in rows)
-    assert by_level["full"].cpu_ratio > 1.5 * by_level["rigid"].cpu_ratio
+    assert 1.1 < by_level["full"].cpu_ratio / by_level["rigid"].cpu_ratio < 3.0, "sums over modes are tabulated"
     assert (out / "study.csv").read_text().splitlines()[0] == COLUMNS
     reference = read_rows(out / "references.csv", ReferenceRow)[0]
     assert reference.h_s < min(row.h_s for row in rows) / 3 and reference.n_dyn == by_level["full"].n_dyn
@@ -91,7 +91,7 @@ def test_half_the_step_costs_about_twice(scene: SceneSpec) -> None:
     model = models_for(scene)
     whole, half = (measure(scene, model, Point("fast", h=h)) for h in (5e-6, 2.5e-6))
     price = paired_price(half, whole)
-    assert 1.4 < price.cpu_ratio < 2.6 and price.realtime_factor > 0
+    assert 1.6 < price.cpu_ratio < 2.4 and price.realtime_factor > 0
 
 
 def test_points_cover_levels_steps_slices_and_the_papers_way() -> None:
