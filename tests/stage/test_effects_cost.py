@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import shutil
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -28,7 +29,7 @@ def test_every_effect_has_its_measured_cost() -> None:
 def benchmark_() -> ModuleType:
     """benchmarks/effects_cost.py as a module."""
     spec = importlib.util.spec_from_file_location("effects_cost", ROOT / "benchmarks" / "effects_cost.py")
-    module = importlib.util.module_from_spec(spec)
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
