@@ -28,7 +28,7 @@ from gearfmu.stage.tables import ROLLS
 from gearfmu.study.norm import Signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
-LOOKED_AT = 0.3  # s of processor time after which passes of a replay have said enough
+LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough
 LONGEST_PASS = 2.0  # s of processor time
 
 

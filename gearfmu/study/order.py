@@ -24,7 +24,7 @@ EXPECTED[MESH] = EXPECTED[IMPACT]
 FULL_LEVEL = 3
 END, COUNTS = 576e-6, (12, 16, 24, 32)  # s and steps: closed contact, all modes exponential
 LEVELS = ("rigid", "fast")
-MESH_STEPS, MESH_REFERENCE = (10e-6, 5e-6, 2.5e-6, 1.25e-6, 0.625e-6), 0.15625e-6  # s
+MESH_STEPS, MESH_REFERENCE = (10e-6, 5e-6, 2.5e-6, 1.25e-6, 0.625e-6), 0.625e-6 / 3  # s
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from gearfmu.study.ladder import QUICK_STEPS, STEPS, fitting
 from gearfmu.study.norm import Errors, Signals, errors, kept_signals
 
 SHARE = 0.2
-FINEST = 0.1e-6  # s: below this single-precision modes move more by rounding than by the step
-FIRST = 4  # first reference: the finest step of the study over this
+FINEST = 0.2e-6  # s: below this rounding of single-precision modes moves level full by 0.5 % and more
+FIRST = 3  # first reference: the finest step of the study over this
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from gearfmu.study.notes import notes
 from gearfmu.study.reference import Reference, keep_reference, kept_reference, make_reference
 from gearfmu.study.table import KeptTable, ReferenceRow, Row, TransientRow
 
-FORMAT = 1  # of what is kept: a study of another format is measured anew
+FORMAT = 2  # of what is kept: a study of another format is measured anew
 Progress = Callable[..., None]
 
 
