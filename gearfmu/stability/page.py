@@ -18,7 +18,7 @@ HEAD = """# Hard cases
 This page is made from the table that `make stability` writes, by `python -m gearfmu.stability.page`.
 
 ```
-gearfmu stability                                            # everything; an hour on one core
+gearfmu stability                                            # everything; half an hour on one core
 gearfmu stability --level fast --h default                   # what continuous integration runs
 gearfmu stability --scene rollbacks --h "5 us" --out my.csv  # one scene, another step; a later call goes on with my.csv
 ```
@@ -42,6 +42,9 @@ Every scene is asked that all outputs be finite, that the energy balance close t
 scheme's), and that flanks overlap at no sample by more than what the largest force of its communication step
 presses the softest tooth pair, plus 7.5 µm for tip relief. Chaotic scenes are judged by statistics: contact-loss share,
 impact rate, band levels, impulse.
+
+The kernel's default is the largest step that needs no lowered γ (theory, 3.5); at its half and quarter γ may be lowered
+(bit 8 of the `status` under Statistics), which costs accuracy and no energy. Bit 1: local law beyond its range.
 
 ## Scenes
 
