@@ -15,7 +15,7 @@ from gearfmu.study.ladder import QUICK_STEPS, STEPS, fitting
 from gearfmu.study.norm import Errors, Signals, errors, kept_signals
 
 SHARE = 0.2
-FINEST = 0.2e-6  # s: below this rounding of single-precision modes moves level full by 0.5 % and more
+FINEST = 0.2e-6  # s: below this the contact force of level full rings with dashpots (docs/decisions.md)
 FIRST = 3  # first reference: the finest step of the study over this
 
 
