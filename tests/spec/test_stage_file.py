@@ -83,7 +83,7 @@ def test_shipped_stage_in_si() -> None:
     assert (stage.torque_max, stage.contact.slices, pinion.tip_relief) == (600, 5, None)
     assert stage.speed_max == pytest.approx(200 * math.pi)
     assert (pinion.bearing.stiffness, pinion.bearing.damping_ratio) == (3e8, 0.03)
-    assert (stage.levels.fast_cut, stage.levels.standard_cut) == (50e3, 120e3)
+    assert (stage.levels.fast_cut, stage.levels.standard_cut) == (80e3, 120e3)
     assert {name: port.kind for name, port in stage.ports.items()} == {"pinion": "spring", "wheel": "spring"}
     with pytest.raises(ValueError, match="frozen"):
         stage.torque_max = 1.0
