@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import combinations
 
 from gearfmu.study.table import ReferenceRow, Row
 
@@ -17,13 +18,16 @@ def notes(rows: tuple[Row, ...], references: tuple[ReferenceRow, ...]) -> Iterat
     for (level, integrator, slices), line in lines.items():
         line.sort(key=lambda row: -row.h_s)
         for name in ("te", "force", "bearing"):
-            least = min(line, key=lambda row: getattr(row, f"{name}_error"))
-            last, low = getattr(line[-1], f"{name}_error"), getattr(least, f"{name}_error")
-            if last > GROWTH * low:
+            found = [(row.h_s, getattr(row, f"{name}_error")) for row in line]
+            growth, large, small = max(
+                ((small[1] / large[1], large, small) for large, small in combinations(found, 2) if large[1] > 0),
+                default=(0.0, None, None),
+            )
+            if growth > GROWTH:
                 yield (
-                    f"{level} ({integrator}), {slices} slices: {name} error grows from {100 * low:.2g} % at "
-                    f"{1e6 * least.h_s:.3g} µs to {100 * last:.2g} % at {1e6 * line[-1].h_s:.3g} µs: the errors of "
-                    "time and of modes cancel in part"
+                    f"{level} ({integrator}), {slices} slices: {name} error grows from {100 * large[1]:.2g} % at "
+                    f"{1e6 * large[0]:.3g} µs to {100 * small[1]:.2g} % at {1e6 * small[0]:.3g} µs: the errors of time "
+                    "and of modes cancel in part at the larger step, or γ is lowered at the smaller one"
                 )
     for r in references:
         if not r.reached:
