@@ -23,6 +23,7 @@ VERBS = {
         "Reduce the gears of a stage to .h5 bodies (skipped when up to date).",
     ),
     "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
+    "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),
     "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
     "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),

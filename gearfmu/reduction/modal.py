@@ -13,7 +13,7 @@ import numpy as np
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.sector import SectorBody
 
-_SHAPES = 4  # lowest shapes of each family kept for pictures
+_SHAPES = 4  # lowest shapes of each family kept, unless more are asked for
 
 Progress = Callable[[str, float], None]
 
@@ -47,8 +47,9 @@ class _FamilyModes:
     shapes: np.ndarray
 
 
-def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None) -> Modes:
-    """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
+def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None, shapes: int = _SHAPES) -> Modes:
+    """The `count` lowest elastic modes of the free body (one less where `count` would split a pair), with the `shapes`
+    lowest shapes of each family.
 
     Every family is solved for its expected share and again for more, until the highest frequency it was solved for
     lies above the last mode kept: no mode is missed. Raises ModesError when the eigensolver fails.
@@ -66,7 +67,7 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
         for number, key in enumerate(open_families):
             if progress:
                 progress(f"modes, nodal diameter {key[1]}", number / len(open_families))
-            found[key] = _solve(body, key, wanted[key])
+            found[key] = _solve(body, key, wanted[key], shapes)
         limit = _limit(found.values(), count)
         again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
         if not again:
@@ -81,7 +82,7 @@ def _limit(found, count: int) -> float:
     return squared[min(count, len(squared)) - 1]
 
 
-def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
+def _solve(body: SectorBody, key: tuple[int, int], count: int, pictured: int) -> _FamilyModes:
     family = body.family(*key)
     harmonic = family.harmonic
     squared, shapes = lowest_modes(harmonic, count)
@@ -92,7 +93,7 @@ def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
     flank = flank * _gauge(flank)
     bore = body.teeth * (family.bore.conj().T @ shapes)
     space = body.spaces[key[0]]
-    pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
+    pictures = space.to_nodes @ harmonic.expand(shapes[:, :pictured])
     return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures)
 
 

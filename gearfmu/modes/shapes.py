@@ -1,0 +1,81 @@
+"""Modes of one body with their shapes on its surface: what pictures, .vtu files and tables are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+DRAWN = 0.05  # of the body's diameter: the largest displacement as it is drawn
+
+@dataclass(frozen=True)
+class Mode:
+    """One frequency of a body: a single mode, or the pair of a cyclic body.
+
+    numbers : which modes of the body, counted from 1. frequency : Hz. damping_ratio. parity : +1 symmetric about
+    mid-width (motion in the plane), −1 antisymmetric (out of it), 0 no such symmetry. nodal_diameter : ν, and
+    `harmonic_share` the part of the kinetic energy that has it (1 in a cyclic body).
+    energy : (3,) shares of the kinetic energy in radial, tangential and axial motion.
+    shape : (1 or 2, P, 3) displacement of the surface's points in kg^-½, mass-normalised, of the mode or of either one
+    of the pair.
+    """
+
+    numbers: tuple[int, ...]
+    frequency: float
+    damping_ratio: float
+    parity: int
+    nodal_diameter: int
+    harmonic_share: float
+    energy: np.ndarray
+    shape: np.ndarray
+
+    @property
+    def motion(self) -> str:
+        """In words: in or out of the plane, by symmetry about mid-width, else by where most of the energy is."""
+        parity = self.parity or (-1 if self.energy[2] > 0.5 else 1)
+        return "in-plane" if parity > 0 else "out-of-plane"
+
+    @property
+    def name(self) -> str:
+        """What the shape is called: umbrella, torsion, breathing, tilting, …"""
+        radial, tangential, axial = self.energy
+        if self.motion == "out-of-plane":
+            return {0: "umbrella" if axial > 0.5 else "counter-torsion", 1: "tilting"}.get(
+                self.nodal_diameter, "disc bending"
+            )
+        turning = tangential > 0.8 * (radial + tangential)
+        return {0: "torsion" if turning else "breathing", 1: "shifting"}.get(
+            self.nodal_diameter, "tooth and rim shear" if turning else f"{self.nodal_diameter} lobes"
+        )
+
+
+@dataclass(frozen=True)
+class BodyModes:
+    """Modes of one body by ascending frequency. points (P, 3) m: nodes of the finite elements' surface; faces (F, 8):
+    quadratic quadrilaterals (VTK order), normals outward."""
+
+    name: str
+    points: np.ndarray
+    faces: np.ndarray
+    modes: tuple[Mode, ...]
+
+    def drawn(self, mode: Mode) -> np.ndarray:
+        """The shape of a mode scaled so that its largest displacement is `DRAWN` of the body's diameter, m: (1 or 2, P,
+        3)."""
+        diameter = 2 * np.linalg.norm(self.points[:, :2], axis=1).max()
+        return mode.shape * (DRAWN * diameter / np.linalg.norm(mode.shape[0], axis=1).max())
+
+
+def energy_shares(nodes: np.ndarray, mass: sp.csr_array, shape: np.ndarray) -> np.ndarray:
+    """Shares (3,) of a shape's kinetic energy in radial, tangential and axial motion about z.
+
+    nodes (N, 3) m; mass (N, N) kg: of each component alike; shape (N, 3) real or complex. The consistent mass is
+    applied to the nodal values of the cylindrical components; their sum differs from the energy by the turn of the
+    axes within an element and is scaled to 1.
+    """
+    radius = np.hypot(nodes[:, 0], nodes[:, 1])
+    c, s = (nodes[:, k] / np.where(radius > 0, radius, 1.0) for k in (0, 1))
+    radial, tangential = c * shape[:, 0] + s * shape[:, 1], c * shape[:, 1] - s * shape[:, 0]
+    parts = np.array([np.vdot(u, mass @ u).real for u in (radial, tangential, shape[:, 2])])
+    return parts / parts.sum()
