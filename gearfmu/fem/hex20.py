@@ -107,21 +107,23 @@ def element_matrices(positions: np.ndarray, material: Material) -> tuple[np.ndar
     measure = volume * weight
     values = shape(xi)
     mass = material.density * np.einsum("eg,gi,gj->eij", measure, values, values, optimize=True)
-    return _stiffness(spatial, measure, elasticity(material)), mass
+    return stiffness_of(spatial, measure, elasticity(material)), mass
 
 
-def _stiffness(spatial: np.ndarray, measure: np.ndarray, d: np.ndarray) -> np.ndarray:
-    elements, points = measure.shape
-    strain = np.zeros((elements, points, 6, 20, 3))
+def stiffness_of(spatial: np.ndarray, measure: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """∫ Bᵀ D B of a batch of elements with k nodes: spatial gradients (E, G, 3, k), 1/m, of the shape functions at G
+    points, their volumes (E, G), m³, and elasticity d (6, 6), Pa → (E, 3k, 3k), N/m."""
+    elements, points, _, k = spatial.shape
+    strain = np.zeros((elements, points, 6, k, 3))
     for component in range(3):
         strain[:, :, component, :, component] = spatial[:, :, component]
     for row, (a, b) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
         strain[:, :, row, :, a] = spatial[:, :, b]
         strain[:, :, row, :, b] = spatial[:, :, a]
-    strain = strain.reshape(elements, points, 6, 60)
+    strain = strain.reshape(elements, points, 6, 3 * k)
     stress = np.matmul(d, strain) * measure[:, :, None, None]
-    k = np.matmul(strain.reshape(elements, -1, 60).transpose(0, 2, 1), stress.reshape(elements, -1, 60))
-    return 0.5 * (k + k.transpose(0, 2, 1))
+    k_elements = np.matmul(strain.reshape(elements, -1, 3 * k).transpose(0, 2, 1), stress.reshape(elements, -1, 3 * k))
+    return 0.5 * (k_elements + k_elements.transpose(0, 2, 1))
 
 
 def assemble(nodes: np.ndarray, elements: np.ndarray, material: Material) -> tuple[sp.csr_array, sp.csr_array]:
@@ -137,12 +139,13 @@ def assemble(nodes: np.ndarray, elements: np.ndarray, material: Material) -> tup
         stiffness.append(k)
         mass.append(m)
     dofs = (3 * elements[:, :, None] + np.arange(3)).reshape(len(elements), 60)
-    k_global = _scatter(np.concatenate(stiffness), dofs, 3 * len(nodes))
-    m_scalar = _scatter(np.concatenate(mass), elements, len(nodes))
+    k_global = scatter(np.concatenate(stiffness), dofs, 3 * len(nodes))
+    m_scalar = scatter(np.concatenate(mass), elements, len(nodes))
     return k_global, sp.csr_array(sp.kron(m_scalar, sp.identity(3), format="csr"))
 
 
-def _scatter(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
+def scatter(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
+    """Sum of element matrices (E, k, k) at the unknowns (E, k), symmetric: (size, size)."""
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
     matrix = sp.coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)).tocsr()
