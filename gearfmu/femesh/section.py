@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.errors import MeshError
+from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.spec.gear import MeshSpec
 
@@ -48,17 +49,17 @@ def build_section(gear: GearGeometry, mesh: MeshSpec) -> Section:
     elements = mesh.scaled(mesh.flank, 2)
     roll = flank_rolls(gear, elements)
     tooth, root, rim = _blocks(gear, mesh, roll)
-    upper = np.concatenate([_quads(block) for block in (tooth, root, rim)])
-    points = np.concatenate([upper, _mirrored(upper)])
+    upper = np.concatenate([quads_of(block) for block in (tooth, root, rim)])
+    points = np.concatenate([upper, mirrored(upper)])
     nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
-    find = _Finder(nodes)
+    find = Finder(nodes)
     flank_line, cut = tooth[0, : 2 * elements + 1], np.concatenate([root[:, -1], rim[1:, -1]])
     return Section(
         nodes=nodes, quads=index.reshape(-1, 8),
         bore=find(np.concatenate([rim[-1], rim[-1, 1:] * [1, -1]])),
         cut_plus=find(cut), cut_minus=find(cut * [1, -1]),
-        flank=np.stack([_edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
-        flank_roll=_edges(roll[: 2 * elements + 1]),
+        flank=np.stack([edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
+        flank_roll=edges(roll[: 2 * elements + 1]),
     )  # fmt: skip
 
 
@@ -73,39 +74,6 @@ def flank_rolls(gear: GearGeometry, elements: int) -> np.ndarray:
     return roll
 
 
-def graded(elements: int, growth: float) -> np.ndarray:
-    """Parameters (2·elements + 1,) from 0 to 1 of corner and mid nodes; elements grow by the factor `growth`."""
-    sizes = growth ** np.arange(elements)
-    corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
-    corners[-1] = 1.0
-    result = np.empty(2 * elements + 1)
-    result[::2] = corners
-    result[1::2] = 0.5 * (corners[1:] + corners[:-1])
-    return result
-
-
-def transfinite(low: np.ndarray, high: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Lattice (P, Q, 2) between the curves low, high (P, 2), first and last of the second index, and start, end (Q, 2).
-
-    Gordon and Hall's interpolation with the curves' own arc-length parameters, so that gradings of opposite sides
-    need not agree.
-    """
-    u0, u1, v0, v1 = (_parameter(curve) for curve in (low, high, start, end))
-    du, dv = (u1 - u0)[:, None], (v1 - v0)[None, :]
-    u = (u0[:, None] + du * v0[None, :]) / (1 - du * dv)
-    v = (v0[None, :] + dv * u0[:, None]) / (1 - du * dv)
-    u, v = u[..., None], v[..., None]
-    result = (1 - v) * low[:, None] + v * high[:, None] + (1 - u) * start[None] + u * end[None]
-    result -= (1 - u) * (1 - v) * low[0] + u * (1 - v) * low[-1] + (1 - u) * v * high[0] + u * v * high[-1]
-    result[:, 0], result[:, -1], result[0], result[-1] = low, high, start, end
-    return result
-
-
-def _parameter(curve: np.ndarray) -> np.ndarray:
-    steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
-
-
 def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     across = graded(mesh.scaled(mesh.thickness), mesh.growth(mesh.thickness_grading))[:, None]
     share = graded(mesh.scaled(mesh.root, 2), 1.0)
@@ -114,7 +82,7 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
     space = np.array([math.cos(gear.half_pitch), math.sin(gear.half_pitch)])
     core, depth = _core_arc(gear, flank[0], share)
     core[-1], surface[-1] = (gear.r_f - depth) * space, gear.r_f * space
-    middle = core[0] + (gear.r_a - core[0, 0]) * _parameter(flank)[:, None] * [1, 0]
+    middle = core[0] + (gear.r_a - core[0, 0]) * parameter(flank)[:, None] * [1, 0]
     tip_angle = gear.tip_half_angle * (1 - across)
     tip = gear.r_a * np.concatenate([np.cos(tip_angle), np.sin(tip_angle)], axis=1)
     middle[-1], tip[0], tip[-1] = (gear.r_a, 0.0), flank[-1], (gear.r_a, 0.0)
@@ -171,34 +139,3 @@ def _core_arc(gear: GearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[
         raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make the bore smaller")
     angle = share * gear.half_pitch
     return radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1), depth
-
-
-def _quads(lattice: np.ndarray) -> np.ndarray:
-    """Coordinates (E, 8, 2) of the counter-clockwise quadrilaterals of a lattice (2a+1, 2b+1, 2)."""
-    rows, columns = lattice.shape[0] // 2, lattice.shape[1] // 2
-    steps = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
-    quads = np.stack(
-        [lattice[i : i + 2 * rows - 1 : 2, j : j + 2 * columns - 1 : 2] for i, j in steps], axis=2
-    ).reshape(-1, 8, 2)
-    first, last = quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]
-    clockwise = np.median(first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]) < 0
-    return quads[:, [0, 3, 2, 1, 7, 6, 5, 4]] if clockwise else quads
-
-
-def _mirrored(quads: np.ndarray) -> np.ndarray:
-    return (quads * [1, -1] + 0.0)[:, [0, 3, 2, 1, 7, 6, 5, 4]]
-
-
-def _edges(line: np.ndarray) -> np.ndarray:
-    """(F, 3) start, end, middle of the elements along a line of 2F + 1 nodes."""
-    return np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1)
-
-
-class _Finder:
-    """Index of points that are rows of a sorted unique array, by exact equality."""
-
-    def __init__(self, nodes: np.ndarray):
-        self._index = {(x, y): k for k, (x, y) in enumerate(nodes.tolist())}
-
-    def __call__(self, points: np.ndarray) -> np.ndarray:
-        return np.array([self._index[x, y] for x, y in (points + 0.0).tolist()])

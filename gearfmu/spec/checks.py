@@ -33,7 +33,7 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
     ]
     sound = not found
     if pair.center_distance <= shapes[0].r_b + shapes[1].r_b:
-        least = _mm(shapes[0].r_b + shapes[1].r_b)
+        least = millimetres(shapes[0].r_b + shapes[1].r_b)
         found.append(
             (
                 "pair.center_distance",
@@ -47,7 +47,7 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
         found += _reliefs(gears, geometry)
         found += _strips(gears, geometry, torque_max)
     return [
-        Problem(file, field, value if isinstance(value, str) else _mm(value), remedy) for field, value, remedy in found
+        Problem(file, field, value if isinstance(value, str) else millimetres(value), remedy) for field, value, remedy in found
     ]
 
 
@@ -70,7 +70,7 @@ def _rack_problems(gear: GearSpec, shape: GearGeometry) -> list[tuple[str, float
             (
                 "rack.fillet_radius",
                 f"{gear.rack.fillet_radius:g}",
-                f"does not fit the rack's tip: at most {_floor(largest):g} for this dedendum",
+                f"does not fit the rack's tip: at most {rounded_down(largest):g} for this dedendum",
             )
         )
     elif shape.s_form <= 0:
@@ -79,7 +79,7 @@ def _rack_problems(gear: GearSpec, shape: GearGeometry) -> list[tuple[str, float
             (
                 "profile_shift",
                 f"{gear.profile_shift:g}",
-                f"the rack undercuts the flank: at least {_ceil(least):g}, or more teeth",
+                f"the rack undercuts the flank: at least {rounded_up(least):g}, or more teeth",
             )
         )
     return found
@@ -92,7 +92,7 @@ def _rim_problems(gear: GearSpec, shape: GearGeometry) -> Found:
         yield (
             "bore_diameter",
             gear.bore_diameter,
-            f"leaves a rim thinner than half the tooth height: at most {_mm(_floor(largest))}",
+            f"leaves a rim thinner than half the tooth height: at most {millimetres(rounded_down(largest))}",
         )
 
 
@@ -103,7 +103,7 @@ def _index_problems(gear: GearSpec, shape: GearGeometry) -> Found:
         if tooth >= gear.teeth:
             yield field, deviation, f"there is no such tooth: they are numbered 0 to {gear.teeth - 1}"
         elif abs(deviation) > largest:
-            yield field, deviation, f"more than a twentieth of the module: at most {_mm(largest)}"
+            yield field, deviation, f"more than a twentieth of the module: at most {millimetres(largest)}"
 
 
 def _tip_problems(gear: GearSpec, shape: GearGeometry) -> Found:
@@ -113,26 +113,26 @@ def _tip_problems(gear: GearSpec, shape: GearGeometry) -> Found:
         yield (
             "tip_diameter",
             gear.tip_diameter,
-            f"larger than the basic rack makes, d + 2 m (x + addendum): at most {_mm(_floor(2 * rack_tip))}",
+            f"larger than the basic rack makes, d + 2 m (x + addendum): at most {millimetres(rounded_down(2 * rack_tip))}",
         )
     if shape.r_a - shape.tip_edge <= form:
         yield (
             "tip_diameter",
             gear.tip_diameter,
-            f"no involute is left above the form circle: more than {_mm(2 * (form + shape.tip_edge))}",
+            f"no involute is left above the form circle: more than {millimetres(2 * (form + shape.tip_edge))}",
         )
     elif shape.tip_half_angle <= 0:
         largest = _root(lambda radius: float(shape.thickness_angle(radius)), form, shape.r_a)
         yield (
             "tip_diameter",
             gear.tip_diameter,
-            f"the tooth is pointed (tip thickness ≤ 0): less than {_mm(_floor(2 * largest))}",
+            f"the tooth is pointed (tip thickness ≤ 0): less than {millimetres(rounded_down(2 * largest))}",
         )
     elif shape.tip_land_half_angle < 0:
         yield (
             "tip_edge_radius",
             gear.tip_edge_radius,
-            f"the two roundings overlap on a tip of {_mm(2 * shape.r_a * shape.tip_half_angle)}: make it smaller",
+            f"the two roundings overlap on a tip of {millimetres(2 * shape.r_a * shape.tip_half_angle)}: make it smaller",
         )
 
 
@@ -153,7 +153,7 @@ def _pair(pair: PairSpec, gears: Sequence[GearSpec], geometry: PairGeometry) -> 
             f"{facts}, more than declared: declare that, or correct centre distance or profile shifts",
         )
     elif allowance > _LARGEST_ALLOWANCE * module:
-        fitting = _mm(geometry.zero_backlash_center_distance)
+        fitting = millimetres(geometry.zero_backlash_center_distance)
         remedy = f"{facts}, none at {fitting}; to thin the teeth by {_um(allowance)} is no tolerance: correct it"
         yield "pair.center_distance", pair.center_distance, remedy
 
@@ -167,14 +167,14 @@ def _interference(gears: Sequence[GearSpec], geometry: PairGeometry, index: int)
         yield (
             field,
             value,
-            f"the tip touches the root circle of {other}: less than {_mm(_floor(2 * (geometry.a - root.r_f)))}",
+            f"the tip touches the root circle of {other}: less than {millimetres(rounded_down(2 * (geometry.a - root.r_f)))}",
         )
     elif geometry.opposite(tip.s_a) < root.s_form:
         largest = 2 * float(involute.radius_at_roll(max(geometry.opposite(root.s_form), 0.0), tip.r_b))
         yield (
             field,
             value,
-            f"interference: the tip meets {other} below its form circle: at most {_mm(_floor(largest))}",
+            f"interference: the tip meets {other} below its form circle: at most {millimetres(rounded_down(largest))}",
         )
 
 
@@ -188,13 +188,13 @@ def _reliefs(gears: Sequence[GearSpec], geometry: PairGeometry) -> Found:
             yield (
                 f"{field}.amount",
                 relief.amount,
-                f"more than a tenth of the module: at most {_mm(_LARGEST_RELIEF * shape.m)}",
+                f"more than a tenth of the module: at most {millimetres(_LARGEST_RELIEF * shape.m)}",
             )
         if not isinstance(relief.start_roll, str) and not shape.s_form <= relief.start_roll < shape.s_a:
             yield (
                 f"{field}.start_roll",
                 relief.start_roll,
-                f"outside the flank: from {_mm(shape.s_form)} to {_mm(shape.s_a)}",
+                f"outside the flank: from {millimetres(shape.s_form)} to {millimetres(shape.s_a)}",
             )
 
 
@@ -208,10 +208,10 @@ def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float
             yield (
                 field,
                 width,
-                f"too narrow for the contact at torque_max: at least 1.5 Hertz half-widths, {_mm(_ceil(least, 3))}",
+                f"too narrow for the contact at torque_max: at least 1.5 Hertz half-widths, {millimetres(rounded_up(least, 3))}",
             )
         elif 2 * width > flank:
-            yield field, width, f"the strip is longer than the flank: at most {_mm(flank / 2)}"
+            yield field, width, f"the strip is longer than the flank: at most {millimetres(flank / 2)}"
 
 
 def largest_half_width(gears: Sequence[GearSpec], geometry: PairGeometry, torque: float) -> float:
@@ -234,17 +234,19 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
     return low
 
 
-def _floor(value: float, digits: int = 4) -> float:
+def rounded_down(value: float, digits: int = 4) -> float:
     """The largest number of so many significant digits that is not above `value`."""
     step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
     return math.floor(value / step) * step
 
 
-def _ceil(value: float, digits: int = 4) -> float:
-    return -_floor(-value, digits)
+def rounded_up(value: float, digits: int = 4) -> float:
+    """The smallest number of so many significant digits that is not below `value`."""
+    return -rounded_down(-value, digits)
 
 
-def _mm(value: float) -> str:
+def millimetres(value: float) -> str:
+    """A length in m as text in mm, six digits."""
     return f"{1e3 * value:.6g} mm"
 
 

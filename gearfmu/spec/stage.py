@@ -1,4 +1,4 @@
-"""stage.toml → StageSpec: one external gear pair with its bodies, contact and ports."""
+"""stage.toml → StageSpec, one external gear pair with its bodies, contact and ports, or PlanetarySpec."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from gearfmu.spec.checks import geometry_problems
 from gearfmu.spec.gear import GearSpec, PairSpec
 from gearfmu.spec.layers import Layers, read_layers
 from gearfmu.spec.library import find_stage
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.planetary_checks import set_problems
 from gearfmu.units import to_si
 
 Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
@@ -111,13 +113,38 @@ class StageSpec(Spec):
         return self
 
 
-def load_stage(stage: str | os.PathLike[str]) -> StageSpec:
-    """The stage of a file, a folder (its stage.toml) or a shipped name ("fzg_c", "fzg_c/stage_relief").
+def load_stage(stage: str | os.PathLike[str]) -> Any:
+    """The StageSpec or PlanetarySpec of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
+    "fzg_c/stage_relief", "planetary54").
 
     SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that cannot run or carry
     `torque_max`.
     """
     layers = read_layers(find_stage(stage))
+    kind = layers.tables.get("kind", "external_pair")
+    if kind == "planetary_set":
+        return _load_set(layers)
+    return _load_pair(layers)
+
+
+def load_pair(stage: str | os.PathLike[str]) -> StageSpec:
+    """`load_stage` where only a pair will do; SpecError for a planetary set."""
+    spec = load_stage(stage)
+    require_pair(spec)
+    return spec  # type: ignore[no-any-return]
+
+
+def require_pair(spec: Any) -> None:
+    """SpecError unless `spec` is a pair: a planetary set has bodies, but no contact, ports and FMU yet."""
+    if spec.kind != "external_pair":
+        remedy = (
+            "this needs a pair; a planetary set can be meshed, reduced and inspected so far, its motion in time is not "
+            "built yet: name a stage of kind external_pair, such as fzg_c"
+        )
+        raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
+
+
+def _load_pair(layers: Layers) -> StageSpec:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
     spec, found = validate(StageSpec, raw | {"source": path}, str(path))
@@ -129,6 +156,19 @@ def load_stage(stage: str | os.PathLike[str]) -> StageSpec:
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
     return _with_relief_rolls(spec)
+
+
+def _load_set(layers: Layers) -> PlanetarySpec:
+    path, raw = layers.path, layers.tables
+    problems = [_unknown("source", raw)] if "source" in raw else []
+    named = {key: raw[key] | {"name": key} for key in ("sun", "planet", "ring") if isinstance(raw.get(key), dict)}
+    spec, found = validate(PlanetarySpec, raw | named | {"source": path}, str(path))
+    problems += found
+    if spec is not None:
+        problems += set_problems(str(path), spec)
+    if problems or spec is None:
+        raise SpecError(layers.attributed(problem) for problem in problems)
+    return spec
 
 
 def _unknown(key: str, raw: dict[str, Any]) -> Problem:

@@ -1,0 +1,80 @@
+"""The planet carrier: a plate with a bore beside the planets, and a bolt for each planet."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class CarrierGeometry:
+    """Carrier in the set's frame (m): axis z, z = 0 at the planets' mid-width, bolt 0 on +x, bolt k at angle 2πk/N.
+
+    planets: number N of bolts. a: radius of the bolt circle. r_bore, r_o: bore and outer radius of the plate; it lies
+    in z ∈ [plate_low, plate_high]. r_bolt: radius of the bolts, from the plate to z = +seat/2; their seats, where the
+    planets' bearings sit, are z ∈ [−seat/2, seat/2].
+    """
+
+    planets: int
+    a: float
+    r_bore: float
+    r_o: float
+    r_bolt: float
+    thickness: float
+    gap: float
+    seat: float
+
+    @classmethod
+    def of(cls, spec: Any) -> CarrierGeometry:
+        """The geometry of the carrier of a PlanetarySpec."""
+        carrier = spec.carrier
+        return cls(
+            planets=spec.set.planets, a=spec.set.center_distance, r_bore=carrier.bore_diameter / 2,
+            r_o=carrier.outer_diameter / 2, r_bolt=carrier.bolt_diameter / 2, thickness=carrier.thickness,
+            gap=carrier.gap, seat=spec.planet.face_width,
+        )  # fmt: skip
+
+    @property
+    def plate_high(self) -> float:
+        return -self.seat / 2 - self.gap
+
+    @property
+    def plate_low(self) -> float:
+        return self.plate_high - self.thickness
+
+    def bolt_axis(self, bolt: int) -> np.ndarray:
+        """(3,) m, middle of the seat of a bolt: its master node."""
+        angle = 2 * math.pi * bolt / self.planets
+        return np.array([self.a * math.cos(angle), self.a * math.sin(angle), 0.0])
+
+    @property
+    def bore_centre(self) -> np.ndarray:
+        """(3,) m, middle of the bore: its master node."""
+        return np.array([0.0, 0.0, 0.5 * (self.plate_low + self.plate_high)])
+
+    @property
+    def volume(self) -> float:
+        """m³."""
+        plate, bolt = self._parts()
+        return plate + self.planets * bolt
+
+    @property
+    def centre_of_mass(self) -> float:
+        """z of the centre of mass, m."""
+        plate, bolt = self._parts()
+        moment = plate * self.bore_centre[2] - self.planets * bolt * self.gap / 2
+        return moment / self.volume
+
+    @property
+    def polar_moment(self) -> float:
+        """∫ (x² + y²) dV about the axis, m⁵ (Steiner's theorem for the bolts)."""
+        plate, bolt = self._parts()
+        return plate * (self.r_o**2 + self.r_bore**2) / 2 + self.planets * bolt * (self.r_bolt**2 / 2 + self.a**2)
+
+    def _parts(self) -> tuple[float, float]:
+        """Volumes of the plate and of one bolt above it."""
+        plate = math.pi * (self.r_o**2 - self.r_bore**2) * self.thickness
+        return plate, math.pi * self.r_bolt**2 * (self.gap + self.seat)

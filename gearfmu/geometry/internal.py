@@ -1,0 +1,174 @@
+"""One internal spur gear: reference data, flank, root and cross-section.
+
+A ring's tooth space is bounded by the same involutes as the tooth of the external gear that would fill it, so space 0
+is centred on +x, ψ_b is the half angle of the *space* at the base circle, and flank sg = +1 is that at its larger
+angle. Roll s and radius mean what they mean outside; along a flank both grow from the tip to the root, and the normal
+out of the material points into the space: −sg e_t(t). ISO 21771 gives diameters of internal gears a minus sign; here
+all are positive.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gearfmu.geometry import involute
+
+_GAUSS = np.polynomial.legendre.leggauss(40)
+
+
+@dataclass(frozen=True)
+class InternalGearGeometry:
+    """An internal spur gear in its body frame: tooth space 0 centred on +x (lengths m, angles rad).
+
+    z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient (positive outwards). r_a: tip radius, the
+    smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of the tip edge rounding. fillet: radius of the
+    root fillet, an arc tangent to flank and root circle (as a shaping cutter with that tip rounding leaves it, up to
+    its motion along the trochoid).
+    """
+
+    z: int
+    m: float
+    alpha: float
+    x: float
+    r_a: float
+    r_f: float
+    r_rim: float
+    tip_edge: float
+    fillet: float
+
+    @classmethod
+    def of(cls, ring: Any, gear_set: Any) -> InternalGearGeometry:
+        """The geometry of the RingSpec of a SetSpec."""
+        m = gear_set.normal_module
+        return cls(
+            z=ring.teeth, m=m, alpha=gear_set.pressure_angle, x=ring.profile_shift, r_a=ring.tip_diameter / 2,
+            r_f=m * (ring.teeth / 2 + ring.profile_shift + ring.dedendum), r_rim=ring.rim_diameter / 2,
+            tip_edge=ring.tip_edge_radius, fillet=ring.fillet_radius * m,
+        )  # fmt: skip
+
+    @property
+    def r(self) -> float:
+        return self.m * self.z / 2
+
+    @property
+    def r_b(self) -> float:
+        return self.r * math.cos(self.alpha)
+
+    @property
+    def half_pitch(self) -> float:
+        """Half the angle of a tooth and a space, π/z."""
+        return math.pi / self.z
+
+    @property
+    def psi_b(self) -> float:
+        """Half angle of the tooth space at the base circle."""
+        return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha))
+
+    @property
+    def s_a(self) -> float:
+        """Roll of the involute's intersection with the tip circle; negative where that lies inside the base circle."""
+        return _signed_root(self.r_a, self.r_b)
+
+    @property
+    def s_tip(self) -> float:
+        """Roll of the tip form point, where the tip edge rounding (tangent to flank and tip circle) begins."""
+        return _signed_root(self.r_a + self.tip_edge, self.r_b) - self.tip_edge
+
+    @property
+    def s_form(self) -> float:
+        """Roll of the root form point, where the fillet takes over; the largest of the flank."""
+        return _signed_root(self.r_f - self.fillet, self.r_b) + self.fillet
+
+    @property
+    def fillet_centre(self) -> tuple[float, float]:
+        """Radius (m) and polar angle (rad, side sg = +1) of the fillet's centre; at or below 0 the two fillets of a
+        space overlap."""
+        roll = self.s_form - self.fillet
+        return self.r_f - self.fillet, self.psi_b - self.s_form / self.r_b + math.atan2(roll, self.r_b)
+
+    @property
+    def tip_half_angle(self) -> float:
+        """Half tooth-thickness angle at the tip circle, edge rounding left away; negative for a pointed tooth."""
+        return self.half_pitch - float(involute.flank_angle(self.s_a, self.r_b, self.psi_b))
+
+    @property
+    def tip_land_half_angle(self) -> float:
+        """Half angle of the tip land between the two edge roundings; negative when they do not fit."""
+        roll = self.s_tip + self.tip_edge
+        return self.half_pitch - (self.psi_b - self.s_tip / self.r_b + math.atan2(roll, self.r_b))
+
+    def flank_point(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Points (..., 2) in m of the flank of space 0."""
+        return involute.flank_point(roll, self.r_b, self.psi_b, sg)
+
+    def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
+        """Unit normals (..., 2) out of the ring's material, into space 0."""
+        return -involute.flank_normal(roll, self.r_b, self.psi_b, sg)
+
+    def space_angle(self, radius: ArrayLike) -> np.ndarray:
+        """Half angle (rad) of the space on a circle of `radius` (m) between tip and form circle."""
+        return involute.flank_angle(involute.roll_at_radius(radius, self.r_b), self.r_b, self.psi_b)
+
+    def fillet_point(self, share: ArrayLike) -> np.ndarray:
+        """Points (..., 2) in m of the fillet of flank sg = +1 at shares 0 (form point) … 1 (root circle) of its arc."""
+        radius, angle = self.fillet_centre
+        centre = radius * np.array([math.cos(angle), math.sin(angle)])
+        start = -self.flank_normal(self.s_form)
+        begin, turn = math.atan2(start[1], start[0]), self._fillet_turn
+        towards = begin + np.asarray(share, float) * turn
+        return centre + self.fillet * np.stack([np.cos(towards), np.sin(towards)], axis=-1)
+
+    @property
+    def _fillet_turn(self) -> float:
+        """Angle (rad, negative) of the fillet's arc from the flank's normal to the radial direction."""
+        start = -self.flank_normal(self.s_form)
+        return self.fillet_centre[1] - math.atan2(start[1], start[0])
+
+    @property
+    def fillet_length(self) -> float:
+        """Length of one fillet, m."""
+        return abs(self._fillet_turn) * self.fillet
+
+    @property
+    def sector_area(self) -> float:
+        """Area (m²) of the cross-section of one tooth with half a space on either side, up to the rim."""
+        return self.half_pitch * self.r_rim**2 - 0.5 * self._inner_moment(2)
+
+    @property
+    def sector_polar_moment(self) -> float:
+        """Second polar moment ∫ r² dA (m⁴) of one sector's cross-section about the gear's axis."""
+        return 0.5 * self.half_pitch * self.r_rim**4 - 0.25 * self._inner_moment(4)
+
+    def _inner_moment(self, power: int) -> float:
+        """∫ r^power dθ along the inner outline of one sector, tip edges sharp (m^power)."""
+        land = self.fillet_centre[1] * self.r_f**power
+        tip = self.tip_half_angle * self.r_a**power
+        return 2 * (land + self._fillet_moment(power) + self._flank_moment(power) + tip)
+
+    def _flank_moment(self, power: int) -> float:
+        """dθ = −u²/(1+u²) du with u = s/r_b; the outline runs from the root to the tip."""
+        low, high = self.s_a / self.r_b, self.s_form / self.r_b
+        u = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
+        values = u * u / (1 + u * u) * (self.r_b * np.sqrt(1 + u * u)) ** power
+        return float(0.5 * (high - low) * np.dot(_GAUSS[1], values))
+
+    def _fillet_moment(self, power: int) -> float:
+        """By the angle at the fillet's centre: dθ = (x dy − y dx)/r²."""
+        share = 0.5 * (1 + _GAUSS[0])
+        point, turn = self.fillet_point(share), self._fillet_turn
+        radius, angle = self.fillet_centre
+        arm = (point - radius * np.array([math.cos(angle), math.sin(angle)])) * turn
+        square = (point**2).sum(axis=-1)
+        swept = (point[:, 0] * arm[:, 0] + point[:, 1] * arm[:, 1]) / square
+        return float(-0.5 * np.dot(_GAUSS[1], square ** (power / 2) * swept))
+
+
+def _signed_root(radius: float, r_b: float) -> float:
+    """√(r² − r_b²), negative √(r_b² − r²) inside the base circle, so that checks can go on."""
+    square = (radius - r_b) * (radius + r_b)
+    return math.copysign(math.sqrt(abs(square)), square)

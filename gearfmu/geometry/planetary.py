@@ -1,0 +1,157 @@
+"""A planetary set: two meshes with one centre distance, equally spaced planets, phases of assembly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearfmu.geometry import involute
+from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.pair import PairGeometry
+
+
+@dataclass(frozen=True)
+class RingMesh:
+    """A planet in the ring at centre distance `a` (m), with circumferential backlash (m) on its working pitch circle.
+
+    Along the line of action the ring's roll is that of the planet plus `length`. a > r_b,ring − r_b,planet is needed
+    (ValueError otherwise).
+    """
+
+    planet: GearGeometry
+    ring: InternalGearGeometry
+    a: float
+    backlash: float
+
+    def __post_init__(self) -> None:
+        if not self.a > self.ring.r_b - self.planet.r_b > 0:
+            raise ValueError("the centre distance is smaller than the difference of the base radii")
+
+    @property
+    def length(self) -> float:
+        """Distance (m) of the line of action's tangent points with the base circles, a sin α_wt."""
+        base = self.ring.r_b - self.planet.r_b
+        return math.sqrt((self.a - base) * (self.a + base))
+
+    @property
+    def alpha_wt(self) -> float:
+        """Working pressure angle, rad."""
+        return math.atan2(self.length, self.ring.r_b - self.planet.r_b)
+
+    @property
+    def path(self) -> dict[str, float]:
+        """Rolls (m) of the planet at the ends of the path of contact: A at the ring's tip, E at its own; C pitch."""
+        pitch = self.planet.r_b * math.tan(self.alpha_wt)
+        return {"A": self.ring.s_tip - self.length, "C": pitch, "E": self.planet.s_tip}
+
+    @property
+    def contact_ratio(self) -> float:
+        """Transverse contact ratio of the usable flanks."""
+        return (self.path["E"] - self.path["A"]) / (math.pi * self.planet.m * math.cos(self.planet.alpha))
+
+    @property
+    def least_tip_radius(self) -> float:
+        """Smallest tip radius (m) of the ring whose flank does not meet the planet below its form circle."""
+        roll = self.length + max(self.planet.s_form, 0.0)
+        return float(involute.radius_at_roll(roll, self.ring.r_b))
+
+    @property
+    def largest_planet_tip_radius(self) -> float:
+        """Largest tip radius (m) of the planet that stays below the ring's fillet; its base radius when none does."""
+        return float(involute.radius_at_roll(max(self.ring.s_form - self.length, 0.0), self.planet.r_b))
+
+    @property
+    def tip_clearance_angle(self) -> float:
+        """Angle (rad) by which the tips pass each other outside the line of action; negative: they collide.
+
+        Colbourne, The Geometry of Involute Gears (1987), ch. 9: tip interference of internal gear pairs.
+        """
+        r_p, r_r, a = self.planet.r_a, self.ring.r_a, self.a
+        at_planet = (r_r * r_r - a * a - r_p * r_p) / (2 * a * r_p)
+        at_ring = (r_r * r_r + a * a - r_p * r_p) / (2 * a * r_r)
+        if not (-1 < at_planet < 1 and -1 < at_ring < 1):
+            return math.inf  # the tip circles do not cross
+        planet_turn = math.acos(at_planet) + float(involute.inv(math.acos(self.planet.r_b / r_p)))
+        ring_turn = math.acos(at_ring) + float(involute.inv(math.acos(min(self.ring.r_b / r_r, 1.0))))
+        inv_w = float(involute.inv(self.alpha_wt))
+        ratio = self.planet.z / self.ring.z
+        return ratio * (planet_turn - inv_w) - (ring_turn - inv_w)
+
+    @property
+    def nominal_backlash(self) -> float:
+        """Circumferential backlash (m) on the working pitch circle that profile shifts and centre distance give."""
+        inv_w = float(involute.inv(self.alpha_wt))
+        pitch = self.a / (self.ring.z - self.planet.z)
+        return 2 * pitch * (self.ring.z * (self.ring.psi_b - inv_w) - self.planet.z * (self.planet.psi_b - inv_w))
+
+    def largest_relative_radius(self) -> float:
+        """Largest relative radius of curvature s (s + L)/L (m) along the path of contact."""
+        roll = self.path["E"]
+        return roll * (roll + self.length) / self.length
+
+
+@dataclass(frozen=True)
+class PlanetaryGeometry:
+    """Sun, planets and ring of a set: the two meshes and how many planets."""
+
+    sun_mesh: PairGeometry
+    ring_mesh: RingMesh
+    planets: int
+
+    @classmethod
+    def of(cls, spec: Any) -> PlanetaryGeometry:
+        """The geometry of a PlanetarySpec."""
+        sun, planet = (GearGeometry.of(gear, spec.set) for gear in (spec.sun, spec.planet))
+        ring = InternalGearGeometry.of(spec.ring, spec.set)
+        a, backlash = spec.set.center_distance, spec.set.backlash
+        return cls(PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), spec.set.planets)
+
+    @property
+    def ratio(self) -> float:
+        """Speed of the sun over that of the carrier with the ring at rest, 1 + z_r/z_s."""
+        return 1 + self.ring_mesh.ring.z / self.sun_mesh.gears[0].z
+
+    def planet_centre(self, planet: int) -> np.ndarray:
+        """(2,) m, with the carrier at angle 0: planet k at 2πk/N."""
+        angle = 2 * math.pi * planet / self.planets
+        return self.sun_mesh.a * np.array([math.cos(angle), math.sin(angle)])
+
+    @property
+    def neighbour_clearance(self) -> float:
+        """Gap (m) between the tip circles of neighbouring planets; negative: they touch."""
+        return 2 * self.sun_mesh.a * math.sin(math.pi / self.planets) - 2 * self.ring_mesh.planet.r_a
+
+    def planet_phase(self, planet: int) -> float:
+        """Angle (rad, in (−π/z_p, π/z_p]) of planet k's tooth 0 from +x that centres it in the mesh with the ring.
+
+        Ring at rest with space 0 on +x, carrier at 0: the planet rolls in the ring by θ (1 − z_r/z_p) on the way to its
+        place θ = 2πk/N.
+        """
+        z_p, z_r = self.ring_mesh.planet.z, self.ring_mesh.ring.z
+        theta, pitch = 2 * math.pi * planet / self.planets, 2 * math.pi / z_p
+        return _wrapped(theta * (1 - z_r / z_p), pitch)
+
+    def sun_phase(self) -> float:
+        """Angle (rad, in (−π/z_s, π/z_s]) of the sun's tooth 0 from +x that centres it in the mesh with planet 0.
+
+        Planet 0 has tooth 0 on +x, so towards the sun, at angle π, it shows a tooth (z_p even) or a space (odd).
+        """
+        z_s, z_p = self.sun_mesh.gears[0].z, self.ring_mesh.planet.z
+        return math.pi / z_s if z_p % 2 == 0 else 0.0
+
+    def assembles(self) -> bool:
+        """Whether equally spaced planets fit: (z_s + z_r)/N is an integer."""
+        return (self.sun_mesh.gears[0].z + self.ring_mesh.ring.z) % self.planets == 0
+
+
+def _wrapped(angle: float, period: float) -> float:
+    turned = math.fmod(angle, period)
+    if turned > period / 2 * (1 + 1e-12):
+        turned -= period
+    elif turned <= -period / 2 * (1 - 1e-12):
+        turned += period
+    return turned

@@ -1,0 +1,34 @@
+"""The carrier before reduction: four bolts, its 24 inputs, and the bore, which is the ground when it is judged."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gearfmu.fem import hex20
+from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.full_order import FullOrder
+
+
+def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
+    """The carrier of a PlanetarySpec: interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
+
+    scale : factor on all element counts (1: about 70 000 unknowns). Rotations count with the bolt circle's radius.
+    """
+    geometry = CarrierGeometry.of(spec)
+    counts = spec.carrier.mesh
+    sector = carrier_sector(geometry, counts.model_copy(update={"scale": counts.scale * scale}))
+    whole = sector.full()
+    body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, spec.carrier.material))
+    couplings = [
+        Coupling(
+            f"bolt{k}",
+            spec.carrier.coupling_of(f"bolt{k}"),
+            sector.sector_nodes(k)[sector.sets["bolt"]],
+            geometry.bolt_axis(k),
+        )
+        for k in range(geometry.planets)
+    ]
+    couplings.append(Coupling("bore", spec.carrier.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
+    return full_order("carrier", body, couplings, Judgement(("bore",), geometry.a))

@@ -1,0 +1,151 @@
+"""What a stage file says about a planetary set: sun, planets, ring, carrier (ISO 21771 terms; SI floats)."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
+from gearfmu.spec.gear import BodySpec, Factor, Length, Material, RackSpec, Ratio, Size
+
+CouplingKind = Literal["rigid", "averaging"]
+
+
+class SetSpec(Spec):
+    """The set as a whole; sun–planet and planet–ring share centre distance, module and pressure angle."""
+
+    planets: Annotated[Count, Field(ge=2, le=12)] = Field(description="number of planets, equally spaced")
+    center_distance: Length = Field(description="distance of planet and sun axes, the radius of the bolt circle")
+    normal_module: Length = Field(description="normal module m_n")
+    pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
+        description="normal pressure angle"
+    )
+    helix_angle: Annotated[float, Quantity("rad", at_least=0, at_most=0)] = Field(
+        default=0.0, description="helix angle; only spur gears so far"
+    )
+    backlash: Size = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")
+    load_sharing: Annotated[float, Quantity(at_least=1, at_most=4)] = Field(
+        default=1.35, description="mesh load factor K_gamma: most loaded planet over the mean (ISO 6336-1)"
+    )
+
+
+class SetGearSpec(Spec):
+    """Sun or planet: an external gear."""
+
+    name: Name
+    teeth: Annotated[Count, Field(ge=6, le=400)] = Field(description="number of teeth z")
+    profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(
+        default=0.0, description="profile shift coefficient x"
+    )
+    tip_diameter: Length = Field(description="tip diameter d_a")
+    face_width: Length = Field(description="face width b")
+    bore_diameter: Length = Field(description="diameter of the bore")
+    tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
+    rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
+    material: Material = Field(description="material")
+    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    body: BodySpec = Field(description="mesh and reduction")
+
+    @property
+    def index_deviation(self) -> dict[int, float]:
+        """No pitch errors are declared for a set yet."""
+        return {}
+
+    @property
+    def tip_relief(self) -> None:
+        """No tip relief is declared for a set yet."""
+        return None
+
+
+class MountsSpec(Spec):
+    """Elastic mounting of the ring: springs between equal patches of its rim and the ground."""
+
+    points: Annotated[Count, Field(ge=3, le=60)] = Field(
+        description="number of mounts, equally spaced from tooth space 0; a divisor of the number of teeth"
+    )
+    stiffness: Annotated[float, Quantity("N/m", above=0)] = Field(
+        description="stiffness of one mount, the same in all three directions"
+    )
+
+
+class RingSpec(Spec):
+    """The internal gear. Its profile shift is positive outwards, as for the external gear that fills its spaces."""
+
+    name: Name = "ring"
+    teeth: Annotated[Count, Field(ge=12, le=600)] = Field(description="number of teeth z")
+    profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(
+        default=0.0, description="profile shift coefficient x, positive outwards"
+    )
+    tip_diameter: Length = Field(description="tip diameter, the smallest of the ring")
+    rim_diameter: Length = Field(description="outer diameter of the rim")
+    face_width: Length = Field(description="face width b")
+    tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
+    dedendum: Factor = Field(default=1.25, description="root depth below the reference circle, factor of m")
+    fillet_radius: Factor = Field(
+        default=0.3, description="root fillet, an arc tangent to flank and root circle, factor of m"
+    )
+    material: Material = Field(description="material")
+    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    mounts: MountsSpec | None = Field(default=None, description="elastic mounts; none when the table is absent")
+    body: BodySpec = Field(description="mesh and reduction")
+
+
+class CarrierMeshSpec(Spec):
+    """Element counts of one bolt's sector (20-node hexahedra; half of it, mirrored)."""
+
+    around: Annotated[Count, Field(ge=2, le=60)] = Field(
+        default=4, description="elements around the bolt towards bore and rim, each half side"
+    )
+    sides: Annotated[Count, Field(ge=2, le=60)] = Field(
+        default=6, description="elements around the bolt towards the next bolt"
+    )
+    bolt: Annotated[Count, Field(ge=1, le=30)] = Field(default=2, description="elements from the bolt's core outwards")
+    disc: Annotated[Count, Field(ge=1, le=60)] = Field(default=5, description="elements from the bolt to the edges")
+    plate: Annotated[Count, Field(ge=1, le=60)] = Field(default=3, description="elements through the plate")
+    length: Annotated[Count, Field(ge=1, le=60)] = Field(default=4, description="elements along the planet's seat")
+    scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(default=1.0, description="factor on all counts")
+
+    def scaled(self, count: int, least: int = 1) -> int:
+        """`count` times the scale, rounded."""
+        return max(least, round(self.scale * count))
+
+
+class CarrierSpec(Spec):
+    """A plate with a bore, beside the planets, and a bolt for each of them, made of one piece."""
+
+    bore_diameter: Length = Field(description="diameter of the bore")
+    outer_diameter: Length = Field(description="outer diameter of the plate")
+    thickness: Length = Field(description="thickness of the plate")
+    gap: Length = Field(description="clearance between the plate and the planets' faces")
+    bolt_diameter: Length = Field(description="diameter of the bolts; their seats are as long as the planets are wide")
+    coupling: dict[Name, CouplingKind] = Field(
+        default={}, description='how "bore", "bolt0", "bolt1" … are held: rigid (RBE2) or averaging (RBE3)'
+    )
+    material: Material = Field(description="material")
+    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    modes: Annotated[Count, Field(ge=1, le=2000)] = Field(default=120, description="number of oscillators stored")
+    mesh: CarrierMeshSpec = Field(default_factory=CarrierMeshSpec, description="element counts")
+
+    def coupling_of(self, interface: str) -> str:
+        """Kind of coupling of "bore", "bolt0" …; rigid where the file says nothing."""
+        return self.coupling.get(interface, "rigid")
+
+
+class PlanetarySpec(Spec):
+    """A planetary set as its file gives it; SI floats. `source` is that file."""
+
+    name: Name = Field(description="name of the stage")
+    description: Text = Field(default="", description="one line about the stage")
+    source: Path
+    kind: Literal["planetary_set"] = Field(description="kind of stage")
+    torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(
+        description="largest carrier torque the model is made for"
+    )
+    set: SetSpec = Field(description="the set")
+    sun: SetGearSpec = Field(description="sun")
+    planet: SetGearSpec = Field(description="one planet; all are equal")
+    ring: RingSpec = Field(description="ring")
+    carrier: CarrierSpec = Field(description="carrier")

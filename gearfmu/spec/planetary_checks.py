@@ -1,0 +1,185 @@
+"""Can this planetary set be made, assembled and carry the torque? Every problem names a field and what to write there.
+
+Sun and planet are checked as an external pair, then the ring, the planet in the ring, the assembly and the carrier.
+Formulas: ISO 21771; tip interference: Colbourne (1987). Nothing here stops at the first problem.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from gearfmu.errors import Problem
+from gearfmu.geometry import involute
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry.hertz import contact_modulus, half_width
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import RingMesh
+from gearfmu.spec.checks import STRIP_PER_HERTZ, Found, geometry_problems, millimetres, rounded_down, rounded_up
+from gearfmu.spec.gear import PairSpec
+from gearfmu.spec.planetary import PlanetarySpec
+
+_THINNEST_RIM = 0.5  # of the tooth height: thinner rims are outside the rim thickness factor of ISO 6336-3
+_LARGEST_ALLOWANCE = 0.1  # of the module
+_LARGEST_THICKENING = 0.005  # of the module
+_DIAMETERS = ("tip_diameter", "bore_diameter", "rim_diameter")
+
+
+def set_problems(file: str, spec: PlanetarySpec) -> list[Problem]:
+    """Everything that is wrong with a set whose single fields can be read."""
+    planet, ring = GearGeometry.of(spec.planet, spec.set), InternalGearGeometry.of(spec.ring, spec.set)
+    problems = _sun_mesh(file, spec)
+    alone = list(_ring(spec, ring))
+    found = [*alone, *_assembly(spec, planet), *_carrier(spec), *_mounts(spec)]
+    base = ring.r_b - planet.r_b
+    if spec.set.center_distance <= base or base <= 0:
+        remedy = f"smaller than the difference of the base radii, {millimetres(base)}: check teeth and module"
+        found.append(("set.center_distance", spec.set.center_distance, remedy))
+    elif not any(field != "ring.tip_diameter" for field, *_ in alone):
+        found += _ring_mesh(spec, RingMesh(planet, ring, spec.set.center_distance, spec.set.backlash))
+    shown = ((field, value if isinstance(value, str) else millimetres(value), text) for field, value, text in found)
+    return problems + [Problem(file, *entry) for entry in shown]
+
+
+def mesh_torque(spec: PlanetarySpec) -> float:
+    """Torque (N·m) on the sun in its mesh with the most loaded planet at torque_max, K_γ T_s/N."""
+    sun = spec.torque_max / (1 + spec.ring.teeth / spec.sun.teeth)
+    return spec.set.load_sharing * sun / spec.set.planets
+
+
+def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
+    """Sun and planet by themselves and as a pair; fields under their names in a set."""
+    s = spec.set
+    pair = PairSpec(
+        center_distance=s.center_distance, normal_module=s.normal_module, pressure_angle=s.pressure_angle,
+        backlash=s.backlash,
+    )  # fmt: skip
+    found = geometry_problems(file, pair, (spec.sun, spec.planet), mesh_torque(spec))
+    renamed = {"gears.": "", "pair.": "set."}
+    for old, new in renamed.items():
+        found = [replace(p, field=new + p.field.removeprefix(old) if p.field.startswith(old) else p.field) for p in found]
+    return found
+
+
+def _ring(spec: PlanetarySpec, shape: InternalGearGeometry) -> Found:
+    """The ring by itself, from the root inwards."""
+    fillet, tip = "ring.fillet_radius", "ring.tip_diameter"
+    if shape.fillet_centre[1] <= 0:
+        yield fillet, f"{spec.ring.fillet_radius:g}", "the two fillets of a space overlap: make it smaller"
+    least = 2 * (shape.r_b + 1e-3 * shape.m)
+    if shape.s_tip <= 0:
+        remedy = f"the tip reaches inside the base circle, where there is no involute: above {millimetres(least)}"
+        yield tip, spec.ring.tip_diameter, remedy
+    elif shape.s_form <= shape.s_tip:
+        yield tip, spec.ring.tip_diameter, "no involute is left between tip and fillet: make it smaller"
+    elif shape.tip_half_angle <= 0:
+        yield tip, spec.ring.tip_diameter, "the tooth is pointed (tip thickness ≤ 0): make it larger"
+    elif shape.tip_land_half_angle < 0:
+        land = millimetres(2 * shape.r_a * shape.tip_half_angle)
+        yield "ring.tip_edge_radius", spec.ring.tip_edge_radius, f"the two roundings overlap on a tip of {land}"
+    height = shape.r_f - shape.r_a
+    if shape.r_rim < shape.r_f + _THINNEST_RIM * height:
+        least = 2 * (shape.r_f + _THINNEST_RIM * height)
+        remedy = f"leaves a rim thinner than half the tooth height: at least {millimetres(rounded_up(least))}"
+        yield "ring.rim_diameter", spec.ring.rim_diameter, remedy
+
+
+def _ring_mesh(spec: PlanetarySpec, mesh: RingMesh) -> Found:
+    """Form circles, tips, contact ratio, backlash and load strip of the planet in the ring."""
+    if mesh.ring.r_a < mesh.least_tip_radius:
+        least = rounded_up(2 * mesh.least_tip_radius, 5)
+        remedy = (
+            f"interference: the tip meets the planet below its form circle; at least {millimetres(least)} "
+            f"(tip radius {millimetres(least / 2)})"
+        )
+        yield "ring.tip_diameter", spec.ring.tip_diameter, remedy
+    if mesh.planet.r_a > mesh.largest_planet_tip_radius:
+        largest = rounded_down(2 * mesh.largest_planet_tip_radius, 5)
+        remedy = f"interference: the tip meets the ring in its root fillet; at most {millimetres(largest)}"
+        yield "planet.tip_diameter", spec.planet.tip_diameter, remedy
+    if mesh.a + mesh.planet.r_a >= mesh.ring.r_f:
+        largest = rounded_down(2 * (mesh.ring.r_f - mesh.a), 5)
+        yield "planet.tip_diameter", spec.planet.tip_diameter, f"touches the ring's root: less than {millimetres(largest)}"
+    if mesh.tip_clearance_angle < 0:
+        remedy = "the planet's and the ring's tips collide outside the line of action: more teeth in the ring, or larger"
+        yield "ring.tip_diameter", spec.ring.tip_diameter, remedy
+    if mesh.contact_ratio < 1:
+        remedy = f"the contact ratio of planet and ring is {mesh.contact_ratio:.3f}, below 1: make it smaller"
+        yield "ring.tip_diameter", spec.ring.tip_diameter, remedy
+    allowance = spec.set.backlash - mesh.nominal_backlash
+    if not -_LARGEST_THICKENING * mesh.planet.m <= allowance <= _LARGEST_ALLOWANCE * mesh.planet.m:
+        remedy = (
+            f"profile shifts and centre distance give j_wt = {millimetres(mesh.nominal_backlash)} of planet and ring, "
+            f"not the declared {millimetres(spec.set.backlash)}: correct it"
+        )
+        yield "ring.profile_shift", f"{spec.ring.profile_shift:g}", remedy
+    yield from _ring_strips(spec, mesh)
+
+
+def _ring_strips(spec: PlanetarySpec, mesh: RingMesh) -> Found:
+    least = STRIP_PER_HERTZ * ring_half_width(spec, mesh)
+    for gear, shape in ((spec.planet, mesh.planet), (spec.ring, mesh.ring)):
+        field, width = f"{gear.name}.body.strip_half_width", gear.body.strip_half_width
+        flank = abs(float(involute.arc_length(shape.s_tip, shape.r_b) - involute.arc_length(shape.s_form, shape.r_b)))
+        if width < least:
+            remedy = f"too narrow for the ring's contact at torque_max: at least {millimetres(rounded_up(least, 3))}"
+            yield field, width, remedy
+        elif gear is spec.ring and 2 * width > flank:
+            yield field, width, f"the strip is longer than the flank: at most {millimetres(flank / 2)}"
+
+
+def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
+    """Largest Hertz half-width b (m) of planet and ring, one tooth pair carrying the most loaded planet's force."""
+    sun_base = spec.sun.teeth * spec.set.normal_module / 2 * math.cos(spec.set.pressure_angle)
+    load = mesh_torque(spec) / sun_base / min(spec.planet.face_width, spec.ring.face_width)
+    materials = (spec.planet.material, spec.ring.material)
+    e_star = contact_modulus(
+        (materials[0].youngs_modulus, materials[1].youngs_modulus),
+        (materials[0].poisson_ratio, materials[1].poisson_ratio),
+    )
+    return half_width(load, mesh.largest_relative_radius(), e_star)
+
+
+def _assembly(spec: PlanetarySpec, planet: GearGeometry) -> Found:
+    teeth, planets = spec.sun.teeth + spec.ring.teeth, spec.set.planets
+    if teeth % planets:
+        fitting = [n for n in range(2, 13) if teeth % n == 0]
+        remedy = (
+            f"the set cannot be assembled with equally spaced planets: (z_sun + z_ring)/planets = {teeth}/{planets} is "
+            f"no integer; possible are {', '.join(map(str, fitting)) or 'none'}, or other tooth numbers"
+        )
+        yield "set.planets", str(planets), remedy
+    room = 2 * spec.set.center_distance * math.sin(math.pi / planets)
+    if room <= 2 * planet.r_a:
+        remedy = f"neighbouring planets touch: their axes are {millimetres(room)} apart, the tip diameter is "
+        yield "set.planets", str(planets), f"{remedy}{millimetres(2 * planet.r_a)}; fewer or smaller planets"
+
+
+def _mounts(spec: PlanetarySpec) -> Found:
+    mounts = spec.ring.mounts
+    if mounts is not None and spec.ring.teeth % mounts.points:
+        fitting = [n for n in range(3, 61) if spec.ring.teeth % n == 0]
+        remedy = f"must divide the {spec.ring.teeth} teeth: {', '.join(map(str, fitting))}"
+        yield "ring.mounts.points", str(mounts.points), remedy
+
+
+def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
+    g, carrier = CarrierGeometry.of(spec), spec.carrier
+    if 2 * g.r_bolt >= spec.planet.bore_diameter:
+        largest = millimetres(spec.planet.bore_diameter)
+        yield "carrier.bolt_diameter", carrier.bolt_diameter, f"does not fit the planet's bore: less than {largest}"
+    if g.r_bore >= g.a - g.r_bolt:
+        largest = millimetres(2 * (g.a - g.r_bolt))
+        yield "carrier.bore_diameter", carrier.bore_diameter, f"cuts into the bolts: less than {largest}"
+    if g.r_o <= g.a + g.r_bolt:
+        least = millimetres(2 * (g.a + g.r_bolt))
+        yield "carrier.outer_diameter", carrier.outer_diameter, f"the bolts stand over the edge: more than {least}"
+    if g.r_bolt >= g.a * math.sin(math.pi / g.planets):
+        largest = millimetres(2 * g.a * math.sin(math.pi / g.planets))
+        yield "carrier.bolt_diameter", carrier.bolt_diameter, f"neighbouring bolts touch: less than {largest}"
+    known = ["bore", *(f"bolt{k}" for k in range(g.planets))]
+    for name in carrier.coupling:
+        if name not in known:
+            yield f"carrier.coupling.{name}", carrier.coupling[name], f"no such interface: known are {', '.join(known)}"
