@@ -72,7 +72,7 @@ def _core_sides(g: CarrierGeometry, centre: np.ndarray, around: np.ndarray, side
 
 
 def _edges_of_plate(g: CarrierGeometry, around: np.ndarray, sides: np.ndarray) -> list[np.ndarray]:
-    """Outer edge from the middle to the cut, the cut from outside inwards, the bore's edge from the cut to the middle."""
+    """Outer edge from the middle to the cut, the cut inwards, the bore's edge from the cut to the middle."""
     half = math.pi / g.planets
     cut = (g.r_o + (g.r_bore - g.r_o) * sides)[:, None] * _directions(np.array([half]))
     return [g.r_o * _directions(half * around), cut, g.r_bore * _directions(half * (1 - around))]

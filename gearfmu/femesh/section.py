@@ -20,14 +20,15 @@ from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, q
 from gearfmu.geometry import GearGeometry, involute
 from gearfmu.spec.gear import MeshSpec
 
-_ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
-_RIM_SHARE = 0.45  # … and in parts of the rim
-_CORE_SLOPE = 0.577  # A lies this times the half-thickness at F below F: three blocks of 60° meet there
+ROOT_DEPTH = 0.7  # depth of the root block under the root circle, in modules, where the rim allows it
+RIM_SHARE = 0.45  # … and in parts of the rim
+CORE_SLOPE = 0.577  # A lies this times the half-thickness at F below F: three blocks of 60° meet there
 
 
 @dataclass(frozen=True)
 class Section:
-    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore, cut_plus, cut_minus: node indices.
+    """nodes: (N, 2) m. quads: (E, 8) counter-clockwise, mid nodes last. bore (of a ring: its rim), cut_plus, cut_minus:
+    node indices.
 
     cut_plus[i] is cut_minus[i] turned by 2π/z.
 
@@ -90,15 +91,15 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
     neck[-1] = core[0]
     bore = gear.r_bore * np.stack([np.cos(share * gear.half_pitch), np.sin(share * gear.half_pitch)], axis=1)
     bore[-1] = gear.r_bore * space
-    down = _rim_parameters(gear.r_f - depth - gear.r_bore, depth, mesh)[:, None]
+    down = rim_parameters(gear.r_f - depth - gear.r_bore, depth, mesh)[:, None]
     tooth = transfinite(neck, tip, flank, middle)
     root = transfinite(neck, surface[-1] - across * depth * space, surface, core)
     under, below = core[0] + down * (bore[0] - core[0]), core[-1] + down * (bore[-1] - core[-1])
     return tooth, root, transfinite(under, below, core, bore)
 
 
-def _rim_parameters(height: float, depth: float, mesh: MeshSpec) -> np.ndarray:
-    """Grading down a rim of this height whose first element continues the last one of the root block, `depth` high."""
+def rim_parameters(height: float, depth: float, mesh: MeshSpec) -> np.ndarray:
+    """Grading through a rim of this height whose first element continues the last one of the root block, `depth` high."""
     across = graded(mesh.thickness, mesh.thickness_grading)
     first = depth * (across[-1] - across[-3])
     wanted = math.log1p(height / first * (mesh.rim_grading - 1)) / math.log(mesh.rim_grading)
@@ -132,8 +133,8 @@ def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
 def _core_arc(gear: GearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, float]:
     """Arc (P, 2) under the root from mid tooth to mid space, square to the cut there, and its depth there (m)."""
     rim = gear.r_f - gear.r_bore
-    depth = min(_ROOT_DEPTH * gear.m, _RIM_SHARE * rim)
-    middle = max(form[0] - _CORE_SLOPE * form[1], gear.r_f - _RIM_SHARE * rim)
+    depth = min(ROOT_DEPTH * gear.m, RIM_SHARE * rim)
+    middle = max(form[0] - CORE_SLOPE * form[1], gear.r_f - RIM_SHARE * rim)
     radius = gear.r_f - depth + (middle - gear.r_f + depth) * (1 - share) ** 2
     if rim <= 0 or radius.min() <= gear.r_bore:
         raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make the bore smaller")

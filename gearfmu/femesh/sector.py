@@ -18,20 +18,27 @@ def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> Fe
     Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. The mesh is its own mirror
     image about z = 0 and about y = 0. MeshError when the geometry leaves no valid element.
     """
-    section = build_section(geometry, mesh)
-    numbers, nodes = _extruded(section, face_width, mesh.scaled(mesh.width))
+    return sector_of(build_section(geometry, mesh), geometry.z, face_width, mesh.scaled(mesh.width), "bore")
+
+
+def sector_of(section: Section, teeth: int, face_width: float, elements: int, held: str) -> FeMesh:
+    """A section extruded over the face width b (m) with `elements` across it; `held` names the set of its held edge.
+
+    MeshError when an element is folded.
+    """
+    numbers, nodes = _extruded(section, face_width, elements)
     result = FeMesh(
         nodes=nodes,
         elements=_hexahedra(section.quads, numbers),
-        sets={"bore": _column(section.bore, numbers)},
-        teeth=geometry.z,
+        sets={held: _column(section.bore, numbers)},
+        teeth=teeth,
         cut_minus=_column(section.cut_minus, numbers),
         cut_plus=_column(section.cut_plus, numbers),
         flank={side: _flank_grid(section, side, numbers, nodes) for side in (0, 1)},
     )
     if not (worst := float(scaled_jacobian(result).min())) > 0:
         raise MeshError(
-            f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape or bore"
+            f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape, bore or rim"
         )
     return result
 

@@ -172,8 +172,9 @@ def _cells(body: Elements, rigid: Sequence[Coupling], springs: Springs | None) -
     cells[:, 1:][cells[:, 1:] == cells[:, :-1]] = -1
     if springs is None:
         return cells
-    touched = sorted({tuple(np.unique(row.indices // 3)) for row in (springs.rows[[k]] for k in range(len(springs.stiffness)))})
-    groups = [np.unique(_masters(len(body.nodes), rigid)[list(nodes)]) for nodes in touched]
+    stands = _masters(len(body.nodes), rigid)
+    touched = {tuple(np.unique(stands[springs.rows[[k]].indices // 3])) for k in range(len(springs.stiffness))}
+    groups = [np.array(nodes) for nodes in sorted(touched)]
     width = max(cells.shape[1], *(len(group) for group in groups))
     result = np.full((len(cells) + len(groups), width), -1)
     result[: len(cells), : cells.shape[1]] = cells

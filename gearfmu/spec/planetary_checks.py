@@ -59,7 +59,9 @@ def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
     found = geometry_problems(file, pair, (spec.sun, spec.planet), mesh_torque(spec))
     renamed = {"gears.": "", "pair.": "set."}
     for old, new in renamed.items():
-        found = [replace(p, field=new + p.field.removeprefix(old) if p.field.startswith(old) else p.field) for p in found]
+        found = [
+            replace(p, field=new + p.field.removeprefix(old)) if p.field.startswith(old) else p for p in found
+        ]  # fmt: skip
     return found
 
 
@@ -100,10 +102,10 @@ def _ring_mesh(spec: PlanetarySpec, mesh: RingMesh) -> Found:
         remedy = f"interference: the tip meets the ring in its root fillet; at most {millimetres(largest)}"
         yield "planet.tip_diameter", spec.planet.tip_diameter, remedy
     if mesh.a + mesh.planet.r_a >= mesh.ring.r_f:
-        largest = rounded_down(2 * (mesh.ring.r_f - mesh.a), 5)
-        yield "planet.tip_diameter", spec.planet.tip_diameter, f"touches the ring's root: less than {millimetres(largest)}"
+        largest = millimetres(rounded_down(2 * (mesh.ring.r_f - mesh.a), 5))
+        yield "planet.tip_diameter", spec.planet.tip_diameter, f"touches the ring's root: less than {largest}"
     if mesh.tip_clearance_angle < 0:
-        remedy = "the planet's and the ring's tips collide outside the line of action: more teeth in the ring, or larger"
+        remedy = "planet and ring collide with their tips outside the line of action: make it larger, or more teeth"
         yield "ring.tip_diameter", spec.ring.tip_diameter, remedy
     if mesh.contact_ratio < 1:
         remedy = f"the contact ratio of planet and ring is {mesh.contact_ratio:.3f}, below 1: make it smaller"

@@ -1,0 +1,118 @@
+"""The sector of an internal gear: tooth space 0 on +x with half a tooth on either side, cut through the teeth.
+
+    tooth: surface = flank, core = middle of the tooth (the cut); rows run from the root form point F to the tip
+    root:  surface = fillet and root land, core = an arc; rows run from F to the middle of the space
+    rim:   from that arc out to the rim
+
+as in `section`, inside out; for y ≥ 0, the other half is the mirror image.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearfmu.errors import MeshError
+from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, rim_parameters
+from gearfmu.femesh.sector import sector_of
+from gearfmu.geometry import involute
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.spec.gear import MeshSpec
+
+
+def ring_sector(geometry: InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
+    """One sector of an internal spur gear, `face_width` b (m) about z = 0; sets: "rim", its share of the outer surface.
+
+    Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. flank[0] is that of space 0 at
+    its larger angle. MeshError when the geometry leaves no valid element.
+    """
+    return sector_of(build_ring_section(geometry, mesh), geometry.z, face_width, mesh.scaled(mesh.width), "rim")
+
+
+def build_ring_section(ring: InternalGearGeometry, mesh: MeshSpec) -> Section:
+    """The section of `ring` with the counts of `mesh`; MeshError when the rim leaves no room for the root block."""
+    elements = mesh.scaled(mesh.flank, 2)
+    roll = ring_flank_rolls(ring, elements)
+    tooth, root, rim = _blocks(ring, mesh, roll)
+    upper = np.concatenate([quads_of(block) for block in (tooth, root, rim)])
+    points = np.concatenate([upper, mirrored(upper)])
+    nodes, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
+    find = Finder(nodes)
+    flank_line = tooth[0, : 2 * elements + 1]
+    cut = np.concatenate([tooth[-1, ::-1], rim[1:, 0]])
+    return Section(
+        nodes=nodes, quads=index.reshape(-1, 8),
+        bore=find(np.concatenate([rim[-1], rim[-1, :-1] * [1, -1]])),
+        cut_plus=find(cut), cut_minus=find(cut * [1, -1]),
+        flank=np.stack([edges(find(flank_line * [1, sg])) for sg in (1, -1)]),
+        flank_roll=edges(roll[: 2 * elements + 1]),
+    )  # fmt: skip
+
+
+def ring_flank_rolls(ring: InternalGearGeometry, elements: int) -> np.ndarray:
+    """Rolls (m) of the flank's nodes from the form point to the tip form point, equal arc lengths, then one element to
+    the tip circle."""
+    ends = involute.arc_length(np.array([ring.s_form, ring.s_tip, ring.s_a]), ring.r_b)
+    length = np.linspace(ends[0], ends[1], 2 * elements + 1)
+    if ring.s_a < ring.s_tip:
+        length = np.append(length, [0.5 * (ends[1] + ends[2]), ends[2]])
+    roll = involute.roll_at_arc_length(length, ring.r_b)
+    roll[0], roll[2 * elements] = ring.s_form, ring.s_tip
+    return roll
+
+
+def _blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    across = graded(mesh.scaled(mesh.thickness), mesh.growth(mesh.thickness_grading))[:, None]
+    share = graded(mesh.scaled(mesh.root, 2), 1.0)
+    flank, surface = ring.flank_point(roll), _root_curve(ring, share)
+    surface[0] = flank[0]
+    tooth_middle = _direction(ring.half_pitch)
+    core, depth = _core_arc(ring, flank[0], share)
+    top = ring.r_a * tooth_middle
+    middle = core[0] + parameter(flank)[:, None] * (top - core[0])
+    half = ring.half_pitch - ring.tip_half_angle
+    tip = ring.r_a * _direction(half + (ring.half_pitch - half) * across[:, 0])
+    middle[-1], tip[0], tip[-1] = top, flank[-1], top
+    neck = flank[0] + across * (core[0] - flank[0])
+    neck[-1] = core[0]
+    outer = ring.r_rim * _direction((1 - share) * ring.half_pitch)
+    outer[-1] = (ring.r_rim, 0.0)
+    up = rim_parameters(ring.r_rim - ring.r_f - depth, depth, mesh)[:, None]
+    below = np.concatenate([surface[-1:], surface[-1] + across[1:] * [depth, 0.0]])
+    below[-1] = core[-1]
+    tooth, root = transfinite(neck, tip, flank, middle), transfinite(neck, below, surface, core)
+    sides = [core[k] + up * (outer[k] - core[k]) for k in (0, -1)]
+    for side, k in zip(sides, (0, -1), strict=True):
+        side[-1] = outer[k]
+    return tooth, root, transfinite(*sides, core, outer)
+
+
+def _root_curve(ring: InternalGearGeometry, share: np.ndarray) -> np.ndarray:
+    """Points (P, 2) from the form point over fillet and root land to mid space, at shares of the way."""
+    land = ring.fillet_centre[1] * ring.r_f
+    wanted = share * (ring.fillet_length + land)
+    angle = np.maximum(ring.fillet_length + land - wanted, 0.0) / ring.r_f
+    on_fillet = ring.fillet_point(np.minimum(wanted / ring.fillet_length, 1.0))
+    curve = np.where((wanted > ring.fillet_length)[:, None], ring.r_f * _direction(angle), on_fillet)
+    curve[-1] = (ring.r_f, 0.0)
+    return curve
+
+
+def _core_arc(ring: InternalGearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, float]:
+    """Arc (P, 2) around the root from mid tooth to mid space, square to the symmetry line there; its depth there (m)."""
+    rim = ring.r_rim - ring.r_f
+    if rim <= 0:
+        raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make its diameter larger")
+    depth = min(ROOT_DEPTH * ring.m, RIM_SHARE * rim)
+    along = _direction(ring.half_pitch)
+    half_thickness = along[1] * form[0] - along[0] * form[1]
+    middle = min(form @ along + CORE_SLOPE * half_thickness, ring.r_f + RIM_SHARE * rim)
+    radius = ring.r_f + depth + (middle - ring.r_f - depth) * (1 - share) ** 2
+    arc = radius[:, None] * _direction((1 - share) * ring.half_pitch)
+    arc[0], arc[-1] = middle * along, (ring.r_f + depth, 0.0)
+    return arc, depth
+
+
+def _direction(angle: float | np.ndarray) -> np.ndarray:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -1,0 +1,94 @@
+"""Ring, sun and planet before reduction, as whole bodies without any symmetry: one input node a tooth, bore or mounts.
+
+The road through cyclic symmetry (`sector`) takes far finer meshes; this one serves every method of reduction.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.fem import hex20
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.femesh.ring import ring_sector
+from gearfmu.femesh.sector import gear_sector
+from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
+from gearfmu.reduction.full_order import FullOrder
+
+RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
+GEAR_SCALE = 0.5
+
+
+def ring_full_order(spec: Any, scale: float = RING_SCALE, mounted: bool = True) -> FullOrder:
+    """The ring of a PlanetarySpec with its 54 input nodes tooth0 …, three displacements each.
+
+    mounted : its springs are in the stiffness, and nothing else holds it. Otherwise the body is free, and the mounts
+    (averaging nodes mount0 …) are interfaces and the ground when it is judged.
+    """
+    geometry = InternalGearGeometry.of(spec.ring, spec.set)
+    counts = spec.ring.body.mesh
+    sector = ring_sector(geometry, spec.ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
+    body = _whole(sector, spec.ring.material)
+    couplings, mounts = _teeth(sector, body), ring_mounts(sector, body, spec.ring.mounts)
+    if mounted and mounts:
+        springs = mount_springs(body, mounts, spec.ring.mounts.stiffness)
+        return full_order("ring", body, couplings, Judgement((), geometry.r), springs)
+    ground = tuple(mount.name for mount in mounts)
+    return full_order("ring", body, [*couplings, *mounts], Judgement(ground, geometry.r))
+
+
+def gear_full_order(spec: Any, name: str, scale: float = GEAR_SCALE) -> FullOrder:
+    """The gear `name` ("sun", "planet") of a PlanetarySpec, or of a StageSpec, with one input node a tooth and the
+    averaging node of its bore, which is the ground when it is judged."""
+    pair, gears = (spec.set, (spec.sun, spec.planet)) if spec.kind == "planetary_set" else (spec.pair, spec.gears)
+    gear = next(gear for gear in gears if gear.name == name)
+    geometry, counts = GearGeometry.of(gear, pair), gear.body.mesh
+    sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
+    body = _whole(sector, gear.material)
+    bore = Coupling("bore", "averaging", sector.full().sets["bore"], np.zeros(3))
+    return full_order(name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
+
+
+def ring_mounts(sector: FeMesh, body: Elements, mounts: Any) -> list[Coupling]:
+    """The mounts mount0 … of a whole ring: averaging nodes, each of the rim of one sector; none when `mounts` is None.
+
+    Mount k holds the sector of tooth space k·z/points; its point is the middle of that patch.
+    """
+    if mounts is None:
+        return []
+    couplings = []
+    for k in range(mounts.points):
+        patch = sector.sector_nodes(k * sector.teeth // mounts.points)[sector.sets["rim"]]
+        couplings.append(Coupling(f"mount{k}", "averaging", patch, body.nodes[patch].mean(axis=0)))
+    return couplings
+
+
+def mount_springs(body: Elements, mounts: list[Coupling], stiffness: float) -> Springs:
+    """Springs on the mean displacement of each mount, `stiffness` (N/m) in every direction."""
+    rows = sp.vstack([averaging(body, mount.nodes, mount.point)[:3] for mount in mounts])
+    return Springs(sp.csr_array(rows), np.full(3 * len(mounts), stiffness))
+
+
+def _whole(sector: FeMesh, material: hex20.Material) -> Elements:
+    full = sector.full()
+    return Elements(full.nodes, full.elements, *hex20.assemble(full.nodes, full.elements, material))
+
+
+def _teeth(sector: FeMesh, body: Elements) -> list[Coupling]:
+    """One node a tooth: that of flank sg = +1 nearest to the middle of the flank at mid-width."""
+    node = _middle(sector)
+    numbers = [int(sector.sector_nodes(k)[node]) for k in range(sector.teeth)]
+    return [Coupling(f"tooth{k}", "nodes", np.array([n]), body.nodes[n]) for k, n in enumerate(numbers)]
+
+
+def _middle(sector: FeMesh) -> int:
+    grid = sector.flank[0]
+    arc = grid.roll**2
+    middle = 0.5 * (arc.min() + arc.max())
+    width, length = np.ptp(grid.z), np.ptp(arc)
+    distance = ((arc - middle) / length) ** 2 + (grid.z / width) ** 2
+    return int(grid.quads.ravel()[distance.ravel().argmin()])
