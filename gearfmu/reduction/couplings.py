@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
-from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, rigid_fields, rigid_modes
+from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, moved, rigid_fields, rigid_modes
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 
 
@@ -95,7 +95,7 @@ def averaging(body: Elements, nodes: np.ndarray, point: np.ndarray) -> sp.csr_ar
     """
     faces = surface.faces_within(body.elements, nodes) if body.elements.shape[1] == 20 else np.empty((0, 8), int)
     about_origin = averaging_rows(body.nodes, faces) if len(faces) else averaging_rows_uniform(body.nodes, nodes)
-    return sp.csr_array(np.vstack([rigid_fields(point) @ about_origin, about_origin[3:]]))
+    return sp.csr_array(moved(about_origin, point))
 
 
 def _check(couplings: Sequence[Coupling]) -> None:

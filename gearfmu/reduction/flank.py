@@ -24,7 +24,8 @@ _GAUSS_WIDTH = np.polynomial.legendre.leggauss(6)
 @dataclass(frozen=True)
 class ToothFlank:
     """The involute flanks of tooth 0 and their load strips (m, rad): base radius, half tooth-thickness angle at the
-    base circle, form and tip roll, face width, half-width of the strip in arc length."""
+    base circle (of the space for an internal gear), form and tip roll, face width, half-width of the strip in arc
+    length. An internal gear's form roll is its larger one, and its normals point the other way."""
 
     r_b: float
     psi_b: float
@@ -32,21 +33,29 @@ class ToothFlank:
     s_tip: float
     face_width: float
     strip_half_width: float
+    internal: bool = False
+
+    @property
+    def roll_range(self) -> tuple[float, float]:
+        """Smallest and largest roll of the flank, m."""
+        return min(self.s_form, self.s_tip), max(self.s_form, self.s_tip)
 
     def strip(self, rolls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Clipped strips: roll points (R,), m → first and last arc length (R,), m."""
-        arc, low, high = (np.square(s) / (2 * self.r_b) for s in (np.asarray(rolls, float), self.s_form, self.s_tip))
+        arc, low, high = (np.square(s) / (2 * self.r_b) for s in (np.asarray(rolls, float), *self.roll_range))
         return np.clip(arc - self.strip_half_width, low, high), np.clip(arc + self.strip_half_width, low, high)
 
     def normal(self, roll: np.ndarray, side: int) -> np.ndarray:
-        """Outward normals (…, 3) of flank index `side` (0 ↔ sg = +1) at roll (…)."""
+        """Normals (…, 3) out of the material of flank index `side` (0 ↔ sg = +1) at roll (…)."""
         plane = involute.flank_normal(roll, self.r_b, self.psi_b, 1 - 2 * side)
+        plane = -plane if self.internal else plane
         return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
 
     def chebyshev_rolls(self, count: int) -> np.ndarray:
-        """Chebyshev points of the first kind on [s_form, s_tip], ascending: (count,), m."""
+        """Chebyshev points of the first kind on the flank, ascending: (count,), m."""
         x = -np.cos(np.pi * (2 * np.arange(count) + 1) / (2 * count))
-        return 0.5 * (self.s_form + self.s_tip) + 0.5 * (self.s_tip - self.s_form) * x
+        low, high = self.roll_range
+        return 0.5 * (low + high) + 0.5 * (high - low) * x
 
 
 def flank_loads(nodes: np.ndarray, quads: np.ndarray, flank: ToothFlank, side: int, points: Points) -> np.ndarray:
@@ -107,13 +116,13 @@ class _Patch:
         return _Patch(quads, lines_a, lines_z)
 
     def check_cover(self, flank: ToothFlank) -> None:
-        low, high = (s * s / (2 * flank.r_b) for s in (flank.s_form, flank.s_tip))
+        low, high = (s * s / (2 * flank.r_b) for s in flank.roll_range)
         slack = 1e-6 * (high - low)
         if self.arc.min() > low + slack or self.arc.max() < high - slack:
             rolls = np.sqrt(2 * flank.r_b * np.array([self.arc.min(), self.arc.max()])) * 1e3
             raise MeshError(
                 f"flank elements cover roll {rolls[0]:.4f}…{rolls[1]:.4f} mm, "
-                f"the flank is {flank.s_form * 1e3:.4f}…{flank.s_tip * 1e3:.4f} mm; mesh the whole flank"
+                f"the flank is {flank.roll_range[0] * 1e3:.4f}…{flank.roll_range[1] * 1e3:.4f} mm; mesh the whole flank"
             )
         area = ((self.arc[:, 2] - self.arc[:, 0]) * np.abs(self.width[:, 2] - self.width[:, 0])).sum()
         if not np.isclose(area, np.ptp(self.arc) * flank.face_width, rtol=1e-6):

@@ -13,7 +13,7 @@ import numpy as np
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.sector import SectorBody
 
-_SHAPES = 4  # lowest shapes of each family kept, unless more are asked for
+_SHAPES = 4  # lowest shapes of each family kept for pictures
 
 Progress = Callable[[str, float], None]
 
@@ -23,7 +23,7 @@ class Modes:
     """n real elastic modes by ascending frequency; conventions of `body.ReducedBody`.
 
     frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
-    and kg^-½/m. shapes : index of a mode → (3N,) sector displacement in kg^-½, complex for a pair's first mode.
+    and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½. shapes : index of a mode → (3N,) sector displacement in kg^-½, complex for a pair's first mode.
     """
 
     frequency: np.ndarray
@@ -32,12 +32,13 @@ class Modes:
     parity: np.ndarray
     flank_rows: np.ndarray
     bore_rows: np.ndarray
+    patch_rows: np.ndarray
     shapes: dict[int, np.ndarray]
 
 
 @dataclass(frozen=True)
 class _FamilyModes:
-    """Sector modes of one family: ω² (k,), flank rows (2·R·A, k) and bore rows (6, k), complex for pairs (weight 2)."""
+    """Sector modes of one family: ω² (k,), flank (and patch) rows (m, k), bore rows (6, k), complex for weight 2."""
 
     weight: int
     complete: bool
@@ -47,9 +48,8 @@ class _FamilyModes:
     shapes: np.ndarray
 
 
-def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None, shapes: int = _SHAPES) -> Modes:
-    """The `count` lowest elastic modes of the free body (one less where `count` would split a pair), with the `shapes`
-    lowest shapes of each family.
+def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None) -> Modes:
+    """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
 
     Every family is solved for its expected share and again for more, until the highest frequency it was solved for
     lies above the last mode kept: no mode is missed. Raises ModesError when the eigensolver fails.
@@ -67,7 +67,7 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
         for number, key in enumerate(open_families):
             if progress:
                 progress(f"modes, nodal diameter {key[1]}", number / len(open_families))
-            found[key] = _solve(body, key, wanted[key], shapes)
+            found[key] = _solve(body, key, wanted[key])
         limit = _limit(found.values(), count)
         again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
         if not again:
@@ -82,18 +82,18 @@ def _limit(found, count: int) -> float:
     return squared[min(count, len(squared)) - 1]
 
 
-def _solve(body: SectorBody, key: tuple[int, int], count: int, pictured: int) -> _FamilyModes:
+def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
     family = body.family(*key)
     harmonic = family.harmonic
     squared, shapes = lowest_modes(harmonic, count)
     shapes = shapes * np.sqrt(family.weight / body.teeth)
-    flank = np.zeros((len(body.flank_rows), len(squared)), shapes.dtype)
+    flank = np.zeros((len(body.load_rows), len(squared)), shapes.dtype)
     flank[family.columns] = family.flank.conj().T @ shapes
     shapes = shapes * _gauge(flank)
     flank = flank * _gauge(flank)
     bore = body.teeth * (family.bore.conj().T @ shapes)
     space = body.spaces[key[0]]
-    pictures = space.to_nodes @ harmonic.expand(shapes[:, :pictured])
+    pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
     return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures)
 
 
@@ -129,6 +129,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
             columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
             columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
     integers = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
+    rows, flank = np.stack(columns["flank"], 1), len(body.flank_rows)
     return Modes(
-        np.array(columns["frequency"]), *integers, np.stack(columns["flank"], 1), np.stack(columns["bore"], 1), shapes
+        np.array(columns["frequency"]), *integers, rows[:flank], np.stack(columns["bore"], 1), rows[flank:], shapes
     )

@@ -1,4 +1,5 @@
-"""The full-order gear body on one sector, with everything that loads it: tooth flanks and bore."""
+"""The full-order gear body on one sector, with everything that loads it: tooth flanks and bore; of an internal gear
+tooth flanks, rim (in place of the bore) and the sector's own patch of the rim, where a mount may hold it."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.fem import hex20, surface
-from gearfmu.fem.coupling import rigid_modes, surface_moments
+from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Harmonic, Sector, SectorSpace, sector_spaces
 from gearfmu.reduction.flank import Points, ToothFlank, flank_loads
 
@@ -19,7 +20,7 @@ class Family:
     """One harmonic of one mirror parity with its loads.
 
     harmonic : nodal diameter ν of a parity.
-    columns : which flank loads (flat index over side, roll, function) this parity sees.
+    columns : which loads of a tooth (flat index over side, roll, function; then the patch) this parity sees.
     flank : (size, c) their force on one tooth. bore : (size, 6) Fourier coefficient of the unit loads on the bore node
     (force x, y, z, moment x, y, z in the body frame): f_j = Σ_ν bore_ν e^{iθ_ν j} over ν and −ν.
     weight : 2 for 0 < ν < z/2 (ν and −ν together), else 1.
@@ -44,14 +45,14 @@ class Family:
 class SectorBody:
     """A free gear body: finite elements of one sector, flank loads of tooth 0 and the averaging node of the bore.
 
-    mesh : FeMesh of a gear sector. material : SI. flank : ToothFlank. points : where the flanks are loaded.
+    mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI. flank : ToothFlank. points : where the flanks are loaded.
     Raises MeshError when cuts, flanks or bore of the mesh are not as they should be.
     """
 
     def __init__(self, mesh: Any, material: hex20.Material, flank: ToothFlank, points: Points):
         self.mesh, self.flank, self.points, self.teeth = mesh, flank, points, mesh.teeth
         stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
-        self.stiffness = stiffness
+        self.stiffness, self.internal = stiffness, "rim" in mesh.sets
         sector = Sector(
             mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus
         )
@@ -65,17 +66,37 @@ class SectorBody:
         return np.stack(both).reshape(-1, self.mesh.nodes.size)
 
     @cached_property
+    def patch_rows(self) -> np.ndarray:
+        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; none of a gear (0, 3N)."""
+        if not self.internal:
+            return np.zeros((0, self.mesh.nodes.size))
+        return averaging_rows_at(self.mesh.nodes, self._held_faces, self.patch_point)[:3]
+
+    @property
+    def patch_point(self) -> np.ndarray:
+        """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
+        return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
+
+    @cached_property
+    def load_rows(self) -> np.ndarray:
+        """All loads of one tooth as rows over the sector's nodes: flank rows, then patch rows."""
+        return np.concatenate([self.flank_rows, self.patch_rows])
+
+    @property
+    def _held_faces(self) -> np.ndarray:
+        return surface.faces_within(self.mesh.elements, self.mesh.sets["rim" if self.internal else "bore"])
+
+    @cached_property
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
-        """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
-        faces = surface.faces_within(self.mesh.elements, self.mesh.sets["bore"])
-        moments, gram = surface_moments(self.mesh.nodes, faces)
-        return moments, _turned_sum(gram, self.teeth)
+        """One sector's share of the bore's (ring: rim's) averaging node: b (6, 3N), and g (6, 6) of all of it."""
+        moments, gram = surface_moments(self.mesh.nodes, self._held_faces)
+        return moments, turned_sum(gram, self.teeth)
 
     @cached_property
     def inertia(self) -> np.ndarray:
         """Mass matrix of the whole rigid body about the origin, (6, 6): kg, kg·m, kg·m²."""
         fields = rigid_modes(self.mesh.nodes)
-        return _turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
+        return turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
 
     def rigid_rows(self) -> np.ndarray:
         """Flank rows of the six rigid motions: (2·R·A, 6)."""
@@ -101,9 +122,10 @@ class SectorBody:
 
     def _space_inputs(self, space: SectorSpace) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         function = np.tile(np.arange(self.points.functions), 2 * len(self.points.rolls))
-        seen = {1: function % 2 == 0, -1: function % 2 == 1, 0: function >= 0}[space.parity]
+        odd = np.concatenate([function % 2, [0, 0, 1][: len(self.patch_rows)]])
+        seen = {1: odd == 0, -1: odd == 1, 0: odd >= 0}[space.parity]
         columns = np.flatnonzero(seen)
-        loads = space.from_nodes @ self.flank_rows[columns].T
+        loads = space.from_nodes @ self.load_rows[columns].T
         bore = space.from_nodes @ self.bore_moments[0].T
         return columns, loads, space.solve_held(loads[: space.interior]), bore
 
@@ -114,7 +136,7 @@ def _rotating(h: np.ndarray) -> np.ndarray:
     return np.stack([amplitude, 1j * amplitude])
 
 
-def _turned_sum(matrix: np.ndarray, teeth: int) -> np.ndarray:
+def turned_sum(matrix: np.ndarray, teeth: int) -> np.ndarray:
     """Σ_j Q_j A Q_jᵀ of a (6, 6) matrix over the sectors."""
     total = np.zeros((6, 6))
     for angle in 2 * np.pi * np.arange(teeth) / teeth:

@@ -18,11 +18,14 @@ from gearfmu.reduction.sector import Family, SectorBody
 class Statics:
     """Static compliance, conventions of `body.ReducedBody`: C_ff (2, 2, z, R, R, A, A), m/N; C_fb (2, R, A, 6), m/N and
     1/N; C_bb (6, 6), m/N … 1/(N·m). pictures : (p, z, 3N) displacement of all sectors, in sector frames, under the
-    unit flank loads asked for, m/N."""
+    unit flank loads asked for, m/N. Of a ring also static_fp (2, z, R, A, 3), flank row of tooth 0 per unit force x, y,
+    z (sector frame) on the rim patch of sector m, and static_pp (z, 3, 3), m/N; empty (last index 0) of a gear."""
 
     static_ff: np.ndarray
     static_fb: np.ndarray
     static_bb: np.ndarray
+    static_fp: np.ndarray
+    static_pp: np.ndarray
     pictures: np.ndarray
 
 
@@ -31,7 +34,7 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
 
     picture_loads : flat indices (side, roll, function) of loads on tooth 0 whose displacement is wanted everywhere.
     """
-    size, z = len(body.flank_rows), body.teeth
+    size, z = len(body.load_rows), body.teeth
     ff, fb, bb = np.zeros((z, size, size)), np.zeros((size, 6)), np.zeros((6, 6))
     pictures = np.zeros((len(picture_loads), z, body.mesh.nodes.size))
     for index, space in enumerate(body.spaces):
@@ -64,6 +67,9 @@ def _add_pictures(pictures: np.ndarray, space, family: Family, response: np.ndar
 def _shaped(body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, pictures: np.ndarray) -> Statics:
     rolls, functions, z = len(body.points.rolls), body.points.functions, body.teeth
     back = ff[(-np.arange(z)) % z].transpose(0, 2, 1)
-    shaped = (0.5 * (ff + back)).reshape(z, 2, rolls, functions, 2, rolls, functions)
+    both, flank = 0.5 * (ff + back), 2 * rolls * functions
+    shaped = both[:, :flank, :flank].reshape(z, 2, rolls, functions, 2, rolls, functions)
     static_ff = np.ascontiguousarray(shaped.transpose(1, 4, 0, 2, 5, 3, 6))
-    return Statics(static_ff, fb.reshape(2, rolls, functions, 6), 0.5 * (bb + bb.T), pictures)
+    static_fp = both[:, :flank, flank:].reshape(z, 2, rolls, functions, -1).transpose(1, 0, 2, 3, 4)
+    static_fb = fb[:flank].reshape(2, rolls, functions, 6)
+    return Statics(static_ff, static_fb, 0.5 * (bb + bb.T), static_fp, both[:, flank:, flank:], pictures)
