@@ -44,7 +44,7 @@ class Factor:
 
     def __init__(self, matrix: sp.sparray, cells: np.ndarray, node_of_dof: np.ndarray):
         self.shape = matrix.shape
-        groups = _dof_groups(nested_dissection(cells), node_of_dof)
+        groups = dof_groups(nested_dissection(cells), node_of_dof)
         self._order = np.concatenate(groups)
         assert len(self._order) == matrix.shape[0], "every unknown must belong to a node of some element"
         ordered = sp.csr_array(matrix)[self._order][:, self._order].tocsr()
@@ -75,7 +75,8 @@ class Factor:
             own[:] = dtrsm(1.0, front.triangle, own.T, side=1, lower=1).T
 
 
-def _dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.ndarray]:
+def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.ndarray]:
+    """The unknowns of each group of nodes, groups without any left out."""
     order = np.argsort(node_of_dof, kind="stable")
     nodes = node_of_dof[order]
     result = []
@@ -97,7 +98,7 @@ def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
         children, waiting[number] = waiting[number], []
         touched = np.unique(np.concatenate([rows.indices, *(index for index, _ in children)]))
         below = touched[touched >= stop]
-        dense = _gathered(rows, start, below, children)
+        dense = gathered(rows, start, below, children)
         front, update = _eliminate(dense, start, int(stop), below)
         fronts.append(front)
         if len(below):
@@ -105,14 +106,14 @@ def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
     return fronts
 
 
-def _gathered(rows: sp.csr_array, start: int, below: np.ndarray, children: list) -> np.ndarray:
-    """Lower triangle of a front: own columns of A and the children's Schur complements."""
+def gathered(rows: sp.csr_array, start: int, below: np.ndarray, children: list) -> np.ndarray:
+    """Lower triangle of a front (complex as `rows`): own columns of A and the children's Schur complements."""
     own = rows.shape[0]
     size = own + len(below)
     position = np.empty(rows.shape[1], int)
     position[start : start + own] = np.arange(own)
     position[below] = np.arange(own, size)
-    dense = np.zeros((size, size), order="F")
+    dense = np.zeros((size, size), rows.dtype, order="F")
     entries = rows.tocoo()
     ahead = entries.col >= start
     dense[position[entries.col[ahead]], entries.row[ahead]] = entries.data[ahead]

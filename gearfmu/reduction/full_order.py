@@ -1,12 +1,12 @@
 """A body before reduction, whatever it came from: matrices, rigid fields and the interfaces at which it is loaded.
 
-M q̈ + K q = Σ Bᵢᵀ fᵢ,  uᵢ = Bᵢ q. Unknowns q are nodal displacements; a rigid coupling (RBE2) has replaced those of its
+M q̈ + K q = Σ Bᵢᵀ fᵢ − Cᵀ λ,  C q = 0,  uᵢ = Bᵢ q. Unknowns q are nodal displacements; a rigid coupling (RBE2) has replaced those of its
 surface by the six of its master node, an averaging coupling (RBE3) adds none: the motion of its node is a mean.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,7 +29,7 @@ class Interface:
     kind: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FullOrder:
     """Finite elements of one body with everything that loads it; nothing is reduced yet.
 
@@ -40,6 +40,7 @@ class FullOrder:
     length : m, rotations are multiplied by it (and moments divided) in the transfer matrix.
     cells, node_of_dof : (E, k) node numbers of each element (−1: none) and (N,) the node of each unknown, for
     `fem.factor.Factor`: two unknowns may be coupled only if their nodes share a cell (a rigid coupling is one cell).
+    constraints : (c, N) rows C of what is held, None for nothing; `rigid` stays the kernel of K.
     """
 
     name: str
@@ -51,6 +52,7 @@ class FullOrder:
     length: float
     cells: np.ndarray
     node_of_dof: np.ndarray
+    constraints: sp.csr_array | None = None
 
     @property
     def size(self) -> int:
@@ -61,3 +63,21 @@ class FullOrder:
         """Rows of the named interfaces (all of them without a name), one below the other: (m, N)."""
         chosen = [i for i in self.interfaces if not names or i.name in names]
         return sp.csr_array(sp.vstack([i.rows for i in chosen]))
+
+    def scales(self, *names: str) -> np.ndarray:
+        """Factors that make rotations of the named interfaces lengths: `length` for rx, ry, rz, else 1; (m,)."""
+        chosen = [i for i in self.interfaces if not names or i.name in names]
+        turning = [component in COMPONENTS[3:] for i in chosen for component in i.components]
+        return np.where(turning, self.length, 1.0)
+
+    def held(self, rows: sp.csr_array) -> FullOrder:
+        """The same body with `rows` q = 0 besides what is held already."""
+        before = [] if self.constraints is None else [self.constraints]
+        return replace(self, constraints=sp.csr_array(sp.vstack([*before, rows])))
+
+    def grounded(self) -> FullOrder:
+        """The body with its ground interfaces held; they are no interfaces any more. Itself when it has none."""
+        if not self.ground:
+            return self
+        others = tuple(i for i in self.interfaces if i.name not in self.ground)
+        return replace(self.held(self.rows(*self.ground)), interfaces=others, ground=())

@@ -1,0 +1,113 @@
+"""What a reduction method gives: a basis of the body's elastic motion; and how large it shall be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import BodyError
+from gearfmu.reduction.elastic import Elastic
+
+BAND = (50.0, 10e3)
+DEPENDENT = 1e-10  # norm, relative to that before projection, at which a direction counts as known
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a basis shall be: by number or by tolerance.
+
+    count : elastic vectors n; rigid modes come on top. A method may return fewer, never more.
+    tolerance : largest relative error of the transfer matrix (paper eq. 3, ground held) over `band`, Hz.
+    band also places the expansion points of the Krylov method. Raises BodyError for anything else.
+    """
+
+    count: int | None = None
+    tolerance: float | None = None
+    band: tuple[float, float] = BAND
+
+    def __post_init__(self) -> None:
+        if (self.count is None) == (self.tolerance is None):
+            raise BodyError("size: give the number of vectors or a tolerance, one of them")
+        if self.count is not None and self.count < 1:
+            raise BodyError(f"size: count = {self.count}: at least one vector")
+        if self.tolerance is not None and not 0 < self.tolerance < 1:
+            raise BodyError(f"size: tolerance = {self.tolerance}: a relative error between 0 and 1")
+        if not 0 <= self.band[0] < self.band[1]:
+            raise BodyError(f"size: band = {self.band} Hz: from a lower to a higher frequency")
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Elastic motion of a body: V (N, n), orthonormal in M and M-orthogonal to the rigid modes that nothing holds.
+
+    method : its name. facts : what it was made of (expansion points, numbers of modes …), for reports.
+    """
+
+    method: str
+    vectors: np.ndarray
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Number n of elastic vectors."""
+        return self.vectors.shape[1]
+
+
+class Growing:
+    """A basis that grows block by block, orthonormal in M and to the rigid modes.
+
+    Each block is scaled to unit columns, freed of what is there, twice, and of directions that then are shorter than
+    `DEPENDENT` (deflation relative to the norm before projection). Source: Grimme, Krylov projection methods for model
+    reduction, thesis, Urbana 1997; twice: Giraud et al., Numer. Math. 101 (2005) 87.
+    """
+
+    def __init__(self, space: Elastic):
+        self.space, self.size = space, 0
+        self._v = np.empty((space.size, 0), order="F")
+        self._mv = np.empty((space.size, 0), order="F")
+
+    @property
+    def vectors(self) -> np.ndarray:
+        """V (N, n)."""
+        return self._v[:, : self.size]
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """M V (N, n)."""
+        return self._mv[:, : self.size]
+
+    def add(self, block: np.ndarray, at_most: int | None = None) -> np.ndarray:
+        """Append what is new in `block` (N, k), the strongest `at_most` directions of it; returns M times the new
+        vectors (N, ≤ k)."""
+        block, inertia = self._new(block)
+        if at_most is not None:
+            block, inertia = block[:, :at_most], inertia[:, :at_most]
+        first, self.size = self.size, self.size + block.shape[1]
+        self._reserve()
+        self._v[:, first : self.size], self._mv[:, first : self.size] = block, inertia
+        return inertia
+
+    def _new(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        norm = np.sqrt(np.einsum("ij,ij->j", block, self.space.mass(block)))
+        block = block[:, norm > 0] / norm[norm > 0]
+        limit = DEPENDENT**2
+        for _ in range(2):
+            block = self.space.gauge(block)
+            block = block - self.vectors @ (self.inertia.T @ block)
+            inertia = self.space.mass(block)
+            values, turn = np.linalg.eigh(block.T @ inertia)
+            keep = np.flatnonzero(values > limit)[::-1]
+            turn = turn[:, keep] / np.sqrt(values[keep])
+            block, inertia, limit = block @ turn, inertia @ turn, 0.25
+        return block, inertia
+
+    def _reserve(self) -> None:
+        if self.size <= self._v.shape[1]:
+            return
+        for name in ("_v", "_mv"):
+            old = getattr(self, name)
+            larger = np.empty((self.space.size, max(self.size, 2 * old.shape[1])), order="F")
+            larger[:, : old.shape[1]] = old
+            setattr(self, name, larger)

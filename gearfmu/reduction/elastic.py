@@ -1,0 +1,189 @@
+"""A full-order body as operators: mass product, flexibility, shifted solutions, lowest modes; rigid motion explicit.
+
+With C q = 0 held and λ what holds it, at a real shift σ (rad²/s²)
+    (K − σM) q + Cᵀλ = f,   C q = 0;        σ = 0 of a free body:  q = P K⁺ Pᵀ f,  P = I − R Rᵀ M
+(inertia relief and mean-axis gauge, R the rigid modes that nothing holds, mass-normalised). λ comes from the small
+Schur complement of the rows C, so that averaging couplings are held as exactly as nodes are.
+Source: inertia relief and attachment modes: Craig & Kurdila, Fundamentals of Structural Dynamics (2006), ch. 17.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+
+from gearfmu.fem.factor import Factor, FactorError
+from gearfmu.fem.indefinite import SymmetricFactor
+from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.reduction.full_order import FullOrder
+
+_NEAR = 1e-4  # relative distance of a shift to an eigenvalue at which it moves
+_MOVE = 3e-3  # by how much it moves
+_RANK = 1e-12  # relative size at which a small symmetric system counts as singular
+_KNOWN: WeakKeyDictionary[FullOrder, Elastic] = WeakKeyDictionary()
+
+
+def elastic(body: FullOrder) -> Elastic:
+    """The operators of a body, made once for each FullOrder object: factors and modes are kept with it."""
+    if body not in _KNOWN:
+        _KNOWN[body] = Elastic(body)
+    return _KNOWN[body]
+
+
+class Elastic:
+    """Operators of a body under its constraints; vectors are (N, k).
+
+    rigid : (N, r) mass-normalised rigid modes that nothing holds. elastic : number of elastic degrees of freedom.
+    """
+
+    dtype = float
+
+    def __init__(self, body: FullOrder):
+        self.stiffness, self.mass_matrix = body.stiffness, body.mass
+        self.cells, self.node_of_dof, self.size = body.cells, body.node_of_dof, body.size
+        self._kernel = body.rigid
+        empty = sp.csr_array((0, body.size))
+        self.constraints = empty if body.constraints is None else body.constraints
+        self.rigid = self._free_motions()
+        self._mass_rigid = self.mass_matrix @ self.rigid
+        self.elastic = body.size - self.rigid.shape[1] - self.constraints.shape[0]
+        self._modes: tuple[np.ndarray, np.ndarray] = (np.empty(0), np.empty((body.size, 0)))
+
+    def _free_motions(self) -> np.ndarray:
+        fields = self._kernel
+        if not fields.shape[1]:
+            return fields
+        fields = fields / np.sqrt(np.einsum("ij,ij->j", fields, self.mass_matrix @ fields))
+        held = self.constraints @ fields
+        if len(held):
+            held = held / (np.abs(held).max(axis=1, initial=0.0)[:, None] + np.finfo(float).tiny)
+            fields = fields @ sl.null_space(held, rcond=1e-9)
+        gram = fields.T @ (self.mass_matrix @ fields)
+        return sl.solve_triangular(np.linalg.cholesky(gram), fields.T, lower=True).T
+
+    def mass(self, vectors: np.ndarray) -> np.ndarray:
+        """M v."""
+        return self.mass_matrix @ vectors
+
+    def balance(self, loads: np.ndarray) -> np.ndarray:
+        """Pᵀ f: loads together with the inertia forces of the rigid motion they cause."""
+        return loads - self._mass_rigid @ (self.rigid.T @ loads)
+
+    def gauge(self, vectors: np.ndarray) -> np.ndarray:
+        """P u: displacement without its rigid part and, against rounding, without what C would still see of it."""
+        if self.constraints.shape[0]:
+            vectors = vectors - self.constraints.T @ self._spread.solve(self.constraints @ vectors)
+        return vectors - self.rigid @ (self._mass_rigid.T @ vectors)
+
+    @cached_property
+    def _spread(self) -> _SmallSystem:
+        """C Cᵀ."""
+        return _SmallSystem((self.constraints @ self.constraints.T).toarray())
+
+    @cached_property
+    def _supported(self) -> tuple[np.ndarray, Factor]:
+        """Unknowns left free by statically determinate supports of the kernel of K, and the factor of their K."""
+        kernel = self._kernel
+        held = sl.qr(kernel.T, mode="r", pivoting=True)[1][: kernel.shape[1]] if kernel.shape[1] else []
+        free = np.setdiff1d(np.arange(self.size), held)
+        return free, Factor(self.stiffness[free][:, free], self.cells, self.node_of_dof[free])
+
+    def _solve_supported(self, loads: np.ndarray) -> np.ndarray:
+        free, factor = self._supported
+        solution = np.zeros((self.size, loads.shape[1]))
+        solution[free] = factor.solve(loads[free])
+        return solution
+
+    @cached_property
+    def _holding(self) -> tuple[np.ndarray, _SmallSystem]:
+        """Response to Cᵀ on the supports, and the system of λ and the rigid motion on the supports."""
+        response = self._solve_supported(self.constraints.T.toarray())
+        coupling = self.constraints @ self._kernel
+        zero = np.zeros((coupling.shape[1],) * 2)
+        return response, _SmallSystem(np.block([[self.constraints @ response, -coupling], [-coupling.T, zero]]))
+
+    def flexibility(self, loads: np.ndarray) -> np.ndarray:
+        """The static response to loads (N, k): P K⁺ Pᵀ f for a free body, with what is held held."""
+        balanced = self.balance(loads)
+        solution = self._solve_supported(balanced)
+        if self.constraints.shape[0]:
+            response, system = self._holding
+            rows = self.constraints.shape[0]
+            known = np.vstack([self.constraints @ solution, -self._kernel.T @ balanced])
+            small = system.solve(known)
+            solution = solution - response @ small[:rows] + self._kernel @ small[rows:]
+        return self.gauge(solution)
+
+    def shifted(self, shift: float) -> Shifted:
+        """Solutions at a shift, rad²/s²; one within 1e-4 of an eigenvalue moves by 0.3 % and more until it is not."""
+        for attempt in range(1, 9):
+            try:
+                found = Shifted(self, shift)
+                if shift <= 0 or found.distance() > _NEAR * shift:
+                    return found
+            except FactorError:
+                assert shift > 0, "K − σM of a negative shift is positive definite"
+            shift *= 1 + attempt * _MOVE
+        raise FactorError(f"no shift near {shift:.6g} rad²/s² is far enough from every eigenvalue")
+
+    def modes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The `count` lowest elastic modes (fewer when the body has fewer): ω² (k,) and mass-normalised shapes (N, k).
+
+        Raises ModesError."""
+        if len(self._modes[0]) < min(count, self.elastic):
+            self._modes = lowest_modes(self, count, block=16 if count > 60 else 8)
+        return self._modes[0][:count], self._modes[1][:, :count]
+
+
+class Shifted:
+    """(K − σM)⁻¹ with what is held held. `shift` : σ as it is, perhaps moved."""
+
+    def __init__(self, space: Elastic, shift: float):
+        self.shift, self.space = shift, space
+        matrix = sp.csr_array(space.stiffness - shift * space.mass_matrix)
+        self._factor = SymmetricFactor(matrix, space.cells, space.node_of_dof)
+        self._response = self._factor.solve(space.constraints.T.toarray()) if space.constraints.shape[0] else None
+        if self._response is not None:
+            self._system = _SmallSystem(space.constraints @ self._response)
+
+    def solve(self, loads: np.ndarray) -> np.ndarray:
+        """(K − σM)⁻¹ f under the constraints, loads (N, k)."""
+        solution = self._factor.solve(loads)
+        if self._response is None:
+            return solution
+        return solution - self._response @ self._system.solve(self.space.constraints @ solution)
+
+    def distance(self) -> float:
+        """About |ω² − σ| of the nearest eigenvalue, rad²/s², by inverse iteration from fixed random vectors."""
+        mass = self.space.mass_matrix
+        vectors = np.random.default_rng(2).standard_normal((self.space.size, 2))
+        for _ in range(2):
+            loads = mass @ (vectors / np.linalg.norm(vectors, axis=0))
+            vectors = self.solve(loads)
+        inverse = np.einsum("ij,ij->j", vectors, loads) / np.einsum("ij,ij->j", vectors, mass @ vectors)
+        return float(np.abs(inverse).min())
+
+
+class _SmallSystem:
+    """Symmetric system, scaled; directions that do not matter (dependent rows) are left out.
+
+    Rows with a diagonal are scaled to unit diagonal, those without one to unit coupling with them."""
+
+    def __init__(self, matrix: np.ndarray):
+        diagonal, tiny = np.sqrt(np.abs(matrix.diagonal())), np.finfo(float).tiny
+        self._scale = np.where(diagonal > 0, 1 / (diagonal + tiny), 0.0)
+        coupling = np.abs(matrix @ np.diag(self._scale)).max(axis=1, initial=0.0)
+        self._scale = np.where(diagonal > 0, self._scale, 1 / (coupling + tiny))
+        scaled = matrix * np.outer(self._scale, self._scale)
+        values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+        keep = np.abs(values) > _RANK * np.abs(values).max(initial=0.0)
+        self._values, self._vectors = values[keep], vectors[:, keep]
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """A⁺ rhs."""
+        scaled = self._vectors.T @ (self._scale[:, None] * rhs)
+        return self._scale[:, None] * (self._vectors @ (scaled / self._values[:, None]))

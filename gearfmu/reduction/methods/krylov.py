@@ -1,0 +1,45 @@
+"""Block Krylov subspaces: moments of the transfer matrix matched at several real expansion points, 0 among them.
+
+Matched: with b blocks of m vectors on b points H and dH/dΩ² at each of them, the static response among them (`moments`).
+n = b·m, less what deflation leaves out and less what fills no whole block: n floats. Points: 0 and Chebyshev points in Ω
+over the band; one that meets an eigenvalue moves. Source: Grimme, thesis, Urbana 1997; Lehner & Eberhard, Math. Comput.
+Model. Dyn. Syst. 13 (2007) 191; paper section 2 (four nodes · six directions · five moments = 120).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearfmu.errors import BodyError
+from gearfmu.reduction.basis import Basis, Growing, Size
+from gearfmu.reduction.elastic import elastic
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.methods.sizing import sized
+from gearfmu.reduction.moments import Expansion, expansion_points, input_loads
+
+_POINTS = 5  # expansion points; more blocks than that become higher powers at the same points
+
+
+def reduce(body: FullOrder, size: Size) -> Basis:
+    """Krylov basis with as many whole blocks as `size` allows. Raises BodyError when that is less than one block."""
+    return sized(body, size, _blocks)
+
+
+def _blocks(body: FullOrder, size: Size) -> Basis:
+    loads = input_loads(body)
+    blocks = size.count // loads.shape[1]
+    if not blocks:
+        raise BodyError(
+            f"{body.name}: Krylov subspaces come in blocks of one vector per input: n = {size.count} is less than the "
+            f"{loads.shape[1]} inputs of this body; give at least that"
+        )
+    points = expansion_points(min(blocks, _POINTS), size.band)
+    powers = [blocks // len(points) + (k < blocks % len(points)) for k in range(len(points))]
+    basis, used = Growing(elastic(body)), []
+    for shift, power in zip(points, powers, strict=True):
+        point = Expansion(basis.space, shift)
+        for _ in range(power):
+            point.advance(basis, loads)
+        used.append(point.shift)
+    facts = {"inputs": loads.shape[1], "points_Hz": [float(np.sqrt(s) / (2 * np.pi)) for s in used], "powers": powers}
+    return Basis("krylov", np.array(basis.vectors), facts)

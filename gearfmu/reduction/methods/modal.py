@@ -1,0 +1,23 @@
+"""Modal truncation: the n lowest elastic eigenmodes K φ = ω² M φ.
+
+Matched: the lowest poles with their residues. Not matched: static flexibility of the modes left out, which is added
+only as static residual (`Oscillators.residual`). Source: Craig & Kurdila, Fundamentals of Structural Dynamics (2006),
+ch. 11; paper section 2.
+"""
+
+from __future__ import annotations
+
+from gearfmu.reduction.basis import Basis, Size
+from gearfmu.reduction.elastic import elastic
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.methods.sizing import sized
+
+
+def reduce(body: FullOrder, size: Size) -> Basis:
+    """The lowest elastic modes. Raises BodyError when a tolerance cannot be met, ModesError."""
+    return sized(body, size, _lowest)
+
+
+def _lowest(body: FullOrder, size: Size) -> Basis:
+    squared, shapes = elastic(body).modes(size.count)
+    return Basis("modal", shapes, {"modes": len(squared)})

@@ -1,0 +1,54 @@
+"""Moments of the transfer matrix: Krylov blocks of (K − σM)⁻¹ at real shifts σ in Ω², zero among them.
+
+H(s) = B (K − sM)⁻¹ Bᵀ with s = Ω²/(1 + 2iζ) is, with structural damping, the undamped transfer matrix at a complex s,
+so that undamped real moments serve every damping ratio. The blocks X₁ = (K − σM)⁻¹ Bᵀ, X_{j+1} = (K − σM)⁻¹ M X_j, j ≤ p,
+make the projected H̄ agree with H at s = σ in value and the first 2p − 1 derivatives (symmetric projection doubles them).
+For a free body rigid motion is taken out: at σ = 0 the blocks are those of the flexibility P K⁺ Pᵀ.
+Source: Grimme, thesis, Urbana 1997, th. 3.1; Lehner & Eberhard, Math. Comput. Model. Dyn. Syst. 13 (2007) 191 (for
+flexible multibody systems); Beattie & Gugercin, Syst. Control Lett. 58 (2009) 225 (structured systems).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearfmu.reduction.basis import Growing
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.full_order import FullOrder
+
+
+def input_loads(body: FullOrder) -> np.ndarray:
+    """Unit loads at all interfaces, moments divided by the body's length: (N, m)."""
+    return body.rows().T.toarray() / body.scales()
+
+
+class Expansion:
+    """One expansion point: `advance` adds the next block of moments to a basis.
+
+    shift : σ as used, rad²/s² (moved when it was an eigenvalue). powers : blocks added so far.
+    """
+
+    def __init__(self, space: Elastic, shift: float):
+        self.space, self.powers = space, 0
+        self._solver = space.shifted(shift) if shift else None
+        self.shift = self._solver.shift if self._solver else 0.0
+        self._loads: np.ndarray | None = None
+
+    def advance(self, basis: Growing, loads: np.ndarray, at_most: int | None = None) -> int:
+        """Add the next power of this point to `basis`; loads Bᵀ (N, m) for the first one. Returns how many vectors."""
+        right = loads if self._loads is None else self._loads
+        if not right.shape[1]:
+            return 0
+        response = self._solver.solve(right) if self._solver else self.space.flexibility(right)
+        self._loads = basis.add(response, at_most)
+        self.powers += 1
+        return self._loads.shape[1]
+
+
+def expansion_points(count: int, band: tuple[float, float]) -> np.ndarray:
+    """`count` real points σ = Ω², rad²/s²: 0 and the rest on Chebyshev points of the second kind in Ω up to the upper
+    end of `band` (Hz), dense where the error would be largest."""
+    if count == 1:
+        return np.zeros(1)
+    top = 2 * np.pi * band[1]
+    return (top * 0.5 * (1 - np.cos(np.pi * np.arange(count) / (count - 1)))) ** 2

@@ -1,0 +1,106 @@
+"""From any basis to what the kernel takes: mass-normalised oscillators in the mean-axis frame, rigid motion explicit.
+
+The projected problem VᵀKV y = ω² y is solved once more, so that every method gives the same kind of body (DESIGN 4.1):
+
+    q̈_k + 2 ζ_k ω_k q̇_k + ω_k² q_k = Σ N_k,i f_i,     u_i = Σ_k N_k,i q_k + rigid motion + (C_static − Σ N Nᵀ/ω²) f
+
+The basis is M-orthogonal to the rigid modes, hence the frame of the oscillators is the mean-axis frame and rigid and
+elastic inertia decouple (theory, section 1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.reduction.basis import Basis
+from gearfmu.reduction.elastic import elastic
+from gearfmu.reduction.full_order import FullOrder
+
+
+@dataclass(frozen=True)
+class Oscillators:
+    """A reduced body: n oscillators, r rigid modes and the static compliance at m interface rows.
+
+    omega (n,) rad/s ascending; damping_ratio (n,); rows (m, n), kg^-½ (rotations kg^-½/m), of all interfaces in the
+    order of the FullOrder: labels (m,) = (interface, component), scales (m,) = length for rotations, else 1, m.
+    rigid_rows (m, r), rows of the rigid fields about the origin, and rigid_mass (r, r) their mass matrix; r = 0 for a
+    body that is held. static (m, m) : C_static, m/N …, of the full model (inertia relief, mean-axis gauge).
+    """
+
+    name: str
+    method: str
+    omega: np.ndarray
+    damping_ratio: np.ndarray
+    rows: np.ndarray
+    labels: tuple[tuple[str, str], ...]
+    scales: np.ndarray
+    rigid_rows: np.ndarray
+    rigid_mass: np.ndarray
+    static: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number n of oscillators."""
+        return len(self.omega)
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Natural frequencies (n,), Hz."""
+        return self.omega / (2 * np.pi)
+
+    def select(self, *names: str) -> np.ndarray:
+        """Indices of the rows of the named interfaces, in their order here."""
+        return np.array([k for k, (interface, _) in enumerate(self.labels) if interface in names], int)
+
+    def residual(self, dynamic: int | None = None) -> np.ndarray:
+        """C_static − Σ N Nᵀ/ω² over the `dynamic` lowest oscillators (all when None): static flexibility of the rest,
+        (m, m)."""
+        kept = self.rows[:, :dynamic] / self.omega[:dynamic]
+        return self.static - kept @ kept.T
+
+
+def oscillators(body: FullOrder, basis: Basis, damping_ratio: float) -> Oscillators:
+    """Oscillators of `body` in `basis`, all with modal damping `damping_ratio`; costs n products with K and the static
+    response to all interfaces."""
+    projected = basis.vectors.T @ (body.stiffness @ basis.vectors)
+    rows = body.rows()
+    static = rows @ elastic(body).flexibility(rows.T.toarray())
+    static = 0.5 * (static + static.T)
+    return decoupled(body, Projection(basis.method, projected, rows @ basis.vectors, static), damping_ratio)
+
+
+@dataclass(frozen=True)
+class Projection:
+    """A body in a basis orthonormal in M: VᵀKV (n, n), interface rows B V (m, n), and C_static (m, m)."""
+
+    method: str
+    stiffness: np.ndarray
+    rows: np.ndarray
+    static: np.ndarray
+
+
+def decoupled(body: FullOrder, projection: Projection, damping_ratio: float) -> Oscillators:
+    """Oscillators of a projection of `body`."""
+    squared, turn = np.linalg.eigh(0.5 * (projection.stiffness + projection.stiffness.T))
+    assert squared.min(initial=1.0) > 0, "a basis with a motion that costs no energy"
+    fields = _rigid_fields(body)
+    return Oscillators(
+        name=body.name,
+        method=projection.method,
+        omega=np.sqrt(squared),
+        damping_ratio=np.full(len(squared), damping_ratio),
+        rows=projection.rows @ turn,
+        labels=tuple((i.name, component) for i in body.interfaces for component in i.components),
+        scales=body.scales(),
+        rigid_rows=body.rows() @ fields,
+        rigid_mass=fields.T @ (body.mass @ fields),
+        static=projection.static,
+    )
+
+
+def _rigid_fields(body: FullOrder) -> np.ndarray:
+    """The body's own rigid fields while nothing is held, else what is left of them."""
+    space = elastic(body)
+    return body.rigid if space.rigid.shape[1] == body.rigid.shape[1] else space.rigid
