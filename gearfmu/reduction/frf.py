@@ -56,26 +56,46 @@ class FrfCase:
     length: float
 
 
+@dataclass(frozen=True)
+class Series:
+    """Transfer matrix of the elastic part between m ports as modes and a Taylor series of all that is not in them.
+
+    rows : (m, n) kg^-½ of the modes, frequency (n,) Hz. moments : (m, m) each, Fᵀ C (M C)^j F for j = 0, 1, …, m/N · s^2j.
+    The last six ports are the bore; rotations are lengths.
+    """
+
+    rows: np.ndarray
+    frequency: np.ndarray
+    moments: list[np.ndarray]
+
+
 def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase) -> FrfError:
     """Relative error of modes below the cut + static residual against the finite elements (see the head of this
     file)."""
-    inputs = _inputs(body)
-    scale = np.concatenate([np.ones(len(inputs)), [1, 1, 1, case.length, case.length, case.length]])
+    inputs = frf_inputs(len(body.points.rolls), body.points.functions)
+    scale = port_scale(len(inputs), case.length)
     static = _static_matrix(body, statics, inputs)
-    rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows])
     moments = [m * np.outer(scale, scale) for m in [static, *_moments(body, inputs)]]
-    rows, rigid = rows * scale[:, None], _rigid_compliance(body, inputs) * np.outer(scale, scale)
-    cut = _cut_in_gap(modes.frequency, case.cut)
-    kept = modes.frequency < cut
+    rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows]) * scale[:, None]
+    full = Series(rows, modes.frequency, moments)
+    rigid = rigid_compliance(body.rigid_rows()[inputs], body.inertia) * np.outer(scale, scale)
+    return compare(full, Series(rows, modes.frequency, moments[:1]), rigid, case)
+
+
+def compare(full: Series, reduced: Series, rigid: np.ndarray, case: FrfCase) -> FrfError:
+    """Relative error of `reduced`, cut at the wish of the case, against `full`; rigid (m, m): −Ω² times the rigid body's
+    transfer matrix, 1/kg."""
+    cut = _cut_in_gap(reduced.frequency, case.cut)
+    kept = reduced.frequency < cut
     frequency = np.geomspace(BAND[0], _HIGHEST, _LINES)
     held, free = [], []
     for f in frequency:
         squared = (2 * np.pi * f) ** 2
         s = squared / (1 + 2j * case.damping_ratio)
-        full = _transfer(rows, modes.frequency, moments, s) * s / squared
-        reduced = _transfer(rows[:, kept], modes.frequency[kept], moments[:1], s) * s / squared
-        free.append(_relative(full, reduced))
-        held.append(_relative(_bore_held(full - rigid / squared), _bore_held(reduced - rigid / squared)))
+        exact = _transfer(full.rows, full.frequency, full.moments, s) * s / squared
+        ours = _transfer(reduced.rows[:, kept], reduced.frequency[kept], reduced.moments, s) * s / squared
+        free.append(_relative(exact, ours))
+        held.append(_relative(_bore_held(exact - rigid / squared), _bore_held(ours - rigid / squared)))
     error = np.array(held)
     in_band = (frequency >= BAND[0]) & (frequency <= BAND[1] * (1 + 1e-12))
     bad = np.flatnonzero(error > TRUSTED_ERROR)
@@ -93,10 +113,21 @@ def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase) -
     )
 
 
-def _inputs(body: SectorBody) -> np.ndarray:
-    rolls, functions = len(body.points.rolls), body.points.functions
+def frf_inputs(rolls: int, functions: int) -> np.ndarray:
+    """The flank loads that are compared, as flat indices (side, roll, function)."""
     flat = np.arange(2 * rolls * functions).reshape(2, rolls, functions)
     return flat[:, sorted({rolls // 8, rolls // 2, rolls - 1 - rolls // 8})][:, :, : min(2, functions)].ravel()
+
+
+def port_scale(flank_ports: int, length: float) -> np.ndarray:
+    """Factors that make rotations of the bore lengths, all ports."""
+    return np.concatenate([np.ones(flank_ports + 3), np.full(3, length)])
+
+
+def rigid_compliance(flank: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """Rows of the six rigid motions at flank ports (k, 6) and the rigid mass matrix (6, 6) → (k + 6, k + 6), 1/kg."""
+    rows = np.vstack([flank, np.eye(6)])
+    return rows @ np.linalg.solve(inertia, rows.T)
 
 
 def _static_matrix(body: SectorBody, statics: Statics, inputs: np.ndarray) -> np.ndarray:
@@ -126,11 +157,6 @@ def _moments(body: SectorBody, inputs: np.ndarray) -> list[np.ndarray]:
             for matrix, product in zip(total, products, strict=True):
                 matrix += factor * product.real
     return total
-
-
-def _rigid_compliance(body: SectorBody, inputs: np.ndarray) -> np.ndarray:
-    rows = np.vstack([body.rigid_rows()[inputs], np.eye(6)])
-    return rows @ np.linalg.solve(body.inertia, rows.T)
 
 
 def _cut_in_gap(frequency: np.ndarray, wish: float) -> float:
