@@ -38,11 +38,13 @@ class Elastic:
     """Operators of a body under its constraints; vectors are (N, k).
 
     rigid : (N, r) mass-normalised rigid modes that nothing holds. elastic : number of elastic degrees of freedom.
+    twin : operators of the same body with other constraints, whose factor is used.
     """
 
     dtype = float
 
-    def __init__(self, body: FullOrder):
+    def __init__(self, body: FullOrder, twin: Elastic | None = None):
+        self._twin = twin
         self.stiffness, self.mass_matrix = body.stiffness, body.mass
         self.cells, self.node_of_dof, self.size = body.cells, body.node_of_dof, body.size
         self._kernel = body.rigid
@@ -87,6 +89,8 @@ class Elastic:
     @cached_property
     def _supported(self) -> tuple[np.ndarray, Factor]:
         """Unknowns left free by statically determinate supports of the kernel of K, and the factor of their K."""
+        if self._twin is not None:
+            return self._twin._supported
         kernel = self._kernel
         held = sl.qr(kernel.T, mode="r", pivoting=True)[1][: kernel.shape[1]] if kernel.shape[1] else []
         free = np.setdiff1d(np.arange(self.size), held)
