@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.layout import ENTRIES
+from gearfmu.body.layout import entries_of
 from gearfmu.body.reduced import ReducedBody, value_of
 from gearfmu.body.store import load_body
 
@@ -29,7 +29,7 @@ def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
         "provenance": body.provenance,
         "datasets": [
             {"path": e.path, "shape": list(np.shape(value_of(body, e.field))), "unit": e.unit, "meaning": e.meaning}
-            for e in ENTRIES
+            for e in entries_of(body.internal)
         ],
     }
 

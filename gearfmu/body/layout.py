@@ -128,7 +128,37 @@ def _display_entries() -> tuple[Entry, ...]:
     )
 
 
+def _rim_entries() -> tuple[Entry, ...]:
+    return (
+        Entry("rim/patch_point", "rim.patch_point", (3,), "m", "middle of the rim's patch of sector 0"),
+        Entry(
+            "rim/patch_rows", "rim.patch_rows", (3, "n"), "kg-1/2", "mean displacement x, y, z of that patch in the modes"
+        ),
+        Entry(
+            "rim/flank_rigid", "rim.flank_rigid", (2, "R", "A", 6), ", m", "flank rows of the rigid motions, tooth space 0"
+        ),
+        Entry(
+            "rim/c_fp",
+            "rim.static_fp",
+            (2, "z", "R", "A", 3),
+            "m/N",
+            "flank rows of space 0 per unit force x, y, z on the patch of sector m, in its frame",
+        ),
+        Entry("rim/c_pp", "rim.static_pp", ("z", 3, 3), "m/N", "patch of sector 0 per unit force on that of sector m"),
+        Entry("rim/mounts", "rim.mounts", (), "", "number of mounts, at the sectors k z/mounts; 0: none", "i8"),
+        Entry("rim/mount_stiffness", "rim.mount_stiffness", (), "N/m", "stiffness of a mount, in every direction"),
+    )
+
+
 ENTRIES = _entries()
+RIM_ENTRIES = _rim_entries()  # besides, in the file of an internal gear
+
+
+def entries_of(internal: bool) -> tuple[Entry, ...]:
+    """The datasets of a body: those of every gear, and of an internal one those of its rim."""
+    return (*ENTRIES, *RIM_ENTRIES) if internal else ENTRIES
+
+
 TEXTS = {
     "material": "material: youngs_modulus (Pa), poisson_ratio, density (kg/m³)",
     "mesh": "finite-element mesh: element counts, degrees of freedom, quality",

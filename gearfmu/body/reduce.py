@@ -4,23 +4,21 @@ matches."""
 from __future__ import annotations
 
 import os
-import platform
-import sys
 import time
 from collections.abc import Callable
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 
 from gearfmu.body.layout import ALGORITHM_VERSION
-from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.provenance import provenance
+from gearfmu.body.reduced import ReducedBody, Rim
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
-from gearfmu.femesh import FeMesh, gear_sector, mesh_report
+from gearfmu.femesh import FeMesh, mesh_report, sector_mesh
 from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -28,9 +26,9 @@ from gearfmu.reduction.modal import Modes, elastic_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import Statics, static_tables
 from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.gear import GearSpec, MeshSpec
+from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.library import model_folder
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.stage import StageSpec, require_pair
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
 _PICTURE_MODES = 12
@@ -38,6 +36,7 @@ _PICTURE_LOADS = 5
 _DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 
 Progress = Callable[[str, float], None]
+Geometry = GearGeometry | InternalGearGeometry
 
 
 def expected_hash(spec: StageSpec, gear_index: int) -> str:
@@ -52,7 +51,8 @@ def body_path(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] |
 
 
 def load_stage_bodies(spec: StageSpec, folder: str | os.PathLike[str] | None = None) -> list[ReducedBody]:
-    """The stored bodies of a stage, one per gear. Raises BodyError when one is missing, damaged or stale."""
+    """The stored bodies of a pair, one per gear. Raises BodyError when one is missing, damaged or stale."""
+    require_pair(spec)
     bodies = []
     for index in range(len(spec.gears)):
         path = body_path(spec, index, folder)
@@ -72,11 +72,12 @@ def reduce_stage(
     force: bool = False,
     progress: Progress | None = None,
 ) -> list[ReducedBody]:
-    """Reduce every gear of a stage and store it; a stored body whose input hash matches is read instead.
+    """Reduce every gear of a pair and store it; a stored body whose input hash matches is read instead.
 
     out_dir : folder of the .h5 files, that of the stage file when None. force : reduce in any case.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
+    require_pair(spec)
     bodies = []
     for index in range(len(spec.gears)):
         path = body_path(spec, index, out_dir)
@@ -91,14 +92,22 @@ def reduce_stage(
 def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = None) -> ReducedBody:
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
-    report = _named(progress, gear.name)
-    started = time.process_time()
+    geometry = GearGeometry.of(gear, spec.pair)
     try:
-        report("mesh and finite elements", 0.0)
-        geometry = GearGeometry.of(gear, spec.pair)
-        full_order = full_order_body(geometry, gear)
+        return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
         raise MeshError(f"{spec.source}: gears.{gear.name}: {error}") from error
+
+
+def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progress | None = None) -> ReducedBody:
+    """The reduced body of an external or internal gear, by cyclic symmetry.
+
+    gear : what a spec says about its mesh, material and reduction (GearSpec, SetGearSpec, RingSpec). Raises MeshError.
+    """
+    report = _named(progress, gear.name)
+    started = time.process_time()
+    report("mesh and finite elements", 0.0)
+    full_order = full_order_body(geometry, gear)
     modes = elastic_modes(full_order, gear.body.modes, report)
     statics = static_tables(full_order, _pictured_loads(full_order), report)
     report("frequency response", 0.0)
@@ -106,10 +115,10 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
     inertia = full_order.inertia
     return ReducedBody(
         name=gear.name,
-        input_hash=expected_hash(spec, gear_index),
+        input_hash=input_hash,
         material=gear.material.model_dump(),
         mesh=_mesh_facts(full_order, gear),
-        provenance=_provenance(time.process_time() - started),
+        provenance=provenance(time.process_time() - started),
         teeth=geometry.z,
         r_b=geometry.r_b,
         psi_b=geometry.psi_b,
@@ -123,24 +132,41 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
         parity=modes.parity,
         flank_rows=_by_point(modes.flank_rows, full_order.points),
         bore_rows=modes.bore_rows,
-        roll_range=np.array([geometry.s_form, geometry.s_tip]),
+        roll_range=np.array(full_order.flank.roll_range),
         roll=full_order.points.rolls,
         strip_half_width=gear.body.strip_half_width,
         static_ff=statics.static_ff,
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=frf,
-        display=_display(gear_sector(geometry, gear.face_width, _DRAWN), full_order, modes, statics),
+        display=_display(sector_mesh(geometry, gear.face_width, _DRAWN), full_order, modes, statics),
+        rim=_rim(full_order, modes, statics, getattr(gear, "mounts", None)),
     )
 
 
-def full_order_body(geometry: GearGeometry, gear: GearSpec) -> SectorBody:
-    """The finite-element model of one gear with its load points."""
+def _rim(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim | None:
+    """What a ring's mounts need; nothing of an external gear."""
+    if not body.internal:
+        return None
+    return Rim(
+        patch_point=body.patch_point,
+        patch_rows=modes.patch_rows,
+        flank_rigid=body.rigid_rows().reshape(2, len(body.points.rolls), body.points.functions, 6),
+        static_fp=np.ascontiguousarray(statics.static_fp),
+        static_pp=np.ascontiguousarray(statics.static_pp),
+        mounts=mounts.points if mounts else 0,
+        mount_stiffness=mounts.stiffness if mounts else 0.0,
+    )
+
+
+def full_order_body(geometry: Geometry, gear: Any) -> SectorBody:
+    """The finite-element model of one external or internal gear with its load points."""
     flank = ToothFlank(
-        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width
-    )
+        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width,
+        isinstance(geometry, InternalGearGeometry),
+    )  # fmt: skip
     points = Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
-    return SectorBody(gear_sector(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
+    return SectorBody(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
 
 
 def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:
@@ -184,7 +210,7 @@ def _display(drawn: FeMesh, body: SectorBody, modes: Modes, statics: Statics) ->
     )
 
 
-def _mesh_facts(body: SectorBody, gear: GearSpec) -> dict[str, Any]:
+def _mesh_facts(body: SectorBody, gear: Any) -> dict[str, Any]:
     facts = mesh_report(body.mesh, body.flank.r_b, gear.body.strip_half_width)
     sector_dofs = 3 * (len(body.mesh.nodes) - len(body.mesh.cut_plus))
     return {
@@ -193,24 +219,3 @@ def _mesh_facts(body: SectorBody, gear: GearSpec) -> dict[str, Any]:
         "dof_sector": sector_dofs,
         "dof_body": body.teeth * sector_dofs,
     }
-
-
-def _provenance(seconds: float) -> dict[str, Any]:
-    return {
-        "gearfmu": metadata.version("gearfmu"),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "cpu_s": round(seconds, 1),
-        "peak_memory_GB": _peak_memory(),
-    }
-
-
-def _peak_memory() -> float | None:
-    """Largest resident memory of this process so far; None where the system does not tell (Windows)."""
-    if sys.platform == "win32":
-        return None
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return round(peak / (1e9 if sys.platform == "darwin" else 1e6), 2)

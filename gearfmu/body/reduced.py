@@ -7,12 +7,32 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.layout import ALGORITHM_VERSION, ENTRIES, FORMAT_VERSION
+from gearfmu.body.layout import ALGORITHM_VERSION, FORMAT_VERSION, entries_of
 from gearfmu.errors import BodyError
 from gearfmu.reduction.display import Display
 from gearfmu.reduction.frf import FrfError
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
+
+
+@dataclass(frozen=True)
+class Rim:
+    """Where mounts may hold an internal gear: the patch of the rim of each sector, in that sector's frame.
+
+    patch_point (3,) m, of sector 0; patch_rows (3, n), kg^-½: its mean displacement x, y, z in the modes; flank_rigid
+    (2, R, A, 6): flank rows of tooth space 0 of the rigid motions about the origin; static_fp (2, z, R, A, 3), m/N: flank
+    row of space 0 per unit force on the patch of sector m; static_pp (z, 3, 3), m/N: patch of sector 0 per unit force
+    on that of sector m. mounts: number of them, at the sectors k·z/mounts; mount_stiffness: N/m of each, the same in
+    all directions. No mounts: 0 and 0.
+    """
+
+    patch_point: np.ndarray
+    patch_rows: np.ndarray
+    flank_rigid: np.ndarray
+    static_fp: np.ndarray
+    static_pp: np.ndarray
+    mounts: int
+    mount_stiffness: float
 
 
 @dataclass(frozen=True)
@@ -22,7 +42,8 @@ class ReducedBody:
     Shapes, units and meaning of every field stand in `layout.ENTRIES` and docs/file-formats.md. In short: frequency
     (n,) Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, z, R, R, A, A), m/N; static_fb (2, R, A, 6);
     static_bb (6, 6).
-    input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits.
+    input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of an internal gear, whose
+    rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one.
     Raises BodyError naming every field that cannot be.
     """
 
@@ -52,6 +73,7 @@ class ReducedBody:
     static_bb: np.ndarray
     frf: FrfError
     display: Display
+    rim: Rim | None = None
     format_version: int = FORMAT_VERSION
     algorithm_version: int = ALGORITHM_VERSION
 
@@ -63,6 +85,11 @@ class ReducedBody:
     def modes(self) -> int:
         """Number n of elastic modes."""
         return len(self.frequency)
+
+    @property
+    def internal(self) -> bool:
+        """Whether the body is a ring: its index k counts tooth spaces, its normals point into them."""
+        return self.rim is not None
 
     @property
     def width_functions(self) -> int:
@@ -82,7 +109,7 @@ def body_problems(body: ReducedBody) -> list[str]:
     """Everything that is wrong with shapes, numbers and order of a body; empty when it is sound."""
     problems: list[str] = []
     sizes: dict[str, int] = {"z": body.teeth}
-    for entry in ENTRIES:
+    for entry in entries_of(body.rim is not None):
         problems += _array_problems(entry, np.asarray(value_of(body, entry.field)), sizes)
     return problems or _meaning_problems(body)
 

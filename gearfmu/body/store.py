@@ -10,8 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearfmu.body.layout import ENTRIES, FORMAT, FORMAT_VERSION, TEXTS, Entry
-from gearfmu.body.reduced import ReducedBody, value_of
+from gearfmu.body.layout import FORMAT, FORMAT_VERSION, TEXTS, Entry, entries_of
+from gearfmu.body.reduced import ReducedBody, Rim, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.display import Display
@@ -29,7 +29,7 @@ def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
         file.attrs["input_hash"] = body.input_hash
         for text in TEXTS:
             file.attrs[text] = json.dumps(getattr(body, text), sort_keys=True)
-        for entry in ENTRIES:
+        for entry in entries_of(body.internal):
             value = np.asarray(value_of(body, entry.field), dtype=entry.kind)
             if entry.field == "static_ff":
                 value = value[:, :, : body.teeth // 2 + 1]
@@ -41,7 +41,7 @@ def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
 def load_body(path: str | os.PathLike[str]) -> ReducedBody:
     """Read and check a body file. Raises BodyError: missing, damaged, of another kind or version, or not sound."""
     with reading(path, FILE) as file:
-        values = {entry.field: _read(file, entry) for entry in ENTRIES}
+        values = {entry.field: _read(file, entry) for entry in entries_of("rim" in file)}
         heads = {name: str(file.attrs[name]) for name in ("name", "input_hash")}
         texts = {name: json.loads(file.attrs[name]) for name in TEXTS}
         versions = {name: int(file.attrs[name]) for name in ("format_version", "algorithm_version")}
@@ -69,6 +69,7 @@ def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
 def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
     values["static_ff"] = _all_offsets(values["static_ff"], values["teeth"])
     parts: dict[str, Any] = {}
-    for group, kind in (("frf", FrfError), ("display", Display)):
+    groups = (("frf", FrfError), ("display", Display), ("rim", Rim))
+    for group, kind in groups if "rim.mounts" in values else groups[:2]:
         parts[group] = kind(**{f.name: values.pop(f"{group}.{f.name}") for f in fields(kind)})
     return ReducedBody(**values, **parts, **heads)

@@ -15,8 +15,8 @@ from gearfmu.errors import MeshError
 from gearfmu.femesh.lattice import Finder, edges, graded, mirrored, parameter, quads_of, transfinite
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.section import CORE_SLOPE, RIM_SHARE, ROOT_DEPTH, Section, rim_parameters
-from gearfmu.femesh.sector import sector_of
-from gearfmu.geometry import involute
+from gearfmu.femesh.sector import gear_sector, sector_of
+from gearfmu.geometry import GearGeometry, involute
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.gear import MeshSpec
 
@@ -28,6 +28,13 @@ def ring_sector(geometry: InternalGearGeometry, face_width: float, mesh: MeshSpe
     its larger angle. MeshError when the geometry leaves no valid element.
     """
     return sector_of(build_ring_section(geometry, mesh), geometry.z, face_width, mesh.scaled(mesh.width), "rim")
+
+
+def sector_mesh(geometry: GearGeometry | InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
+    """The sector of an external or internal gear."""
+    if isinstance(geometry, InternalGearGeometry):
+        return ring_sector(geometry, face_width, mesh)
+    return gear_sector(geometry, face_width, mesh)
 
 
 def build_ring_section(ring: InternalGearGeometry, mesh: MeshSpec) -> Section:

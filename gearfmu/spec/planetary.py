@@ -126,7 +126,10 @@ class CarrierSpec(Spec):
     )
     material: Material = Field(description="material")
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
-    modes: Annotated[Count, Field(ge=1, le=2000)] = Field(default=120, description="number of oscillators stored")
+    method: Literal["krylov", "rubin", "craig_bampton", "modal"] = Field(
+        default="krylov", description="method of reduction; every one ends in oscillators"
+    )
+    modes: Annotated[Count, Field(ge=24, le=2000)] = Field(default=120, description="number of oscillators stored")
     mesh: CarrierMeshSpec = Field(default_factory=CarrierMeshSpec, description="element counts")
 
     def coupling_of(self, interface: str) -> str:
@@ -149,3 +152,8 @@ class PlanetarySpec(Spec):
     planet: SetGearSpec = Field(description="one planet; all are equal")
     ring: RingSpec = Field(description="ring")
     carrier: CarrierSpec = Field(description="carrier")
+
+    @property
+    def gears(self) -> tuple[SetGearSpec, SetGearSpec, RingSpec]:
+        """Sun, planet, ring."""
+        return self.sun, self.planet, self.ring
