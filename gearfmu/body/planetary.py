@@ -1,0 +1,178 @@
+"""From a planetary set's numbers to its reduced bodies: sun, planet and ring by cyclic symmetry, carrier as a whole."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
+from gearfmu.body.layout import ALGORITHM_VERSION
+from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.provenance import provenance
+from gearfmu.body.reduce import reduced_gear
+from gearfmu.body.store import load_body, save_body
+from gearfmu.errors import BodyError, MeshError
+from gearfmu.femesh import mesh_report
+from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.basis import Size
+from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.oscillators import Oscillators, oscillators
+from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
+from gearfmu.spec.body import body_hash
+from gearfmu.spec.library import model_folder
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.planetary_body import SET_BODIES, set_body_inputs
+
+TRUSTED_ERROR = 0.01
+
+Progress = Callable[[str, float], None]
+Body = ReducedBody | InterfaceBody
+
+
+def set_hash(spec: PlanetarySpec, name: str) -> str:
+    """Fingerprint the body `name` ("sun", "planet", "ring", "carrier") must carry."""
+    return body_hash({**set_body_inputs(spec, name), "algorithm_version": ALGORITHM_VERSION})
+
+
+def set_body_path(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None = None) -> Path:
+    """Where a body lies: `<folder>/<name>.h5`, the folder of the stage file when None."""
+    return (Path(folder) if folder is not None else model_folder(spec)) / f"{name}.h5"
+
+
+def load_set_bodies(spec: PlanetarySpec, folder: str | os.PathLike[str] | None = None) -> list[Body]:
+    """The stored bodies: sun, planet, ring, carrier. Raises BodyError when one is missing, damaged or stale."""
+    bodies = []
+    for name in SET_BODIES:
+        path = set_body_path(spec, name, folder)
+        body = _load(name, path)
+        if body.input_hash != set_hash(spec, name):
+            raise BodyError(
+                f"{path}: stale: made from other numbers, or by another version, than {spec.source} asks for now; "
+                "make it again with 'gearfmu reduce STAGE'"
+            )
+        bodies.append(body)
+    return bodies
+
+
+def reduce_set(
+    spec: PlanetarySpec,
+    folder: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> list[Body]:
+    """Reduce what is missing or stale of a set, on as many processors as there are up to two, and store it.
+
+    progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
+    """
+    wanted = [name for name in SET_BODIES if force or not _is_current(spec, name, folder)]
+    paths = {name: set_body_path(spec, name, folder) for name in wanted}
+    longest_first = sorted(wanted, key=("ring", "carrier", "sun", "planet").index)
+    if len(wanted) > 1 and (os.cpu_count() or 1) > 1:
+        with ProcessPoolExecutor(2) as pool:
+            jobs = {name: pool.submit(_make, spec, name, paths[name]) for name in longest_first}
+            for number, name in enumerate(longest_first):
+                _tell(progress, f"reducing {name}", number / len(jobs))
+                jobs[name].result()
+    else:
+        for name in longest_first:
+            _make(spec, name, paths[name], progress)
+    return load_set_bodies(spec, folder)
+
+
+def reduce_set_body(spec: PlanetarySpec, name: str, progress: Progress | None = None) -> Body:
+    """One body of a set from its numbers. Raises MeshError with the body's name."""
+    try:
+        if name == "carrier":
+            return _carrier(spec, progress)
+        gear = spec.gears[SET_BODIES.index(name)]
+        kind = InternalGearGeometry if name == "ring" else GearGeometry
+        return reduced_gear(gear, kind.of(gear, spec.set), set_hash(spec, name), progress)
+    except MeshError as error:
+        raise MeshError(f"{spec.source}: {name}: {error}") from error
+
+
+def _make(spec: PlanetarySpec, name: str, path: Path, progress: Progress | None = None) -> None:
+    body = reduce_set_body(spec, name, progress)
+    if isinstance(body, InterfaceBody):
+        save_interface_body(body, path)
+    else:
+        save_body(body, path)
+
+
+def _load(name: str, path: Path) -> Body:
+    return load_interface_body(path) if name == "carrier" else load_body(path)
+
+
+def _is_current(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None) -> bool:
+    try:
+        return _load(name, set_body_path(spec, name, folder)).input_hash == set_hash(spec, name)
+    except BodyError:
+        return False
+
+
+def _carrier(spec: PlanetarySpec, progress: Progress | None) -> InterfaceBody:
+    started = time.process_time()
+    _tell(progress, "carrier: mesh and finite elements", 0.0)
+    full = carrier_full_order(spec)
+    _tell(progress, f"carrier: {spec.carrier.method}", 0.2)
+    basis = METHODS[spec.carrier.method](full, Size(spec.carrier.modes))
+    model = oscillators(full, basis, spec.carrier.modal_damping)
+    _tell(progress, "carrier: frequency response", 0.6)
+    judging = Judging.over(damping_ratio=spec.carrier.modal_damping)
+    exact = reference(full, judging)
+    error = relative_error(exact.matrix, transfer(model, judging, full.ground, residual=True))
+    facts = mesh_report(carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh))
+    mesh = {**facts, "counts": spec.carrier.mesh.model_dump(), "dof_body": full.size, "dof_sector": facts["dof"]}
+    evidence = _Evidence(judging.frequency, error)
+    return _interface_body(full, model, evidence, spec, {"mesh": mesh, "started": started})
+
+
+class _Evidence:
+    """Error over frequency, and up to where it stays below 1 %."""
+
+    def __init__(self, frequency: np.ndarray, error: np.ndarray):
+        self.frequency, self.error = frequency, error
+        bad = np.flatnonzero(error > TRUSTED_ERROR)
+        self.trusted_to = float(frequency[-1] if not len(bad) else frequency[max(bad[0] - 1, 0)])
+
+
+def _interface_body(
+    full: FullOrder, model: Oscillators, evidence: _Evidence, spec: PlanetarySpec, made: dict[str, Any]
+) -> InterfaceBody:
+    return InterfaceBody(
+        name="carrier",
+        input_hash=set_hash(spec, "carrier"),
+        method=model.method,
+        interfaces=tuple({"name": i.name, "kind": i.kind, "components": list(i.components)} for i in full.interfaces),
+        ground=full.ground,
+        material=spec.carrier.material.model_dump(),
+        mesh=made["mesh"],
+        provenance=provenance(time.process_time() - made["started"]),
+        rigid_mass=model.rigid_mass,
+        point=np.array([i.point for i in full.interfaces]),
+        rigid_rows=model.rigid_rows,
+        frequency=model.frequency,
+        damping_ratio=model.damping_ratio,
+        rows=model.rows,
+        static=model.static,
+        frf_frequency=evidence.frequency,
+        frf_error=evidence.error,
+        length=full.length,
+        trusted_to=evidence.trusted_to,
+    )
+
+
+def _tell(progress: Progress | None, what: str, share: float) -> None:
+    if progress:
+        progress(what, share)
