@@ -20,6 +20,7 @@ from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import assemble, loaded_te
 
 RATIO = 0.03
+PATH_SHARE = 0.95  # of the residual beyond all stored modes: what a contact's dashpot is parallel to (gk_system.c)
 CLOSING = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion's axis, r_b φ; wheel's axis, r_b φ
 
 
@@ -36,13 +37,14 @@ def strip_weights(slices: int, functions: int) -> np.ndarray:
 
 
 def residual_path(body: ReducedBody, slices: int) -> float:
-    """Deflection of a tooth's flank beyond all stored modes under 1 N shared evenly by the slices, mean over the roll."""
+    """Path of a contact's dashpot in one tooth: its share of the deflection beyond all stored modes under 1 N shared evenly
+    by the slices, mean over the roll, m/N."""
     weights = strip_weights(slices, body.flank_rows.shape[2]).mean(axis=0)
     omega2 = (2 * np.pi * body.frequency) ** 2
     rows = body.flank_rows[0]
     beyond = body.static_ff[0, 0, 0].diagonal(axis1=0, axis2=1).transpose(2, 0, 1)  # (rolls, functions, functions)
     beyond = beyond - np.einsum("ian,ibn->iab", rows / omega2, rows)
-    return float(np.einsum("a,iab,b->i", weights, beyond, weights).mean())
+    return PATH_SHARE * float(np.einsum("a,iab,b->i", weights, beyond, weights).mean())
 
 
 def local_path(spec: StageSpec, force: float) -> float:

@@ -31,11 +31,6 @@ SCENES: dict[str, Callable[[Case], Finding]] = {
     )
 }
 
-KNOWN_FAILURES: frozenset[tuple[str, Case]] = frozenset({("jammed", Case("full", "quarter"))})
-"""Scene and case that fail, and why is known (docs/decisions.md, hard cases): at 0.125 µs the dashpot makes the force
-ring, so that coast flanks open for moments. They are counted as failures all the same."""
-
-
 def what(name: str) -> str:
     """What happens in a scene and what must be seen there: its docstring on one line."""
     return " ".join((SCENES[name].__doc__ or "").split())

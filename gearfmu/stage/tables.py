@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-ROLLS = 32  # error and price of the grid: docs/decisions.md
+ROLLS = 48  # error and price of the grid: docs/decisions.md
 MOST_FUNCTIONS = 6
 OFFSETS = range(-3, 4)
 BORE = (0, 1, 5)

@@ -8,7 +8,7 @@ import pytest
 
 from gearfmu.stability.case import LEVELS, STEPS
 from gearfmu.stability.page import page
-from gearfmu.stability.scenes import KNOWN_FAILURES, SCENES
+from gearfmu.stability.scenes import SCENES
 from gearfmu.stability.suite import Task, read, table, tasks
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +24,7 @@ def test_every_scene_ran_through_at_level_fast() -> None:
 
 def test_only_known_cases_fail() -> None:
     rows = read(TABLE)
-    assert {(row.scene, row.case) for row in rows if row.failed} == KNOWN_FAILURES
+    assert not [(row.scene, row.case) for row in rows if row.failed]
 
 
 @pytest.mark.full

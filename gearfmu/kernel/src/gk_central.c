@@ -3,10 +3,11 @@
  *
  *     v½ = v + ½h a,   x₁ = x + h v½,   0 ≤ λ₁ ⊥ g(x₁) + C λ₁ + δ(λ₁) ≥ 0,   a₁ = M⁻¹(f + Wᵀλ₁ − K x₁ − damping at v½ + ½h a),   v₁ = v½ + ½h a₁
  *
- * 2nd order while contacts keep their status; stable for h < 2/ω, ω the highest frequency of the dynamic coordinates with all contacts closed. Accelerations are kept where dg4 keeps forces. */
+ * 2nd order while contacts keep their status; stable while ¼h²ω² + hχ < 1 with all contacts closed (eq. 16a): ω² of the stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
 #include "gk_core.h"
 
 enum { PLACES_TRIED = 8, POWER = 150 };
+static const double FIRST = 1e-6; /* s: where the search for the limit begins */
 
 /* trial state ← positions and speeds after h with the accelerations at its start */
 static void approach(const gk_setup *setup, const gk_data *data, double h)
@@ -106,6 +107,7 @@ static int closed(const gk_model *model, const gk_setup *setup, double position)
 {
     gk_work *work = setup->work;
     gk_system *s = &work->system;
+    const double full = model->torque_max / (model->gear[0].r_b * setup->width);
     gk_data empty;
     memset(&empty, 0, sizeof empty);
     memset(work->frame, 0, sizeof work->frame);
@@ -119,36 +121,50 @@ static int closed(const gk_model *model, const gk_setup *setup, double position)
     for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
     gk_rows_form(model, setup, work->frame, work);
     gk_system_form(model, setup, &empty, &work->explicit_rows, work);
-    gk_limit_compliance(s, model->torque_max / (model->gear[0].r_b * setup->width), 0, s->J);
+    for (int i = 0; i < s->n; i++) {
+        s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
+        if (i < s->contacts) s->slope[i] = gk_law_at(&s->local[s->place_of[i]], s->width[i], full * s->width[i]).slope;
+    }
+    gk_limit_compliance(s, full, 0, s->J);
     return gk_limit_cholesky(s->J, s->n);
 }
 
-/* one round of power iteration with M⁻¹(K + WᵀC⁻¹W) on the trial speeds; returns Rayleigh's quotient, ω² */
-static double round_of_power(const gk_setup *setup)
+typedef struct quotient { double stiff, damped; } quotient; /* ω², χ of a shape */
+
+/* One round of power iteration with ¼h² M⁻¹(K + WᵀC⁻¹W) + h M⁻¹(damping + WᵀC⁻¹ S c S C⁻¹W) on the trial speeds; returns Rayleigh's quotients of both parts */
+static quotient round_of_power(const gk_setup *setup, double h)
 {
     gk_work *work = setup->work;
     gk_system *s = &work->system;
     const gk_real *u[2] = {work->trial[0] + setup->modal[0].n, work->trial[1] + setup->modal[1].n};
-    double *r = work->trial_rigid + RIGID, y[MAX_STRIDE], up = 0.0, down = 0.0, size = 0.0;
+    const double stiff = 0.25 * h * h;
+    double *r = work->trial_rigid + RIGID, y[MAX_STRIDE], c[MAX_STRIDE], both[MAX_STRIDE], next[RIGID], down = 0.0, size = 0.0;
+    quotient up = {0.0, 0.0};
     work->outer_speed[0] = work->outer_speed[1] = 0.0;
     gk_system_rates(setup, work, u, r, y);
     for (int i = 0; i < s->n; i++)
-        if (s->kind[i] == ROW_TORQUE || s->kind[i] == ROW_CLUTCH) y[i] = 0.0;
+        if (!s->active[i]) y[i] = 0.0;
     gk_limit_solve(s->J, y, s->n);
-    double next[RIGID];
+    memcpy(c, y, (size_t)s->n * sizeof *c);
+    gk_rk45_resist(setup, s, c);
+    for (int i = 0; i < s->n; i++) up.damped += y[i] * c[i];
+    gk_limit_solve(s->J, c, s->n);
+    for (int i = 0; i < s->n; i++) both[i] = stiff * y[i] + h * c[i];
     for (int d = 0; d < RIGID; d++) {
         double force = 0.0;
-        for (int i = 0; i < s->n; i++) force += s->rigid[d][i] * y[i];
-        next[d] = force * setup->inverse_mass[d];
-        if (setup->inverse_mass[d] > 0.0) up += r[d] * force, down += r[d] * r[d] / setup->inverse_mass[d], size += next[d] * next[d] / setup->inverse_mass[d];
+        next[d] = 0.0;
+        for (int i = 0; i < s->n; i++) force += s->rigid[d][i] * y[i], next[d] += s->rigid[d][i] * both[i] * setup->inverse_mass[d];
+        if (setup->inverse_mass[d] > 0.0) up.stiff += r[d] * force, down += r[d] * r[d] / setup->inverse_mass[d], size += next[d] * next[d] / setup->inverse_mass[d];
     }
     for (int g = 0; g < 2; g++) {
         const gk_modal *m = &setup->modal[g];
         if (!m->n) continue;
-        gk_step_scatter(setup, g, y, y, work->force[g], work->reading[g]);
+        gk_step_scatter(setup, g, y, both, work->force[g], work->reading[g]);
         for (int j = 0; j < m->n; j++) {
-            const double a = (double)m->omega2[j] * u[g][j] + work->force[g][j];
-            up += a * u[g][j], down += (double)u[g][j] * u[g][j], size += a * a;
+            const double of_mode = GK_ON(setup, modal_damping) ? 2.0 * m->zeta[j] * m->omega[j] : 0.0, x = u[g][j];
+            const double a = work->reading[g][j] + (stiff * m->omega2[j] + h * of_mode) * x;
+            up.stiff += ((double)m->omega2[j] * x + work->force[g][j]) * x, up.damped += of_mode * x * x;
+            down += x * x, size += a * a;
             work->stage[g][0][j] = (gk_real)a;
         }
     }
@@ -156,23 +172,27 @@ static double round_of_power(const gk_setup *setup)
     for (int d = 0; d < RIGID; d++) r[d] = next[d] * scale;
     for (int g = 0; g < 2; g++)
         for (int j = 0; j < setup->modal[g].n; j++) work->trial[g][setup->modal[g].n + j] = (gk_real)(work->stage[g][0][j] * scale);
-    return down > 0.0 ? up / down : 0.0;
+    return down > 0.0 ? (quotient){up.stiff / down, up.damped / down} : (quotient){0.0, 0.0};
 }
 
-/* Largest stable step 2/ω over the roll positions, all candidate contacts closed (fewer are softer) */
+/* Largest stable step over the roll positions, all candidate contacts closed (fewer are softer): ¼h²ω² + hχ = 1 (eq. 16a) for the shape that is worst at this h */
 double gk_central_limit(const gk_model *model, const gk_setup *setup)
 {
     gk_work *work = setup->work;
-    double highest = 0.0;
+    double smallest = INFINITY;
     for (int i = 0; i < (model->kind == KIND_FLAT ? 1 : PLACES_TRIED); i++) {
-        double square = 0.0;
+        double h = FIRST;
         if (!closed(model, setup, (double)i / PLACES_TRIED)) continue;
         for (int d = 0; d < RIGID; d++) work->trial_rigid[RIGID + d] = setup->inverse_mass[d] > 0.0 ? sqrt(setup->inverse_mass[d]) : 0.0;
         for (int g = 0; g < 2; g++)
             for (int j = 0; j < setup->modal[g].n; j++) work->trial[g][setup->modal[g].n + j] = setup->modal[g].omega[j] > 0.0 ? (gk_real)(1.0 + 0.1 * (j % 7)) : 0;
-        for (int round = 0; round < POWER; round++) square = round_of_power(setup);
-        highest = gk_max(highest, square);
+        for (int round = 0; round < POWER; round++) {
+            const quotient of = round_of_power(setup, h);
+            h = of.stiff > 0.0 ? 2.0 / (sqrt(of.stiff + of.damped * of.damped) + of.damped) : INFINITY;
+            if (!(h < INFINITY)) break;
+        }
+        smallest = gk_min(smallest, h);
     }
-    return highest > 0.0 ? 2.0 / sqrt(highest) : INFINITY;
+    return smallest;
 }
 #endif

@@ -1,10 +1,11 @@
 /* Which internal step: μ′ = largest eigenvalue of C⁻¹K over the roll positions (docs/theory.md, 3.5), C the compliance that answers at once: outside the paths of the dashpots all of it, in them what the
- * dashpots let move within a step, S(1 + ΓS)⁻¹. Energy is conserved while C′ > 0, accuracy wants μ′ ≤ ½. Modes above ωh = 1.2 have no κ, so μ′ goes up and down with h.
- * Default h: the largest with μ′ ≤ ½, at most h_max of the stage and 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = ½; above 1/8 of the period it is refused. */
+ * dashpots let move within a step, S(1 + ΓS)⁻¹. Energy is conserved while C′ > 0, that is μ′ < 1. Modes above ωh = 1.2 have no κ, so μ′ goes up and down with h.
+ * Default h: the largest with μ′ ≤ ½, at most h_max of the stage and 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = ¾ (a lower γ costs more accuracy than a larger μ′); above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "gk_core.h"
 
-static const double MU = 0.5, WITHIN = 0.9, BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
+static const double MU = 0.5, MU_MOST = 0.75;       /* μ′ of the default step; of any other, by γ */
+static const double WITHIN = 0.9, BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
 enum { POSITIONS = 8, POWER_ROUNDS = 60 };
 
 /* Cholesky of a (n, n), in place, lower; 0 when not positive */
@@ -131,11 +132,11 @@ double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, doubl
 /* γ for which μ′ stays at its bound */
 static double gamma_for(const gk_model *model, const gk_setup *setup, double h)
 {
-    if (gk_limit_mu(model, setup, h, 1.0) <= MU) return 1.0;
+    if (gk_limit_mu(model, setup, h, 1.0) <= MU_MOST) return 1.0;
     double low = 0.0, high = 1.0;
     for (int i = 0; i < 12; i++) {
         double middle = 0.5 * (low + high);
-        if (gk_limit_mu(model, setup, h, middle) <= MU) low = middle;
+        if (gk_limit_mu(model, setup, h, middle) <= MU_MOST) low = middle;
         else high = middle;
     }
     return low;

@@ -14,14 +14,11 @@ static const double A[STAGES][6] = {{0},
                                     {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
 static const double ERROR[STAGES] = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
 
-/* Dashpots on the rows' paths P + δ in series with A: with λ̇ = −J⁻¹ġ, J = A + S, their force is S c S λ̇, passed on through J⁻¹ (first order in c; A does not follow its rate). Contacts never pull. */
-static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate)
+/* y ← S c S y on the active rows: what dashpots c on the paths S = P + δ′ make of the rate of λ */
+void gk_rk45_resist(const gk_setup *setup, const gk_system *s, double *y)
 {
-    double y[MAX_STRIDE], path[MAX_ROWS];
-    gk_tangent_factorise(s); /* at the λ found */
-    for (int i = 0; i < s->stride; i++) y[i] = i < s->n && s->active[i] ? -rate[i] : 0.0;
-    gk_tangent_solve(s, y);
-    for (int pass = 0; pass < 2; pass++) { /* y ← c S y, then S y */
+    double path[MAX_ROWS];
+    for (int pass = 0; pass < 2; pass++) {
         gk_solve_path(s, y, path);
         for (int i = 0; i < s->n; i++) {
             const int contact = s->kind[i] == ROW_CONTACT;
@@ -29,6 +26,16 @@ static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate
             y[i] = (path[i] + (contact ? s->slope[i] * y[i] : 0.0)) * (pass ? s->active[i] : c);
         }
     }
+}
+
+/* Dashpots on the rows' paths P + δ in series with A: with λ̇ = −J⁻¹ġ, J = A + S, their force is S c S λ̇, passed on through J⁻¹ (first order in c; A does not follow its rate). Contacts never pull. */
+static void add_dashpots(const gk_setup *setup, gk_system *s, const double *rate)
+{
+    double y[MAX_STRIDE];
+    gk_tangent_factorise(s); /* at the λ found */
+    for (int i = 0; i < s->stride; i++) y[i] = i < s->n && s->active[i] ? -rate[i] : 0.0;
+    gk_tangent_solve(s, y);
+    gk_rk45_resist(setup, s, y);
     gk_tangent_solve(s, y);
     for (int i = 0; i < s->n; i++) {
         if (!s->active[i]) continue;

@@ -2,6 +2,8 @@
  * Rows: slices of all places, then the live bilateral rows (bearings, port springs, shafts, clutches). Contact forces press inward, rows measure outward: a contact row is −(flank row). */
 #include "gk_core.h"
 
+static const double SHARE = 0.95, SHARE_OF_BOTH_FLANKS = 0.75;
+
 /* row of the system that basis row i of gear g stands in, −1: none */
 static int row_of(const gk_system *s, int g, int i) { return i < s->contacts ? i : s->bore[g][i - s->contacts]; }
 
@@ -184,13 +186,25 @@ static void add_rigid(const gk_setup *setup, const gk_coefficients *k, gk_system
             for (int j = 0; j < s->n; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
 }
 
+/* The share of a tooth's own residual that its dashpot is parallel to. What other contacts have in common with it stays outside, so that Q = C_res − P is positive: little with the neighbours, more with the
+ * other flank of the same tooth (docs/theory.md, 2.5). */
+static double path_share(const gk_work *work, int p)
+{
+    const gk_place *place = work->place;
+    for (int q = 0; q < work->places; q++)
+        if (place[q].flank != place[p].flank && (place[q].number[0] == place[p].number[0] || place[q].number[1] == place[p].number[1])) return SHARE_OF_BOTH_FLANKS;
+    return SHARE;
+}
+
 /* the paths of the contacts' own dashpots; what is in P is not in A and Q */
 static void take_paths(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     gk_system *s = &work->system;
     const int strips = GK_STRIPS(s);
     for (int p = 0; p < work->places; p++) {
+        const double share = path_share(work, p);
         gk_table_path(model, setup, &work->place[p], s->path[p]);
+        for (int c = 0; c < strips * strips; c++) s->path[p][c] *= share;
         for (int a = 0; a < strips; a++)
             for (int b = 0; b < strips; b++) {
                 const int at = (p * strips + a) * s->stride + p * strips + b;

@@ -47,6 +47,7 @@
 #define gk_step_scatter gk_step_scatter_avx2
 #define gk_step_energy gk_step_energy_avx2
 #define gk_rk45_evaluate gk_rk45_evaluate_avx2
+#define gk_rk45_resist gk_rk45_resist_avx2
 #define gk_rk45_angles gk_rk45_angles_avx2
 #define gk_rk45_advance gk_rk45_advance_avx2
 #define gk_central_step gk_central_step_avx2
