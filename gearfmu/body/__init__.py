@@ -1,10 +1,26 @@
-"""Reduced bodies: what a gear is to the kernel, their HDF5 files, and how they are made from a stage."""
+"""Reduced bodies: what a gear or a carrier is to the kernel, their HDF5 files, and how they are made from a stage."""
 
 from __future__ import annotations
 
 from gearfmu.body.inspect import inspect_file
+from gearfmu.body.interface_body import InterfaceBody, load_interface_body
+from gearfmu.body.mounted import MountedRing, mounted
+from gearfmu.body.planetary import load_set_bodies, reduce_set
 from gearfmu.body.reduce import body_path, load_stage_bodies, reduce_stage
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body
 
-__all__ = ["ReducedBody", "body_path", "inspect_file", "load_body", "load_stage_bodies", "reduce_stage"]
+__all__ = [
+    "InterfaceBody",
+    "MountedRing",
+    "ReducedBody",
+    "body_path",
+    "inspect_file",
+    "load_body",
+    "load_interface_body",
+    "load_set_bodies",
+    "load_stage_bodies",
+    "mounted",
+    "reduce_set",
+    "reduce_stage",
+]

@@ -7,13 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
+from gearfmu.body.interface_body import interface_facts, load_interface_body
 from gearfmu.body.layout import entries_of
+from gearfmu.body.mounted import mounted
 from gearfmu.body.reduced import ReducedBody, value_of
 from gearfmu.body.store import load_body
+from gearfmu.hdf5 import format_of
 
 
 def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Summary of a body file as JSON-ready data: kind, versions, hash, facts, datasets. Raises BodyError."""
+    if format_of(path) == INTERFACE_FORMAT:
+        return {"file": str(path), "kind": "interface body", **interface_facts(load_interface_body(path))}
     body = load_body(path)
     return {
         "file": str(path),
@@ -48,6 +54,22 @@ def _facts(body: ReducedBody) -> dict[str, Any]:
         "roll_points": len(body.roll),
         "width_functions": body.width_functions,
         "tooth_compliance_mid_flank_m_per_N": float(body.static_ff[0, 0, 0, middle, middle, 0, 0]),
+        **_mounts(body),
+    }
+
+
+def _mounts(body: ReducedBody) -> dict[str, Any]:
+    """What holds an internal gear, and its lowest frequencies then."""
+    if body.rim is None:
+        return {}
+    if not body.rim.mounts:
+        return {"internal": True, "mounts": 0}
+    ring = mounted(body)
+    return {
+        "internal": True,
+        "mounts": body.rim.mounts,
+        "mount_stiffness_N_per_m": body.rim.mount_stiffness,
+        "mounted_frequencies_Hz": [float(f) for f in ring.frequency[:8]],
     }
 
 

@@ -31,9 +31,6 @@ from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import StageSpec, require_pair
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
-_PICTURE_MODES = 12
-_PICTURE_LOADS = 5
-_DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 
 Progress = Callable[[str, float], None]
 Geometry = GearGeometry | InternalGearGeometry
@@ -107,41 +104,57 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
     report = _named(progress, gear.name)
     started = time.process_time()
     report("mesh and finite elements", 0.0)
-    full_order = full_order_body(geometry, gear)
-    modes = elastic_modes(full_order, gear.body.modes, report)
-    statics = static_tables(full_order, _pictured_loads(full_order), report)
-    report("frequency response", 0.0)
-    frf = frf_error(full_order, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
-    inertia = full_order.inertia
+    flank, points = tooth_flank(geometry, gear, isinstance(geometry, InternalGearGeometry))
+    rim = None
+    if getattr(gear, "imported", None):
+        made = imported_parts(gear, geometry, FRF_CUT, report)
+    else:
+        made, rim = _made_here(gear, geometry, (flank, points), report)
+    modes, statics = made.modes, made.statics
     return ReducedBody(
         name=gear.name,
         input_hash=input_hash,
         material=gear.material.model_dump(),
-        mesh=_mesh_facts(full_order, gear),
+        mesh=made.facts,
         provenance=provenance(time.process_time() - started),
         teeth=geometry.z,
         r_b=geometry.r_b,
         psi_b=geometry.psi_b,
         face_width=gear.face_width,
-        mass=float(inertia[0, 0]),
-        inertia=inertia[3:, 3:],
+        mass=float(made.inertia[0, 0]),
+        inertia=made.inertia[3:, 3:],
         frequency=modes.frequency,
         damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
         nodal_diameter=modes.nodal_diameter,
         part=modes.part,
         parity=modes.parity,
-        flank_rows=_by_point(modes.flank_rows, full_order.points),
+        flank_rows=_by_point(modes.flank_rows, points),
         bore_rows=modes.bore_rows,
-        roll_range=np.array(full_order.flank.roll_range),
-        roll=full_order.points.rolls,
+        roll_range=np.array(flank.roll_range),
+        roll=points.rolls,
         strip_half_width=gear.body.strip_half_width,
         static_ff=statics.static_ff,
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
-        frf=frf,
-        display=_display(sector_mesh(geometry, gear.face_width, _DRAWN), full_order, modes, statics),
-        rim=_rim(full_order, modes, statics, getattr(gear, "mounts", None)),
+        frf=made.frf,
+        display=made.display,
+        rim=rim,
     )
+
+
+def _made_here(
+    gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Points], report: Progress
+) -> tuple[Parts, Rim | None]:
+    """A gear meshed here, reduced by cyclic symmetry."""
+    flank, points = load_points
+    body = SectorBody(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
+    modes = elastic_modes(body, gear.body.modes, report)
+    statics = static_tables(body, pictured_loads(points), report)
+    report("frequency response", 0.0)
+    frf = frf_error(body, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
+    display = sector_display(sector_mesh(geometry, gear.face_width, DRAWN), body, modes, statics)
+    made = Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia)
+    return made, _rim(body, modes, statics, getattr(gear, "mounts", None))
 
 
 def _rim(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim | None:
@@ -161,11 +174,7 @@ def _rim(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim |
 
 def full_order_body(geometry: Geometry, gear: Any) -> SectorBody:
     """The finite-element model of one external or internal gear with its load points."""
-    flank = ToothFlank(
-        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width,
-        isinstance(geometry, InternalGearGeometry),
-    )  # fmt: skip
-    points = Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
+    flank, points = tooth_flank(geometry, gear, isinstance(geometry, InternalGearGeometry))
     return SectorBody(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
 
 
@@ -184,30 +193,6 @@ def _named(progress: Progress | None, name: str) -> Progress:
 
 def _by_point(rows: np.ndarray, points: Points) -> np.ndarray:
     return rows.reshape(2, len(points.rolls), points.functions, -1)
-
-
-def _pictured_loads(body: SectorBody) -> list[int]:
-    """Flat indices of the uniform loads on flank 0 at a few rolls from form circle to tip."""
-    rolls, functions = len(body.points.rolls), body.points.functions
-    chosen = sorted({round(k) for k in np.linspace(0, rolls - 1, _PICTURE_LOADS)})
-    return [roll * functions for roll in chosen]
-
-
-def _display(drawn: FeMesh, body: SectorBody, modes: Modes, statics: Statics) -> Display:
-    pictured = _pictured_loads(body)
-    sector = outline(drawn, body.mesh.nodes)
-    points, quads = whole_surface(sector, body.teeth)
-    index = [k for k in sorted(modes.shapes) if k < _PICTURE_MODES]
-    shapes = [unfold_mode(modes.shapes[k], int(modes.nodal_diameter[k]), sector, body.teeth) for k in index]
-    loads = [unfold_sectors(picture, sector) for picture in statics.pictures]
-    return Display(
-        points.astype("f4"),
-        quads,
-        np.array(shapes, "f4").reshape(-1, *points.shape),
-        np.array(index, int),
-        np.array(loads, "f4"),
-        body.points.rolls[[load // body.points.functions for load in pictured]],
-    )
 
 
 def _mesh_facts(body: SectorBody, gear: Any) -> dict[str, Any]:

@@ -89,11 +89,12 @@ def _shipped(name: Path) -> Path:
 
 def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body import inspect_file
+    from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
     from gearfmu.body.layout import FORMAT
     from gearfmu.hdf5 import format_of
     from gearfmu.stage.trace import Trace
 
-    if format_of(path) == FORMAT:
+    if format_of(path) in (FORMAT, INTERFACE_FORMAT):
         return inspect_file(path)
     trace = Trace.load(path)
     channels = {
@@ -133,6 +134,8 @@ def _derived(spec: Any) -> dict[str, Any]:
 
     from gearfmu.geometry import PairGeometry
 
+    if spec.kind == "planetary_set":
+        return _derived_set(spec)
     pair = PairGeometry.of(spec)
     radii = {
         gear.name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a}
@@ -144,6 +147,32 @@ def _derived(spec: Any) -> dict[str, Any]:
         "base_pitch": pair.base_pitch,
         **radii,
     }
+
+
+def _derived_set(spec: Any) -> dict[str, Any]:
+    """What follows from the numbers of a planetary set."""
+    import math
+
+    from gearfmu.geometry.carrier import CarrierGeometry
+    from gearfmu.geometry.planetary import PlanetaryGeometry
+    from gearfmu.spec.planetary_checks import mesh_torque, ring_half_width
+
+    g = PlanetaryGeometry.of(spec)
+    shapes = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
+    carrier = CarrierGeometry.of(spec)
+    return {
+        "speed_ratio_sun_to_carrier": g.ratio,
+        "working_pressure_angle_deg": {
+            "sun_planet": math.degrees(g.sun_mesh.alpha_wt), "planet_ring": math.degrees(g.ring_mesh.alpha_wt)
+        },
+        "contact_ratio": {"sun_planet": g.sun_mesh.contact_ratio, "planet_ring": g.ring_mesh.contact_ratio},
+        "ring_least_tip_radius": g.ring_mesh.least_tip_radius,
+        "gap_between_planets": g.neighbour_clearance,
+        "sun_torque_in_one_mesh": mesh_torque(spec),
+        "largest_hertz_half_width_planet_ring": ring_half_width(spec, g.ring_mesh),
+        "carrier_mass": carrier.volume * spec.carrier.material.density,
+        **{name: {"r_b": s.r_b, "r_f": s.r_f, "r_a": s.r_a} for name, s in shapes.items()},
+    }  # fmt: skip
 
 
 def _fmu(path: Path) -> dict[str, Any]:

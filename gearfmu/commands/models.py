@@ -21,9 +21,9 @@ def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> Any:
 def bodies_of(stage: str) -> tuple[Any, list[Any]]:
     """StageSpec and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first, with a
     progress bar."""
-    from gearfmu.spec.stage import load_stage
+    from gearfmu.spec.stage import load_pair
 
-    spec = load_stage(stage)
+    spec = load_pair(stage)
     from gearfmu.body import reduce_stage
 
     with progress_bar("reducing") as progress:

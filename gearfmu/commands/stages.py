@@ -24,27 +24,24 @@ def new(name: str, like: str) -> None:
 
 @click.command()
 @click.argument("stage")
-@click.option("--gear", "only", metavar="NAME", help="Only this gear (pinion or wheel).")
+@click.option("--gear", "only", metavar="NAME", help="Only this body (pinion, wheel; sun, planet, ring, carrier).")
 @click.option(
     "--scale", type=click.FloatRange(0.2, 4), default=1.0, show_default=True, help="Factor on all element counts."
 )
 @click.option("--full", is_flag=True, help="All teeth instead of one sector.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the .vtu files.")
 def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> None:
-    """Mesh the gears of STAGE, print size and quality, write <gear>.vtu."""
-    from gearfmu.femesh import gear_sector, mesh_report, write_vtu
-    from gearfmu.geometry import GearGeometry
+    """Mesh the bodies of STAGE, print size and quality, write <body>.vtu."""
+    from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    for gear in _chosen(spec.gears, only):
-        counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * scale})
-        geometry = GearGeometry.of(gear, spec.pair)
-        sector = gear_sector(geometry, gear.face_width, counts)
-        path = out / f"{gear.name}.vtu"
+    for name in _chosen(_names(spec), only):
+        sector, facts = _sector(spec, name, scale)
+        path = out / f"{name}.vtu"
         write_vtu(sector.full() if full else sector, path)
-        click.echo(gear.name)
-        echo_pairs({**mesh_report(sector, geometry.r_b, gear.body.strip_half_width), "written": str(path)}, "  ")
+        click.echo(name)
+        echo_pairs({**mesh_report(sector, *facts), "written": str(path)}, "  ")
 
 
 @click.command()
@@ -54,35 +51,71 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> N
 )
 @click.option("--force", is_flag=True, help="Reduce again even where a body is up to date.")
 def reduce(stage: str, out: Path | None, force: bool) -> None:
-    """Reduce the gears of STAGE to <gear>.h5; a body whose input hash matches is left as it is."""
-    from gearfmu.body import reduce_stage
+    """Reduce the bodies of STAGE to <body>.h5; a body whose input hash matches is left as it is."""
+    import time
+
+    from gearfmu.body import reduce_set, reduce_stage
     from gearfmu.spec.stage import load_stage
 
-    spec = load_stage(stage)
+    spec, started = load_stage(stage), time.perf_counter()
+    reduce_all = reduce_set if spec.kind == "planetary_set" else reduce_stage
     with progress_bar("reducing") as progress:
-        bodies = reduce_stage(spec, out_dir=out, force=force, progress=by_text(progress))
+        bodies = reduce_all(spec, out, force, by_text(progress))
     for body in bodies:
-        click.echo(
-            f"{body.name}: {body.modes} modes to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, "
-            f"frequency response within {body.frf.max_error:.1e} to {body.frf.band[1] / 1e3:.0f} kHz, input "
-            f"{body.input_hash[:12]}\n  {_cost(body)}"
-        )
+        click.echo(_told(body))
+    click.echo(f"{len(bodies)} bodies in {time.perf_counter() - started:.1f} s")
+
+
+def _told(body: Any) -> str:
+    """A body in two lines: what it is and how good, and what it cost."""
+    from gearfmu.body import InterfaceBody
+
+    if isinstance(body, InterfaceBody):
+        kind, error, top = f"{body.modes} oscillators ({body.method})", body.max_error, body.band[1]
+    else:
+        kind, error, top = f"{body.modes} modes", body.frf.max_error, body.frf.band[1]
+    return (
+        f"{body.name}: {kind} to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, frequency response "
+        f"within {error:.1e} to {top / 1e3:.0f} kHz, input {body.input_hash[:12]}\n  {_cost(body)}"
+    )
 
 
 def _cost(body: Any) -> str:
     """Size of the finite elements behind a body, and the processor time and memory its reduction took."""
     mesh, made = body.mesh, body.provenance
-    memory = made["peak_memory_GB"]
+    memory, sectors = made["peak_memory_GB"], getattr(body, "teeth", mesh["teeth"])
     return (
-        f"{mesh['dof_body']} DOF, {body.teeth} sectors of {mesh['dof_sector']}; reduced in {made['cpu_s']:g} s CPU time"
-        + ("" if memory is None else f" and {memory:g} GB")
+        f"{mesh['dof_body']} DOF, {sectors} sectors of {mesh['dof_sector']}; reduced in {made['cpu_s']:g} s CPU "
+        "time" + ("" if memory is None else f" and {memory:g} GB")
     )
 
 
-def _chosen(gears: tuple, only: str | None) -> list:
-    chosen = [gear for gear in gears if only in (None, gear.name)]
-    if not chosen:
-        raise click.BadParameter(
-            f"no gear '{only}'; the stage has {', '.join(gear.name for gear in gears)}", param_hint="--gear"
-        )
-    return chosen
+def _names(spec: Any) -> list[str]:
+    """Bodies of a stage in their order."""
+    from gearfmu.spec.planetary_body import SET_BODIES
+
+    return list(SET_BODIES) if spec.kind == "planetary_set" else [gear.name for gear in spec.gears]
+
+
+def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
+    """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
+    from gearfmu.femesh import sector_mesh
+    from gearfmu.femesh.carrier import carrier_sector
+    from gearfmu.geometry import GearGeometry
+    from gearfmu.geometry.carrier import CarrierGeometry
+    from gearfmu.geometry.internal import InternalGearGeometry
+
+    body = spec.carrier if name == "carrier" else next(gear for gear in spec.gears if gear.name == name)
+    own = body.mesh if name == "carrier" else body.body.mesh
+    counts = own.model_copy(update={"scale": own.scale * scale})
+    if name == "carrier":
+        return carrier_sector(CarrierGeometry.of(spec), counts), ()
+    pair = spec.set if spec.kind == "planetary_set" else spec.pair
+    geometry = (InternalGearGeometry if name == "ring" else GearGeometry).of(body, pair)
+    return sector_mesh(geometry, body.face_width, counts), (geometry.r_b, body.body.strip_half_width)
+
+
+def _chosen(names: list[str], only: str | None) -> list[str]:
+    if only is not None and only not in names:
+        raise click.BadParameter(f"no gear '{only}'; the stage has {', '.join(names)}", param_hint="--gear")
+    return [name for name in names if only in (None, name)]
