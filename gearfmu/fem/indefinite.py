@@ -114,13 +114,18 @@ def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> t
     block, coupling = dense[:size, :size], dense[size:, :size]
     own = _cholesky(block) if not np.iscomplexobj(dense) else None
     if own is None:
-        own = sl.lu_factor(np.tril(block) + np.tril(block, -1).T, check_finite=False)
-        diagonal = np.abs(own[0].diagonal())
-        if not diagonal.min() > 1e-14 * diagonal.max():
-            raise FactorError("the shifted stiffness matrix is singular: the shift is an eigenvalue; move it")
+        own = _lu(np.tril(block) + np.tril(block, -1).T)
     front = _Front(start, stop, below, own, np.empty((size, 0)))
     front.influence = front.solve(np.asfortranarray(coupling.T))
     return front, dense[size:, size:] - coupling @ front.influence
+
+
+def _lu(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    factors, pivots, info = sl.get_lapack_funcs(("getrf",), (block,))[0](block, overwrite_a=True)
+    diagonal = np.abs(factors.diagonal())
+    if info or not diagonal.min() > 1e-14 * diagonal.max():
+        raise FactorError("the shifted stiffness matrix is singular: the shift is an eigenvalue; move it")
+    return factors, pivots
 
 
 def _cholesky(block: np.ndarray) -> tuple[np.ndarray] | None:

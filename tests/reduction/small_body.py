@@ -1,8 +1,9 @@
-"""A small ring with a bore and four bolts as a FullOrder: averaging nodes, one bolt-like master by elimination."""
+"""A small ring with a bore and bolts as a FullOrder, interfaces as averaging nodes: free, or on springs."""
 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -27,13 +28,17 @@ def averaging(name: str, nodes: np.ndarray, chosen: np.ndarray) -> Interface:
 
 
 def ring_body(cells: tuple[int, int, int] = (2, 12, 1), bolts: int = 2, outer: float = OUTER) -> FullOrder:
-    """A free ring; the bore is ground, `bolts` patches on the outer half of one face are loaded."""
-    nodes, elements = ring(cells, INNER, outer, HEIGHT)
+    """A free ring; the bore is ground, `bolts` patches on the outer half of one face are loaded.
+
+    outer : outer radius; the same mesh stretched."""
+    nodes, elements = ring(cells, INNER, OUTER, HEIGHT)
+    radius = np.hypot(nodes[:, 0], nodes[:, 1])
+    nodes[:, :2] *= ((INNER + (radius - INNER) * (outer - INNER) / (OUTER - INNER)) / radius)[:, None]
     stiffness, mass = hex20.assemble(nodes, elements, STEEL)
     radius, angle = np.hypot(nodes[:, 0], nodes[:, 1]), np.arctan2(nodes[:, 1], nodes[:, 0])
     interfaces = [averaging("bore", nodes, np.flatnonzero(radius < INNER * 1.0001))]
     for k in range(bolts):
-        near = np.abs((angle - 2 * np.pi * k / bolts + np.pi) % (2 * np.pi) - np.pi) < 0.3
+        near = np.abs((angle - 2 * np.pi * k / bolts + np.pi) % (2 * np.pi) - np.pi) < 0.32
         patch = near & (nodes[:, 2] > 0.49 * HEIGHT) & (radius > 0.6 * INNER + 0.4 * outer)
         interfaces.append(averaging(f"bolt_{k + 1}", nodes, np.flatnonzero(patch)))
     return FullOrder(
@@ -53,3 +58,32 @@ def ring_body(cells: tuple[int, int, int] = (2, 12, 1), bolts: int = 2, outer: f
 def small() -> FullOrder:
     """Free ring of about a thousand unknowns, bore and two bolts: 18 rows."""
     return ring_body()
+
+
+@lru_cache(maxsize=1)
+def tiny() -> FullOrder:
+    """A ring so small that dense matrices and full bases are cheap: a bore and two bolts."""
+    return ring_body((1, 10, 1))
+
+
+@lru_cache(maxsize=1)
+def mounted() -> FullOrder:
+    """The small ring on springs at its bore, nothing else held: no rigid modes."""
+    body = small()
+    mount = body.rows("bore")[:3]
+    springs = sp.csr_array(mount.T @ sp.diags_array([3e8, 4e8, 5e8]) @ mount)
+    turning = body.rows("bore")[3:]
+    springs = springs + sp.csr_array(turning.T @ sp.diags_array([1e5, 1e5, 2e5]) @ turning)
+    bore_nodes = np.unique(body.node_of_dof[np.unique(mount.indices)])
+    cells = np.full((len(body.cells) + 1, max(len(bore_nodes), body.cells.shape[1])), -1)
+    cells[:-1, : body.cells.shape[1]] = body.cells
+    cells[-1, : len(bore_nodes)] = bore_nodes
+    return replace(
+        body,
+        name="mounted ring",
+        stiffness=sp.csr_array(body.stiffness + springs),
+        rigid=np.zeros((body.size, 0)),
+        interfaces=body.interfaces[1:],
+        ground=(),
+        cells=cells,
+    )

@@ -24,7 +24,7 @@ from gearfmu.reduction.basis import Basis
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.oscillators import Oscillators, oscillators
 
-_ALIGNED = 1e-3  # smallest singular value of RᵀM̄V_i: below it a basis has a direction the others know nothing of
+_ALIGNED = 0.3  # least singular value of RᵀM̄V_i: below it a basis has a direction the others know little of
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,8 @@ def _problems(samples: Sequence[Sample]) -> list[str]:
         problems.append("two samples have the same parameter value")
     for s in samples[1:]:
         at = f"sample at {s.value:g}"
-        if s.body.size != first.body.size:
-            problems.append(f"{at}: mesh of {s.body.size} unknowns, the first of {first.body.size}: not one topology")
+        if s.body.size != first.body.size or not np.array_equal(s.body.cells, first.body.cells):
+            problems.append(f"{at}: its mesh has other elements than the first: one topology, nodes moved, is needed")
         if [i.name for i in s.body.interfaces] != [i.name for i in first.body.interfaces]:
             problems.append(f"{at}: other interfaces than the first")
         if s.basis.size != first.basis.size:

@@ -1,0 +1,213 @@
+"""What each reduction method promises to match, on a free, a held and an elastically mounted body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_body import mounted, small, tiny
+
+from gearfmu.errors import BodyError
+from gearfmu.reduction.basis import Size
+from gearfmu.reduction.elastic import elastic
+from gearfmu.reduction.methods import METHODS, snapshots
+from gearfmu.reduction.moments import input_loads
+from gearfmu.reduction.oscillators import oscillators
+from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
+
+BODIES = {"free": small, "held": lambda: HELD, "mounted": mounted}
+HELD = small().grounded()
+COUNT = 72
+LINES = Judging.over(lines=40)
+
+
+@pytest.fixture(scope="module", params=BODIES)
+def body(request):
+    return BODIES[request.param]()
+
+
+@pytest.fixture(scope="module")
+def full(body):
+    return reference(body, LINES)
+
+
+@pytest.fixture(scope="module", params=METHODS)
+def basis(request, body):
+    return METHODS[request.param](body, Size(COUNT))
+
+
+def projected(body, vectors):
+    return vectors.T @ (body.stiffness @ vectors)
+
+
+def test_vectors_are_orthonormal_in_mass_and_free_of_rigid_motion(body, basis):
+    space = elastic(body)
+    assert 0 < basis.size <= COUNT
+    assert np.abs(basis.vectors.T @ (body.mass @ basis.vectors) - np.eye(basis.size)).max() < 1e-9
+    assert np.abs(space.rigid.T @ (body.mass @ basis.vectors)).max(initial=0) < 1e-10
+
+
+def test_six_rigid_modes_are_exact_for_every_method(basis, body):
+    """[R V]: no energy in R, no coupling to V in K and M, mass and rows of R those of the full body."""
+    model = oscillators(body, basis, 0.01)
+    assert model.rigid_rows.shape[1] == body.rigid.shape[1] * (body is small())
+    if not model.rigid_rows.shape[1]:
+        return
+    everything = np.hstack([elastic(body).rigid, basis.vectors])
+    stiffness = everything.T @ (body.stiffness @ everything)
+    values = np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))
+    assert np.abs(values[:6]).max() < 1e-9 * values[6]
+    assert np.allclose(model.rigid_mass, body.rigid.T @ (body.mass @ body.rigid), rtol=0, atol=1e-12)
+    assert np.allclose(model.rigid_rows, body.rows() @ body.rigid, rtol=0, atol=1e-12)
+
+
+def test_oscillators_answer_as_the_basis_does(basis, body):
+    """Decoupled, with rigid motion and ground as the kernel sees them, against the projected matrices solved whole."""
+    model = oscillators(body, basis, 0.01)
+    everything = np.hstack([elastic(body).rigid, basis.vectors])
+    rows = (body.scales()[:, None] * (body.rows() @ everything)).astype(complex)
+    held = model.select(*body.ground)
+    free = np.setdiff1d(np.arange(len(rows)), held)
+    lines = Judging(np.array([300.0, 3000.0, 9000.0]))
+    mine = transfer(model, lines, body.ground)
+    for k, f in enumerate(lines.frequency):
+        dynamic = projected(body, everything) * (1 + 0.02j) - (2 * np.pi * f) ** 2 * np.eye(everything.shape[1])
+        zero = np.zeros((len(held),) * 2)
+        system = np.block([[dynamic, rows[held].T], [rows[held], zero]])
+        loads = np.vstack([rows[free].T, np.zeros((len(held), len(free)))])
+        solved = np.linalg.solve(system, loads)[: everything.shape[1]]
+        whole = rows[free] @ solved
+        assert np.linalg.norm(mine[k] - whole) < 1e-10 * np.linalg.norm(whole) * (1 + 1e2 * (f < 1000))
+
+
+@pytest.mark.parametrize("name", ["rubin", "krylov", "static"])
+def test_static_response_is_reproduced(name, body):
+    model = oscillators(body, METHODS[name](body, Size(COUNT)), 0.01)
+    scale = np.outer(model.scales, model.scales)
+    assert np.linalg.norm(model.residual() * scale) < 1e-8 * np.linalg.norm(model.static * scale)
+
+
+def test_craig_bampton_reproduces_loads_in_equilibrium(body):
+    from gearfmu.reduction.methods.craig_bampton import balanced_loads
+
+    model = oscillators(body, METHODS["craig_bampton"](body, Size(40)), 0.01)
+    balanced = balanced_loads(elastic(body), np.eye(body.size))[:, :0]
+    assert balanced.shape[0] == body.size
+    rigid = elastic(body).rigid
+    patterns = np.eye(body.rows().shape[0])
+    resultant = rigid.T @ body.rows().T.toarray()
+    if len(resultant):
+        patterns = np.linalg.svd(resultant / np.abs(resultant).max(axis=1)[:, None])[2][len(resultant) :].T
+    left = patterns.T @ model.residual() @ patterns
+    assert np.abs(left).max() < 1e-8 * np.abs(patterns.T @ model.static @ patterns).max()
+
+
+def test_krylov_matches_the_moments_it_names(body):
+    """H and its derivatives in s at every point: 2p of them for p powers, the static ones too."""
+    loads = input_loads(body)
+    basis = METHODS["krylov"](body, Size(7 * loads.shape[1]))
+    assert max(basis.facts["powers"]) == 2 and 0.0 in basis.facts["points_Hz"]
+    space = elastic(body)
+    stiffness, mass = projected(body, basis.vectors), np.eye(basis.size)
+    small_loads = basis.vectors.T @ loads
+    for hertz, power in zip(basis.facts["points_Hz"], basis.facts["powers"], strict=True):
+        shift = (2 * np.pi * hertz) ** 2
+        solver = space.shifted(shift) if shift else None
+        whole, part = space.balance(loads), small_loads
+        scale = None
+        for derivative in range(2 * power):
+            whole = solver.solve(whole) if solver else space.flexibility(whole)
+            part = np.linalg.solve(stiffness - shift * mass, part)
+            exact, mine = loads.T @ whole, small_loads.T @ part
+            scale = np.linalg.norm(exact) if scale is None else scale
+            assert np.linalg.norm(exact - mine) < 1e-6 * np.linalg.norm(exact), (hertz, derivative)
+            whole, part = space.mass(whole), part
+
+
+def test_order_of_the_methods_is_that_of_the_paper(body, full):
+    errors = {
+        name: relative_error(
+            full.matrix, transfer(oscillators(body, METHODS[name](body, Size(COUNT)), 0.01), LINES, body.ground)
+        ).max()
+        for name in ("modal", "craig_bampton", "rubin", "krylov")
+    }
+    assert errors["krylov"] < 1e-2 * errors["rubin"] < 1e-4 * errors["craig_bampton"] < 1e-4 * errors["modal"]
+
+
+@pytest.mark.parametrize("ground", [False, True])
+@pytest.mark.parametrize("name", ["modal", "craig_bampton", "rubin"])
+def test_a_full_basis_is_the_full_model(name, ground):
+    """All free modes, and all fixed-interface modes with the constraint modes: nothing is left out."""
+    body = tiny().grounded() if ground else tiny()
+    model = oscillators(body, METHODS[name](body, Size(elastic(body).elastic)), 0.01)
+    assert model.size == elastic(body).elastic or name == "rubin"  # what it deflates is shorter than 1e-10
+    lines = Judging(np.array([200.0, 4e3, 40e3]))
+    for h, f in zip(transfer(model, lines, body.ground), lines.frequency, strict=True):
+        exact = direct(body, f, 0.01)
+        assert np.linalg.norm(h - exact) < 1e-8 * np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("name", ["modal", "craig_bampton", "rubin", "krylov", "snapshots"])
+def test_a_tolerance_is_met(name):
+    tolerance = {"modal": 0.2, "snapshots": 0.05}.get(name, 1e-3)
+    basis = METHODS[name](HELD, Size(tolerance=tolerance, band=(100.0, 8e3)))
+    lines = Judging.over((100.0, 8e3), 77)
+    error = relative_error(
+        reference(HELD, lines).matrix, transfer(oscillators(HELD, basis, 0.01), lines, HELD.ground)
+    )
+    assert 1e-3 * tolerance < error.max() <= 1.02 * tolerance or name == "krylov" and error.max() <= tolerance
+
+
+def test_a_tolerance_out_of_reach_is_refused_with_the_best_error():
+    with pytest.raises(BodyError, match="does not reach 1e-06"):
+        METHODS["static"](HELD, Size(tolerance=1e-6))
+
+
+def test_a_shift_on_an_eigenvalue_moves():
+    space = elastic(small())
+    eigenvalue = space.modes(3)[0][2]
+    moved = space.shifted(eigenvalue)
+    assert 1e-4 < abs(moved.shift / eigenvalue - 1) < 0.05
+    assert space.shifted(0.5 * eigenvalue).shift == 0.5 * eigenvalue
+
+
+def test_snapshots_reproduce_their_training_and_the_run_its_equation():
+    """The captured share is what projection loses; the run obeys the trapezoidal rule of the full model."""
+    training = snapshots.default_training(HELD, Size(30))
+    run = snapshots.training_run(HELD, training)
+    basis = snapshots.from_snapshots(HELD, run, 30)
+    lost = run - basis.vectors @ (basis.vectors.T @ (HELD.mass @ run))
+    energy = [np.einsum("ij,ij->", x, HELD.mass @ x) for x in (lost, run)]
+    assert energy[0] / energy[1] == pytest.approx(1 - basis.facts["captured"], rel=1e-3)
+    squared, shapes = elastic(HELD).modes(4)
+    modal = (shapes.T @ (HELD.mass @ run)).reshape(4, len(training.loads), -1)
+    force = np.einsum("km,smc->ksc", (HELD.rows() @ shapes).T, training.loads)
+    q, v = np.zeros(modal[:, 0].shape), np.zeros(modal[:, 0].shape)
+    a, h, w2 = 0 * q, training.step, squared[:, None]
+    for k in range(len(training.loads)):
+        predicted = q + h * v + 0.25 * h**2 * a
+        new = (force[:, k] - w2 * predicted) / (1 + 0.25 * h**2 * w2)
+        q, v, a = predicted + 0.25 * h**2 * new, v + 0.5 * h * (a + new), new
+        assert np.abs(q - modal[:, k]).max() < 1e-9 * np.abs(modal).max()
+
+
+def test_bad_sizes_say_what_to_do():
+    for wrong in ({}, {"count": 3, "tolerance": 0.1}, {"count": 0}, {"tolerance": 2.0}, {"count": 3, "band": (5, 1)}):
+        with pytest.raises(BodyError, match="size"):
+            Size(**wrong)
+    for name in ("krylov", "rubin", "craig_bampton"):
+        with pytest.raises(BodyError, match="give at least that"):
+            METHODS[name](small(), Size(5))
+    with pytest.raises(BodyError, match="snapshots have shape"):
+        snapshots.from_snapshots(small(), np.zeros((3, 4)), 2)
+
+
+def test_dependent_inputs_are_deflated():
+    """The same interface twice: half as many vectors, the same transfer matrix."""
+    twice = replace(HELD, interfaces=(*HELD.interfaces, replace(HELD.interfaces[0], name="again")))
+    once, both = (METHODS["krylov"](b, Size(3 * b.rows().shape[0])) for b in (HELD, twice))
+    assert both.size == once.size
+    rows = slice(0, HELD.rows().shape[0])
+    mine = transfer(oscillators(twice, both, 0.01), LINES)[:, rows, rows]
+    assert relative_error(transfer(oscillators(HELD, once, 0.01), LINES), mine).max() < 1e-9
