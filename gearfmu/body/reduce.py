@@ -11,22 +11,22 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body.imported import imported_parts
 from gearfmu.body.layout import ALGORITHM_VERSION
+from gearfmu.body.parts import DRAWN, Parts, pictured_loads, sector_display, tooth_flank
 from gearfmu.body.provenance import provenance
 from gearfmu.body.reduced import ReducedBody, Rim
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
-from gearfmu.femesh import FeMesh, mesh_report, sector_mesh
+from gearfmu.femesh import mesh_report, sector_mesh
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.modal import Modes, elastic_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import Statics, static_tables
 from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import StageSpec, require_pair
 
@@ -170,12 +170,6 @@ def _rim(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim |
         mounts=mounts.points if mounts else 0,
         mount_stiffness=mounts.stiffness if mounts else 0.0,
     )
-
-
-def full_order_body(geometry: Geometry, gear: Any) -> SectorBody:
-    """The finite-element model of one external or internal gear with its load points."""
-    flank, points = tooth_flank(geometry, gear, isinstance(geometry, InternalGearGeometry))
-    return SectorBody(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
 
 
 def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:

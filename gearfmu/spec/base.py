@@ -182,12 +182,17 @@ def _unknown_key(key: str, known: list[str]) -> str:
 def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
     """The fields of the model that stands at `loc` inside a `kind`."""
     for part in loc:
-        if field := kind.model_fields.get(part):
+        if field := fields_by_key(kind).get(part):
             inner = inner_model(field.annotation)
             if inner is None:
                 return {}
             kind = inner
-    return dict(kind.model_fields)
+    return fields_by_key(kind)
+
+
+def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
+    """The fields by their keys in a file."""
+    return {field.alias or name: field for name, field in kind.model_fields.items()}
 
 
 def inner_model(annotation: Any) -> type[BaseModel] | None:

@@ -6,6 +6,7 @@ import hashlib
 import json
 from typing import Any
 
+from gearfmu.spec.imported import import_inputs
 from gearfmu.spec.stage import StageSpec
 
 
@@ -14,10 +15,11 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
 
     Backlash, tip relief, contact, ports, levels, names and bearings do not.
 
-    The rack's addendum is left out too: the tip diameter says where the tooth ends.
+    The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
+    contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
     """
     gear, pair = spec.gears[gear_index], spec.pair
-    return {
+    inputs = {
         "kind": spec.kind,
         "teeth": gear.teeth,
         "normal_module": pair.normal_module,
@@ -33,6 +35,10 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
         "modal_damping": gear.modal_damping,
         "body": gear.body.model_dump(),
     }
+    if gear.imported is not None:
+        inputs["import"] = import_inputs(gear.imported, spec.source, gear.name)
+        inputs["body"].pop("mesh")
+    return inputs
 
 
 def body_hash(inputs: dict[str, Any]) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec
+from gearfmu.spec.imported import ImportSpec
 
 Length = Annotated[float, Quantity("m", above=0)]
 Size = Annotated[float, Quantity("m", at_least=0)]
@@ -123,6 +124,8 @@ class BodySpec(Spec):
 class GearSpec(Spec):
     """One gear; `name` is also its shaft's name."""
 
+    model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
+
     name: Name = Field(description="name of gear and shaft")
     teeth: Annotated[Count, Field(ge=6, le=400)] = Field(description="number of teeth z")
     profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(description="profile shift coefficient x")
@@ -141,3 +144,6 @@ class GearSpec(Spec):
     )
     bearing: Bearing = Field(description="bearing")
     body: BodySpec = Field(description="mesh and reduction")
+    imported: ImportSpec | None = Field(
+        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    )

@@ -13,9 +13,10 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Quantity, Spec, inner_model
+from gearfmu.spec.base import Quantity, Spec, fields_by_key, inner_model
 from gearfmu.spec.layers import read_layers
 from gearfmu.spec.library import find_stage
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec, load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
@@ -50,7 +51,8 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
 def stage_text(raw: dict[str, Any], name: str, like: str) -> str:
     """The commented file for these tables."""
     tables = {key: value for key, value in raw.items() if key != "source"}
-    return _HEAD.format(name=name, like=like) + "\n".join(_table(StageSpec, tables, ())) + "\n"
+    kind = PlanetarySpec if tables.get("kind") == "planetary_set" else StageSpec
+    return _HEAD.format(name=name, like=like) + "\n".join(_table(kind, tables, ())) + "\n"
 
 
 def _write_new(target: Path, text: str) -> None:
@@ -72,7 +74,7 @@ def _write_new(target: Path, text: str) -> None:
 def _table(kind: type[Spec], raw: dict[str, Any], place: tuple[str, ...]) -> Iterator[str]:
     """Lines of one table: its own fields first, then its sub-tables."""
     fields = {
-        key: field for key, field in kind.model_fields.items() if key != "source" and not (key == "name" and place)
+        key: field for key, field in fields_by_key(kind).items() if key != "source" and not (key == "name" and place)
     }
     for key, field in fields.items():
         if inner_model(field.annotation) is None and (line := _line(key, field, raw)):
@@ -90,11 +92,7 @@ def _sub_table(kind: Any, raw: dict[str, Any] | None, place: tuple[str, ...], fi
     header = f"[{'.'.join(place)}]"
     if raw is None and type(None) in get_args(field.annotation):
         yield f"\n# {header}  # {field.description}"
-        yield from (
-            line if line.startswith("# ") else f"# {line}"
-            for line in _table(kind, {}, place)
-            if not line.startswith("\n")
-        )
+        yield from (f"# {line}" for line in _table(kind, {}, place) if not line.startswith("\n"))
         return
     yield f"\n{header}  # {field.description}"
     yield from _table(kind, raw or {}, place)
@@ -133,4 +131,6 @@ def _toml(value: Any) -> str:
     if isinstance(value, dict):
         entries = ", ".join(f"{json.dumps(str(key))} = {_toml(item)}" for key, item in value.items())
         return f"{{ {entries} }}" if entries else "{}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_toml(item) for item in value)}]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, (str, bool, int)) else repr(value)

@@ -155,7 +155,7 @@ def _load_pair(layers: Layers) -> StageSpec:
         problems += _geometry_of_what_can_be_read(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
-    return _with_relief_rolls(spec)
+    return _with_relief_rolls(_with_import_paths(spec))
 
 
 def _load_set(layers: Layers) -> PlanetarySpec:
@@ -194,6 +194,15 @@ def _geometry_of_what_can_be_read(layers: Layers) -> list[Problem]:
     except UnitError:
         torque = None
     return geometry_problems(file, pair, gears, torque)
+
+
+def _with_import_paths(spec: StageSpec) -> StageSpec:
+    """The same stage with the files of imported bodies named as seen from here."""
+    gears = tuple(
+        gear if gear.imported is None else gear.model_copy(update={"imported": gear.imported.located(spec.source)})
+        for gear in spec.gears
+    )
+    return spec.model_copy(update={"gears": gears})
 
 
 def _with_relief_rolls(spec: StageSpec) -> StageSpec:

@@ -1,0 +1,84 @@
+"""A gear body from finite elements made elsewhere: the same parts as of a gear meshed here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gearfmu.body.parts import DRAWN, PICTURE_MODES, Parts, pictured_loads, sector_display, tooth_flank
+from gearfmu.errors import MeshError
+from gearfmu.fem.factor import FactorError
+from gearfmu.fem.lanczos import ModesError
+from gearfmu.femesh import sector_mesh
+from gearfmu.reduction.display import Display, outline, whole_surface
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.frf import FrfCase, frf_error
+from gearfmu.reduction.imported_gear import ImportedGear, Wanted, hinge_problem, imported_gear
+from gearfmu.reduction.imported_sector import ImportedSector
+from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
+from gearfmu.reduction.modal import Modes, Progress, elastic_modes
+from gearfmu.reduction.statics import Statics, static_tables
+
+
+def read_gear(gear: Any, geometry: Any) -> ImportedGear:
+    """The imported finite elements of a GearSpec, checked and placed. Raises MeshError."""
+    flank, points = tooth_flank(geometry, gear)
+    wanted = Wanted(geometry.z, flank, points, 0.5 * gear.bore_diameter, gear.material)
+    return imported_gear(gear.imported, wanted)
+
+
+def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Parts:
+    """Modes, static tables, error and pictures of an imported gear. cut : Hz, of the stored error. Raises MeshError."""
+    found = read_gear(gear, geometry)
+    case = FrfCase(gear.modal_damping, cut, geometry.r)
+    drawn = sector_mesh(geometry, gear.face_width, DRAWN)
+    try:
+        if isinstance(found.body, ImportedSector):
+            return _by_sector(found, gear.body.modes, case, (drawn, report))
+        return _by_mean_tooth(found, gear.body.modes, case, (drawn, report))
+    except (FactorError, ModesError) as error:
+        raise MeshError(
+            f"{gear.imported.file}: the stiffness matrix cannot be factorised ({error}): it is singular beyond the six rigid "
+            "motions (a hinge, a loose part), or not of a free body"
+        ) from error
+
+
+def _by_sector(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
+    body, (drawn, report) = found.body, drawing
+    modes = elastic_modes(body, count, report)
+    statics = static_tables(body, pictured_loads(body.points), report)
+    report("frequency response", 0.0)
+    frf = frf_error(body, modes, statics, case)
+    return Parts(modes, statics, frf, found.facts, sector_display(drawn, body, modes, statics), body.inertia)
+
+
+def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
+    gear, (drawn, report) = found.body, drawing
+    space = Elastic(gear.body)
+    if problem := hinge_problem(space, float(space.modes(1)[0][0])):
+        raise MeshError(f"{found.facts['file']}: {problem}")
+    modes, left = mean_modes(gear, space, count, report)
+    statics, deviation = mean_statics(gear, space, pictured_loads(gear.points), report)
+    report("frequency response", 0.0)
+    frf = mean_frf(gear, space, modes, statics, case)
+    facts = found.facts | {"teeth_deviation": deviation, "compliance_left_to_residual": left}
+    return Parts(modes, statics, frf, facts, _whole_display(drawn, found, modes, statics), gear.inertia)
+
+
+def _whole_display(drawn: Any, found: ImportedGear, modes: Modes, statics: Statics) -> Display:
+    """Pictures on the drawn surface: every point moves like the nearest node of the whole mesh."""
+    gear: WholeGear = found.body
+    sector = outline(drawn, found.nodes)
+    points, quads = whole_surface(sector, gear.teeth)
+    kept = np.unique(gear.body.node_of_dof[: gear.body.size - gear.body.size % 3])
+    kept = kept[kept < len(found.nodes)]
+    nearest = cKDTree(found.nodes[kept]).query(points)[1]
+    dofs = 3 * nearest[:, None] + np.arange(3)
+    index = [k for k in sorted(modes.shapes) if k < PICTURE_MODES]
+    shapes = np.array([modes.shapes[k][dofs] for k in index], "f4").reshape(-1, *points.shape)
+    pictured = pictured_loads(gear.points)
+    loads = np.array([picture[dofs] for picture in statics.pictures], "f4")
+    rolls = gear.points.rolls[[load // gear.points.functions for load in pictured]]
+    return Display(points.astype("f4"), quads, shapes, np.array(index, int), loads, rolls)

@@ -1,0 +1,67 @@
+"""What every road to a gear body gives, and its pictures: shared by bodies meshed here and bodies made elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearfmu.femesh import FeMesh
+from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
+from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.frf import FrfError
+from gearfmu.reduction.modal import Modes
+from gearfmu.reduction.sector import SectorBody
+from gearfmu.reduction.statics import Statics
+from gearfmu.spec.gear import MeshSpec
+
+DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
+PICTURE_MODES = 12
+_PICTURE_LOADS = 5
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A reduced gear without its names and numbers: modes, static tables, error, plain facts of the mesh, pictures, mass
+    matrix (6, 6) of the rigid body."""
+
+    modes: Modes
+    statics: Statics
+    frf: FrfError
+    facts: dict[str, Any]
+    display: Display
+    inertia: np.ndarray
+
+
+def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[ToothFlank, Points]:
+    """Flank and load points of a gear: geometry (GearGeometry or InternalGearGeometry) and what a spec says about it."""
+    flank = ToothFlank(
+        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width, internal
+    )
+    return flank, Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
+
+
+def pictured_loads(points: Points) -> list[int]:
+    """Flat indices of the uniform loads on flank 0 at a few rolls from form circle to tip."""
+    rolls, functions = len(points.rolls), points.functions
+    chosen = sorted({round(k) for k in np.linspace(0, rolls - 1, _PICTURE_LOADS)})
+    return [roll * functions for roll in chosen]
+
+
+def sector_display(drawn: FeMesh, body: SectorBody, modes: Modes, statics: Statics) -> Display:
+    """Pictures of a gear reduced on one sector; `drawn`: a coarse sector mesh of the same gear."""
+    pictured = pictured_loads(body.points)
+    sector = outline(drawn, body.mesh.nodes)
+    points, quads = whole_surface(sector, body.teeth)
+    index = [k for k in sorted(modes.shapes) if k < PICTURE_MODES]
+    shapes = [unfold_mode(modes.shapes[k], int(modes.nodal_diameter[k]), sector, body.teeth) for k in index]
+    loads = [unfold_sectors(picture, sector) for picture in statics.pictures]
+    return Display(
+        points.astype("f4"),
+        quads,
+        np.array(shapes, "f4").reshape(-1, *points.shape),
+        np.array(index, int),
+        np.array(loads, "f4"),
+        body.points.rolls[[load // body.points.functions for load in pictured]],
+    )

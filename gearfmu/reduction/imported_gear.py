@@ -1,0 +1,209 @@
+"""From a mesh file (and matrix files) to a gear body that can be reduced: checked, fitted, in the frame of the gear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import solids
+from gearfmu.fem.matrices import read_matrix, read_unknowns
+from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
+from gearfmu.femesh.cyclic_cut import cyclic_cut
+from gearfmu.femesh.imported import ImportedMesh, read_mesh
+from gearfmu.geometry.involute_fit import InvoluteFit
+from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.imported import Matrices, SetInterface, full_order
+from gearfmu.reduction.imported_flank import FitRange, fit_flanks, tooth_loads
+from gearfmu.reduction.imported_sector import ImportedSector
+from gearfmu.reduction.mean_tooth import WholeGear
+
+BORE = "bore"
+_AXES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}
+_ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
+_WIDTH = 2e-3  # relative difference of face width, base radius and tooth thickness to the stage file
+_HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibration of a solid body
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The gear that the stage file describes: teeth, flank and its load points, radius of the bore (m), material."""
+
+    teeth: int
+    flank: ToothFlank
+    points: Points
+    bore_radius: float
+    material: Any
+
+
+@dataclass(frozen=True)
+class ImportedGear:
+    """An imported gear ready to be reduced: its body, on one sector or whole; the nodes (N, 3), m, of the whole file in the
+    frame of the gear; plain facts about mesh and fit."""
+
+    body: ImportedSector | WholeGear
+    nodes: np.ndarray
+    facts: dict[str, Any]
+
+
+def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
+    """Read, check, fit and place the finite elements of a gear.
+
+    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, goes the cyclic
+    road; a whole mesh that is not, ready-made matrices and a rigid bore go by the mean tooth. MeshError lists what is
+    wrong with the files.
+    """
+    file = Path(source.file)
+    mesh = read_mesh(file, source.length, tuple(source.ignore))
+    mesh = replace(mesh, nodes=mesh.nodes[:, _AXES[source.axis]])
+    if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
+        raise MeshError(f"{file}: " + "; ".join(problems))
+    try:
+        fit = _fit(mesh, source, wanted)
+        placed = replace(mesh, nodes=fit.in_gear_frame(mesh.nodes))
+        _same_gear(placed, fit, wanted)
+        placed.sets[BORE] = _bore_nodes(placed, source.bore, wanted)
+        facts = _facts(placed, fit)
+        matrices = _matrices(source, placed, fit, wanted)
+        cut = None
+        if matrices is None and source.bore_coupling == "averaging":
+            cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
+        if cut is not None:
+            bore = np.flatnonzero(np.isin(cut.of_mesh, placed.sets[BORE]))
+            body = ImportedSector(cut, bore, wanted.teeth, wanted.material, (wanted.flank, wanted.points))
+            dofs = 3 * (len(cut.nodes) - len(cut.cut_plus))
+            return ImportedGear(body, placed.nodes, facts | {"road": "cyclic", "dof_sector": dofs, "dof_body": wanted.teeth * dofs})
+        whole = _whole(placed, matrices, source.bore_coupling, wanted)
+        size = whole.body.size
+        return ImportedGear(whole, placed.nodes, facts | {"road": "mean tooth", "dof_sector": size // wanted.teeth, "dof_body": size})
+    except MeshError as error:
+        raise MeshError(str(error) if str(error).startswith(str(file.parent)) else f"{file}: {error}") from error
+
+
+def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:
+    flank = wanted.flank
+    middle = mesh.nodes[mesh.node_set(source.bore)].mean(axis=0) if source.bore and _around(mesh, source.bore) else np.zeros(3)
+    search = FitRange(wanted.teeth, flank.r_b, flank.s_form, flank.s_tip, source.flank_tolerance)
+    fit = fit_flanks(mesh.nodes - middle, solids.boundary(mesh.elements), search)
+    return replace(fit, origin=fit.origin + middle)
+
+
+def _around(mesh: ImportedMesh, name: str) -> bool:
+    """Whether a set surrounds its own middle, as a whole bore does and that of a sector does not."""
+    points = mesh.nodes[mesh.node_set(name)]
+    around = np.sort(np.arctan2(*(points - points.mean(axis=0))[:, [1, 0]].T))
+    return bool(np.diff(around, append=around[0] + 2 * np.pi).max() < np.pi / 2)
+
+
+def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
+    """MeshError when the fitted gear is not the one of the stage file."""
+    flank = wanted.flank
+    width = 2 * float(np.abs(mesh.nodes[:, 2][_flank_nodes(mesh, wanted)]).max())
+    pairs = {
+        "base radius": (1e3 * fit.r_b, 1e3 * flank.r_b, "mm"),
+        "half tooth thickness at the base circle": (1e3 * fit.psi_b * fit.r_b, 1e3 * flank.psi_b * flank.r_b, "mm"),
+        "face width": (1e3 * width, 1e3 * flank.face_width, "mm"),
+    }
+    slack = {"half tooth thickness at the base circle": 0.05}
+    wrong = [
+        f"{name} {own:.5g} {unit} instead of {meant:.5g} {unit}"
+        for name, (own, meant, unit) in pairs.items()
+        if abs(own - meant) > slack.get(name, _WIDTH) * meant
+    ]
+    if wrong:
+        raise MeshError(f"this is not the gear of the stage file: {', '.join(wrong)}; correct one of them, or the unit `length`")
+
+
+def _flank_nodes(mesh: ImportedMesh, wanted: Wanted) -> np.ndarray:
+    radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
+    low, high = (np.hypot(wanted.flank.r_b, s) for s in (wanted.flank.s_form, wanted.flank.s_tip))
+    return (radius > low) & (radius < high)
+
+
+def _bore_nodes(mesh: ImportedMesh, name: str, wanted: Wanted) -> np.ndarray:
+    if name:
+        return mesh.node_set(name)
+    radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
+    found = np.flatnonzero(np.abs(radius - wanted.bore_radius) < _ON_BORE * wanted.bore_radius)
+    faces = solids.boundary(mesh.elements).within(found)
+    if len(faces.nodes) == 0:
+        raise MeshError(
+            f"no face lies on the bore of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the bore in `bore`, or "
+            "correct bore_diameter"
+        )
+    return faces.nodes
+
+
+def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
+    quality = np.concatenate([solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()])
+    return {
+        "file": mesh.source.name,
+        "nodes": len(mesh.nodes),
+        "elements": {kind: len(block) for kind, block in mesh.elements.items()},
+        "raised_to_quadratic": mesh.raised,
+        "scaled_jacobian_min": float(quality.min()),
+        "scaled_jacobian_mean": float(quality.mean()),
+        "fit": {
+            "base_radius_m": fit.r_b,
+            "half_tooth_angle_rad": fit.psi_b,
+            "residual_rms_um": 1e6 * fit.rms,
+            "residual_max_um": 1e6 * fit.worst,
+            "points": len(fit.residual),
+        },
+    }
+
+
+def _matrices(source: Any, mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> Matrices | None:
+    """Ready-made matrices in SI and in the frame of the gear, checked against mesh and material; None without files."""
+    if not source.stiffness:
+        return None
+    if mesh.raised:
+        raise MeshError("matrices of linear elements (hex8) do not go with quadratic faces: mesh with C3D20 or C3D10")
+    unknowns = read_unknowns(Path(source.unknowns)) if source.unknowns else None
+    units = source.force_unit / source.length, source.mass_unit
+    permute = np.eye(3)[_AXES[source.axis]]
+    turn = sp.kron(sp.identity(len(mesh.nodes)), sp.csr_array(fit.turn() @ permute), format="csr")
+    stiffness, mass = (
+        sp.csr_array(turn @ (factor * read_matrix(Path(name), unknowns, mesh.labels)) @ turn.T)
+        for factor, name in zip(units, (source.stiffness, source.mass), strict=True)
+    )
+    own = solids.assemble(mesh.nodes, mesh.elements, wanted.material)[1]
+    problems = matrix_problems(stiffness, mass, mesh.nodes, float(own.sum()) / 3)
+    problems += [] if problems else speed_problem(stiffness, mass, mesh.nodes, np.sqrt(wanted.material.youngs_modulus / wanted.material.density))
+    if problems:
+        raise MeshError("; ".join(problems))
+    return Matrices(stiffness, mass)
+
+
+def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted: Wanted) -> WholeGear:
+    if matrices is None:
+        matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, wanted.material))
+    body = full_order(mesh, matrices, [SetInterface(BORE, coupling, np.zeros(3))], (BORE,), wanted.flank.r_b)
+    faces = solids.boundary(mesh.elements)
+    angles = 2 * np.pi * np.arange(wanted.teeth) / wanted.teeth
+    rows = (tooth_loads(mesh.nodes, faces, wanted.flank, wanted.points, angle) for angle in angles)
+    if coupling == "rigid":
+        kept = np.setdiff1d(np.arange(len(mesh.nodes)), mesh.sets[BORE])
+        pick = (3 * kept[:, None] + np.arange(3)).ravel()
+        rows = (_padded(row[:, pick], body.size) for row in rows)
+    return WholeGear(body, tuple(rows), wanted.points)
+
+
+def _padded(rows: sp.csr_array, size: int) -> sp.csr_array:
+    return sp.csr_array(sp.hstack([rows, sp.csr_array((rows.shape[0], size - rows.shape[1]))]))
+
+
+def hinge_problem(space: Elastic, first_squared: float) -> str | None:
+    """Why a body whose lowest elastic mode has ω² = first_squared cannot be one solid, or None."""
+    stiffest = float((space.stiffness.diagonal() / space.mass_matrix.diagonal()).max())
+    if first_squared > _HINGE**2 * stiffest:
+        return None
+    return (
+        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: connect it, or "
+        "export it without mechanisms"
+    )

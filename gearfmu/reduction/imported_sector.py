@@ -1,0 +1,55 @@
+"""A gear sector made elsewhere, reduced like our own: the same harmonics, tables and errors on its mesh."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from types import SimpleNamespace
+
+import numpy as np
+
+from gearfmu.fem import solids
+from gearfmu.fem.cyclic import Sector, sector_spaces
+from gearfmu.fem.hex20 import Material
+from gearfmu.fem.patches import patch_moments
+from gearfmu.femesh.cyclic_cut import CyclicCut
+from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.imported_flank import tooth_loads
+from gearfmu.reduction.sector import SectorBody, turned_sum
+
+
+class ImportedSector(SectorBody):
+    """`SectorBody` on a cut of an imported mesh.
+
+    cut : the sector in the gear's frame. bore : its nodes on the bore. Raises MeshError when flanks or bore of the mesh
+    are not as they should be.
+    """
+
+    def __init__(self, cut: CyclicCut, bore: np.ndarray, teeth: int, material: Material, flank: tuple[ToothFlank, Points]):
+        self.cut, self.bore, self.teeth = cut, bore, teeth
+        self.flank, self.points = flank
+        self.internal = False
+        self.mesh = SimpleNamespace(
+            nodes=cut.nodes, cut_minus=cut.cut_minus, cut_plus=cut.cut_plus, elements=_repeated(cut.elements), teeth=teeth
+        )
+        self.faces = solids.boundary(cut.elements)
+        self.stiffness, self.mass_matrix = solids.assemble(cut.nodes, cut.elements, material)
+        self.spaces = sector_spaces(
+            Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
+        )
+        self._inputs = [self._space_inputs(space) for space in self.spaces]
+
+    @cached_property
+    def flank_rows(self) -> np.ndarray:
+        """Unit flank loads of tooth 0 as rows over the sector's nodes: (2·R·A, 3N)."""
+        return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points).toarray()
+
+    @cached_property
+    def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:
+        """One sector's share of the bore's averaging node: b (6, 3N), and g (6, 6) of the whole bore."""
+        moments, gram = patch_moments(self.cut.nodes, self.faces.within(self.bore))
+        return moments, turned_sum(gram, self.teeth)
+
+
+def _repeated(elements: dict[str, np.ndarray]) -> np.ndarray:
+    """(E, 20) node numbers of all elements; a tetrahedron repeats its first node."""
+    return np.concatenate([np.hstack([b, np.repeat(b[:, :1], 20 - b.shape[1], axis=1)]) for b in elements.values()])

@@ -1,0 +1,80 @@
+"""[gears.<name>.import]: a gear body from finite elements made elsewhere (docs/howto-import.md)."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.base import Quantity, Spec, Text, refuse
+
+_FILES = ("file", "stiffness", "mass", "unknowns")
+
+
+class ImportSpec(Spec):
+    """Mesh of the body, its units, and, where they are ready-made, its matrices. Paths are relative to the stage file."""
+
+    file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
+    length: Annotated[float, Quantity("m", above=0)] = Field(
+        description='one length unit of the file, "1 mm" for a mesh in millimetres'
+    )
+    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the gear in the file")
+    bore: Text = Field(
+        default="", description="node set of the bore; without it the nodes on the stage's bore diameter"
+    )
+    bore_coupling: Literal["averaging", "rigid"] = Field(
+        default="averaging", description="averaging (RBE3) or rigid (RBE2) master node of the bore"
+    )
+    ignore: tuple[Text, ...] = Field(default=(), description="node sets of reference nodes that belong to no element")
+    flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
+        default=5e-6, description="largest distance of a corner node from the best involute"
+    )
+    stiffness: Text = Field(default="", description="ready-made stiffness matrix: .mtx, .npz, .sti, .op4 or .pch")
+    mass: Text = Field(default="", description="ready-made mass matrix, with stiffness")
+    unknowns: Text = Field(
+        default="", description="CalculiX .dof file: node and direction of each row; without it x, y, z node by node"
+    )
+    force_unit: Annotated[float, Quantity("N", above=0)] = Field(
+        default=1.0, description='one unit of force of the stiffness matrix, "1 N"'
+    )
+    mass_unit: Annotated[float, Quantity("kg", above=0)] = Field(
+        default=1.0, description='one unit of mass of the mass matrix, "1 t" with millimetres, newtons and seconds'
+    )
+
+    @model_validator(mode="after")
+    def _both_matrices(self) -> ImportSpec:
+        if bool(self.stiffness) != bool(self.mass):
+            raise refuse("stiffness and mass come together: give both files or none")
+        if self.unknowns and not self.stiffness:
+            raise refuse("unknowns sorts the rows of ready-made matrices: give stiffness and mass too")
+        return self
+
+    def located(self, source: Path) -> ImportSpec:
+        """The same with the files as seen from here, not from the stage file `source`."""
+        files = {field: str(source.parent / getattr(self, field)) for field in _FILES if getattr(self, field)}
+        return self.model_copy(update=files)
+
+
+def import_inputs(spec: ImportSpec, source: Path, gear: str) -> dict[str, Any]:
+    """What the import contributes to the body's fingerprint: its fields, with the SHA-256 of each file for its name.
+
+    spec : its files as they can be opened (`located`). source, gear : for the message. SpecError for every file that is
+    not there.
+    """
+    values, problems = spec.model_dump(), []
+    for field in _FILES:
+        if not getattr(spec, field):
+            continue
+        path = Path(getattr(spec, field))
+        try:
+            values[field] = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            place = f"gears.{gear}.import.{field}"
+            remedy = f"{path} cannot be read ({error.strerror}): write the path relative to the stage file"
+            problems.append(Problem(str(source), place, path.name, remedy))
+    if problems:
+        raise SpecError(problems)
+    return values
