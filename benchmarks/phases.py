@@ -2,7 +2,8 @@
 
     python benchmarks/phases.py
 
-Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. Prints a table and writes benchmarks/phases.csv.
+Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. Beside the cycles the arithmetic that the phase cannot do without and
+the bytes that it reads and writes, counted from the sizes of the model (`work`). Prints a table and writes benchmarks/phases.csv.
 """
 from __future__ import annotations
 
@@ -18,9 +19,11 @@ from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import build_library
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage import Steady, assemble
+from gearfmu.stage import StageModel, Steady, assemble
+from gearfmu.stage.blob import read_blob
 
 STEP, BLOCK, DURATION, TORQUE, SPEED = 1e-4, 10, 0.05, 302.0, 2000 * math.pi / 30
+PAIRS = 2  # tooth pairs within reach, nearly always
 
 
 def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
@@ -28,6 +31,31 @@ def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
     in which the tables of the step are made; so neither that nor what else ran on the machine counts."""
     found = [{phase: (after[phase] - before[phase]) / (n - m) for phase in after} for (m, before), (n, after) in pairwise(blocks[1:])]
     return {phase: statistics.median(block[phase] for block in found) for phase in found[0]}
+
+
+def lanes(model: StageModel, cut: float) -> int:
+    """Lanes of modal state of both gears: a pair of modes is one lane of each half, halves are padded to LANES / 2."""
+    total, sections = 0, read_blob(model.blob)
+    for gear in (0, 1):
+        part = sections[f"part{gear}"][sections[f"omega{gear}"] < 2 * math.pi * cut]
+        total += 2 * math.ceil(int((part != 2).sum()) / 8) * 8
+    return total
+
+
+def work(n: int, pairs: float, strips: int) -> dict[str, tuple[float, float]]:
+    """(floating-point operations, bytes) a step of the phases that do arithmetic: n lanes of single precision, `pairs` tooth pairs of `strips` contact rows, six bilateral rows.
+
+    predict: eight coefficients, three states. rows: four grid rolls and a turn to the tooth. system: readings of all rows, 16 cells of D, K and Q between any two places on either
+    gear, rigid motion into D and A. solve: tangent, its factors, two solutions and four products. correct: scatter of two forces, new state, damping."""
+    m, cells = pairs * strips + 6, 2 * pairs * (pairs + 1) / 2 * 16 * 3 * strips**2
+    rows = pairs * strips
+    return {
+        "predict": (12 * n, 4 * n * (8 + 3 + 2)),
+        "rows": (10 * rows * n, 4 * n * 5 * rows),
+        "system": (2 * (m + 2) * n + 2 * cells + 24 * m * m, 4 * n * (m + 2) + 4 * cells + 8 * 5 * m * m),
+        "solve": (2 * m * m * (1 + 3 * strips) + 2 / 3 * m**3 + 2 * 2 * m * m + 4 * 2 * m * m, 8 * m * m * (3 + 2 + 2 + 4)),
+        "correct": (4 * (rows + 4) * n + 16 * n, 4 * n * (rows + 4 + 12)),
+    }
 
 
 def profile(library: Path) -> list[dict[str, object]]:
@@ -49,8 +77,11 @@ def profile(library: Path) -> list[dict[str, object]]:
                 kernel.set(variable, value)
             kernel.step(i * STEP, STEP)
         cycles, steps = quiet(blocks), kernel.get("solver.steps")
+        cut = {"rigid": 0.0, "fast": spec.levels.fast_cut, "standard": spec.levels.standard_cut, "full": math.inf}[name]
+        counted = work(lanes(model, cut), PAIRS, (spec.contact.slices + 1) // 2)
         rows += [{"level": name, "phase": phase, "cycles_per_step": round(value), "share": round(value / sum(cycles.values()), 4),
-                  "n_dyn": int(kernel.get("solver.n_dyn")), "h_s": kernel.get("solver.h"), "rounds": round(kernel.get("solver.rounds") / steps, 3)}
+                  "n_dyn": int(kernel.get("solver.n_dyn")), "h_s": kernel.get("solver.h"), "rounds": round(kernel.get("solver.rounds") / steps, 3),
+                  "flops": round(counted.get(phase, (0, 0))[0]), "bytes": round(counted.get(phase, (0, 0))[1])}
                  for phase, value in cycles.items()]
     return rows
 
@@ -63,4 +94,4 @@ if __name__ == "__main__":
         writer.writeheader()
         writer.writerows(table)
     for row in table:
-        print(f"{row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:7d} cycles a step  {row['share']:6.1%}   h {1e6 * row['h_s']:.2f} µs, {row['n_dyn']} modes")
+        print(f"{row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:7d} cycles a step  {row['share']:6.1%}  {row['flops']:7d} flop {row['bytes']:7d} B   h {1e6 * row['h_s']:.2f} µs, {row['n_dyn']} modes")
