@@ -24,10 +24,10 @@ def inspect(path: Path, as_json: bool) -> None:
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["stage", "scene", "variables", "effects"]))
+@click.argument("kind", type=click.Choice(["stage", "planetary", "scene", "variables", "effects"]))
 @click.option("--out", type=click.Path(path_type=Path), help="File to write; standard output when not given.")
 def schema(kind: str, out: Path | None) -> None:
-    """JSON schema of stage.toml or scene.toml; or the table of FMU variables (docs/variables.md) or effects
+    """JSON schema of the stage.toml of a pair or a planetary set, or of scene.toml; or the table of FMU variables (docs/variables.md) or effects
     (docs/effects.md)."""
     from gearfmu.files import write_text
 
@@ -48,9 +48,9 @@ def _schema_text(kind: str) -> str:
 
         return effects_page()
     from gearfmu.spec.scene import SceneSpec
-    from gearfmu.spec.schema import file_schema, stage_schema
+    from gearfmu.spec.schema import file_schema, set_schema, stage_schema
 
-    made = stage_schema() if kind == "stage" else file_schema(SceneSpec)
+    made = {"stage": stage_schema, "planetary": set_schema, "scene": lambda: file_schema(SceneSpec)}[kind]()
     return json.dumps(made, indent=2, ensure_ascii=False) + "\n"
 
 

@@ -17,9 +17,11 @@ from gearfmu.commands.shared import echo_pairs, progress_bar
 def new(name: str, like: str) -> None:
     """Write NAME/stage.toml, every field commented, as a copy of a shipped stage. Never overwrites."""
     from gearfmu.spec.new import new_stage
+    from gearfmu.spec.stage import load_stage
 
     path = new_stage(name, like)
-    click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}' and 'gearfmu export {path}'.")
+    further = "" if load_stage(path).kind == "planetary_set" else f" and 'gearfmu export {path}'"
+    click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}'{further}.")
 
 
 @click.command()

@@ -37,7 +37,7 @@ def set_problems(file: str, spec: PlanetarySpec) -> list[Problem]:
     if spec.set.center_distance <= base or base <= 0:
         remedy = f"smaller than the difference of the base radii, {millimetres(base)}: check teeth and module"
         found.append(("set.center_distance", spec.set.center_distance, remedy))
-    elif not any(field != "ring.tip_diameter" for field, *_ in alone):
+    elif not any(field in ("ring.tip_diameter", "ring.fillet_radius") for field, *_ in alone):
         found += _ring_mesh(spec, RingMesh(planet, ring, spec.set.center_distance, spec.set.backlash))
     shown = ((field, value if isinstance(value, str) else millimetres(value), text) for field, value, text in found)
     return problems + [Problem(file, *entry) for entry in shown]
@@ -97,13 +97,13 @@ def _ring_mesh(spec: PlanetarySpec, mesh: RingMesh) -> Found:
             f"(tip radius {millimetres(least / 2)})"
         )
         yield "ring.tip_diameter", spec.ring.tip_diameter, remedy
-    if mesh.planet.r_a > mesh.largest_planet_tip_radius:
-        largest = rounded_down(2 * mesh.largest_planet_tip_radius, 5)
-        remedy = f"interference: the tip meets the ring in its root fillet; at most {millimetres(largest)}"
-        yield "planet.tip_diameter", spec.planet.tip_diameter, remedy
     if mesh.a + mesh.planet.r_a >= mesh.ring.r_f:
         largest = millimetres(rounded_down(2 * (mesh.ring.r_f - mesh.a), 5))
         yield "planet.tip_diameter", spec.planet.tip_diameter, f"touches the ring's root: less than {largest}"
+    elif mesh.planet.r_a > mesh.largest_planet_tip_radius:
+        largest = rounded_down(2 * mesh.largest_planet_tip_radius, 5)
+        remedy = f"interference: the tip meets the ring in its root fillet; at most {millimetres(largest)}"
+        yield "planet.tip_diameter", spec.planet.tip_diameter, remedy
     if mesh.tip_clearance_angle < 0:
         remedy = "planet and ring collide with their tips outside the line of action: make it larger, or more teeth"
         yield "ring.tip_diameter", spec.ring.tip_diameter, remedy

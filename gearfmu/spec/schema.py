@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.spec.base import Spec
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 
 
@@ -21,6 +22,24 @@ def stage_schema() -> dict[str, Any]:
         "type": "object", "description": schema["properties"]["gears"]["description"],
         "minProperties": 2, "maxProperties": 2, "additionalProperties": {"$ref": "#/$defs/GearSpec"},
     }  # fmt: skip
+    return _with_base(schema)
+
+
+def set_schema() -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of the stage.toml of a planetary set."""
+    schema = file_schema(PlanetarySpec)
+    schema["title"] = "gearfmu planetary set"
+    del schema["properties"]["source"]
+    schema["required"] = [name for name in schema["required"] if name != "source"]
+    for part in ("SetGearSpec", "RingSpec"):
+        gear = schema["$defs"][part]
+        del gear["properties"]["name"]
+        gear["required"] = [name for name in gear["required"] if name != "name"]
+    return _with_base(schema)
+
+
+def _with_base(schema: dict[str, Any]) -> dict[str, Any]:
+    """A file that begins with `base` need not say everything."""
     schema["properties"]["base"] = {"type": "string", "description": "file that says everything this one does not"}
     schema["if"] = {"required": ["base"]}
     schema["then"], schema["else"] = {}, {"required": schema.pop("required")}

@@ -1,0 +1,136 @@
+"""Internal gears and planetary sets: the involute equation by finite differences, tangents, areas, mesh and assembly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearfmu.geometry import involute
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.spec.stage import load_stage
+
+SPEC = load_stage("planetary54")
+SET = PlanetaryGeometry.of(SPEC)
+RING = SET.ring_mesh.ring
+
+
+def test_flank_is_the_involute_of_the_base_circle_and_its_normal_points_into_the_space():
+    roll, step = np.linspace(RING.s_a, RING.s_form, 50), 1e-8
+    for sg in (1, -1):
+        tangent = (RING.flank_point(roll + step, sg) - RING.flank_point(roll - step, sg)) / (2 * step)
+        normal, point = RING.flank_normal(roll, sg), RING.flank_point(roll, sg)
+        assert np.abs((tangent * normal).sum(axis=1)).max() < 1e-7
+        assert np.linalg.norm(tangent, axis=1) == pytest.approx(roll / RING.r_b, rel=1e-6)  # dσ = s ds/r_b
+        foot = point + roll[:, None] * normal  # the normal's line is tangent to the base circle at distance s
+        assert np.linalg.norm(foot, axis=1) == pytest.approx(RING.r_b, rel=1e-12)
+        assert np.all(normal[:, 1] * sg < 0)  # out of the ring's material, towards the middle of space 0
+
+
+def test_space_and_tooth_share_the_pitch_on_the_reference_circle():
+    assert float(RING.space_angle(RING.r)) == pytest.approx(RING.half_pitch / 2, rel=1e-12)
+
+
+def test_fillet_is_tangent_to_flank_and_root_circle():
+    start, end = RING.fillet_point(0.0), RING.fillet_point(1.0)
+    assert start == pytest.approx(RING.flank_point(RING.s_form), abs=1e-15)
+    assert np.hypot(*end) == pytest.approx(RING.r_f, rel=1e-13)
+    share, step = np.array([step for step in (1e-7, 1 - 1e-7)]), 1e-8
+    tangent = RING.fillet_point(share + step) - RING.fillet_point(share - step)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    assert abs(tangent[0] @ RING.flank_normal(RING.s_form)) < 1e-6
+    assert abs(tangent[1] @ end) / RING.r_f < 1e-6
+
+
+def test_tip_edge_rounding_touches_flank_and_tip_circle():
+    centre = RING.flank_point(RING.s_tip) - RING.tip_edge * RING.flank_normal(RING.s_tip)
+    assert np.hypot(*centre) == pytest.approx(RING.r_a + RING.tip_edge, rel=1e-13)
+
+
+def outline(ring: InternalGearGeometry) -> np.ndarray:
+    """Inner outline of a sector from mid space to mid tooth, densely."""
+    land = np.linspace(0, ring.fillet_centre[1], 500)
+    tip = np.linspace(ring.half_pitch - ring.tip_half_angle, ring.half_pitch, 500)
+    return np.concatenate(
+        [
+            ring.r_f * np.stack([np.cos(land), np.sin(land)], 1),
+            ring.fillet_point(np.linspace(1, 0, 4000)),
+            ring.flank_point(np.linspace(ring.s_form, ring.s_a, 4000)),
+            ring.r_a * np.stack([np.cos(tip), np.sin(tip)], 1),
+        ]
+    )
+
+
+def test_area_and_polar_moment_are_those_of_the_outline():
+    x, y = outline(RING).T
+    cross, square = x[:-1] * y[1:] - x[1:] * y[:-1], 0.5 * (x * x + y * y)[:-1] + 0.5 * (x * x + y * y)[1:]
+    hole, moment = 0.5 * cross.sum(), 0.25 * (cross * square).sum()
+    assert RING.sector_area == pytest.approx(RING.half_pitch * RING.r_rim**2 - 2 * hole, rel=1e-6)
+    assert RING.sector_polar_moment == pytest.approx(0.5 * RING.half_pitch * RING.r_rim**4 - 2 * moment, rel=1e-6)
+
+
+def test_planet_and_ring_touch_where_the_gap_vanishes():
+    """s_ring = s_planet + L: the two flank points coincide, with opposite normals (DESIGN: internal pair)."""
+    mesh = SET.ring_mesh
+    t = -math.acos((mesh.ring.r_b - mesh.planet.r_b) / mesh.a)  # direction of the tangent points, planet on +x, sg = +1
+    for s in np.linspace(mesh.path["A"], mesh.path["E"], 7):
+        point, normal = [], []
+        for shape, roll, centre in ((mesh.planet, s, mesh.a), (mesh.ring, s + mesh.length, 0.0)):
+            turn = t - (shape.psi_b - roll / shape.r_b)
+            q = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+            point.append(q @ shape.flank_point(roll) + [centre, 0])
+            normal.append(q @ shape.flank_normal(roll))
+        assert point[0] == pytest.approx(point[1], abs=1e-12)
+        assert normal[0] == pytest.approx(-normal[1], abs=1e-12)
+
+
+def test_least_tip_radius_is_where_the_planets_form_circle_is_met():
+    assert SET.ring_mesh.least_tip_radius == pytest.approx(65.36e-3, abs=5e-6)
+    edge = replace(RING, r_a=SET.ring_mesh.least_tip_radius, tip_edge=0.0)
+    assert replace(SET.ring_mesh, ring=edge).path["A"] == pytest.approx(SET.ring_mesh.planet.s_form, abs=1e-12)
+
+
+def test_planets_fit_between_sun_and_ring():
+    z_s, z_p, z_r = SET.sun_mesh.gears[0].z, SET.ring_mesh.planet.z, RING.z
+    assert SET.ratio == 4 and SET.assembles() and SET.neighbour_clearance == pytest.approx(13.64e-3, abs=1e-5)
+    uneven = replace(SET, planets=3)
+    for case in (SET, uneven):
+        for k in range(case.planets):
+            theta, phase = 2 * math.pi * k / case.planets, case.planet_phase(k)
+            assert abs(phase) <= math.pi / z_p * (1 + 1e-9)
+            in_ring = (z_p * (theta - phase) - z_r * theta) / (2 * math.pi)  # a tooth meets a space of the ring
+            in_sun = (z_p * (theta + math.pi - phase) + z_s * (theta - case.sun_phase())) / (2 * math.pi)
+            assert in_ring == pytest.approx(round(in_ring), abs=1e-9)
+            assert in_sun - 0.5 == pytest.approx(round(in_sun - 0.5), abs=1e-9)  # … and a space of the sun
+
+
+def test_no_backlash_at_the_centre_distance_of_the_reference_circles():
+    assert SET.ring_mesh.nominal_backlash == pytest.approx(0, abs=1e-15)
+    wider = replace(SET.ring_mesh, a=SET.ring_mesh.a - 1e-5)  # the planet moves away from the ring's flanks
+    assert wider.nominal_backlash == pytest.approx(2e-5 * math.tan(wider.alpha_wt), rel=1e-2)
+
+
+def test_tips_collide_when_the_ring_has_few_teeth_more_than_the_planet():
+    small = replace(RING, z=22, r_a=RING.m * 11 - RING.m)
+    close = replace(SET.ring_mesh, ring=small, a=RING.m * 2)
+    assert SET.ring_mesh.tip_clearance_angle > 0 > close.tip_clearance_angle
+
+
+def test_carrier_volume_mass_centre_and_polar_moment_are_sums_of_cylinders():
+    g = CarrierGeometry.of(SPEC)
+    plate, bolt = math.pi * (60e-3**2 - 20e-3**2) * 12e-3, math.pi * 8e-3**2 * 22e-3
+    assert g.volume == pytest.approx(plate + 4 * bolt)
+    assert g.centre_of_mass == pytest.approx((plate * -18e-3 + 4 * bolt * -1e-3) / g.volume)
+    polar = plate * (60e-3**2 + 20e-3**2) / 2 + 4 * bolt * (8e-3**2 / 2 + 45e-3**2)
+    assert g.polar_moment == pytest.approx(polar)
+    assert g.bolt_axis(1) == pytest.approx([0, 45e-3, 0], abs=1e-15)
+
+
+def test_inv_of_the_roll_is_the_polar_angle():
+    roll = np.linspace(RING.s_a, RING.s_form, 9)
+    point = RING.flank_point(roll)
+    assert np.arctan2(point[:, 1], point[:, 0]) == pytest.approx(involute.flank_angle(roll, RING.r_b, RING.psi_b))

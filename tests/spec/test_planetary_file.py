@@ -1,0 +1,110 @@
+"""stage.toml of a planetary set: what is right is read, what is wrong is refused with a remedy, all at once."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from gearfmu.errors import SpecError
+from gearfmu.spec.base import read_toml
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.new import new_stage
+from gearfmu.spec.planetary_body import set_body_inputs
+from gearfmu.spec.schema import set_schema
+from gearfmu.spec.stage import load_pair, load_stage
+
+TEXT = find_stage("planetary54").read_text(encoding="utf-8")
+
+
+def written(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = TEXT
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path = folder / "stage.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
+    """Field → remedy of everything that is wrong."""
+    with pytest.raises(SpecError) as error:
+        load_stage(written(folder, *changes))
+    return {problem.field: problem.remedy for problem in error.value.problems}
+
+
+def test_the_shipped_set_is_read():
+    spec = load_stage("planetary54")
+    assert spec.kind == "planetary_set" and [gear.name for gear in spec.gears] == ["sun", "planet", "ring"]
+    assert [gear.teeth for gear in spec.gears] == [18, 18, 54] and spec.set.planets == 4
+    assert spec.ring.mounts.points == 6 and spec.carrier.coupling_of("bolt3") == "rigid"
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "says"),
+    [
+        (('"131 mm"', '"130 mm"'), "ring.tip_diameter", "at least 130.73 mm (tip radius 65.365 mm)"),
+        (('"131 mm"', '"124 mm"'), "ring.tip_diameter", "inside the base circle"),
+        (('"131 mm"', '"138 mm"'), "ring.tip_diameter", "contact ratio"),
+        (('"160 mm"', '"143 mm"'), "ring.rim_diameter", "at least 146.4 mm"),
+        (("fillet_radius = 0.3 ", "fillet_radius = 0.5 "), "ring.fillet_radius", "overlap"),
+        (("dedendum = 1.25               #", "dedendum = 1.02              #"), "planet.tip_diameter", "root fillet"),
+        (("planets = 4", "planets = 5"), "set.planets", "= 72/5 is no integer; possible are 2, 3, 4"),
+        (("planets = 4", "planets = 6"), "set.planets", "fewer or smaller planets"),
+        (('center_distance = "45 mm"', 'center_distance = "42 mm"'), "set.center_distance", "base radii"),
+        (('center_distance = "45 mm"', 'center_distance = "44.6 mm"'), "ring.profile_shift", "j_wt"),
+        (("points = 6 ", "points = 5 "), "ring.mounts.points", "3, 6, 9, 18, 27, 54"),
+        (('bolt_diameter = "16 mm"', 'bolt_diameter = "22 mm"'), "carrier.bolt_diameter", "less than 22 mm"),
+        (('bore_diameter = "40 mm"', 'bore_diameter = "80 mm"'), "carrier.bore_diameter", "less than 74 mm"),
+        (('outer_diameter = "120 mm"', 'outer_diameter = "100 mm"'), "carrier.outer_diameter", "more than 106 mm"),
+        (('bolt3 = "rigid"', 'bolt4 = "rigid"'), "carrier.coupling.bolt4", "bolt0, bolt1, bolt2, bolt3"),
+        (('bolt3 = "rigid"', 'bolt3 = "stiff"'), "carrier.coupling.bolt3", "'rigid' or 'averaging'"),
+        (('strip_half_width = "0.45 mm"', 'strip_half_width = "0.2 mm"'), "ring.body.strip_half_width", "0.273 mm"),
+        (('kind = "planetary_set"', 'kind = "epicyclic"'), "kind", "external_pair"),
+        (('torque_max = "600 N*m"', 'torque_max = "60000 N*m"'), "sun.body.strip_half_width", "1.5 Hertz"),
+        (('bore_diameter = "18 mm"', 'bore_diameter = "38 mm"'), "sun.bore_diameter", "rim thinner"),
+        (("planets = 4", "planet = 4"), "set.planet", 'did you mean "planets"?'),
+    ],
+)
+def test_each_fault_is_named_with_its_remedy(tmp_path, change, field, says):
+    found = problems(tmp_path, change)
+    assert field in found, found
+    assert says in found[field]
+
+
+def test_all_problems_come_at_once(tmp_path):
+    found = problems(
+        tmp_path,
+        ('"131 mm"', '"130 mm"'), ("planets = 4", "planets = 5"), ("points = 6 ", "points = 7 "),
+        ('bolt_diameter = "16 mm"', 'bolt_diameter = "24 mm"'), ('tip_diameter = "50 mm"', 'tip_diameter = "60 mm"'),
+    )  # fmt: skip
+    assert {"ring.tip_diameter", "set.planets", "ring.mounts.points", "carrier.bolt_diameter", "sun.tip_diameter"} <= set(
+        found
+    )
+
+
+def test_a_verb_that_needs_a_pair_says_so():
+    with pytest.raises(SpecError, match="this needs a pair"):
+        load_pair("planetary54")
+
+
+def test_a_body_depends_on_its_own_numbers_only(tmp_path):
+    before = load_stage("planetary54")
+    changed = load_stage(written(tmp_path, ('stiffness = "1e8 N/m"', 'stiffness = "2e8 N/m"'), ("0.06 mm", "0.05 mm")))
+    same = {name: set_body_inputs(before, name) == set_body_inputs(changed, name) for name in ("sun", "ring", "carrier")}
+    assert same == {"sun": True, "ring": False, "carrier": True}
+
+
+def test_a_new_set_is_the_old_one_under_its_name(tmp_path):
+    path = new_stage("mine", "planetary54", tmp_path)
+    made, old = load_stage(path), load_stage("planetary54")
+    assert made.model_copy(update={"name": old.name, "source": old.source}) == old
+
+
+def test_schema_knows_the_tables_of_a_set():
+    schema = json.loads(json.dumps(set_schema()))
+    assert set(read_toml(find_stage("planetary54"))) <= set(schema["properties"])
+    assert "name" not in schema["$defs"]["RingSpec"]["required"] + schema["$defs"]["SetGearSpec"]["required"]
+    assert schema["$defs"]["RingSpec"]["properties"]["rim_diameter"]["unit"] == "m"
