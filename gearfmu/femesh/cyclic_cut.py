@@ -38,7 +38,7 @@ def cyclic_cut(nodes: np.ndarray, elements: dict[str, np.ndarray], teeth: int) -
     image = _images(nodes, nodes, pitch)
     if (image >= 0).all():
         return _cut_out(nodes, elements, teeth, image)
-    if _is_whole(nodes, teeth):
+    if is_whole(nodes, teeth):
         return None
     minus = np.flatnonzero(image >= 0)
     if len(minus) == 0:
@@ -55,8 +55,8 @@ def _images(nodes: np.ndarray, among: np.ndarray, angle: float) -> np.ndarray:
     return np.where(distance <= _SAME * np.ptp(nodes, axis=0).max(), found, -1)
 
 
-def _is_whole(nodes: np.ndarray, teeth: int) -> bool:
-    """Whether every pitch holds nodes."""
+def is_whole(nodes: np.ndarray, teeth: int) -> bool:
+    """Whether every pitch about the z axis holds nodes."""
     angle = np.arctan2(nodes[:, 1], nodes[:, 0])
     return len(np.unique(np.round(angle * teeth / (2 * np.pi)) % teeth)) == teeth
 

@@ -13,7 +13,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
-from gearfmu.femesh.cyclic_cut import cyclic_cut
+from gearfmu.femesh.cyclic_cut import cyclic_cut, is_whole
 from gearfmu.femesh.imported import ImportedMesh, read_mesh
 from gearfmu.geometry.involute_fit import InvoluteFit
 from gearfmu.reduction.elastic import Elastic
@@ -71,13 +71,16 @@ def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
         facts = _facts(placed, fit)
         matrices = _matrices(source, placed, fit, wanted)
         cut = None
-        if matrices is None and source.bore_coupling == "averaging":
+        if source.bore_coupling == "averaging" and (matrices is None or not is_whole(placed.nodes, wanted.teeth)):
             cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
         if cut is not None:
             bore = np.flatnonzero(np.isin(cut.of_mesh, placed.sets[BORE]))
-            body = ImportedSector(cut, bore, wanted.teeth, wanted.material, (wanted.flank, wanted.points))
+            elastic = wanted.material if matrices is None else (matrices.stiffness, matrices.mass)
+            body = ImportedSector(cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
             dofs = 3 * (len(cut.nodes) - len(cut.cut_plus))
             return ImportedGear(body, placed.nodes, facts | {"road": "cyclic", "dof_sector": dofs, "dof_body": wanted.teeth * dofs})
+        if not is_whole(placed.nodes, wanted.teeth):
+            raise MeshError('a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear')
         whole = _whole(placed, matrices, source.bore_coupling, wanted)
         size = whole.body.size
         return ImportedGear(whole, placed.nodes, facts | {"road": "mean tooth", "dof_sector": size // wanted.teeth, "dof_body": size})

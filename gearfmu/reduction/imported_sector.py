@@ -6,6 +6,7 @@ from functools import cached_property
 from types import SimpleNamespace
 
 import numpy as np
+import scipy.sparse as sp
 
 from gearfmu.fem import solids
 from gearfmu.fem.cyclic import Sector, sector_spaces
@@ -20,11 +21,18 @@ from gearfmu.reduction.sector import SectorBody, turned_sum
 class ImportedSector(SectorBody):
     """`SectorBody` on a cut of an imported mesh.
 
-    cut : the sector in the gear's frame. bore : its nodes on the bore. Raises MeshError when flanks or bore of the mesh
-    are not as they should be.
+    cut : the sector in the gear's frame. bore : its nodes on the bore. elastic : a material, or ready-made stiffness (N/m)
+    and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
     """
 
-    def __init__(self, cut: CyclicCut, bore: np.ndarray, teeth: int, material: Material, flank: tuple[ToothFlank, Points]):
+    def __init__(
+        self,
+        cut: CyclicCut,
+        bore: np.ndarray,
+        teeth: int,
+        elastic: Material | tuple[sp.csr_array, sp.csr_array],
+        flank: tuple[ToothFlank, Points],
+    ):
         self.cut, self.bore, self.teeth = cut, bore, teeth
         self.flank, self.points = flank
         self.internal = False
@@ -32,7 +40,8 @@ class ImportedSector(SectorBody):
             nodes=cut.nodes, cut_minus=cut.cut_minus, cut_plus=cut.cut_plus, elements=_repeated(cut.elements), teeth=teeth
         )
         self.faces = solids.boundary(cut.elements)
-        self.stiffness, self.mass_matrix = solids.assemble(cut.nodes, cut.elements, material)
+        ready = isinstance(elastic, tuple)
+        self.stiffness, self.mass_matrix = elastic if ready else solids.assemble(cut.nodes, cut.elements, elastic)
         self.spaces = sector_spaces(
             Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
         )

@@ -49,9 +49,10 @@ def symmetric_functions(count: int) -> np.ndarray:
 
 
 def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
-    """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay together."""
+    """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay together. Of modes of
+    no parity (imported bodies without a mirror at mid-width) the rows of the chosen functions count."""
     rows = np.abs(body.flank_rows[:, :, degrees, :]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
-    seen = (rows > 1e-9) & (body.parity > 0)
+    seen = (rows > 1e-9) & (body.parity >= 0)
     second = np.flatnonzero(body.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     return np.flatnonzero(seen)
