@@ -2,29 +2,88 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from gearfmu.commands.models import bodies_of, by_text
-from gearfmu.commands.shared import progress_bar
+from gearfmu.commands.shared import Quantity, progress_bar
 
 
 @click.command()
 @click.argument("stage")
-@click.option("--body", "name", required=True, metavar="NAME", help="Which body: its free modes, with pictures.")
+@click.option("--body", "name", metavar="NAME", help="Modes of this body, with pictures; without: those of the whole stage.")
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair counts as two.")
+@click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
+@click.option(
+    "--torque", type=Quantity("N*m"), help='Without --body: torque on the pinion, "302 N*m"; torque_max when not given.'
+)
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder of what is written."
 )
-def modes(stage: str, name: str, count: int, out: Path) -> None:
-    """Elastic modes of a body of STAGE: frequencies, nodal diameters, and per frequency a picture and a .vtu file."""
-    body = _shapes(stage, name, count)
+def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float | None, out: Path) -> None:
+    """Natural frequencies of STAGE.
+
+    With --body: elastic modes of one body, with nodal diameters, and per frequency a picture and a .vtu file. Without:
+    the stage linearised in loaded contact, gears, bearings and port springs together, and a Campbell diagram.
+    """
+    if name is None:
+        if mounted:
+            raise click.BadParameter("goes with --body ring", param_hint="--mounted")
+        return _of_stage(stage, torque, count, out)
+    if torque is not None:
+        raise click.BadParameter("a body's modes know no torque: leave it away", param_hint="--torque")
+    body = _shapes(stage, name, count, mounted)
     for line in table(body):
         click.echo(line)
     _write(body, out)
-    click.echo(f"{out / name}_modes.csv, _sheet.png and per frequency _mode_NN.png, .vtu")
+    click.echo(f"{out / body.name}_modes.csv, _sheet.png and per frequency _mode_NN.png, .vtu")
+
+
+def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
+    spec, bodies = _pair(stage)
+    from gearfmu.modes.linear import stage_modes
+    from gearfmu.report.campbell import RPM, campbell_columns, crossings, write_campbell
+    from gearfmu.stage import assemble
+    from gearfmu.stage.trace import write_columns
+
+    torque = spec.torque_max if torque is None else torque
+    if torque <= 0:
+        raise click.BadParameter("must be above 0: the drive flanks have to carry load", param_hint="--torque")
+    found = stage_modes(assemble(spec, bodies), bodies, torque, count)
+    for line in stage_table(found):
+        click.echo(line)
+    shafts = [(gear.name, gear.teeth) for gear in spec.gears]
+    for order, number, speed in crossings(found, shafts[0][1], spec.speed_max):
+        click.echo(f"mesh order {order} meets mode {number} at {RPM * speed:.0f} rpm of the {shafts[0][0]}")
+    out.mkdir(parents=True, exist_ok=True)
+    paths = out / f"{spec.name}_frequencies.csv", out / f"{spec.name}_campbell.png"
+    write_columns(paths[0], campbell_columns(found))
+    write_campbell(found, shafts, spec.speed_max, paths[1])
+    click.echo(f"{paths[0]}, {paths[1]}")
+
+
+def _pair(stage: str) -> tuple[Any, list[Any]]:
+    from gearfmu.spec.stage import load_stage, require_pair
+
+    require_pair(load_stage(stage))
+    return bodies_of(stage)
+
+
+def stage_table(found: Any) -> list[str]:
+    """The linearised stage's modes as lines of a table, means over the pitch."""
+    lines = [f"linearised at {found.torque:g} N·m, {len(found.position)} positions of one pitch",
+             "  mode  frequency   lowest  highest  damping     mesh force    strain energy in %",
+             "               Hz       Hz       Hz        %  per te, N/µm   mesh bearings shafts bodies"]  # fmt: skip
+    for k in range(found.frequency.shape[1]):
+        f, share = found.frequency[:, k], 100 * found.shares[:, k].mean(axis=0)
+        lines.append(
+            f"{k + 1:6d} {f.mean():10.0f} {f.min():8.0f} {f.max():8.0f} {100 * found.damping_ratio[:, k].mean():8.2f} "
+            f"{1e-6 * found.mesh_force[:, k].mean():13.1f} {share[0]:6.0f} {share[1]:8.0f} {share[2]:6.0f} {share[3]:6.0f}"
+        )
+    return lines
 
 
 def table(body: Any) -> list[str]:
@@ -42,16 +101,37 @@ def table(body: Any) -> list[str]:
     return lines
 
 
-def _shapes(stage: str, name: str, count: int) -> Any:
-    spec, bodies = bodies_of(stage)
+def _shapes(stage: str, name: str, count: int, mounted: bool) -> Any:
+    from gearfmu.spec.stage import load_stage
+
+    spec = load_stage(stage)
+    if mounted and (spec.kind != "planetary_set" or name != "ring"):
+        raise click.BadParameter("only the ring of a planetary set has mounts", param_hint="--mounted")
+    if spec.kind == "planetary_set":
+        return _of_set(spec, name, count, mounted)
     names = [gear.name for gear in spec.gears]
-    if name not in names:
-        raise click.BadParameter(f"no body '{name}'; the stage has {', '.join(names)}", param_hint="--body")
+    _check(name, names)
+    _, bodies = bodies_of(stage)
     from gearfmu.modes.gear import gear_modes
 
     index = names.index(name)
     with progress_bar("shapes") as progress:
         return gear_modes(spec, index, bodies[index], count, by_text(progress))
+
+
+def _of_set(spec: Any, name: str, count: int, mounted: bool) -> Any:
+    from gearfmu.modes.planetary import BODIES, mounted_ring_modes, set_body_modes
+
+    _check(name, BODIES)
+    with progress_bar("shapes") as progress:
+        if mounted:
+            return mounted_ring_modes(spec, count, by_text(progress))
+        return set_body_modes(spec, name, count, by_text(progress))
+
+
+def _check(name: str, names: Sequence[str]) -> None:
+    if name not in names:
+        raise click.BadParameter(f"no body '{name}'; the stage has {', '.join(names)}", param_hint="--body")
 
 
 def _write(body: Any, out: Path) -> None:

@@ -133,7 +133,7 @@ def _outline(axis: Axes, points: np.ndarray, rest: np.ndarray, surface: _Surface
     place, middle = (((p[:, :2] - low) / cell).astype(int) for p in (centres, points[surface.edges[:, 1]]))
     depth = np.full(place.max(axis=0) + 2, -np.inf)
     np.maximum.at(depth, tuple(place.T), centres[:, 2])
-    seen = points[surface.edges[:, 1], 2] > depth[tuple(middle.T)] - 2 * cell
+    seen = points[surface.edges[:, 1], 2] > depth[tuple(middle.T)] - 4 * cell
     axis.add_collection(LineCollection(list(points[surface.edges[seen], :2]), colors=INK, linewidths=0.55, alpha=0.5))
 
 

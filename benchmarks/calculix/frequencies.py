@@ -1,0 +1,138 @@
+"""Elastic frequencies of free bodies by CalculiX, beside ours: first on the same mesh of the same elements, then on finer
+ones.
+
+    python benchmarks/calculix/frequencies.py [CASE …] [--work DIR] [--out frequencies.csv] [--compare]
+
+The whole body goes to CalculiX (20-node hexahedra, C3D20); ours come from one sector and its cyclic symmetry. What the
+table has is not run again unless it is named. `--compare` runs nothing of CalculiX: it prints both codes side by side.
+Needs CalculiX's ccx (Debian: calculix-ccx); minutes a case.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import hashlib
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ccx import require_ccx, run
+from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.files import written_whole
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.stage import load_stage
+
+COUNT, RIGID = 20, 6
+HERE = Path(__file__).parent
+FIELDS = ("case", "mode", "frequency_Hz", "nodes", "elements", "seconds", "deck_sha256")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A body of a shipped stage. scale: of all element counts of its mesh."""
+
+    name: str
+    stage: str
+    body: str
+    scale: float
+
+
+CASES = {
+    case.name: case
+    for case in (
+        Case("pinion_coarse", "fzg_c", "pinion", 0.4),
+        Case("pinion", "fzg_c", "pinion", 0.7),
+    )
+}
+
+
+def body_of(case: Case) -> tuple[GearSpec, FeMesh]:
+    """The gear and the finite elements of one of its sectors."""
+    spec = load_stage(case.stage)
+    (gear,) = (gear for gear in spec.gears if gear.name == case.body)
+    counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * case.scale})
+    return gear, gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts)
+
+
+def write_deck(mesh: FeMesh, gear: GearSpec, path: Path) -> None:
+    """Free vibration of the whole body, in mm, N, tonnes and s."""
+    lines = ["*NODE, NSET=ALL"]
+    lines += [f"{k}, {x:.14g}, {y:.14g}, {z:.14g}" for k, (x, y, z) in enumerate(1e3 * mesh.nodes, start=1)]
+    lines += ["*ELEMENT, TYPE=C3D20, ELSET=BODY"]
+    for k, row in enumerate(mesh.elements + 1, start=1):
+        text = [str(node) for node in row]
+        lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
+    material = gear.material
+    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}"]
+    lines += ["*DENSITY", f"{1e-12 * material.density:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL"]
+    lines += ["*STEP", "*FREQUENCY", f"{COUNT + RIGID}", "*END STEP"]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def frequencies(path: Path) -> np.ndarray:
+    """Elastic frequencies (Hz) of a .dat file: the table of eigenvalues without the six rigid modes."""
+    text = path.read_text(encoding="ascii")
+    rows = re.findall(r"^\s+(\d+)\s+(\S+)\s+(\S+)\s+(\S+)\s+(\S+)\s*$", text.split("E I G E N V A L U E")[1], re.MULTILINE)
+    values = np.array([float(row[1]) for row in rows[: COUNT + RIGID]])
+    assert len(values) == COUNT + RIGID and np.all(np.abs(values[:RIGID]) < 1e-4 * values[RIGID])
+    return np.sqrt(values[RIGID:]) / (2 * np.pi)
+
+
+def solved(case: Case, work: Path) -> list[dict[str, Any]]:
+    """The table's rows of a case, made by running it."""
+    gear, sector = body_of(case)
+    mesh = sector.full()
+    folder = work / f"frequencies_{case.name}"
+    folder.mkdir(parents=True, exist_ok=True)
+    deck = folder / "free.inp"
+    write_deck(mesh, gear, deck)
+    seconds = run(deck)
+    digest = hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
+    size = {"nodes": len(mesh.nodes), "elements": len(mesh.elements), "seconds": f"{seconds:.0f}", "deck_sha256": digest}
+    return [
+        {"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size}
+        for k, f in enumerate(frequencies(deck.with_suffix(".dat")), start=1)
+    ]
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    """The table's rows, none where there is no table."""
+    if not path.exists():
+        return []
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def write(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The table in the order of CASES."""
+    rows = [row for name in CASES for row in rows if row["case"] == name]
+    with written_whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
+    parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
+    parser.add_argument("--out", type=Path, default=HERE / "frequencies.csv")
+    chosen = parser.parse_args()
+    if unknown := [name for name in chosen.cases if name not in CASES]:
+        parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
+    require_ccx()
+    done = {row["case"] for row in read(chosen.out)}
+    for name in chosen.cases or [name for name in CASES if name not in done]:
+        fresh = solved(CASES[name], chosen.work)
+        write(chosen.out, [row for row in read(chosen.out) if row["case"] != name] + fresh)
+        print(f"{name}: {fresh[0]['nodes']} nodes, {fresh[0]['seconds']} s", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

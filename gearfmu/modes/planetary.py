@@ -1,0 +1,79 @@
+"""Modes of the bodies of a planetary set."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import BodyError
+from gearfmu.femesh import FeMesh
+from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.ring import ring_sector, sector_mesh
+from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.modes.cyclic import Progress, cyclic_modes
+from gearfmu.modes.shapes import BodyModes
+from gearfmu.modes.whole import whole_modes
+from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
+
+BODIES = ("sun", "planet", "ring", "carrier")
+
+
+def set_body_modes(spec: Any, name: str, count: int, progress: Progress | None = None) -> BodyModes:
+    """The `count` lowest elastic modes of a free body of a PlanetarySpec, with its modal damping: sun, planet and ring
+    by one sector; the carrier with its bolts and bore coupled as the file says. The ring's mounts are left out."""
+    gear = getattr(spec, name)
+    if name == "carrier":
+        found = _carrier(spec, count, progress)
+    else:
+        found = cyclic_modes(name, set_sector(spec, name), gear.material, count, progress)
+    return _damped(found, gear.modal_damping)
+
+
+def mounted_ring_modes(spec: Any, count: int, progress: Progress | None = None) -> BodyModes:
+    """The lowest modes of the ring on its mounts; element counts are 0.4 of the file's, since all teeth are needed.
+
+    BodyError for a ring without mounts.
+    """
+    if spec.ring.mounts is None:
+        raise BodyError(f"{spec.source}: the ring has no mounts: leave --mounted away, or add [ring.mounts]")
+    if progress:
+        progress("finite elements", 0.1)
+    geometry, counts = InternalGearGeometry.of(spec.ring, spec.set), spec.ring.body.mesh
+    mesh = ring_sector(
+        geometry, spec.ring.face_width, counts.model_copy(update={"scale": counts.scale * RING_SCALE})
+    ).full()
+    found = whole_modes(ring_full_order(spec), mesh, {}, spec.ring.material, count)
+    return _damped(replace(found, name="ring_on_mounts"), spec.ring.modal_damping)
+
+
+def set_sector(spec: Any, name: str, scale: float = 1.0) -> FeMesh:
+    """Finite elements of one sector of a body of a PlanetarySpec. scale : factor on all element counts."""
+    part = getattr(spec, name)
+    if name == "carrier":
+        counts = part.mesh.model_copy(update={"scale": part.mesh.scale * scale})
+        return carrier_sector(CarrierGeometry.of(spec), counts)
+    counts = part.body.mesh.model_copy(update={"scale": part.body.mesh.scale * scale})
+    geometry = InternalGearGeometry if name == "ring" else GearGeometry
+    return sector_mesh(geometry.of(part, spec.set), part.face_width, counts)
+
+
+def _carrier(spec: Any, count: int, progress: Progress | None) -> BodyModes:
+    if progress:
+        progress("finite elements", 0.1)
+    sector = set_sector(spec, "carrier")
+    mesh = sector.full()
+    slaves = {f"bolt{k}": sector.sector_nodes(k)[sector.sets["bolt"]] for k in range(sector.teeth)}
+    return whole_modes(
+        carrier_full_order(spec), mesh, slaves | {"bore": mesh.sets["bore"]}, spec.carrier.material, count
+    )
+
+
+def _damped(found: BodyModes, damping_ratio: float) -> BodyModes:
+    """Every mode with the damping ratio that the file gives the body."""
+    assert np.isnan([mode.damping_ratio for mode in found.modes]).all()
+    return replace(found, modes=tuple(replace(mode, damping_ratio=damping_ratio) for mode in found.modes))
