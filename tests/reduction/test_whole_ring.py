@@ -1,0 +1,187 @@
+"""An internal gear by one sector against the whole ring, and on its mounts: two roads, one answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+from small_ring import (
+    GEOMETRY,
+    MOUNTS,
+    STEEL,
+    coarse,
+    mounted_stiffness,
+    reduced,
+    set_spec,
+    turn,
+    whole,
+    whole_rows,
+)
+
+from gearfmu.body.mounted import mount_sectors, mounted, turned_rows
+from gearfmu.errors import BodyError
+from gearfmu.fem.coupling import rigid_modes
+from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.reduction.modal import elastic_modes
+from gearfmu.reduction.statics import static_tables
+from gearfmu.reduction.toothed import ring_full_order
+
+Z, POINTS = GEOMETRY.z, 2 * 4 * 3
+
+
+@pytest.fixture(scope="module")
+def modes():
+    return elastic_modes(coarse(), 61)
+
+
+@pytest.fixture(scope="module")
+def statics():
+    return static_tables(coarse(), [])
+
+
+@pytest.fixture(scope="module")
+def held():
+    """The ring on its mounts, and the solver of the whole finite elements on the same springs."""
+    return mounted(reduced()), spl.splu(sp.csc_matrix(mounted_stiffness()))
+
+
+def test_flank_loads_are_one_newton_and_turn_the_ring_by_its_base_radius():
+    """Uniform unit loads (function 0): force 1 on the normal, moment −sg r_b about the axis: into the material."""
+    fields = rigid_modes(coarse().mesh.nodes)
+    resultant = (coarse().flank_rows @ fields).reshape(2, 4, 3, 6)[:, :, 0]
+    for side, sg in ((0, 1), (1, -1)):
+        assert resultant[side, :, 5] == pytest.approx(-sg * GEOMETRY.r_b, rel=1e-5)
+        assert np.linalg.norm(resultant[side, :, :2], axis=1) == pytest.approx(1.0, rel=1e-3)
+        normal = GEOMETRY.flank_normal(coarse().points.rolls, sg)
+        assert (normal * resultant[side, :, :2]).sum(axis=1).min() > 0.99
+
+
+def test_loads_of_the_sector_are_those_of_the_whole_ring():
+    assert np.abs(whole().flank_rows[0] - whole().space_0).max() < 1e-12
+
+
+def test_frequencies_of_one_sector_are_those_of_the_whole_ring(modes):
+    squared, _ = lowest_modes(whole().free, len(modes.frequency) + 3, block=12)
+    assert np.allclose(modes.frequency, (np.sqrt(squared) / (2 * np.pi))[: len(modes.frequency)], rtol=1e-8)
+
+
+def test_rows_of_flanks_and_patches_are_those_of_the_whole_ring(modes):
+    squared, shapes = lowest_modes(whole().free, len(modes.frequency) + 6, block=12)
+    body = replace(reduced(), **{name: getattr(modes, name) for name in ("frequency", "nodal_diameter", "part", "parity")},
+                   flank_rows=modes.flank_rows.reshape(2, 4, 3, -1), bore_rows=modes.bore_rows,
+                   damping_ratio=np.full(len(modes.frequency), 0.01),
+                   rim=replace(reduced().rim, patch_rows=modes.patch_rows))  # fmt: skip
+    omega, mine_0 = 2 * np.pi * modes.frequency, np.vstack([modes.flank_rows, modes.patch_rows])
+    full_0 = np.vstack([whole().flank_rows[0], whole_rows(coarse().patch_rows, 0)]) @ shapes
+    ends = np.flatnonzero(np.diff(omega) / omega[:-1] > 1e-6) + 1
+    for tooth in (0, 1, 5, 11):
+        mine = turned_rows(body, mine_0, tooth)
+        full = np.vstack([whole().flank_rows[tooth], whole_rows(coarse().patch_rows, tooth)]) @ shapes
+        for cluster in np.split(np.arange(len(omega)), ends)[:-1]:
+            difference = mine_0[:, cluster] @ mine[:, cluster].T - full_0[:, cluster] @ full[:, cluster].T
+            assert np.abs(difference).max() < 1e-6 * np.abs(mine_0).max() ** 2
+
+
+def test_static_tables_are_those_of_the_whole_ring(statics):
+    patches = np.array([whole_rows(coarse().patch_rows, m) for m in range(Z)])
+    loads = np.vstack([*whole().flank_rows, *patches])
+    full = np.vstack([whole().flank_rows[0], patches[0]]) @ whole().free.flexibility(loads.T)
+    flank, patch = full[:, : Z * POINTS].reshape(-1, Z, POINTS), full[:, Z * POINTS :].reshape(-1, Z, 3)
+    scale = np.abs(full).max()
+    for m in range(Z):
+        mine = statics.static_ff[:, :, m].transpose(0, 2, 4, 1, 3, 5).reshape(POINTS, POINTS)
+        assert np.abs(mine - flank[:POINTS, m]).max() < 1e-9 * scale
+        assert np.abs(statics.static_fp[:, m].reshape(POINTS, 3) - patch[:POINTS, m]).max() < 1e-9 * scale
+        assert np.abs(statics.static_pp[m] - patch[POINTS:, m]).max() < 1e-9 * scale
+
+
+def test_inertia_is_the_analytic_one():
+    volume = Z * GEOMETRY.sector_area * 8e-3
+    assert coarse().inertia[0, 0] == pytest.approx(STEEL.density * volume, rel=1e-3)
+    polar = STEEL.density * Z * GEOMETRY.sector_polar_moment * 8e-3
+    assert coarse().inertia[5, 5] == pytest.approx(polar, rel=1e-3)
+
+
+def test_modes_and_residual_of_the_mounted_ring_are_its_static_compliance_exactly(held):
+    ring, solver = held
+    for tooth, other in ((0, 0), (1, 2), (5, 17)):
+        full = whole().flank_rows[tooth] @ solver.solve(whole().flank_rows[other].T)
+        assert np.abs(ring.static(tooth, other) - full).max() < 1e-8 * np.abs(full).max()
+
+
+def test_mounts_make_six_rigid_modes_elastic(held):
+    """Frequencies of the whole finite elements on springs, within what n modes and a quasi-static rest can say."""
+    ring, _ = held
+    stiffness, mass = mounted_stiffness(), whole().free.mass_matrix
+    exact = np.sqrt(np.sort(spl.eigsh(stiffness, 20, mass, sigma=0, which="LM")[0])) / (2 * np.pi)
+    assert ring.frequency[:20] == pytest.approx(exact, rel=1e-4)
+    assert len(ring.frequency) == 6 + reduced().modes and ring.frequency[0] > 500
+    softer = replace(reduced(), rim=replace(reduced().rim, mount_stiffness=MOUNTS.stiffness * 1e-8))
+    loose = mounted(softer).frequency
+    assert loose[5] < 1.0 and loose[6:] == pytest.approx(reduced().frequency, rel=1e-6)
+    total = 6 * MOUNTS.stiffness * 1e-8 / reduced().mass  # soft springs: the rigid ring on six of them, along the axis
+    assert np.abs(loose[:6] * 2 * np.pi / np.sqrt(total) - 1).min() < 1e-5
+
+
+def test_forces_of_the_mounts_balance_the_load(held):
+    ring, solver = held
+    for tooth in (0, 3, 7):
+        forces = ring.static_mount_forces(tooth).reshape(MOUNTS.points, 3, POINTS)
+        direct = MOUNTS.stiffness * (whole().springs.rows @ solver.solve(whole().flank_rows[tooth].T))
+        in_body = np.array([turn(s) @ f for s, f in zip(mount_sectors(reduced()), forces, strict=True)])
+        assert np.abs(in_body.reshape(-1, POINTS) - direct).max() < 1e-8
+        load = (whole().flank_rows[tooth] @ rigid_modes(whole().elements.nodes)).T
+        assert np.abs(in_body.sum(axis=0) - load[:3]).max() < 1e-9
+        moment = sum(np.cross(m.point[:, None], f, axis=0) for m, f in zip(whole().mounts, in_body, strict=True))
+        assert moment == pytest.approx(load[3:], abs=1e-10)
+
+
+def test_one_mean_table_serves_all_teeth(held):
+    """The mean over the teeth of each tooth's own residual, and the spread it leaves."""
+    ring, _ = held
+    cut = 0.5 * (ring.frequency[40] + ring.frequency[41])
+    kept = ring.frequency < cut
+    squared = (2 * np.pi * ring.frequency[kept]) ** 2
+    table, own = ring.mean_residual(cut), []
+    for offset in (0, 1, 13):
+        each = []
+        for t in range(Z):
+            rows = [ring.flank_rows(k)[:, kept] for k in (t, (t + offset) % Z)]
+            each.append(ring.static(t, (t + offset) % Z) - (rows[0] / squared) @ rows[1].T)
+        assert np.abs(np.mean(each, axis=0) - table[offset]).max() < 1e-9 * np.abs(table).max()
+        own.append(each)
+    spread = np.abs(np.array(own[0]) - table[0]).max() / np.abs(table[0]).max()
+    assert ring.residual_spread(cut) == pytest.approx(spread, rel=1e-6)
+    assert spread < 0.05
+    all_static = max(np.abs(ring.static(t, t) - ring.static(0, 0)).max() for t in range(Z)) / np.abs(table[0]).max()
+    assert spread < 0.5 * all_static  # the modal rows carry most of what the mounts do to the symmetry
+
+
+def test_full_order_of_the_mounted_ring_has_the_same_frequencies(held):
+    full = ring_full_order(set_spec(), scale=1.0)
+    assert full.size == 3 * len(whole().elements.nodes) and full.rigid.shape[1] == 0 and len(full.interfaces) == Z
+    difference = abs(full.stiffness - mounted_stiffness()).max() / abs(full.stiffness).max()
+    assert difference < 1e-14
+    free = ring_full_order(set_spec(), scale=1.0, mounted=False)
+    assert free.ground == tuple(f"mount{k}" for k in range(6)) and free.rigid.shape[1] == 6
+    assert abs(free.stiffness @ free.rigid).max() < 1e-9 * abs(free.stiffness).max()
+
+
+def test_input_nodes_lie_in_the_middle_of_their_flanks():
+    full = ring_full_order(set_spec(), scale=1.0)
+    points = np.array([i.point for i in full.interfaces])
+    radius, angle = np.hypot(points[:, 0], points[:, 1]), np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    assert np.ptp(radius) < 1e-12 and np.diff(angle) == pytest.approx(2 * np.pi / Z) and np.all(points[:, 2] == 0)
+    roll = np.sqrt(radius[0] ** 2 - GEOMETRY.r_b**2)
+    assert roll**2 == pytest.approx(0.5 * (GEOMETRY.s_form**2 + GEOMETRY.s_tip**2), rel=1e-9)
+    for interface in full.interfaces[:3]:
+        assert interface.rows.toarray().sum() == 3 and interface.components == ("ux", "uy", "uz")
+
+
+def test_a_body_without_mounts_says_so():
+    loose = replace(reduced(), rim=replace(reduced().rim, mounts=0, mount_stiffness=0.0))
+    with pytest.raises(BodyError, match="ring.mounts"):
+        mounted(loose)
