@@ -24,6 +24,8 @@ from gearfmu.reduction.flank import Points, ToothFlank
 
 _STEEP = 0.3  # largest axial component of a flank face's normal
 _INWARD = 0.3  # smallest share of r_b by which a flank face's normal passes the axis
+_END = 1e-5  # of the flank: by how much nodes may lie outside form and tip circle and still be on the flank
+_ASIDE = 0.3  # of the half tooth thickness: faces further from their involute are no flank (cuts of half a gear)
 _OUTSIDE = 0.05  # natural coordinate by which a point may lie beyond the last face
 _LINES = 120  # at most so many mesh lines across a flank count as lines
 _GAUSS = np.polynomial.legendre.leggauss(5)
@@ -91,7 +93,9 @@ def _all_between(
     base = np.arctan2(centre[:, 1], centre[:, 0]) + side * (
         involute.inv(np.arccos(np.minimum(fit.r_b / np.maximum(radius, fit.r_b), 1.0))) - fit.psi_b
     )
-    return FlankPoints(centre, np.round(base * wanted.teeth / (2 * np.pi)).astype(int) % wanted.teeth, side)
+    tooth = np.round(base * wanted.teeth / (2 * np.pi))
+    side = np.where(np.abs(base - tooth * 2 * np.pi / wanted.teeth) < _ASIDE * fit.psi_b, side, 0)
+    return FlankPoints(centre, tooth.astype(int) % wanted.teeth, side)
 
 
 def _nodes_of(nodes: np.ndarray, corners: np.ndarray, faces: FlankPoints, wanted: FitRange) -> FlankPoints:
@@ -101,8 +105,8 @@ def _nodes_of(nodes: np.ndarray, corners: np.ndarray, faces: FlankPoints, wanted
     owner = chosen[first // 4]
     points = FlankPoints(nodes[index], faces.tooth[owner], faces.side[owner])
     radius = np.hypot(points.points[:, 0], points.points[:, 1])
-    slack = 0.02 * (wanted.s_tip - wanted.s_form)
-    low, high = (float(involute.radius_at_roll(s, wanted.r_b)) for s in (wanted.s_form + slack, wanted.s_tip - slack))
+    slack = _END * (wanted.s_tip - wanted.s_form)
+    low, high = (float(involute.radius_at_roll(s, wanted.r_b)) for s in (wanted.s_form - slack, wanted.s_tip + slack))
     return points.of((radius > low) & (radius < high))
 
 

@@ -26,7 +26,7 @@ from gearfmu.reduction.modal import Modes, Progress
 from gearfmu.reduction.statics import Statics
 
 _WINDOW = 3e-3  # relative frequency difference within which contributions are gathered
-_WEAK = 1e-4  # share of its cluster's static compliance below which a direction is left to the residual
+_WEAK = 1e-3  # share of the static compliance of its cluster, all nodal diameters, below which it goes to the residual
 _PURE = 1e-3  # share of the other parity's rows up to which a mode counts as symmetric or antisymmetric
 
 
@@ -76,36 +76,40 @@ def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress |
     flank = rows.shape[1] - 6
     scale = np.ones(flank + 6)
     scale[flank:] = np.abs(rows[:, :flank]).max() / np.abs(rows[:, flank:]).max(axis=(0, 2)) / np.sqrt(flank)
-    found, left, total = [], 0.0, 0.0
-    spectrum = np.fft.fft(rows, axis=0) / gear.teeth
-    for nu in range(gear.teeth // 2 + 1):
-        single = nu == 0 or 2 * nu == gear.teeth
-        amplitude = spectrum[nu].real if single else np.sqrt(2) * spectrum[nu]
-        kept, lost, all_of_it = _gathered(squared, amplitude * scale[:, None], nu)
-        found += [_Found(o.squared, nu, o.amplitude / scale, o.mode) for o in kept]
-        left, total = left + lost, total + all_of_it
+    amplitude = np.fft.rfft(rows, axis=0) / gear.teeth * scale[:, None]
+    nu = np.arange(len(amplitude))
+    amplitude[(nu > 0) & (2 * nu < gear.teeth)] *= np.sqrt(2)
+    found, left = [], 0.0
+    for members in _clusters(np.sqrt(squared)):
+        weighted = amplitude[:, :, members] / np.sqrt(squared[members])
+        kept, lost = _directions(weighted, squared[members], gear.teeth)
+        found += [_Found(o.squared, o.nodal_diameter, o.amplitude / scale, int(members[o.mode])) for o in kept]
+        left += lost
+    total = float((np.abs(amplitude) ** 2 / squared).sum())
     return _as_modes(sorted(found, key=lambda o: o.squared), gear, shapes, count), left / total
 
 
-def _gathered(squared: np.ndarray, amplitude: np.ndarray, nu: int) -> tuple[list[_Found], float, float]:
-    """Oscillators of one nodal diameter, strongest direction of each cluster first; compliance left out; and all of it."""
+def _clusters(frequency: np.ndarray) -> list[np.ndarray]:
+    """Runs of modes, each within `_WINDOW` of the next: a run ends at a gap."""
+    ends = np.flatnonzero(np.diff(frequency) > _WINDOW * frequency[1:]) + 1
+    return np.split(np.arange(len(frequency)), ends)
+
+
+def _directions(weighted: np.ndarray, squared: np.ndarray, teeth: int) -> tuple[list[_Found], float]:
+    """Oscillators of one cluster from its amplitudes over ω (ν, L + 6, k), and the compliance left out."""
     found, left = [], 0.0
-    compliance = (np.abs(amplitude) ** 2).sum(axis=0) / squared
-    total = float(compliance.sum())
-    frequency = np.sqrt(squared)
-    strongest = float(compliance.max(initial=0.0))
-    for members in np.split(np.arange(len(squared)), np.flatnonzero(np.diff(frequency) > _WINDOW * frequency[1:]) + 1):
-        weighted = amplitude[:, members] / frequency[members]
-        directions, sizes, mix = np.linalg.svd(weighted, full_matrices=False)
-        whole = compliance[members].sum()
+    whole = float((np.abs(weighted) ** 2).sum())
+    for nu, block in enumerate(weighted):
+        single = nu == 0 or 2 * nu == teeth
+        directions, sizes, mix = np.linalg.svd(block.real if single else block, full_matrices=False)
         for direction, size, share in zip(directions.T, sizes, mix, strict=True):
-            if size**2 < max(_WEAK * whole, 1e-3 * _WEAK * strongest):
+            if size**2 < _WEAK * whole:
                 left += float(size**2)
                 continue
             weight = np.abs(share) ** 2
-            mean = float(1 / (weight / squared[members]).sum())
-            found.append(_Found(mean, nu, direction * size * np.sqrt(mean), int(members[weight.argmax()])))
-    return found, left, total
+            mean = float(1 / (weight / squared).sum())
+            found.append(_Found(mean, nu, direction * size * np.sqrt(mean), int(weight.argmax())))
+    return found, left
 
 
 def _as_modes(found: list[_Found], gear: WholeGear, shapes: np.ndarray, count: int) -> Modes:

@@ -1,0 +1,78 @@
+"""Small gears as other programs would give them, and the stage file around them."""
+
+from __future__ import annotations
+
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reduction"))
+from decks import write_deck  # noqa: E402
+
+from gearfmu.fem import hex20  # noqa: E402
+from gearfmu.femesh import FeMesh, gear_sector  # noqa: E402
+from gearfmu.geometry import GearGeometry  # noqa: E402
+from gearfmu.spec.library import find_stage  # noqa: E402
+from gearfmu.spec.stage import StageSpec, load_stage  # noqa: E402
+
+COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",
+          "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 8",
+          "width_functions = 5": "width_functions = 3"}  # fmt: skip
+
+
+def stage(folder: Path, section: str = "") -> StageSpec:
+    """fzg_c on a coarse mesh, with `section` as [gears.pinion.import]."""
+    text = find_stage("fzg_c").read_text(encoding="utf-8")
+    for old, new in COUNTS.items():
+        assert old in text
+        text = text.replace(old, new)
+    if section:
+        text = text.replace("[gears.pinion.body.mesh]", f"[gears.pinion.import]\n{section}\n\n[gears.pinion.body.mesh]")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "stage.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_stage(path)
+
+
+@lru_cache(maxsize=2)
+def pinion(whole: bool = True) -> FeMesh:
+    """The coarse mesh of fzg_c's pinion, all teeth or one sector."""
+    spec = load_stage("fzg_c")
+    geometry = GearGeometry.of(spec.gears[0], spec.pair)
+    mesh = spec.gears[0].body.mesh.model_copy(update={"flank": 6, "thickness": 2, "root": 3, "rim": 2, "width": 2})
+    sector = gear_sector(geometry, spec.gears[0].face_width, mesh)
+    return sector.full() if whole else sector
+
+
+def hex20_deck(path: Path, nodes: np.ndarray | None = None, whole: bool = True) -> Path:
+    """The pinion as a deck in mm, its nodes moved to `nodes` (m) when given."""
+    mesh = pinion(whole)
+    points = 1e3 * (mesh.nodes if nodes is None else nodes)
+    return write_deck(path, points, {"hexahedron20": mesh.elements}, {"BORE": mesh.sets["bore"]})
+
+
+def tetrahedra(mesh: FeMesh) -> tuple[np.ndarray, np.ndarray]:
+    """The same body in tet10: every hexahedron in 24 about its middle, mid nodes on its own curved map."""
+    natural = _cut_in_24()
+    place = np.einsum("tpn,enc->etpc", np.stack([hex20.shape(t) for t in natural]), mesh.nodes[mesh.elements])
+    points = place.reshape(-1, 3)
+    key = np.round(points / (1e-7 * np.ptp(mesh.nodes))).astype(np.int64)
+    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return points[first], number.reshape(-1, 10)
+
+
+@lru_cache(maxsize=1)
+def _cut_in_24() -> np.ndarray:
+    """Natural coordinates (24, 10, 3) of tetrahedra: body middle, face middle, and an edge of the face."""
+    edges = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]]
+    found = []
+    for face in hex20.FACES[:, :4]:
+        ring = hex20.CORNERS[face]
+        for k in range(4):
+            corners = np.array([ring[(k + 1) % 4], ring[k], ring.mean(axis=0), np.zeros(3)])
+            if np.linalg.det(corners[1:] - corners[0]) < 0:
+                corners = corners[[1, 0, 2, 3]]
+            found.append(np.vstack([corners, [corners[e].mean(axis=0) for e in edges]]))
+    return np.array(found)

@@ -1,0 +1,167 @@
+"""An imported gear is the gear: whole or one sector, hexahedra or tetrahedra, cyclic road or mean tooth."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from decks import write_deck
+from gears import hex20_deck, pinion, stage, tetrahedra
+
+from gearfmu.body import ReducedBody
+from gearfmu.body.reduce import expected_hash, reduce_gear, reduce_stage
+from gearfmu.fem import solids
+from gearfmu.femesh import write_vtu
+from gearfmu.stage import Steady, assemble, loaded_te, simulate
+from gearfmu.stage.te import on_rigid_bearings
+
+SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
+TABLES = ("static_ff", "static_fb", "static_bb", "inertia")
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory) -> ReducedBody:
+    return reduce_gear(stage(tmp_path_factory.mktemp("native")), 0)
+
+
+def imported(folder: Path, section: str = SECTION) -> ReducedBody:
+    return reduce_gear(stage(folder, section), 0)
+
+
+def assert_same(body: ReducedBody, native: ReducedBody, tolerance: float) -> None:
+    assert body.modes == native.modes
+    assert np.abs(body.frequency / native.frequency - 1).max() < tolerance
+    for name in TABLES:
+        own, other = getattr(body, name), getattr(native, name)
+        assert np.abs(own - other).max() < tolerance * np.abs(other).max(), name
+    assert body.frf.max_error == pytest.approx(native.frf.max_error, rel=1e-3)
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_our_own_mesh_comes_back_as_the_same_body(tmp_path: Path, native: ReducedBody, whole: bool) -> None:
+    """Cut into sectors again, or one sector as such."""
+    hex20_deck(tmp_path / "pinion.inp", whole=whole)
+    body = imported(tmp_path, SECTION + 'bore = "bore"')
+    assert body.mesh["road"] == "cyclic"
+    assert_same(body, native, 1e-9)
+
+
+def test_a_gear_that_lies_elsewhere_is_found(tmp_path: Path, native: ReducedBody) -> None:
+    """Axis along x, off the origin, tilted by 0.2°, tooth 0 anywhere."""
+    points = pinion().nodes @ turn(2, 0.7) @ turn(0, np.radians(0.2)) + np.array([3e-4, -2e-4, 0.1])
+    hex20_deck(tmp_path / "pinion.inp", points[:, [2, 0, 1]])
+    body = imported(tmp_path, SECTION + 'bore = "BORE"\naxis = "x"')
+    assert body.mesh["road"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
+    assert_same(body, native, 1e-7)
+
+
+def turn(axis: int, angle: float) -> np.ndarray:
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[[a, a, b, b], [a, b, a, b]] = [np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)]
+    return matrix
+
+
+def test_exported_vtu_comes_back(tmp_path: Path, native: ReducedBody) -> None:
+    write_vtu(pinion(whole=False), tmp_path / "pinion.vtu")
+    assert_same(imported(tmp_path, 'file = "pinion.vtu"\nlength = "1 m"\nbore = "bore"'), native, 1e-9)
+
+
+@pytest.mark.full
+def test_ready_made_matrices_give_the_same_body_by_the_mean_tooth(tmp_path: Path, native: ReducedBody) -> None:
+    """The whole gear without any symmetry, its 60 lowest modes sorted by nodal diameter: two roads, one answer."""
+    hex20_deck(tmp_path / "pinion.inp")
+    material = stage(tmp_path).gears[0].material
+    stiffness, mass = solids.assemble(pinion().nodes, {"hexahedron20": pinion().elements}, material)
+    sp.save_npz(tmp_path / "k.npz", sp.csr_matrix(1e-3 * stiffness))
+    sp.save_npz(tmp_path / "m.npz", sp.csr_matrix(1e-3 * mass))
+    body = imported(tmp_path, SECTION + 'stiffness = "k.npz"\nmass = "m.npz"\nmass_unit = "1 t"')
+    assert body.mesh["road"] == "mean tooth" and body.mesh["teeth_deviation"] < 1e-9
+    assert_same(body, native, 1e-8)
+    assert np.array_equal(body.nodal_diameter, native.nodal_diameter) and np.array_equal(body.parity, native.parity)
+
+
+@pytest.mark.full
+def test_tetrahedra_of_one_sector(tmp_path: Path, native: ReducedBody) -> None:
+    """tet10 on the same curved geometry: elements differ, the gear does not."""
+    points, cells = tetrahedra(pinion(whole=False))
+    write_deck(tmp_path / "pinion.inp", 1e3 * points, {"tetra10": cells})
+    body = imported(tmp_path)
+    assert body.mesh["road"] == "cyclic" and body.mesh["elements"] == {"tetra10": len(cells)}
+    assert np.abs(body.frequency[:40] / native.frequency[:40] - 1).max() < 0.01
+    middle = (0, 0, 0, 4, 4, 0, 0)
+    assert body.static_ff[middle] == pytest.approx(native.static_ff[middle], rel=0.02)
+
+
+def test_hex8_is_raised_and_not_stiff(tmp_path: Path, native: ReducedBody) -> None:
+    """The corner nodes alone, as hex8: mid nodes come back on straight edges."""
+    corners = np.unique(pinion(whole=False).elements[:, :8])
+    new = np.full(len(pinion(whole=False).nodes), -1)
+    new[corners] = np.arange(len(corners))
+    write_deck(tmp_path / "pinion.inp", 1e3 * pinion(whole=False).nodes[corners], {"hexahedron": new[pinion(whole=False).elements[:, :8]]})
+    body = imported(tmp_path)
+    assert body.mesh["raised_to_quadratic"] == len(pinion(whole=False).elements)
+    assert np.abs(body.frequency[:30] / native.frequency[:30] - 1).max() < 0.02
+
+
+@lru_cache(maxsize=1)
+def keyway_cells() -> np.ndarray:
+    """The whole pinion without the elements of a keyway: on the bore, one pitch wide."""
+    mesh = pinion()
+    middle = mesh.nodes[mesh.elements].mean(axis=1)
+    radius, angle = np.hypot(middle[:, 0], middle[:, 1]), np.arctan2(middle[:, 1], middle[:, 0])
+    return mesh.elements[~((radius < 19e-3) & (np.abs(angle) < np.pi / 16))]
+
+
+@pytest.mark.full
+def test_a_keyway_is_the_mean_tooth_and_its_error_is_stated(tmp_path: Path, native: ReducedBody) -> None:
+    cells = keyway_cells()
+    assert 0 < len(pinion().elements) - len(cells) < 20
+    used = np.unique(cells)
+    new = np.full(len(pinion().nodes), -1)
+    new[used] = np.arange(len(used))
+    write_deck(tmp_path / "pinion.inp", 1e3 * pinion().nodes[used], {"hexahedron20": new[cells]})
+    body = imported(tmp_path)
+    assert body.mesh["road"] == "mean tooth"
+    assert 1e-4 < body.mesh["teeth_deviation"] < 0.2 and body.mesh["compliance_left_to_residual"] < 0.02
+    assert native.mass * 0.97 < body.mass < native.mass
+    middle = (0, 0, 0, 4, 4, 0, 0)
+    assert body.static_ff[middle] == pytest.approx(native.static_ff[middle], rel=0.05)
+    assert body.frf.max_error > native.frf.max_error
+    modes_and_rest(body)
+
+
+def modes_and_rest(body: ReducedBody) -> None:
+    """Static compliance minus that of the modes is still a compliance: positive semidefinite."""
+    size = body.flank_rows[..., 0].size
+    rows = body.flank_rows.reshape(size, -1) / (2 * np.pi * body.frequency)
+    table = body.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(size, size)
+    values = np.linalg.eigvalsh(table - rows @ rows.T)
+    assert values.min() > -1e-6 * values.max()
+
+
+def test_the_hash_covers_the_contents_of_the_file(tmp_path: Path) -> None:
+    deck = hex20_deck(tmp_path / "pinion.inp")
+    spec = stage(tmp_path, SECTION)
+    before = expected_hash(spec, 0)
+    deck.write_text(deck.read_text(encoding="utf-8") + "** a comment\n", encoding="utf-8")
+    assert expected_hash(spec, 0) != before
+    moved = deck.rename(tmp_path / "other.inp")
+    assert expected_hash(stage(tmp_path, SECTION.replace("pinion.inp", moved.name)), 0) != before
+
+
+def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path) -> None:
+    """Transmission error and a few mesh periods in time: as with the native body."""
+    hex20_deck(tmp_path / "pinion.inp")
+    spec, own = stage(tmp_path, SECTION), stage(tmp_path / "native")
+    bodies = reduce_stage(spec)
+    wheel = bodies[1]
+    models = [assemble(spec, bodies), assemble(own, [reduce_gear(own, 0), wheel])]
+    results = [loaded_te(on_rigid_bearings(model), [302.0], 6).te for model in models]
+    assert np.abs(results[0] / results[1] - 1).max() < 1e-6
+    runs = [simulate(model, Steady(model, 100.0, 302.0), 0.012, 1e-4, {"level": 1}) for model in models]
+    assert np.abs(runs[0]["mesh.te"] - runs[1]["mesh.te"]).max() < 1e-6 * np.abs(runs[1]["mesh.te"]).max()
+    assert runs[0]["mesh.force"].mean() == pytest.approx(302.0 / 0.033829, rel=0.05)
