@@ -144,6 +144,11 @@ def _meshio_sets(mesh: meshio.Mesh) -> dict[str, np.ndarray]:
         ]
         if nodes and not name.startswith("gmsh:"):
             sets[name] = np.unique(np.concatenate(nodes))
+    tags = mesh.cell_data.get("gmsh:physical", [])
+    for name, (tag, *_) in mesh.field_data.items():
+        nodes = [block.data[np.asarray(own) == tag].ravel() for block, own in zip(mesh.cells, tags, strict=False)]
+        if nodes and len(found := np.unique(np.concatenate(nodes))):
+            sets.setdefault(name, found)
     for name, values in mesh.point_data.items():
         values = np.asarray(values)
         if values.ndim == 1 and np.isin(values, (0, 1)).all():

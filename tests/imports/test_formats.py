@@ -1,0 +1,221 @@
+"""Formats: the same brick as .inp, .bdf, .msh and .vtu, with its sets; matrices in every format that is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+from decks import STEEL, brick, write_deck
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import solids
+from gearfmu.fem.matrices import read_matrix, read_unknowns
+from gearfmu.femesh.imported import read_mesh
+
+MM = 1e-3
+KINDS = ("hexahedron20", "tetra10", "hexahedron")
+
+
+def nastran(path: Path, nodes: np.ndarray, kind: str, cells: np.ndarray, system: str = "") -> Path:
+    """A bulk data file in small fields, with SET 1 = the nodes at x = 0."""
+    left = np.flatnonzero(nodes[:, 0] == 0) + 1
+    lines = [f"SET 1 = {', '.join(map(str, left[:8]))},", f"  {', '.join(map(str, left[8:]))}", "BEGIN BULK"]
+    lines += [f"GRID,{k},{system},{x:.9g},{y:.9g},{z:.9g}" for k, (x, y, z) in enumerate(np.round(nodes, 9), 1)]
+    name = {"hexahedron20": "CHEXA", "tetra10": "CTETRA", "hexahedron": "CHEXA"}[kind]
+    order = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15] if kind == "hexahedron20" else range(cells.shape[1])
+    for k, row in enumerate(cells[:, list(order)] + 1, 1):
+        fields = [f"{name:<8}", f"{k:<8}", f"{1:<8}", *(f"{n:<8}" for n in row)]
+        lines += ["".join(fields[:9]) + "+"] if len(fields) > 9 else ["".join(fields)]
+        for first in range(9, len(fields), 8):
+            lines.append("+       " + "".join(fields[first : first + 8]) + ("+" if first + 8 < len(fields) else ""))
+    path.write_text("\n".join([*lines, "ENDDATA"]) + "\n", encoding="utf-8")
+    return path
+
+
+def as_file(folder: Path, suffix: str, kind: str) -> tuple[Path, np.ndarray, np.ndarray]:
+    nodes, cells = brick(kind)
+    path, left = folder / f"brick{suffix}", np.flatnonzero(nodes[:, 0] == 0)
+    if suffix == ".inp":
+        write_deck(path, nodes, {kind: cells}, {"left": left})
+    elif suffix == ".bdf":
+        nastran(path, nodes, kind, cells)
+    elif suffix == ".vtu":
+        meshio.Mesh(nodes, [(kind, cells)], {"left": np.isin(np.arange(len(nodes)), left).astype(float)}).write(path)
+    else:
+        mesh = meshio.Mesh(nodes, [("vertex", left[:, None]), (kind, cells)])
+        mesh.cell_data = {"gmsh:physical": [np.full(len(left), 7), np.full(len(cells), 8)], "gmsh:geometrical": [np.full(len(left), 1), np.full(len(cells), 1)]}
+        mesh.field_data = {"left": np.array([7, 0]), "solid": np.array([8, 3])}
+        meshio.gmsh.write(path, mesh, "2.2", binary=False)
+    return path, nodes, left
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("suffix", [".inp", ".bdf", ".msh", ".vtu"])
+def test_every_format_gives_the_same_brick(tmp_path: Path, suffix: str, kind: str) -> None:
+    path, nodes, left = as_file(tmp_path, suffix, kind)
+    mesh = read_mesh(path, MM)
+    stiffness, mass = solids.assemble(mesh.nodes, mesh.elements, STEEL)
+    assert mass.sum() / 3 == pytest.approx(7850 * 3.2e-6, rel=1e-9)
+    assert min(solids.jacobian_quality(mesh.nodes, block, k).min() for k, block in mesh.elements.items()) > 0.1
+    found = mesh.node_set("1" if suffix == ".bdf" else "LEFT")
+    assert set(left) <= set(found) and np.allclose(mesh.nodes[found, 0], 0)
+    pulled = np.zeros_like(mesh.nodes)
+    pulled[:, 0], pulled[:, 1:] = mesh.nodes[:, 0], -0.3 * mesh.nodes[:, 1:]
+    force = (stiffness @ pulled.ravel()).reshape(-1, 3)
+    assert force[mesh.nodes[:, 0] > 39.9e-3, 0].sum() == pytest.approx(206e9 * 8e-5, rel=1e-9)
+    assert mesh.raised == (16 if kind == "hexahedron" else 0)
+
+
+def test_hexahedra_and_tetrahedra_in_one_deck(tmp_path: Path) -> None:
+    """Two bricks side by side on faces of their own are two parts; apart from that both kinds are read."""
+    nodes, hexes = brick("hexahedron20", (1, 1, 1), (10.0, 10.0, 10.0))
+    others, tets = brick("tetra10", (1, 1, 1), (10.0, 10.0, 10.0))
+    both = {"hexahedron20": hexes, "tetra10": tets + len(nodes)}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", np.concatenate([nodes, others + 20]), both), MM)
+    mass = solids.assemble(mesh.nodes, mesh.elements, STEEL)[1]
+    assert mass.sum() / 3 == pytest.approx(2 * 7850e-6)
+    assert len(mesh.cells) == 7 and (mesh.cells[1:, 10:] == -1).all()
+
+
+def test_traps_of_decks(tmp_path: Path) -> None:
+    """Lower-case types, several *NODE blocks, sets of sets, GENERATE, includes: read, where meshio ends the process or
+    forgets."""
+    nodes, cells = brick("hexahedron", (1, 1, 1), (1.0, 1.0, 1.0))
+    rows = [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(nodes, 11)]
+    (tmp_path / "more.inp").write_text("*node\n" + "\n".join(rows[4:]) + "\n", encoding="utf-8")
+    text = ["*Heading", "a brick", "*node, nset=low", *rows[:4], "*include, input=more.inp", "*element, type=c3d8r, elset=e1",
+            "1, " + ", ".join(str(n + 11) for n in cells[0]), "*nset, nset=\"High\", generate", "15, 18", "*nset, nset=all",
+            "low, High", "*nset, nset=Body, elset=e1"]  # fmt: skip
+    path = tmp_path / "brick.inp"
+    path.write_text("\n".join(text) + "\n", encoding="utf-8")
+    mesh = read_mesh(path, 1.0)
+    assert {name: len(set(members) & set(range(8))) for name, members in mesh.sets.items()} == {"LOW": 4, "HIGH": 4, "ALL": 8, "BODY": 8}
+    assert list(mesh.labels[:8]) == list(range(11, 19)) and mesh.raised == 1
+
+
+def test_meshio_ends_no_process(tmp_path: Path) -> None:
+    path = tmp_path / "brick.msh"
+    path.write_text("$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", encoding="utf-8")
+    with pytest.raises(MeshError, match="brick.msh: not a gmsh file that can be read"):
+        read_mesh(path, MM)
+    with pytest.raises(MeshError, match="'.stl' is no mesh file that is read here"):
+        read_mesh(tmp_path / "brick.stl", MM)
+
+
+def test_nastran_coordinate_systems_are_refused(tmp_path: Path) -> None:
+    nodes, cells = brick("hexahedron")
+    with pytest.raises(MeshError, match=r"brick.bdf:4: a GRID in coordinate system 5"):
+        read_mesh(nastran(tmp_path / "brick.bdf", nodes, "hexahedron", cells, "5"), MM)
+    (tmp_path / "cards.bdf").write_text("GRID,1,,0.,0.,0.\n", encoding="utf-8")
+    with pytest.raises(MeshError, match="BEGIN BULK"):
+        read_mesh(tmp_path / "cards.bdf", MM)
+
+
+NODES = np.array([[11, 0], [11, 1], [11, 2], [7, 0], [7, 1], [7, 2]])  # rows of the files: node and component
+LABELS = np.array([7, 11])
+
+
+@pytest.fixture(scope="module")
+def matrix() -> np.ndarray:
+    random = np.random.default_rng(4).standard_normal((6, 6))
+    full = random @ random.T
+    full[0, 4] = full[4, 0] = full[1, 5] = full[5, 1] = 0.0
+    return full
+
+
+def op4(path: Path, values: np.ndarray, sparse: bool, big: bool = False) -> Path:
+    """ASCII OUTPUT4, five numbers a line of 16 characters."""
+    rows = -len(values) if big else len(values)
+    lines = [f"{len(values):8d}{rows:8d}{6:8d}{2:8d}{'KGG':<8}1P,5E16.9"]
+    for k, column in enumerate(values.T, 1):
+        words = [f"{v:16.9E}" for v in column]
+        numbers = ["".join(words[i : i + 5]) for i in range(0, len(words), 5)]
+        if not sparse:
+            lines += [f"{k:8d}{1:8d}{len(values):8d}", *numbers]
+        elif big:
+            lines += [f"{k:8d}{0:8d}{2 * len(values) + 2:8d}", f"{2 * len(values) + 1:8d}{1:8d}", *numbers]
+        else:
+            lines += [f"{k:8d}{0:8d}{2 * len(values) + 1:8d}", f"{1 + 65536 * (2 * len(values) + 1):8d}", *numbers]
+    lines += [f"{len(values) + 1:8d}{1:8d}{1:8d}", f"{1.0:16.9E}"]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    return path
+
+
+def dmig(path: Path, values: np.ndarray, wide: bool) -> Path:
+    """Lower triangle by columns, as Nastran punches a symmetric DMIG."""
+    star, width = ("*", 16) if wide else ("", 8)
+    lines = [f"{'DMIG' + star:<8}" + "".join(f"{v:<{width}}" for v in ("KAAX", "0", "6", "2")) if not wide else "DMIG    KAAX    0       6       2       0"]
+    for k, (node, component) in enumerate(NODES):
+        lines.append(f"{'DMIG' + star:<8}{'KAAX':<{width}}{node:<{width}}{component + 1:<{width}}")
+        for j in range(k, 6):
+            value = f"{values[j, k]:.9E}".replace("E", "D") if wide else f"{values[j, k]:.4f}"
+            lines.append(f"{star or '+':<8}{NODES[j, 0]:<{width}}{NODES[j, 1] + 1:<{width}}{value:<{width}}")
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    return path
+
+
+def in_mesh_order(values: np.ndarray) -> np.ndarray:
+    return values[np.ix_([3, 4, 5, 0, 1, 2], [3, 4, 5, 0, 1, 2])]
+
+
+@pytest.mark.parametrize("form", ["mtx", "mtx symmetric", "npz", "npz dense", "npy", "sti", "op4", "op4 sparse", "op4 big"])
+def test_matrices_by_rows(tmp_path: Path, matrix: np.ndarray, form: str) -> None:
+    path = tmp_path / f"k.{form.split()[0]}"
+    writers = {
+        "mtx": lambda: scipy.io.mmwrite(path, sp.coo_array(matrix), precision=16, symmetry="general"),
+        "mtx symmetric": lambda: scipy.io.mmwrite(path, sp.coo_array(matrix), precision=16, symmetry="symmetric"),
+        "npz": lambda: sp.save_npz(path, sp.csr_matrix(matrix)),
+        "npz dense": lambda: np.savez(path, k=matrix),
+        "npy": lambda: np.save(path, matrix),
+        "sti": lambda: path.write_text(
+            "".join(f"{i + 1} {j + 1} {matrix[i, j]:20.13e}\n" for j in range(6) for i in range(j + 1)), encoding="ascii"
+        ),
+        "op4": lambda: op4(path, matrix, False),
+        "op4 sparse": lambda: op4(path, matrix, True),
+        "op4 big": lambda: op4(path, matrix, True, big=True),
+    }
+    writers[form]()
+    (tmp_path / "k.dof").write_text("".join(f"{n}.{c + 1}\n" for n, c in NODES), encoding="ascii")
+    found = read_matrix(path, read_unknowns(tmp_path / "k.dof"), LABELS).toarray()
+    assert np.allclose(found, in_mesh_order(matrix), rtol=0, atol=2e-8)
+    assert np.allclose(read_matrix(path, None, LABELS).toarray(), matrix, rtol=0, atol=2e-8)
+
+
+@pytest.mark.parametrize("wide", [True, False])
+def test_dmig_names_its_own_rows(tmp_path: Path, matrix: np.ndarray, wide: bool) -> None:
+    path = dmig(tmp_path / "k.pch", matrix, wide)
+    assert np.allclose(read_matrix(path, None, LABELS).toarray(), in_mesh_order(matrix), rtol=0, atol=2e-8 if wide else 1e-4)
+
+
+BAD = {
+    "k.op2": (b"x", "is no matrix file that is read here: .mtx"),
+    "k.op4": (b"\x18\x00\x00\x00\x06\x00", "a binary OUTPUT4 file; ask for FORMATTED"),
+    "k.mtx": (b"no header", "no sound .mtx matrix"),
+    "k.npz": (b"no zip", "no sound .npz matrix|cannot be read"),
+    "k.sti": (b"1 2\n", "no sound .sti matrix"),
+    "k.pch": (b"$ nothing\n", "expected one DMIG matrix, found 0"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_unreadable_matrices_are_refused(tmp_path: Path, name: str) -> None:
+    content, wanted = BAD[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError, match=wanted):
+        read_matrix(tmp_path / name, None, LABELS)
+    with pytest.raises(MeshError, match="nowhere.mtx: the file cannot be read"):
+        read_matrix(tmp_path / "nowhere.mtx", None, LABELS)
+
+
+def test_rows_must_be_the_displacements_of_all_nodes(tmp_path: Path, matrix: np.ndarray) -> None:
+    np.save(tmp_path / "k.npy", matrix)
+    with pytest.raises(MeshError, match="row 11.1 is no displacement of a node"):
+        read_matrix(tmp_path / "k.npy", NODES, np.array([7, 8]))
+    with pytest.raises(MeshError, match=r"3 unknowns of the mesh have no row \(first: node 12\)"):
+        read_matrix(tmp_path / "k.npy", NODES, np.array([7, 11, 12]))
+    with pytest.raises(MeshError, match="6 rows, but `unknowns` names 5"):
+        read_matrix(tmp_path / "k.npy", NODES[:5], LABELS)
