@@ -106,9 +106,9 @@ class Elastic:
     def _holding(self) -> tuple[np.ndarray, _SmallSystem]:
         """Response to Cᵀ on the supports, and the system of λ and the rigid motion on the supports."""
         response = self._solve_supported(self.constraints.T.toarray())
-        coupling = self.constraints @ self._kernel
+        coupling, rows = self.constraints @ self._kernel, self.constraints.shape[0]
         zero = np.zeros((coupling.shape[1],) * 2)
-        return response, _SmallSystem(np.block([[self.constraints @ response, -coupling], [-coupling.T, zero]]))
+        return response, _SmallSystem(np.block([[self.constraints @ response, -coupling], [-coupling.T, zero]]), rows)
 
     def flexibility(self, loads: np.ndarray) -> np.ndarray:
         """The static response to loads (N, k): P K⁺ Pᵀ f for a free body, with what is held held."""
@@ -175,13 +175,16 @@ class Shifted:
 class _SmallSystem:
     """Symmetric system, scaled; directions that do not matter (dependent rows) are left out.
 
-    Rows with a diagonal are scaled to unit diagonal, those without one to unit coupling with them."""
+    The first `forces` rows are scaled to unit diagonal (those that the supports hold have none: as the smallest), the
+    others, which never have one, to unit coupling with them."""
 
-    def __init__(self, matrix: np.ndarray):
-        diagonal, tiny = np.sqrt(np.abs(matrix.diagonal())), np.finfo(float).tiny
-        self._scale = np.where(diagonal > 0, 1 / (diagonal + tiny), 0.0)
-        coupling = np.abs(matrix @ np.diag(self._scale)).max(axis=1, initial=0.0)
-        self._scale = np.where(diagonal > 0, self._scale, 1 / (coupling + tiny))
+    def __init__(self, matrix: np.ndarray, forces: int | None = None):
+        tiny = np.finfo(float).tiny
+        diagonal = np.abs(matrix.diagonal()[:forces])
+        smallest = diagonal[diagonal > 1e-12 * diagonal.max(initial=0.0)].min(initial=np.inf)
+        first = 1 / np.sqrt(np.maximum(diagonal, smallest if np.isfinite(smallest) else 1.0) + tiny)
+        second = np.abs(matrix[len(first) :, : len(first)] * first).max(axis=1, initial=0.0)
+        self._scale = np.concatenate([first, 1 / np.where(second > 0, second, 1.0)])
         scaled = matrix * np.outer(self._scale, self._scale)
         values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
         keep = np.abs(values) > _RANK * np.abs(values).max(initial=0.0)
