@@ -22,6 +22,7 @@ VERBS = {
         "gearfmu.commands.stages:reduce",
         "Reduce the gears of a stage to .h5 bodies (skipped when up to date).",
     ),
+    "import": ("gearfmu.commands.imports:import_", "Check finite elements made elsewhere, fit the involutes; writes nothing."),
     "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),

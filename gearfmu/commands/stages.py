@@ -31,17 +31,22 @@ def new(name: str, like: str) -> None:
     "--scale", type=click.FloatRange(0.2, 4), default=1.0, show_default=True, help="Factor on all element counts."
 )
 @click.option("--full", is_flag=True, help="All teeth instead of one sector.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the .vtu files.")
-def mesh(stage: str, only: str | None, scale: float, full: bool, out: Path) -> None:
+@click.option("--deck", is_flag=True, help="Also <body>.inp for CalculiX, with a step that stores K and M.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the files.")
+def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out: Path) -> None:
     """Mesh the bodies of STAGE, print size and quality, write <body>.vtu."""
     from gearfmu.femesh import mesh_report, write_vtu
+    from gearfmu.femesh.deck import write_deck
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
     for name in _chosen(_names(spec), only):
         sector, facts = _sector(spec, name, scale)
         path = out / f"{name}.vtu"
-        write_vtu(sector.full() if full else sector, path)
+        written = sector.full() if full else sector
+        write_vtu(written, path)
+        if deck:
+            write_deck(written, path.with_suffix(".inp"), _body(spec, name).material.model_dump())
         click.echo(name)
         echo_pairs({**mesh_report(sector, *facts), "written": str(path)}, "  ")
 
@@ -99,6 +104,11 @@ def _names(spec: Any) -> list[str]:
     return list(SET_BODIES) if spec.kind == "planetary_set" else [gear.name for gear in spec.gears]
 
 
+def _body(spec: Any, name: str) -> Any:
+    """What the spec says about a body."""
+    return spec.carrier if name == "carrier" else next(gear for gear in spec.gears if gear.name == name)
+
+
 def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
     from gearfmu.femesh import sector_mesh
@@ -107,7 +117,7 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     from gearfmu.geometry.carrier import CarrierGeometry
     from gearfmu.geometry.internal import InternalGearGeometry
 
-    body = spec.carrier if name == "carrier" else next(gear for gear in spec.gears if gear.name == name)
+    body = _body(spec, name)
     own = body.mesh if name == "carrier" else body.body.mesh
     counts = own.model_copy(update={"scale": own.scale * scale})
     if name == "carrier":
