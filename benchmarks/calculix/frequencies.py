@@ -1,11 +1,10 @@
-"""Elastic frequencies of free bodies by CalculiX, beside ours: first on the same mesh of the same elements, then on finer
-ones.
+"""Elastic frequencies of free bodies by CalculiX: our meshes, all teeth, 20-node hexahedra (C3D20).
 
     python benchmarks/calculix/frequencies.py [CASE …] [--work DIR] [--out frequencies.csv] [--compare]
 
-The whole body goes to CalculiX (20-node hexahedra, C3D20); ours come from one sector and its cyclic symmetry. What the
-table has is not run again unless it is named. `--compare` runs nothing of CalculiX: it prints both codes side by side.
-Needs CalculiX's ccx (Debian: calculix-ccx); minutes a case.
+What the table has is not run again unless it is named. `--compare` runs nothing of CalculiX: it prints ours, from one
+sector of the same mesh and its cyclic symmetry, and from the mesh that the stage file asks for. Needs CalculiX's ccx
+(Debian: calculix-ccx); seconds to some minutes a case.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import csv
 import hashlib
 import re
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,9 @@ from ccx import require_ccx, run
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.gear import GearSpec
+from gearfmu.modes.cyclic import cyclic_modes
+from gearfmu.modes.planetary import set_sector
+from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
 
 COUNT, RIGID = 20, 6
@@ -48,19 +49,42 @@ CASES = {
     for case in (
         Case("pinion_coarse", "fzg_c", "pinion", 0.4),
         Case("pinion", "fzg_c", "pinion", 0.7),
+        Case("ring_coarse", "planetary54", "ring", 0.2),
+        Case("ring", "planetary54", "ring", 0.4),
+        Case("carrier_coarse", "planetary54", "carrier", 0.5),
+        Case("carrier", "planetary54", "carrier", 1.0),
     )
 }
 
 
-def body_of(case: Case) -> tuple[GearSpec, FeMesh]:
-    """The gear and the finite elements of one of its sectors."""
+def body_of(case: Case) -> tuple[Material, FeMesh]:
+    """The body's material and the finite elements of one of its sectors."""
     spec = load_stage(case.stage)
+    if spec.kind == "planetary_set":
+        return getattr(spec, case.body).material, set_sector(spec, case.body, case.scale)
     (gear,) = (gear for gear in spec.gears if gear.name == case.body)
     counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * case.scale})
-    return gear, gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts)
+    return gear.material, gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts)
 
 
-def write_deck(mesh: FeMesh, gear: GearSpec, path: Path) -> None:
+def ours(case: Case) -> np.ndarray:
+    """Our lowest elastic frequencies (COUNT,) Hz of a case."""
+    material, sector = body_of(case)
+    found = cyclic_modes(case.body, sector, material, COUNT)
+    return np.concatenate([[mode.frequency] * len(mode.numbers) for mode in found.modes])[:COUNT]
+
+
+def compare(rows: list[dict[str, Any]]) -> None:
+    """Print our frequencies against those of the table."""
+    for name, case in CASES.items():
+        theirs = np.array([float(row["frequency_Hz"]) for row in rows if row["case"] == name])
+        if len(theirs):
+            same = np.abs(ours(case) / theirs - 1)
+            shipped = 100 * (ours(replace(case, scale=1.0)) / theirs - 1)
+            print(f"{name}: same mesh {same.max():.1e}, the file's mesh {shipped.min():+.3f} … {shipped.max():+.3f} %")
+
+
+def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
     """Free vibration of the whole body, in mm, N, tonnes and s."""
     lines = ["*NODE, NSET=ALL"]
     lines += [f"{k}, {x:.14g}, {y:.14g}, {z:.14g}" for k, (x, y, z) in enumerate(1e3 * mesh.nodes, start=1)]
@@ -68,7 +92,6 @@ def write_deck(mesh: FeMesh, gear: GearSpec, path: Path) -> None:
     for k, row in enumerate(mesh.elements + 1, start=1):
         text = [str(node) for node in row]
         lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
-    material = gear.material
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}"]
     lines += ["*DENSITY", f"{1e-12 * material.density:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL"]
     lines += ["*STEP", "*FREQUENCY", f"{COUNT + RIGID}", "*END STEP"]
@@ -86,12 +109,12 @@ def frequencies(path: Path) -> np.ndarray:
 
 def solved(case: Case, work: Path) -> list[dict[str, Any]]:
     """The table's rows of a case, made by running it."""
-    gear, sector = body_of(case)
+    material, sector = body_of(case)
     mesh = sector.full()
     folder = work / f"frequencies_{case.name}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "free.inp"
-    write_deck(mesh, gear, deck)
+    write_deck(mesh, material, deck)
     seconds = run(deck)
     digest = hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
     size = {"nodes": len(mesh.nodes), "elements": len(mesh.elements), "seconds": f"{seconds:.0f}", "deck_sha256": digest}
@@ -123,9 +146,12 @@ def main() -> None:
     parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES))
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
     parser.add_argument("--out", type=Path, default=HERE / "frequencies.csv")
+    parser.add_argument("--compare", action="store_true")
     chosen = parser.parse_args()
     if unknown := [name for name in chosen.cases if name not in CASES]:
         parser.error(f"no case {', '.join(unknown)}; there are {', '.join(CASES)}")
+    if chosen.compare:
+        return compare(read(chosen.out))
     require_ccx()
     done = {row["case"] for row in read(chosen.out)}
     for name in chosen.cases or [name for name in CASES if name not in done]:

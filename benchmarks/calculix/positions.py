@@ -1,12 +1,15 @@
 """Loaded transmission error over one pitch by CalculiX: 12 positions, three torques, beside what `gearfmu te` says.
 
-    python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--work DIR] [--out positions.csv] [--compare]
+    python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--bores averaged|clamped] [--work DIR]
+                                            [--out FILE] [--compare]
 
-The bores' mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does). The pinion is turned
-to where gearfmu expects the torque; from the torque that comes out (within a few per cent) te is moved to the one asked
-by gearfmu's tangent stiffness. Where ccx ends with teeth that stick, te is moved by up to 2 % and solved again. What the table has is not run again unless its position is named. `--compare` runs
-nothing: it prints both codes side by side. Needs CalculiX's ccx (Debian: calculix-ccx); half a minute to some minutes a
-run.
+Bores averaged: their mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does), into
+positions.csv. Clamped: all nodes of a bore move as one rigid body, in both codes (`rigid_bores.py`: minutes before the
+first run), into positions_clamped.csv. The pinion is turned to where gearfmu expects the torque; from the torque that
+comes out (within a few per cent) te is moved to the one asked by gearfmu's tangent stiffness. Where ccx ends with teeth
+that stick, te is moved by up to 2 % and solved again. What the table has is not run again unless its position is named.
+`--compare` runs nothing: it prints both codes side by side. Needs CalculiX's ccx (Debian: calculix-ccx); half a minute
+to some minutes a run.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import argparse
 import csv
 import math
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +31,7 @@ from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry, hertz
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
+from rigid_bores import rigid_bore_bodies
 from section import Fineness
 
 POSITIONS = 12
@@ -38,14 +43,24 @@ PENALTY = 1e16  # Pa/m: two pairs do not converge at 3e16; costs 0.3 % of stiffn
 HERE = Path(__file__).parent
 
 
-def te_of_gearfmu(spec: StageSpec) -> TeResult:
+@dataclass(frozen=True)
+class Place:
+    """A row to come: torque (N·m), number of the position, bores "averaged" or "clamped"."""
+
+    torque: float
+    position: int
+    bores: str
+
+
+def te_of_gearfmu(spec: StageSpec, bores: str) -> TeResult:
     """Transmission error and tangent stiffness at all torques and positions."""
-    model = assemble(spec, load_stage_bodies(spec))
+    bodies = load_stage_bodies(spec) if bores == "averaged" else rigid_bore_bodies(spec)
+    model = assemble(spec, bodies)
     return loaded_te(model, TORQUES, POSITIONS, rigid_bearings=True)
 
 
-def case_at(spec: StageSpec, pair: PairGeometry, torque: float) -> Case:
-    """Averaged bores; fine zone as wide as contact at this torque (N·m) needs it."""
+def case_at(spec: StageSpec, pair: PairGeometry, torque: float, bores: str) -> Case:
+    """Fine zone as wide as contact at this torque (N·m) needs it."""
     materials = [gear.material for gear in spec.gears]
     e_star = hertz.contact_modulus(
         (materials[0].youngs_modulus, materials[1].youngs_modulus),
@@ -55,18 +70,19 @@ def case_at(spec: StageSpec, pair: PairGeometry, torque: float) -> Case:
     load = torque / pair.gears[0].r_b / spec.gears[0].face_width
     half_width = hertz.half_width(load, radius, e_star)
     fine = Fineness(patch=PATCH * half_width, size=SIZE * half_width)
-    return Case("positions", bores="averaged", fine=fine, penalty=PENALTY)
+    return Case("positions", bores=bores, fine=fine, penalty=PENALTY)
 
 
-def solved(spec: StageSpec, ours: TeResult, torque: float, position: int, work: Path) -> dict[str, Any]:
+def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path) -> dict[str, Any]:
     """The table's row of one torque and position."""
+    torque, position = place.torque, place.position
     pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES.index(torque)
     turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
-    folder = work / f"position_{position:02d}_{torque:g}"
+    folder = work / f"position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
     for nudge in NUDGES:
         load = Load(turn, nudge * ours.te[row, position], MARGIN)
         try:
-            solution = solve(case_at(spec, pair, torque), pair, width, [load], folder)
+            solution = solve(case_at(spec, pair, torque, place.bores), pair, width, [load], folder)
         except RuntimeError as failure:
             refused = failure
         else:
@@ -103,9 +119,8 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-def compare(spec: StageSpec, rows: list[dict[str, Any]]) -> None:
-    """Print te of both codes, and mean and peak to peak over the positions that there are."""
-    ours = 1e6 * te_of_gearfmu(spec).te
+def compare(ours: np.ndarray, rows: list[dict[str, Any]]) -> None:
+    """Print te (µm) of both codes, and mean and peak to peak over the positions that there are."""
     print("torque_Nm,position,calculix_um,gearfmu_um,difference_%")
     for torque, curve in zip(TORQUES, ours, strict=True):
         here = [row for row in rows if float(row["torque_Nm"]) == torque]
@@ -127,24 +142,26 @@ def main() -> None:
     parser.add_argument("--torque", type=float, action="append", choices=TORQUES, help="N·m on the pinion; may repeat")
     parser.add_argument("--stage", default="fzg_c")
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
-    parser.add_argument("--out", type=Path, default=HERE / "positions.csv")
+    parser.add_argument("--bores", choices=("averaged", "clamped"), default="averaged")
+    parser.add_argument("--out", type=Path, help="table; positions.csv or positions_clamped.csv beside this file")
     parser.add_argument("--compare", action="store_true")
     chosen = parser.parse_args()
-    spec, rows = load_stage(chosen.stage), read(chosen.out)
+    out = chosen.out or HERE / ("positions.csv" if chosen.bores == "averaged" else "positions_clamped.csv")
+    spec, rows = load_stage(chosen.stage), read(out)
+    ours = te_of_gearfmu(spec, chosen.bores)
     if chosen.compare:
-        return compare(spec, rows)
+        return compare(1e6 * ours.te, rows)
     require_ccx()
-    ours = te_of_gearfmu(spec)
     done, failed = {_place(row) for row in rows}, []
     for torque in chosen.torque or TORQUES:
         for position in chosen.positions or [k for k in range(POSITIONS) if (torque, k) not in done]:
             try:
-                fresh = solved(spec, ours, torque, position, chosen.work)
+                fresh = solved(spec, ours, Place(torque, position, chosen.bores), chosen.work)
             except RuntimeError as failure:
                 failed.append(f"{torque:g} N·m, position {position}: {failure}")
                 continue
             rows = [row for row in rows if _place(row) != (torque, position)] + [fresh]
-            write(chosen.out, rows)
+            write(out, rows)
             print(f"{torque:g} N·m, position {position}: {fresh['te_um']} µm", file=sys.stderr, flush=True)
     if failed:
         raise SystemExit("\n".join(failed))

@@ -39,5 +39,7 @@ def main_harmonic(points: np.ndarray, shape: np.ndarray, cyclic_index: int, sect
 
 
 def _cells(values: np.ndarray) -> np.ndarray:
-    span = np.ptp(values) or 1.0
-    return np.minimum(((values - values.min()) / span * CELLS).astype(int), CELLS - 1)
+    """Number of each value's cell; cells are a little wider than the span over CELLS, and lie so that equal values but
+    for rounding share one."""
+    span = max(np.ptp(values), 1e-6 * np.abs(values).max())
+    return ((values - values.min()) / span * (CELLS - 1) + 0.37).astype(int)

@@ -10,7 +10,7 @@ import numpy as np
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.femesh.ring import ring_sector, sector_mesh
+from gearfmu.femesh.ring import sector_mesh
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
@@ -23,31 +23,35 @@ from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
 BODIES = ("sun", "planet", "ring", "carrier")
 
 
-def set_body_modes(spec: Any, name: str, count: int, progress: Progress | None = None) -> BodyModes:
+def set_body_modes(
+    spec: Any, name: str, count: int, progress: Progress | None = None, scale: float = 1.0
+) -> BodyModes:
     """The `count` lowest elastic modes of a free body of a PlanetarySpec, with its modal damping: sun, planet and ring
-    by one sector; the carrier with its bolts and bore coupled as the file says. The ring's mounts are left out."""
+    by one sector; the carrier with its bolts and bore coupled as the file says. The ring's mounts are left out.
+
+    scale : factor on all element counts.
+    """
     gear = getattr(spec, name)
     if name == "carrier":
-        found = _carrier(spec, count, progress)
+        found = _carrier(spec, count, progress, scale)
     else:
-        found = cyclic_modes(name, set_sector(spec, name), gear.material, count, progress)
+        found = cyclic_modes(name, set_sector(spec, name, scale), gear.material, count, progress)
     return _damped(found, gear.modal_damping)
 
 
-def mounted_ring_modes(spec: Any, count: int, progress: Progress | None = None) -> BodyModes:
-    """The lowest modes of the ring on its mounts; element counts are 0.4 of the file's, since all teeth are needed.
+def mounted_ring_modes(
+    spec: Any, count: int, progress: Progress | None = None, scale: float = RING_SCALE
+) -> BodyModes:
+    """The lowest modes of the ring on its mounts, with all its teeth.
 
-    BodyError for a ring without mounts.
+    scale : factor on all element counts; at 1 a whole ring is too much. BodyError for a ring without mounts.
     """
     if spec.ring.mounts is None:
         raise BodyError(f"{spec.source}: the ring has no mounts: leave --mounted away, or add [ring.mounts]")
     if progress:
         progress("finite elements", 0.1)
-    geometry, counts = InternalGearGeometry.of(spec.ring, spec.set), spec.ring.body.mesh
-    mesh = ring_sector(
-        geometry, spec.ring.face_width, counts.model_copy(update={"scale": counts.scale * RING_SCALE})
-    ).full()
-    found = whole_modes(ring_full_order(spec), mesh, {}, spec.ring.material, count)
+    mesh = set_sector(spec, "ring", scale).full()
+    found = whole_modes(ring_full_order(spec, scale), mesh, {}, spec.ring.material, count)
     return _damped(replace(found, name="ring_on_mounts"), spec.ring.modal_damping)
 
 
@@ -62,14 +66,14 @@ def set_sector(spec: Any, name: str, scale: float = 1.0) -> FeMesh:
     return sector_mesh(geometry.of(part, spec.set), part.face_width, counts)
 
 
-def _carrier(spec: Any, count: int, progress: Progress | None) -> BodyModes:
+def _carrier(spec: Any, count: int, progress: Progress | None, scale: float) -> BodyModes:
     if progress:
         progress("finite elements", 0.1)
-    sector = set_sector(spec, "carrier")
+    sector = set_sector(spec, "carrier", scale)
     mesh = sector.full()
     slaves = {f"bolt{k}": sector.sector_nodes(k)[sector.sets["bolt"]] for k in range(sector.teeth)}
     return whole_modes(
-        carrier_full_order(spec), mesh, slaves | {"bore": mesh.sets["bore"]}, spec.carrier.material, count
+        carrier_full_order(spec, scale), mesh, slaves | {"bore": mesh.sets["bore"]}, spec.carrier.material, count
     )
 
 

@@ -1,0 +1,42 @@
+"""Small bodies of shipped stages for tests: few elements, every tooth."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.geometry import GearGeometry
+from gearfmu.modes import BodyModes
+from gearfmu.modes.cyclic import cyclic_modes
+from gearfmu.modes.planetary import set_sector
+from gearfmu.spec.gear import Material
+from gearfmu.spec.stage import load_stage
+
+COUNT = 10
+
+
+def pinion() -> tuple[FeMesh, Material]:
+    """One coarse sector of the FZG pinion."""
+    spec = load_stage("fzg_c")
+    gear = spec.gears[0]
+    counts = gear.body.mesh.model_copy(update={"scale": 0.25})
+    return gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts), gear.material
+
+
+def set_body(name: str, scale: float) -> tuple[FeMesh, Material]:
+    """One sector of a body of planetary54."""
+    spec = load_stage("planetary54")
+    return set_sector(spec, name, scale), getattr(spec, name).material
+
+
+@lru_cache
+def pinion_modes() -> BodyModes:
+    mesh, material = pinion()
+    return cyclic_modes("pinion", mesh, material, COUNT)
+
+
+def frequencies(body: BodyModes) -> np.ndarray:
+    """All of them, those of a pair twice."""
+    return np.concatenate([[mode.frequency] * len(mode.numbers) for mode in body.modes])

@@ -1,0 +1,168 @@
+"""Mode shapes of bodies: one sector against the whole body, nodal diameters, energies, rigid couplings, mounts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small import COUNT, frequencies, pinion, pinion_modes, set_body
+
+from gearfmu.errors import BodyError
+from gearfmu.fem import hex20, surface
+from gearfmu.fem.free import FreeBody
+from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.modes.cyclic import cyclic_modes
+from gearfmu.modes.gear import as_stored
+from gearfmu.modes.harmonics import MOST, harmonic_shares
+from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes
+from gearfmu.modes.shapes import energy_shares
+from gearfmu.modes.whole import whole_modes
+from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.spec.stage import load_stage
+
+
+@pytest.fixture(scope="module")
+def whole() -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (Hz) and shapes (N, 3, k) of the whole pinion without any symmetry."""
+    mesh, material = pinion()
+    full = mesh.full()
+    free = FreeBody(*hex20.assemble(full.nodes, full.elements, material), full.nodes, full.elements)
+    squared, shapes = lowest_modes(free, COUNT + 2)
+    return np.sqrt(squared) / (2 * np.pi), shapes.reshape(len(full.nodes), 3, -1)
+
+
+def test_frequencies_are_those_of_the_whole_body(whole) -> None:
+    found = frequencies(pinion_modes())
+    assert len(found) >= COUNT and np.allclose(found, whole[0][: len(found)], rtol=1e-7)
+
+
+def test_shapes_are_those_of_the_whole_body_and_mass_normalised(whole) -> None:
+    """The shapes of one frequency span the same space, by the same orthogonal turn everywhere on the surface."""
+    mesh, _ = pinion()
+    used = np.unique(surface.boundary_faces(mesh.full().elements))
+    body = pinion_modes()
+    assert np.allclose(body.points, mesh.full().nodes[used])
+    for mode in body.modes:
+        theirs = whole[1][used][..., [n - 1 for n in mode.numbers]].reshape(-1, len(mode.numbers))
+        mine = mode.shape.reshape(len(mode.numbers), -1).T
+        turn, *_ = np.linalg.lstsq(theirs, mine, rcond=None)
+        assert np.allclose(theirs @ turn, mine, atol=1e-4 * np.abs(mine).max())
+        assert np.allclose(turn.T @ turn, np.eye(len(turn)), atol=1e-4)
+
+
+def test_count_is_kept_and_pairs_stay_whole() -> None:
+    mesh, material = pinion()
+    for count, expected in ((1, 2), (2, 2), (5, 5)):
+        body = cyclic_modes("pinion", mesh, material, count)
+        numbers = [n for mode in body.modes for n in mode.numbers]
+        assert numbers == list(range(1, expected + 1))
+        assert np.allclose(frequencies(body), frequencies(pinion_modes())[:expected], rtol=1e-9)
+
+
+def test_projection_around_the_axis_finds_the_nodal_diameters() -> None:
+    body = pinion_modes()
+    for mode in body.modes:
+        shares = sum(harmonic_shares(body.points, shape) for shape in mode.shape) / len(mode.shape)
+        assert np.argmax(shares) == mode.nodal_diameter and shares.max() > 0.8
+
+
+def test_projection_of_known_fields() -> None:
+    angle, z = (a.ravel() for a in np.meshgrid(2 * np.pi * np.arange(48) / 48, [-1.0, 1.0]))
+    points = np.stack([np.cos(angle), np.sin(angle), z], axis=1)
+    field = np.stack([0 * angle, 0 * angle, 3 * np.cos(2 * angle + 0.3) + np.sin(5 * angle)], axis=1)
+    expected = np.zeros(MOST + 1)
+    expected[[2, 5]] = 0.9, 0.1
+    assert np.allclose(harmonic_shares(points, field), expected, atol=1e-12)
+
+
+def test_names_and_energies_of_the_lowest_pinion_modes() -> None:
+    """Disc bending with 2 nodal diameters comes first, then 2 lobes, then the umbrella (shipped mesh: the same)."""
+    modes = pinion_modes().modes[:3]
+    assert [(m.nodal_diameter, m.motion, m.name) for m in modes] == [
+        (2, "out-of-plane", "disc bending"),
+        (2, "in-plane", "2 lobes"),
+        (0, "out-of-plane", "umbrella"),
+    ]
+    for mode in modes:
+        assert mode.energy.sum() == pytest.approx(1) and np.argmax(mode.energy) == (0 if mode.parity > 0 else 2)
+
+
+def test_energy_of_rigid_motions() -> None:
+    mesh, material = pinion()
+    full = mesh.full()
+    mass = hex20.assemble(full.nodes, full.elements, material)[1][::3, ::3]
+    turning = np.cross([0, 0, 1.0], full.nodes)
+    assert np.allclose(energy_shares(full.nodes, mass, turning), [0, 1, 0], atol=1e-12)
+    assert np.allclose(energy_shares(full.nodes, mass, np.eye(3)[[2] * len(full.nodes)]), [0, 0, 1], atol=1e-12)
+    assert np.allclose(energy_shares(full.nodes, mass, np.eye(3)[[0] * len(full.nodes)]), [0.5, 0.5, 0], atol=1e-3)
+
+
+def test_stored_frequencies_are_compared() -> None:
+    body = pinion_modes()
+    stored = frequencies(body)
+    damping = np.linspace(0.01, 0.02, len(stored))
+    assert [m.damping_ratio for m in as_stored(body, stored, damping).modes] == [
+        damping[m.numbers[0] - 1] for m in body.modes
+    ]
+    with pytest.raises(BodyError, match=r"pinion: frequencies .* differ by 1\.0e-04 .*gearfmu reduce --force"):
+        as_stored(body, stored * 1.0001, damping)
+
+
+def test_a_ring_by_sectors_and_as_a_whole() -> None:
+    """Two roads: 54 sectors, and all teeth at once without symmetry."""
+    mesh, material = set_body("ring", 0.2)
+    sectors = cyclic_modes("ring", mesh, material, 8)
+    whole = whole_modes(ring_full_order(load_stage("planetary54"), 0.2, mounted=False), mesh.full(), {}, material, 8)
+    assert np.allclose(frequencies(sectors)[:8], frequencies(whole)[:8], rtol=1e-7)
+    assert [m.nodal_diameter for m in whole.modes] == [m.nodal_diameter for m in sectors.modes]
+    assert [m.parity for m in whole.modes] == [m.parity for m in sectors.modes]
+    for mode, other in zip(whole.modes, sectors.modes, strict=True):
+        assert np.allclose(mode.energy, other.energy, atol=1e-3) and len(mode.numbers) == len(other.numbers)
+
+
+def test_springs_at_the_rim_hold_the_ring() -> None:
+    """Soft mounts: six modes of the rigid ring below its elastic ones, √(Σk/m) in each direction."""
+    spec = load_stage("planetary54")
+    soft = spec.ring.mounts.model_copy(update={"stiffness": 1e4})
+    spec = spec.model_copy(update={"ring": spec.ring.model_copy(update={"mounts": soft})})
+    found = mounted_ring_modes(spec, 7, scale=0.2)
+    mesh, material = set_body("ring", 0.2)
+    mass = mesh.teeth * hex20.assemble(mesh.nodes, mesh.elements, material)[1][::3, ::3].sum()
+    expected = np.sqrt(6 * 1e4 / mass) / (2 * np.pi)
+    held = frequencies(found)
+    assert (np.abs(held[:6] / expected - 1) < 1e-3).sum() == 3, "x, y and z"
+    assert held[6] == pytest.approx(frequencies(cyclic_modes("ring", mesh, material, 2))[0], rel=1e-3)
+
+
+def test_the_ring_without_mounts_has_no_mounted_modes() -> None:
+    spec = load_stage("planetary54")
+    spec = spec.model_copy(update={"ring": spec.ring.model_copy(update={"mounts": None})})
+    with pytest.raises(BodyError, match="the ring has no mounts"):
+        mounted_ring_modes(spec, 7)
+
+
+def test_rigid_couplings_of_the_carrier() -> None:
+    """Its bolts and its bore move as rigid bodies, which makes it stiffer than the bare carrier, not softer."""
+    spec = load_stage("planetary54")
+    found = set_body_modes(spec, "carrier", 6, scale=0.4)
+    mesh, material = set_body("carrier", 0.4)
+    assert np.all(frequencies(found)[:6] > frequencies(cyclic_modes("carrier", mesh, material, 6))[:6])
+    assert all(mode.damping_ratio == spec.carrier.modal_damping for mode in found.modes)
+    radius = np.hypot(found.points[:, 0], found.points[:, 1])
+    bore = found.points[np.abs(radius - spec.carrier.bore_diameter / 2) < 1e-9]
+    fields = np.zeros((len(bore), 3, 6))
+    fields[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    fields[..., 3:] = -np.cross(bore[:, None, :], np.eye(3)[None], axis=-1).transpose(0, 2, 1)
+    for mode in found.modes:
+        shape = mode.shape[0][np.abs(radius - spec.carrier.bore_diameter / 2) < 1e-9].ravel()
+        fit, *_ = np.linalg.lstsq(fields.reshape(-1, 6), shape, rcond=None)
+        assert np.allclose(fields.reshape(-1, 6) @ fit, shape, atol=1e-9 * np.abs(mode.shape).max())
+
+
+def test_drawn_displacement_is_five_per_cent_of_the_diameter() -> None:
+    body = pinion_modes()
+    doubled = replace(body.modes[0], shape=2 * body.modes[0].shape)
+    diameter = 2 * np.linalg.norm(body.points[:, :2], axis=1).max()
+    for mode in (body.modes[0], doubled):
+        assert np.linalg.norm(body.drawn(mode)[0], axis=1).max() == pytest.approx(0.05 * diameter)
