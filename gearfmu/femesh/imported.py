@@ -47,6 +47,12 @@ class ImportedMesh:
         rows = [np.pad(block, ((0, 0), (0, 20 - block.shape[1])), constant_values=-1) for block in self.elements.values()]
         return np.concatenate(rows)
 
+    @property
+    def repeated_cells(self) -> np.ndarray:
+        """(E, 20) node indices of every element; one of fewer nodes repeats its first."""
+        cells = self.cells
+        return np.where(cells >= 0, cells, cells[:, :1])
+
     def node_set(self, name: str) -> np.ndarray:
         """Node indices of a set, capitals or not. MeshError names the sets there are."""
         for own, nodes in self.sets.items():

@@ -32,12 +32,14 @@ class Elements:
 @dataclass(frozen=True)
 class Coupling:
     """How the nodes of a surface meet the outside: name, kind "rigid", "averaging" or "nodes" (of one node its own
-    three displacements), node numbers, and the master's point (3,) m."""
+    three displacements), node numbers, and the master's point (3,) m. rows (6, 3N): of an averaging coupling at its
+    point, where they are known already."""
 
     name: str
     kind: str
     nodes: np.ndarray
     point: np.ndarray
+    rows: sp.csr_array | None = None
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ def _interface(body: Elements, coupling: Coupling, transform: sp.csr_array, rigi
         first = size - 6 * (len(rigid) - k)
         rows = sp.csr_array((np.ones(6), (np.arange(6), first + np.arange(6))), shape=(6, size))
     elif coupling.kind == "averaging":
-        rows = averaging(body, coupling.nodes, coupling.point) @ transform
+        rows = (averaging(body, coupling.nodes, coupling.point) if coupling.rows is None else coupling.rows) @ transform
     else:
         assert coupling.kind == "nodes" and len(coupling.nodes) == 1
         components = COMPONENTS[:3]

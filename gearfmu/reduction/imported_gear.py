@@ -146,6 +146,7 @@ def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
     quality = np.concatenate([solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()])
     return {
         "file": mesh.source.name,
+        "teeth": fit.teeth,
         "nodes": len(mesh.nodes),
         "elements": {kind: len(block) for kind, block in mesh.elements.items()},
         "raised_to_quadratic": mesh.raised,

@@ -11,7 +11,9 @@ from decks import STEEL, brick, write_deck
 from gearfmu.fem import hex20, solids
 from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.errors import MeshError
 from gearfmu.femesh.imported import read_mesh
+from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.imported import Matrices, SetInterface, full_order
 
 MM = 1e-3
@@ -36,3 +38,32 @@ def test_a_deck_gives_the_frequencies_of_our_own_elements(tmp_path: Path) -> Non
     left, right = (i.rows @ body.rigid for i in body.interfaces)
     assert np.allclose(left[3:], np.eye(6)[3:], atol=1e-12)
     assert np.allclose(right[:3, 3:], [[0, 4e-3, -5e-3], [-4e-3, 0, 4e-2], [5e-3, -4e-2, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["hexahedron20", "tetra10", "hexahedron"])
+def test_rigid_and_averaging_sets_of_every_element(tmp_path: Path, kind: str) -> None:
+    """A bar pulled at averaging and rigid ends: the static stretch is F L / (E A), in between for the rigid ends."""
+    nodes, cells = brick(kind, (8, 2, 2))
+    ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {kind: cells}, ends), MM)
+    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
+    stretch = {}
+    for coupling in ("averaging", "rigid"):
+        body = full_order(mesh, matrices, [SetInterface("LEFT", coupling), SetInterface("RIGHT", coupling)])
+        assert np.abs(body.stiffness @ body.rigid).max() < 1e-8 * np.abs(body.stiffness).max()
+        pull = body.rows("RIGHT")[[0]] - body.rows("LEFT")[[0]]
+        stretch[coupling] = float((pull @ Elastic(body.held(body.rows("LEFT"))).flexibility(pull.T.toarray()))[0, 0])
+    exact = 0.04 / (206e9 * 8e-5)
+    assert stretch["averaging"] == pytest.approx(exact, rel=1e-2)
+    assert 0.95 * exact < stretch["rigid"] < stretch["averaging"]
+
+
+def test_a_set_in_one_line_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+    nodes, cells = brick("hexahedron20")
+    edge = {"EDGE": np.flatnonzero((nodes[:, 1] == 0) & (nodes[:, 2] == 0))}
+    mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": cells}, edge), MM)
+    matrices = Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL))
+    with pytest.raises(MeshError, match="'edge' lie in one line"):
+        full_order(mesh, matrices, [SetInterface("edge")])
+    with pytest.raises(MeshError, match="'welded' is no kind of interface: one of averaging, rigid"):
+        full_order(mesh, matrices, [SetInterface("edge", "welded")])
