@@ -91,14 +91,14 @@ def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.nda
 def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
     group_of = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
     waiting: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in ends]
-    fronts = []
+    fronts, workspace = [], Workspace()
     for number, stop in enumerate(ends):
         start = int(ends[number - 1]) if number else 0
         rows = matrix[start:stop]
         children, waiting[number] = waiting[number], []
         touched = np.unique(np.concatenate([rows.indices, *(index for index, _ in children)]))
         below = touched[touched >= stop]
-        dense = gathered(rows, start, below, children)
+        dense = gathered(rows, start, below, children, workspace)
         front, update = _eliminate(dense, start, int(stop), below)
         fronts.append(front)
         if len(below):
@@ -106,21 +106,50 @@ def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
     return fronts
 
 
-def gathered(rows: sp.csr_array, start: int, below: np.ndarray, children: list) -> np.ndarray:
-    """Lower triangle of a front (complex as `rows`): own columns of A and the children's Schur complements."""
+class Workspace:
+    """Memory for one front after the other: asking the system for it anew took longer than the arithmetic."""
+
+    def __init__(self) -> None:
+        self._memory = np.empty(0)
+
+    def square(self, size: int, dtype: np.dtype) -> np.ndarray:
+        """(size, size) zeros in Fortran order; valid until the next call."""
+        if self._memory.size < size * size:
+            self._memory = np.empty(size * size, dtype)
+        dense = self._memory[: size * size].reshape(size, size, order="F")
+        dense.fill(0)
+        return dense
+
+
+def gathered(rows: sp.csr_array, start: int, below: np.ndarray, children: list, workspace: Workspace) -> np.ndarray:
+    """Lower triangle of a front (complex as `rows`): own columns of A and the children's Schur complements.
+
+    children : (places, Schur complement), of which the upper triangle is read.
+    """
     own = rows.shape[0]
     size = own + len(below)
     position = np.empty(rows.shape[1], int)
     position[start : start + own] = np.arange(own)
     position[below] = np.arange(own, size)
-    dense = np.zeros((size, size), rows.dtype, order="F")
+    dense = workspace.square(size, rows.dtype)
     entries = rows.tocoo()
     ahead = entries.col >= start
     dense[position[entries.col[ahead]], entries.row[ahead]] = entries.data[ahead]
     for index, update in children:
-        place = position[index]
-        dense[np.ix_(place, place)] += update
+        _add_lower(dense, position[index], update)
     return dense
+
+
+def _add_lower(dense: np.ndarray, place: np.ndarray, update: np.ndarray) -> None:
+    """Add the upper triangle of `update` (C order) to the lower one of `dense` (Fortran order) at ascending places.
+
+    Run by run of consecutive places, so that whole columns are added at once.
+    """
+    ends = np.append(np.flatnonzero(np.diff(place) > 1) + 1, len(place))
+    columns, first = dense.T, 0
+    for last in ends:
+        columns[place[first] : place[last - 1] + 1, place[first:]] += update[first:last, first:]
+        first = last
 
 
 def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[_Front, np.ndarray]:
@@ -132,5 +161,6 @@ def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> t
             "the stiffness matrix is not positive definite: is the body held, are all elements sound?"
         ) from error
     rest = dtrsm(1.0, triangle, dense[own:, :own], side=1, lower=1, trans_a=1)
-    update = dense[own:, own:] - rest @ rest.T
+    product = np.matmul(rest, rest.T)
+    update = np.subtract(dense.T[own:, own:], product, out=product)
     return _Front(start, stop, below, np.asfortranarray(triangle), rest), update

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
+from scipy.linalg.blas import dtrsm
 
 from gearfmu.fem.dissection import nested_dissection
-from gearfmu.fem.factor import FactorError, dof_groups, gathered
+from gearfmu.fem.factor import FactorError, Workspace, dof_groups, gathered
 
 _COLUMNS = 128
 _REFINED = 1e-14  # residual relative to the right-hand side at which nothing is left to refine
@@ -94,14 +95,14 @@ class SymmetricFactor:
 def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
     group_of = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
     waiting: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in ends]
-    fronts = []
+    fronts, workspace = [], Workspace()
     for number, stop in enumerate(ends):
         start = int(ends[number - 1]) if number else 0
         rows = matrix[start:stop]
         children, waiting[number] = waiting[number], []
         touched = np.unique(np.concatenate([rows.indices, *(index for index, _ in children)]))
         below = touched[touched >= stop]
-        dense = gathered(rows, start, below, children)
+        dense = gathered(rows, start, below, children, workspace)
         front, update = _eliminate(dense, start, int(stop), below)
         fronts.append(front)
         if len(below):
@@ -113,11 +114,16 @@ def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> t
     size = stop - start
     block, coupling = dense[:size, :size], dense[size:, :size]
     own = _cholesky(block) if not np.iscomplexobj(dense) else None
-    if own is None:
+    if own is not None:
+        half = dtrsm(1.0, own[0], coupling.T, lower=1)
+        front = _Front(start, stop, below, own, dtrsm(1.0, own[0], half, lower=1, trans_a=1))
+        product = half.T @ half
+    else:
         own = _lu(np.tril(block) + np.tril(block, -1).T)
-    front = _Front(start, stop, below, own, np.empty((size, 0)))
-    front.influence = front.solve(np.asfortranarray(coupling.T))
-    return front, dense[size:, size:] - coupling @ front.influence
+        front = _Front(start, stop, below, own, np.empty((size, 0)))
+        front.influence = front.solve(np.asfortranarray(coupling.T))
+        product = coupling @ front.influence
+    return front, np.subtract(dense.T[size:, size:], product, out=product)
 
 
 def _lu(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
