@@ -1,0 +1,154 @@
+"""Couplings at interfaces: rigid (RBE2) and averaging (RBE3) nodes against what they mean, carrier and gears with them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from gearfmu.errors import MeshError
+from gearfmu.fem import hex20
+from gearfmu.fem.coupling import rigid_fields
+from gearfmu.fem.factor import Factor
+from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.toothed import gear_full_order
+from gearfmu.spec.stage import load_stage
+
+SPEC = load_stage("planetary54")
+SCALE = 0.34
+STEEL = SimpleNamespace(youngs_modulus=206e9, poisson_ratio=0.3, density=7850.0)
+
+
+def with_couplings(**kinds: str):
+    return SPEC.model_copy(update={"carrier": SPEC.carrier.model_copy(update={"coupling": kinds})})
+
+
+@pytest.fixture(scope="module")
+def carrier() -> FullOrder:
+    return carrier_full_order(SPEC, SCALE)
+
+
+@pytest.fixture(scope="module")
+def averaged() -> FullOrder:
+    return carrier_full_order(with_couplings(bore="averaging", bolt1="averaging"), SCALE)
+
+
+@pytest.fixture(scope="module")
+def elements() -> Elements:
+    mesh = carrier_sector(CarrierGeometry.of(SPEC), SPEC.carrier.mesh.model_copy(update={"scale": SCALE})).full()
+    return Elements(mesh.nodes, mesh.elements, *hex20.assemble(mesh.nodes, mesh.elements, SPEC.carrier.material))
+
+
+def test_interfaces_are_bolts_then_bore_and_the_bore_is_the_ground(carrier):
+    assert [i.name for i in carrier.interfaces] == ["bolt0", "bolt1", "bolt2", "bolt3", "bore"]
+    assert carrier.ground == ("bore",) and carrier.length == 45e-3
+    assert carrier.rows("bolt0", "bolt1", "bolt2", "bolt3").shape == (24, carrier.size)
+
+
+def test_kinds_are_chosen_for_each_interface(averaged, elements):
+    assert [i.kind for i in averaged.interfaces] == ["rigid", "averaging", "rigid", "rigid", "averaging"]
+    slaves = elements.nodes.shape[0] * 3 - (averaged.size - 18)  # three rigid bolts have eliminated theirs
+    assert slaves == 3 * 3 * len(_seat(elements, 0))
+
+
+@pytest.mark.parametrize("name", ["carrier", "averaged"])
+def test_rigid_motion_costs_nothing_and_every_node_follows_it(name, request):
+    body = request.getfixturevalue(name)
+    assert abs(body.stiffness @ body.rigid).max() < 1e-9 * abs(body.stiffness).max()
+    for interface in body.interfaces:
+        expected = np.vstack([rigid_fields(interface.point), np.eye(6)[3:]])
+        assert interface.rows @ body.rigid == pytest.approx(expected, abs=1e-12)
+
+
+def test_mass_and_inertia_are_the_analytic_ones(carrier):
+    geometry, mass = CarrierGeometry.of(SPEC), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
+    assert mass[0, 0] == pytest.approx(7850 * geometry.volume, rel=1e-3)
+    assert mass[5, 5] == pytest.approx(7850 * geometry.polar_moment, rel=1e-3)
+    assert mass[0, 4] / mass[0, 0] == pytest.approx(geometry.centre_of_mass, rel=1e-3)
+
+
+def test_rigid_coupling_is_the_body_with_its_slaves_moved_by_hand(carrier, elements):
+    """Bore held, bolt 0 moved by a unit motion of its master: reaction of the coupled body = that of the plain finite
+    elements whose seat nodes are given that motion."""
+    bolts = [_seat(elements, k) for k in range(4)]
+    bore = np.flatnonzero(np.abs(np.hypot(elements.nodes[:, 0], elements.nodes[:, 1]) - 20e-3) < 1e-9)
+    rows = sp.vstack([carrier.rows("bolt0"), carrier.rows("bolt1", "bolt2", "bolt3", "bore")]).tocsr()
+    driven = rows.indices
+    free = np.setdiff1d(np.arange(carrier.size), driven)
+    k_fd = carrier.stiffness[free][:, driven[:6]].toarray()
+    inner = spl.splu(sp.csc_matrix(carrier.stiffness[free][:, free])).solve(-k_fd)
+    mine = carrier.stiffness[driven[:6]][:, free] @ inner + carrier.stiffness[driven[:6]][:, driven[:6]].toarray()
+    dofs = (3 * np.concatenate([*bolts, bore])[:, None] + np.arange(3)).ravel()
+    motion = np.zeros((len(dofs), 6))
+    motion[: 3 * len(bolts[0])] = rigid_fields(elements.nodes[bolts[0]] - [45e-3, 0, 0]).reshape(-1, 6)
+    rest = np.setdiff1d(np.arange(3 * len(elements.nodes)), dofs)
+    k = elements.stiffness
+    moved = spl.splu(sp.csc_matrix(k[rest][:, rest])).solve(-(k[rest][:, dofs] @ motion))
+    theirs = motion.T @ (k[dofs][:, rest] @ moved + k[dofs][:, dofs] @ motion)
+    assert mine == pytest.approx(theirs, rel=1e-8, abs=1e-9 * np.abs(theirs).max())
+
+
+def test_averaging_node_is_softer_than_a_rigid_one(carrier, averaged):
+    """A rigid coupling stiffens the seat; both read the same rigid motion."""
+    stiff, soft = (_held_flexibility(body, "bolt1") for body in (carrier, averaged))
+    assert np.all(np.diag(soft) > np.diag(stiff)) and np.all(np.diag(soft) < 4 * np.diag(stiff))
+
+
+def _held_flexibility(body: FullOrder, name: str) -> np.ndarray:
+    """Compliance (6, 6) at an interface with the plate's underside at the bore held by springs of 1e12 N/m."""
+    weight = 1e12 * body.rows("bore").T @ sp.diags_array([1, 1, 1, 1e-3, 1e-3, 1e-3]) @ body.rows("bore")
+    rows = body.rows(name).toarray()
+    return rows @ spl.splu(sp.csc_matrix(body.stiffness + weight)).solve(rows.T)
+
+
+def test_cells_cover_every_coupling_so_that_the_factorisation_is_right(carrier):
+    shifted = sp.csr_array(carrier.stiffness + 1e8 * carrier.mass)
+    load = np.random.default_rng(0).standard_normal((carrier.size, 3))
+    solution = Factor(shifted, carrier.cells, carrier.node_of_dof).solve(load)
+    assert np.abs(shifted @ solution - load).max() < 1e-7 * np.abs(load).max()
+
+
+def test_springs_of_mounts_carry_the_load_to_the_ground(elements):
+    """Sum of spring forces = load, sum of moments = moment."""
+    mounts = [Coupling(f"mount{k}", "averaging", _seat(elements, k), elements.nodes[_seat(elements, k)].mean(axis=0))
+              for k in range(4)]  # fmt: skip
+    rows = sp.csr_array(sp.vstack([averaging(elements, m.nodes, m.point)[:3] for m in mounts]))
+    node = Coupling("node", "nodes", np.array([7]), elements.nodes[7])
+    body = full_order("test", elements, [node], Judgement((), 0.05), Springs(rows, np.full(12, 1e7)))
+    assert body.rigid.shape[1] == 0 and abs(body.stiffness - body.stiffness.T).max() == 0
+    load = body.rows("node").toarray().T
+    response = Factor(body.stiffness, body.cells, body.node_of_dof).solve(load)
+    force = (1e7 * (rows @ response)).reshape(4, 3, 3)
+    assert force.sum(axis=0) == pytest.approx(np.eye(3), abs=1e-8)
+    moment = sum(np.cross(m.point[:, None], f, axis=0) for m, f in zip(mounts, force, strict=True))
+    assert moment == pytest.approx(np.cross(elements.nodes[7][:, None], np.eye(3), axis=0), abs=1e-9)
+
+
+def test_two_rigid_couplings_cannot_share_a_node(elements):
+    seat = _seat(elements, 0)
+    both = [Coupling(name, "rigid", seat, np.zeros(3)) for name in ("first", "second")]
+    with pytest.raises(MeshError, match="'first' and 'second'"):
+        full_order("test", elements, both, Judgement((), 1.0))
+    with pytest.raises(MeshError, match="has no nodes"):
+        full_order("test", elements, [Coupling("empty", "rigid", seat[:0], np.zeros(3))], Judgement((), 1.0))
+
+
+def test_a_whole_gear_has_one_node_a_tooth_and_its_bore():
+    body = gear_full_order(SPEC, "sun", 0.25)
+    assert [i.name for i in body.interfaces] == [*(f"tooth{k}" for k in range(18)), "bore"]
+    assert body.ground == ("bore",) and body.length == pytest.approx(22.5e-3)
+    pair = gear_full_order(load_stage("fzg_c"), "pinion", 0.2)
+    assert len(pair.interfaces) == 17
+
+
+def _seat(elements: Elements, bolt: int) -> np.ndarray:
+    axis = CarrierGeometry.of(SPEC).bolt_axis(bolt)
+    distance = np.hypot(elements.nodes[:, 0] - axis[0], elements.nodes[:, 1] - axis[1])
+    return np.flatnonzero((np.abs(distance - 8e-3) < 1e-9) & (elements.nodes[:, 2] > -10e-3 - 1e-9))
