@@ -1,0 +1,182 @@
+"""The bodies of planetary54: not stale, small, physically right; their files; the carrier's body from end to end."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearfmu.body import (
+    inspect_file,
+    load_body,
+    load_interface_body,
+    load_set_bodies,
+    load_stage_bodies,
+    mounted,
+    reduce_set,
+    reduce_stage,
+)
+from gearfmu.body.interface_body import ENTRIES, TEXTS, InterfaceBody, save_interface_body
+from gearfmu.body.layout import RIM_ENTRIES
+from gearfmu.body.planetary import reduce_set_body, set_body_path
+from gearfmu.body.store import save_body
+from gearfmu.errors import BodyError, SpecError
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.spec.planetary_body import SET_BODIES
+from gearfmu.spec.stage import load_stage
+
+SPEC = load_stage("planetary54")
+COARSE = SPEC.model_copy(
+    update={"carrier": SPEC.carrier.model_copy(update={
+        "mesh": SPEC.carrier.mesh.model_copy(update={"scale": 0.34}), "modes": 72, "method": "rubin"
+    })}
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict:
+    return dict(zip(SET_BODIES, load_set_bodies(SPEC), strict=True))
+
+
+@pytest.fixture(scope="module")
+def carrier() -> InterfaceBody:
+    return reduce_set_body(COARSE, "carrier")
+
+
+def test_shipped_bodies_are_current_small_and_trusted_over_the_band(shipped):
+    for name, body in shipped.items():
+        assert set_body_path(SPEC, name).stat().st_size <= 8e6
+        error, band = (body.max_error, body.band) if name == "carrier" else (body.frf.max_error, body.frf.band)
+        assert error < 0.01 and band == (50.0, 10e3)
+    assert [shipped[name].modes for name in ("sun", "planet", "ring", "carrier")] == [400, 400, 400, 120]
+    assert shipped["carrier"].max_error < 1e-6
+
+
+def test_masses_and_inertias_are_the_analytic_ones(shipped):
+    ring, carrier = InternalGearGeometry.of(SPEC.ring, SPEC.set), CarrierGeometry.of(SPEC)
+    volume = ring.z * ring.sector_area * SPEC.ring.face_width
+    assert shipped["ring"].mass == pytest.approx(7850 * volume, rel=1e-5)
+    polar = 7850 * ring.z * ring.sector_polar_moment * SPEC.ring.face_width
+    assert shipped["ring"].inertia[2, 2] == pytest.approx(polar, rel=1e-5)
+    assert shipped["carrier"].mass == pytest.approx(7850 * carrier.volume, rel=1e-4)
+    assert shipped["carrier"].inertia[2, 2] == pytest.approx(7850 * carrier.polar_moment, rel=1e-4)
+    assert shipped["carrier"].centre_of_mass == pytest.approx([0, 0, carrier.centre_of_mass], abs=1e-6)
+
+
+def test_planet_is_the_sun_with_a_larger_bore(shipped):
+    sun, planet = shipped["sun"], shipped["planet"]
+    assert sun.mass > planet.mass and sun.internal is planet.internal is False and sun.rim is None
+    assert sun.r_b == planet.r_b == pytest.approx(22.5e-3 * np.cos(np.radians(20)))
+
+
+def test_four_bolts_are_alike(shipped):
+    """Turned by a quarter, the carrier is itself: compliance of bolt k in its own frame."""
+    body = shipped["carrier"]
+    blocks = [body.static[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] for k in range(4)]
+    for k, block in enumerate(blocks):
+        c, s = np.cos(np.pi / 2 * k), np.sin(np.pi / 2 * k)
+        turn = np.kron(np.eye(2), np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+        size = np.sqrt(np.outer(blocks[0].diagonal(), blocks[0].diagonal()))
+        assert np.abs((turn @ block @ turn.T - blocks[0]) / size).max() < 1e-6
+
+
+@pytest.mark.parametrize("dynamic", [0, 30, 120])
+def test_residual_of_the_carrier_is_positive_semidefinite(shipped, dynamic):
+    body = shipped["carrier"]
+    rows = body.rows[:, :dynamic] / (2 * np.pi * body.frequency[:dynamic])
+    scale = np.sqrt(body.static.diagonal())
+    values = np.linalg.eigvalsh((body.static - rows @ rows.T) / np.outer(scale, scale))
+    assert values.min() > -1e-9
+
+
+def test_ring_on_its_mounts(shipped):
+    """Six modes that were rigid; one mean table for the residual, close to each tooth's own once 128 modes move."""
+    ring = mounted(shipped["ring"])
+    rigid = np.sqrt(6 * SPEC.ring.mounts.stiffness / shipped["ring"].mass) / (2 * np.pi)  # axial, on six springs
+    assert len(ring.frequency) == 406 and 0.6 * rigid < ring.frequency[0] < rigid
+    spread = [ring.residual_spread(0.5 * (ring.frequency[n - 1] + ring.frequency[n])) for n in (0, 36, 128)]
+    assert spread[0] > 0.2 and spread[1] < 0.02 and spread[2] < 0.005
+
+
+def test_ring_file_holds_what_its_mounts_need(shipped, tmp_path):
+    path = tmp_path / "ring.h5"
+    save_body(shipped["ring"], path)
+    back = load_body(path)
+    assert back.internal and np.array_equal(back.rim.static_fp, shipped["ring"].rim.static_fp)
+    facts = inspect_file(path)
+    assert facts["facts"]["mounts"] == 6 and len(facts["facts"]["mounted_frequencies_Hz"]) == 8
+    assert {entry.path for entry in RIM_ENTRIES} <= {d["path"] for d in facts["datasets"]}
+
+
+def test_carrier_file_reads_back_and_says_what_it_can_be_trusted_for(carrier, tmp_path):
+    path = tmp_path / "carrier.h5"
+    save_interface_body(carrier, path)
+    back = load_interface_body(path)
+    for entry in ENTRIES:
+        assert np.array_equal(getattr(back, entry.field), getattr(carrier, entry.field)), entry.path
+    assert [getattr(back, text) for text in TEXTS] == [getattr(carrier, text) for text in TEXTS]
+    facts = json.loads(json.dumps(inspect_file(path)))
+    assert facts["kind"] == "interface body" and facts["facts"]["method"] == "rubin" and facts["facts"]["modes"] <= 72
+    assert facts["frf"]["band_Hz"] == [50.0, 10e3] and facts["frf"]["max_error"] == carrier.max_error < 1e-2
+    assert facts["facts"]["mass_kg"] == pytest.approx(1.0859, rel=1e-3)
+
+
+def test_a_damaged_or_foreign_carrier_file_is_refused(carrier, shipped, tmp_path):
+    path = tmp_path / "carrier.h5"
+    save_interface_body(carrier, path)
+    raw = bytearray(path.read_bytes())
+    raw[5000] ^= 1
+    path.write_bytes(raw)
+    with pytest.raises(BodyError, match="damaged"):
+        load_interface_body(path)
+    save_body(shipped["sun"], path)
+    with pytest.raises(BodyError, match="not a gearfmu interface body"):
+        load_interface_body(path)
+
+
+def test_a_carrier_body_that_cannot_be_is_refused(carrier):
+    with pytest.raises(BodyError, match="modes/rows has shape"):
+        replace(carrier, rows=carrier.rows[:-1])
+    with pytest.raises(BodyError, match="not finite"):
+        replace(carrier, static=carrier.static * np.nan)
+    with pytest.raises(BodyError, match="ascending"):
+        replace(carrier, frequency=carrier.frequency[::-1])
+
+
+def test_missing_and_stale_bodies_are_refused(carrier, tmp_path):
+    with pytest.raises(BodyError, match="sun.h5: no such body file"):
+        load_set_bodies(SPEC, tmp_path)
+    for name in SET_BODIES:
+        (tmp_path / f"{name}.h5").write_bytes(set_body_path(SPEC, name).read_bytes())
+    save_interface_body(carrier, tmp_path / "carrier.h5")
+    with pytest.raises(BodyError, match="carrier.h5: stale"):
+        load_set_bodies(SPEC, tmp_path)
+
+
+def test_pair_functions_refuse_a_set():
+    for function in (load_stage_bodies, reduce_stage):
+        with pytest.raises(SpecError, match="this needs a pair"):
+            function(SPEC)
+
+
+def test_the_layout_is_documented():
+    from pathlib import Path
+
+    text = (Path(__file__).parents[2] / "docs" / "file-formats.md").read_text(encoding="utf-8")
+    for entry in (*RIM_ENTRIES, *ENTRIES):
+        assert f"`/{entry.path}`" in text and entry.meaning in text
+
+
+@pytest.mark.full
+def test_gearfmu_reduce_remakes_the_shipped_set(shipped, tmp_path):
+    """Same hashes, frequencies to 1e-8, statics to 1e-6."""
+    for made in reduce_set(SPEC, tmp_path):
+        old = shipped[made.name]
+        assert made.input_hash == old.input_hash
+        assert np.allclose(made.frequency[:100], old.frequency[:100], rtol=1e-8)
+        for field in ("static",) if made.name == "carrier" else ("static_ff", "static_fb", "static_bb"):
+            stored = getattr(old, field)
+            assert np.abs(getattr(made, field) - stored).max() <= 1e-6 * np.abs(stored).max()
