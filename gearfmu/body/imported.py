@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.body.parts import DRAWN, PICTURE_MODES, Parts, pictured_loads, sector_display, tooth_flank
-from gearfmu.errors import MeshError
+from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
-from gearfmu.femesh import sector_mesh
+from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -27,6 +27,20 @@ def read_gear(gear: Any, geometry: Any) -> ImportedGear:
     flank, points = tooth_flank(geometry, gear)
     wanted = Wanted(geometry.z, flank, points, 0.5 * gear.bore_diameter, gear.material)
     return imported_gear(gear.imported, wanted)
+
+
+def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:
+    """The sector mesh of an imported gear, as of one meshed here, for pictures. BodyError where there is none: mean tooth,
+    tetrahedra, ready-made matrices."""
+    found = read_gear(gear, geometry)
+    body = found.body
+    if not isinstance(body, ImportedSector) or set(body.cut.elements) != {"hexahedron20"} or gear.imported.stiffness:
+        raise BodyError(
+            f"{gear.imported.file}: this needs hexahedra, our own matrices and a mesh that repeats itself from tooth to tooth; "
+            "use the pictures of your own finite-element program"
+        )
+    cut = body.cut
+    return FeMesh(cut.nodes, cut.elements["hexahedron20"], {"bore": body.bore}, geometry.z, cut.cut_minus, cut.cut_plus)
 
 
 def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Parts:

@@ -111,6 +111,7 @@ def _body(spec: Any, name: str) -> Any:
 
 def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
+    from gearfmu.body.imported import imported_sector_mesh
     from gearfmu.femesh import sector_mesh
     from gearfmu.femesh.carrier import carrier_sector
     from gearfmu.geometry import GearGeometry
@@ -124,6 +125,8 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
         return carrier_sector(CarrierGeometry.of(spec), counts), ()
     pair = spec.set if spec.kind == "planetary_set" else spec.pair
     geometry = (InternalGearGeometry if name == "ring" else GearGeometry).of(body, pair)
+    if getattr(body, "imported", None):
+        return imported_sector_mesh(body, geometry), ()
     return sector_mesh(geometry, body.face_width, counts), (geometry.r_b, body.body.strip_half_width)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearfmu.body import ReducedBody
+from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
@@ -26,7 +27,11 @@ def gear_modes(
     another program version).
     """
     gear = spec.gears[gear_index]
-    mesh = gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, gear.body.mesh)
+    geometry = GearGeometry.of(gear, spec.pair)
+    if gear.imported is None:
+        mesh = gear_sector(geometry, gear.face_width, gear.body.mesh)
+    else:
+        mesh = imported_sector_mesh(gear, geometry)
     found = cyclic_modes(gear.name, mesh, gear.material, min(count, stored.modes), progress)
     return as_stored(found, stored.frequency, stored.damping_ratio)
 
