@@ -24,7 +24,7 @@ from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import PortSpec, StageSpec
-from gearfmu.stage import StageModel
+from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.model import FIXED_K
 from gearfmu.stage.tables import BORE, excited_modes, resampling, symmetric_functions
 
@@ -55,18 +55,30 @@ def stage_modes(
 
     SimulationError(no_equilibrium) where the pair finds none.
     """
-    position = np.arange(positions) / positions
-    found = [linearised(model, bodies, torque, part).modes(count) for part in position]
+    position, kernel = np.arange(positions) / positions, _prepared(model, bodies)
+    found = [linearised(model, bodies, torque, part, kernel).modes(count) for part in position]
     return StageModes(torque, position, *(np.stack(part) for part in zip(*found, strict=True)))
 
 
-def linearised(model: StageModel, bodies: Sequence[ReducedBody], torque: float, position: float) -> Linearised:
-    """Equation (18) at one position (in pitches) under `torque`, N·m on the pinion."""
-    kernel = model.kernel(level=0.0)
-    kernel.prepare()
-    contacts = loaded_contacts(model.spec, kernel, torque, position)
+def linearised(
+    model: StageModel, bodies: Sequence[ReducedBody], torque: float, position: float, kernel: Kernel | None = None
+) -> Linearised:
+    """Equation (18) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
+    statics; made here when None."""
+    contacts = loaded_contacts(model.spec, kernel or _prepared(model, bodies), torque, position)
     gears = [_gear(model.spec, bodies, index, position, contacts) for index in (0, 1)]
     return _coupled(model.spec, gears, contacts)
+
+
+def _prepared(model: StageModel, bodies: Sequence[ReducedBody]) -> Kernel:
+    """The kernel for statics. Without chains: their clutches are open at the start and hold no torque."""
+    spec = model.spec
+    if any(port.chain for port in spec.ports.values()):
+        bare = {shaft: port.model_copy(update={"chain": None}) for shaft, port in spec.ports.items()}
+        model = assemble(spec.model_copy(update={"ports": bare}), bodies)
+    kernel = model.kernel(level=0.0)
+    kernel.prepare()
+    return kernel
 
 
 @dataclass(frozen=True)
@@ -203,7 +215,10 @@ class Linearised:
         """Frequencies (count,) Hz above `RIGID_HZ`, ascending, damping ratios, shares (count, 4) of the strain energy,
         and the mesh force at resonance per transmission error (N/m): Γ²/(2ζω²), Γ = 1ᵀ(D + C_res)⁻¹ R φ over the
         contacts."""
-        squared, shapes = sl.eigh(self.stiffness, np.diag(self.mass))
+        scale = 1 / np.sqrt(self.mass)
+        last = min(count + 1, len(scale)) - 1  # at most one mode is rigid: two shafts and a mesh
+        squared, shapes = sl.eigh(scale[:, None] * self.stiffness * scale, subset_by_index=[0, last])
+        shapes = scale[:, None] * shapes
         first = int(np.searchsorted(squared, (2 * np.pi * RIGID_HZ) ** 2))
         squared, shapes = squared[first : first + count], shapes[:, first : first + count]
         omega = np.sqrt(squared)
