@@ -25,6 +25,7 @@ VERBS = {
     "import": ("gearfmu.commands.imports:import_", "Check finite elements made elsewhere, fit the involutes; writes nothing."),
     "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
+    "frf": ("gearfmu.commands.frf:frf", "Reduction methods judged by the transfer matrix of a body."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),
     "validate": ("gearfmu.commands.fmus:validate", "Check an FMU; lists all problems, exit code = their number."),
     "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),

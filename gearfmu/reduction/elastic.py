@@ -9,7 +9,12 @@ Source: inertia relief and attachment modes: Craig & Kurdila, Fundamentals of St
 
 from __future__ import annotations
 
+import time
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -34,17 +39,30 @@ def elastic(body: FullOrder) -> Elastic:
     return _KNOWN[body]
 
 
+@dataclass(frozen=True)
+class Piece:
+    """Something made once and kept: what it is, processor seconds and bytes (0 while memory is not traced) it took."""
+
+    made: Any
+    seconds: float
+    memory: int
+
+
 class Elastic:
     """Operators of a body under its constraints; vectors are (N, k).
 
     rigid : (N, r) mass-normalised rigid modes that nothing holds. elastic : number of elastic degrees of freedom.
     twin : operators of the same body with other constraints, whose factor is used.
+    pieces, touched : what was made and kept (factors, modes) and which of it was asked for since the caller cleared the
+    set, so that a method is charged for what it uses, whoever asked first.
     """
 
     dtype = float
 
     def __init__(self, body: FullOrder, twin: Elastic | None = None):
         self._twin = twin
+        self.pieces: dict[str, Piece] = {}
+        self.touched: set[str] = set()
         self.stiffness, self.mass_matrix = body.stiffness, body.mass
         self.cells, self.node_of_dof, self.size = body.cells, body.node_of_dof, body.size
         self._kernel = body.rigid
@@ -53,7 +71,16 @@ class Elastic:
         self.rigid = self._free_motions()
         self._mass_rigid = self.mass_matrix @ self.rigid
         self.elastic = body.size - self.rigid.shape[1] - self.constraints.shape[0]
-        self._modes: tuple[np.ndarray, np.ndarray] = (np.empty(0), np.empty((body.size, 0)))
+
+    def _piece(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is kept under `name`, made now if it is not there."""
+        self.touched.add(name)
+        if name not in self.pieces:
+            clock, memory = time.process_time(), tracemalloc.get_traced_memory()[0]
+            made = make()
+            taken = tracemalloc.get_traced_memory()[0] - memory
+            self.pieces[name] = Piece(made, time.process_time() - clock, max(taken, 0))
+        return self.pieces[name].made
 
     def _free_motions(self) -> np.ndarray:
         fields = self._kernel
@@ -86,11 +113,14 @@ class Elastic:
         """C Cᵀ."""
         return _SmallSystem((self.constraints @ self.constraints.T).toarray())
 
-    @cached_property
+    @property
     def _supported(self) -> tuple[np.ndarray, Factor]:
         """Unknowns left free by statically determinate supports of the kernel of K, and the factor of their K."""
         if self._twin is not None:
             return self._twin._supported
+        return self._piece("factor of K", self._support)
+
+    def _support(self) -> tuple[np.ndarray, Factor]:
         kernel = self._kernel
         held = sl.qr(kernel.T, mode="r", pivoting=True)[1][: kernel.shape[1]] if kernel.shape[1] else []
         free = np.setdiff1d(np.arange(self.size), held)
@@ -123,7 +153,16 @@ class Elastic:
         return self.gauge(solution)
 
     def shifted(self, shift: float) -> Shifted:
-        """Solutions at a shift, rad²/s²; one within 1e-4 of an eigenvalue moves by 0.3 % and more until it is not."""
+        """Solutions at a shift, rad²/s²; one within 1e-4 of an eigenvalue moves by 0.3 % and more until it is not.
+
+        The last two are kept."""
+        name = f"factor at {shift:.12g}"
+        for old in [key for key in self.pieces if key.startswith("factor at") and key != name][:-1]:
+            if name not in self.pieces:
+                del self.pieces[old]
+        return self._piece(name, lambda: self._clear_of_eigenvalues(shift))
+
+    def _clear_of_eigenvalues(self, shift: float) -> Shifted:
         for attempt in range(1, 9):
             try:
                 found = Shifted(self, shift)
@@ -138,9 +177,10 @@ class Elastic:
         """The `count` lowest elastic modes (fewer when the body has fewer): ω² (k,) and mass-normalised shapes (N, k).
 
         Raises ModesError."""
-        if len(self._modes[0]) < min(count, self.elastic):
-            self._modes = lowest_modes(self, count, block=16 if count > 60 else 8)
-        return self._modes[0][:count], self._modes[1][:, :count]
+        if "modes" in self.pieces and len(self.pieces["modes"].made[0]) < min(count, self.elastic):
+            del self.pieces["modes"]
+        squared, shapes = self._piece("modes", lambda: lowest_modes(self, count, block=16 if count > 60 else 8))
+        return squared[:count], shapes[:, :count]
 
 
 class Shifted:

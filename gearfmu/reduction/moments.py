@@ -47,7 +47,7 @@ class Expansion:
 
 def expansion_points(count: int, band: tuple[float, float]) -> np.ndarray:
     """`count` real points σ = Ω², rad²/s²: 0 and the rest on Chebyshev points of the second kind in Ω up to the upper
-    end of `band` (Hz), dense where the error would be largest."""
+    end of `band` (Hz)."""
     if count == 1:
         return np.zeros(1)
     top = 2 * np.pi * band[1]

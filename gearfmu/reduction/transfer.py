@@ -26,7 +26,7 @@ from gearfmu.reduction.moments import Expansion, input_loads
 from gearfmu.reduction.oscillators import Oscillators, Projection, decoupled
 
 LINES = 400
-_POINTS = (0.0, 0.55, 0.95)  # expansion points of a reference, in parts of the band's upper end
+_POINTS = (0.0, 0.5, 1.0)  # expansion points of a reference, in parts of the band's upper end
 _CONVERGED = 1e-12
 _ROUNDING = 1e-9  # below this a change that no longer shrinks is rounding
 _BLOCKS = 24

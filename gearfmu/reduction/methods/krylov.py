@@ -1,8 +1,8 @@
 """Block Krylov subspaces: moments of the transfer matrix matched at several real expansion points, 0 among them.
 
-Matched: with b blocks of m vectors on b points H and dH/dΩ² at each of them, the static response among them (`moments`).
-n = b·m, less what deflation leaves out and less what fills no whole block: n floats. Points: 0 and Chebyshev points in Ω
-over the band; one that meets an eigenvalue moves. Source: Grimme, thesis, Urbana 1997; Lehner & Eberhard, Math. Comput.
+Matched: H and its first 2p − 1 derivatives in Ω² at each point, p its number of blocks; the static response among them.
+n = b·m for b blocks of m inputs, less what deflation leaves out and what fills no whole block: n floats. Points: 0, the
+middle and the end of the band (three factorisations); one that meets an eigenvalue moves. Source: Grimme, thesis, Urbana 1997; Lehner & Eberhard, Math. Comput.
 Model. Dyn. Syst. 13 (2007) 191; paper section 2 (four nodes · six directions · five moments = 120).
 """
 
@@ -17,7 +17,7 @@ from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods.sizing import sized
 from gearfmu.reduction.moments import Expansion, expansion_points, input_loads
 
-_POINTS = 5  # expansion points; more blocks than that become higher powers at the same points
+_POINTS = 3  # expansion points; more blocks than that become higher powers at the same points
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:

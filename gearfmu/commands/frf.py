@@ -1,0 +1,155 @@
+"""The verb frf: reduction methods judged by the transfer matrix of a body."""
+
+from __future__ import annotations
+
+import fnmatch
+import tracemalloc
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from gearfmu.commands.models import by_text
+from gearfmu.commands.shared import Quantity, progress_bar
+
+HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded", "CPU s", "memory MB")
+
+
+@click.command()
+@click.argument("stage")
+@click.argument("body")
+@click.option(
+    "--methods",
+    default="modal,craig_bampton,rubin,krylov",
+    show_default=True,
+    help="Methods, comma-separated: modal, craig_bampton, rubin, krylov, static, snapshots; 'krylov:240' has a size of "
+    "its own.",
+)
+@click.option("--size", type=click.IntRange(1), default=120, show_default=True, help="Vectors n; rigid modes come on top.")
+@click.option("--tolerance", type=float, help="Instead of --size: the largest relative error allowed over the band.")
+@click.option(
+    "--band", nargs=2, type=Quantity("Hz"), default=(50.0, 10e3), show_default="50 Hz to 10 kHz", help="From, to."
+)
+@click.option("--damping", type=click.FloatRange(0), default=0.01, show_default=True, help="Damping ratio, in both models.")
+@click.option("--lines", type=click.IntRange(2), default=400, show_default=True, help="Logarithmically spaced lines.")
+@click.option("--free/--held", default=False, help="Reduce the free body (as the kernel takes it) or, as the paper, "
+              "with its ground held; judged with the ground held either way.  [default: held]")  # fmt: skip
+@click.option("--loaded", help="Rows that are really loaded, as patterns: 'bolt*.ux,bolt*.uy'; judged once more alone.")
+@click.option("--scale", type=click.FloatRange(0.05, 4), help="Factor on the element counts of the stage.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of table and chart.")
+def frf(stage: str, body: str, **options: Any) -> None:
+    """Relative error of the transfer matrix (Frobenius norm) of BODY of STAGE, reduced by several methods.
+
+    Prints a table, writes <body>_frf.csv (method, n, frequency_Hz, error) and a chart.
+    """
+    full = full_order_of(stage, body, options["scale"])
+    full = full if options["free"] else full.grounded()
+    contest = _contest(full, options)
+    from gearfmu.reduction.comparison import compare
+
+    tracemalloc.start()
+    with progress_bar(body) as progress:
+        found = compare(full, contest, by_text(progress))
+    tracemalloc.stop()
+    click.echo(f"{body}: {full.size} unknowns, {len(found.reference.labels)} inputs, {_ground(full, options)}, "
+               f"rotations times {1e3 * full.length:.4g} mm, {100 * contest.judging.damping_ratio:g} % damping")  # fmt: skip
+    for line in table(found.trials, contest):
+        click.echo(line)
+    click.echo(f"reference: {found.reference.size} vectors, last change {found.reference.change:.1e}, "
+               f"{found.reference_seconds:.1f} s; all {found.seconds:.1f} s of processor time")  # fmt: skip
+    written = write(found, contest, options["out"] / f"{body}_frf", f"{body}, {_ground(full, options)}")
+    click.echo(", ".join(map(str, written)))
+
+
+def full_order_of(stage: str, body: str, scale: float | None = None) -> Any:
+    """The FullOrder of a body of STAGE: gear, ring or carrier; a usage error for a body it does not have."""
+    from gearfmu.spec.stage import load_stage
+
+    spec, factor = load_stage(stage), {} if scale is None else {"scale": scale}
+    names = ["sun", "planet", "ring", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
+    if body not in names:
+        raise click.BadParameter(f"no body '{body}'; the stage has {', '.join(names)}", param_hint="BODY")
+    from gearfmu.reduction.carrier import carrier_full_order
+    from gearfmu.reduction.toothed import gear_full_order, ring_full_order
+
+    if body == "carrier" and spec.kind == "planetary_set":
+        return carrier_full_order(spec, **factor)
+    if body == "ring" and spec.kind == "planetary_set":
+        return ring_full_order(spec, **factor)
+    return gear_full_order(spec, body, **factor)
+
+
+def table(trials: Sequence[Any], contest: Any) -> list[str]:
+    """The trials as lines of text."""
+    rows: list[tuple[str, ...]] = [HEADER]
+    for t in trials:
+        worst = contest.judging.frequency[t.error.argmax()]
+        errors = (f"{np.median(t.error):.1e}", f"{t.mended.max():.1e}", f"{t.loaded.max():.1e}")
+        cost = (f"{t.seconds:.1f}", f"{1e-6 * t.memory:.0f}")
+        rows.append((t.method, str(t.model.size), f"{t.error.max():.1e}", f"{worst:.0f}", *errors, *cost))
+    kept = [k for k, name in enumerate(HEADER) if name != "loaded" or contest.loaded is not None]
+    widths = [max(len(row[k]) for row in rows) for k in kept]
+    return ["  ".join(row[k].rjust(w) for k, w in zip(kept, widths, strict=True)) for row in rows]
+
+
+def write(found: Any, contest: Any, base: Path, title: str) -> list[Path]:
+    """The CSV file (`method,n,frequency_Hz,error`) and the chart at `base` with their suffixes."""
+    from gearfmu.files import write_text
+    from gearfmu.report.frf import label_of, write_error_chart
+
+    lines = ["method,n,frequency_Hz,error"]
+    curves = {"norm": (contest.judging.frequency, np.linalg.norm(found.reference.matrix, axis=(1, 2)))}
+    for t in found.trials:
+        pairs = zip(contest.judging.frequency, t.error, strict=True)
+        lines += [f"{t.method},{t.model.size},{f:.6g},{e:.4e}" for f, e in pairs]
+        curves[f"{label_of(t.method)}, n = {t.model.size}"] = (contest.judging.frequency, t.error)
+    path = base.with_suffix(".csv")
+    write_text(path, "\n".join(lines) + "\n")
+    return [path, *write_error_chart(curves, base, title)]
+
+
+def loaded_rows(labels: Sequence[tuple[str, str]], patterns: str) -> np.ndarray:
+    """Indices of the rows "interface.component" that match one of the comma-separated patterns; a usage error for none."""
+    wanted = [pattern.strip() for pattern in patterns.split(",")]
+    names = [".".join(label) for label in labels]
+    found = [k for k, name in enumerate(names) if any(fnmatch.fnmatch(name, pattern) for pattern in wanted)]
+    if not found:
+        raise click.BadParameter(f"'{patterns}' matches none of {', '.join(names[:8])} …", param_hint="--loaded")
+    return np.array(found)
+
+
+def _contest(full: Any, options: dict[str, Any]) -> Any:
+    from gearfmu.reduction.comparison import Contest
+    from gearfmu.reduction.transfer import Judging
+
+    judging = Judging.over(tuple(options["band"]), options["lines"], options["damping"])
+    labels = [(i.name, c) for i in full.interfaces if i.name not in full.ground for c in i.components]
+    loaded = loaded_rows(labels, options["loaded"]) if options["loaded"] else None
+    return Contest(tuple(_entries(options)), judging, loaded)
+
+
+def _entries(options: dict[str, Any]) -> list[tuple[str, Any]]:
+    from gearfmu.reduction.basis import Size
+    from gearfmu.reduction.methods import METHODS
+
+    band, tolerance = tuple(options["band"]), options["tolerance"]
+    general = Size(None if tolerance else options["size"], tolerance, band)
+    entries = []
+    for text in options["methods"].split(","):
+        name, _, own = text.strip().partition(":")
+        if name not in METHODS or (own and not own.isdigit()):
+            raise click.BadParameter(
+                f"'{text.strip()}' is no method; there are {', '.join(METHODS)}, each with ':n' behind it for a size",
+                param_hint="--methods",
+            )
+        entries.append((name, replace(general, count=int(own), tolerance=None) if own else general))
+    return entries
+
+
+def _ground(full: Any, options: dict[str, Any]) -> str:
+    if options["free"] and full.ground:
+        return f"reduced free, judged with {', '.join(full.ground)} held"
+    return "held at its ground" if full.constraints is not None else "on its own mounts" if not full.rigid.size else "free"

@@ -1,0 +1,80 @@
+"""Charts of reduction methods: error over frequency, error against size, error against processor time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+
+from gearfmu.files import written_whole
+from gearfmu.report.style import COLOURS, INK, panels, styled
+
+LABELS = {
+    "modal": "modal truncation",
+    "craig_bampton": "Craig–Bampton",
+    "rubin": "Rubin / MacNeal",
+    "krylov": "block Krylov",
+    "static": "static modes",
+    "snapshots": "snapshots (POD)",
+}
+
+
+def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path: Path, title: str) -> list[Path]:
+    """Relative error over frequency, SVG and PNG at `path`; curves: label → frequency (F,) Hz and error (F,), or with
+    the label "norm" the norm of the transfer matrix, which gets a panel of its own above."""
+    norm = curves.get("norm")
+    with styled(), rc_context({"svg.hashsalt": path.stem}):
+        figure, axes = panels((1.6, 4.0) if norm is not None else (4.0,))
+        if norm is not None:
+            axes[0].loglog(*norm, color=INK)
+            axes[0].set_ylabel("|H|, m/N")
+        for number, (label, (frequency, error)) in enumerate((k, v) for k, v in curves.items() if k != "norm"):
+            colour = COLOURS[number % len(COLOURS)]
+            axes[-1].loglog(frequency, np.maximum(error, 1e-16), color=colour, label=label)
+        axes[0].set_title(title, loc="left")
+        axes[-1].set_ylabel("relative error (Frobenius)")
+        axes[-1].set_xlabel("frequency, Hz")
+        axes[-1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        return _saved(figure, path)
+
+
+def write_growth_chart(rows: Sequence[Mapping[str, Any]], path: Path, title: str) -> list[Path]:
+    """Largest error against the number of vectors and against processor time, one line a method; rows with method, n,
+    max_error, seconds."""
+    with styled(), rc_context({"svg.hashsalt": path.stem}):
+        figure, axes = panels((3.2, 3.2), share=False)
+        for number, method in enumerate(dict.fromkeys(row["method"] for row in rows)):
+            line = [row for row in rows if row["method"] == method]
+            style = {"color": COLOURS[number % len(COLOURS)], "marker": "o", "markersize": 3.5}
+            error = [row["max_error"] for row in line]
+            axes[0].semilogy([row["n"] for row in line], error, label=label_of(method), **style)
+            axes[1].loglog([row["seconds"] for row in line], error, **style)
+        for axis in axes:
+            axis.set_ylabel("largest relative error")
+        axes[1].xaxis.set_major_formatter("{x:g}")
+        axes[1].xaxis.set_minor_formatter("")
+        axes[0].set_title(title, loc="left")
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axes[0].set_xlabel("vectors n")
+        axes[1].set_xlabel("processor time of the reduction, s")
+        return _saved(figure, path)
+
+
+def label_of(method: str) -> str:
+    """A method's name for a legend; what follows a blank in `method` stays as it is."""
+    name, _, rest = method.partition(" ")
+    return f"{LABELS.get(name, name)} {rest}".strip()
+
+
+def _saved(figure: Any, path: Path) -> list[Path]:
+    written = []
+    for suffix in (".svg", ".png"):
+        target = path.with_suffix(suffix)
+        with written_whole(target) as temporary:
+            metadata = {"Date": None} if suffix == ".svg" else {}
+            figure.savefig(temporary, format=suffix[1:], dpi=160, metadata=metadata)
+        written.append(target)
+    return written
