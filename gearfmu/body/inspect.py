@@ -46,6 +46,8 @@ def _facts(body: ReducedBody) -> dict[str, Any]:
         "teeth": body.teeth,
         "mass_kg": body.mass,
         "polar_inertia_kgm2": float(body.inertia[2, 2]),
+        "transverse_inertia_kgm2": float(body.inertia[0, 0]),
+        "method": "free eigenmodes and static residual",
         "base_radius_m": body.r_b,
         "face_width_m": body.face_width,
         "strip_half_width_m": body.strip_half_width,

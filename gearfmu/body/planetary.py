@@ -71,8 +71,9 @@ def reduce_set(
     force: bool = False,
     progress: Progress | None = None,
 ) -> list[Body]:
-    """Reduce what is missing or stale of a set, on as many processors as there are up to two, and store it.
+    """Reduce what is missing or stale of a set, in two processes where there are two processors, and store it.
 
+    Where processes are spawned (Windows, macOS) a script that calls this needs `if __name__ == "__main__":`.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
     wanted = [name for name in SET_BODIES if force or not _is_current(spec, name, folder)]

@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.interpolate import BarycentricInterpolator
 
-from gearfmu.femesh import gear_sector
+from gearfmu.body.parts import tooth_flank
+from gearfmu.femesh import sector_mesh
 from gearfmu.geometry import GearGeometry
-from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.flank import Points
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import static_tables
 from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.stage import load_stage
 
+FZG, SET = load_stage("fzg_c"), load_stage("planetary54")
+CASES = {
+    "pinion": (FZG.gears[0], FZG.pair, GearGeometry, 20),
+    "sun": (SET.sun, SET.set, GearGeometry, 12),
+    "ring": (SET.ring, SET.set, InternalGearGeometry, 12),
+}
 
-def test_compliance_between_roll_points_is_within_half_a_percent():
-    spec = load_stage("fzg_c")
-    gear = spec.gears[0]
-    shape = GearGeometry.of(gear, spec.pair)
-    flank = ToothFlank(shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, gear.face_width, gear.body.strip_half_width)
-    fine, nodes = np.linspace(shape.s_form, shape.s_tip, 81), flank.chebyshev_rolls(gear.body.roll_points)
-    mesh = MeshSpec(flank=20, thickness=3, root=3, rim=2, width=2, thickness_grading=1.8)
+
+@pytest.mark.parametrize("name", ["pinion", "sun", pytest.param("ring", marks=pytest.mark.full)])
+def test_compliance_between_roll_points_is_within_half_a_percent(name):
+    gear, pair, kind, elements = CASES[name]
+    shape = kind.of(gear, pair)
+    flank, points = tooth_flank(shape, gear, name == "ring")
+    fine, nodes = np.linspace(*flank.roll_range, 81), points.rolls
+    mesh = MeshSpec(flank=elements, thickness=3, root=3, rim=2, width=2, thickness_grading=1.8)
     both = Points(np.concatenate([fine, nodes]), 1)
-    body = SectorBody(gear_sector(shape, gear.face_width, mesh), gear.material, flank, both)
+    body = SectorBody(sector_mesh(shape, gear.face_width, mesh), gear.material, flank, both)
     table = static_tables(body, []).static_ff[0, :, :2, :, :, 0, 0]
     weights = BarycentricInterpolator(nodes, np.eye(len(nodes)))(fine)
     count = len(fine)
