@@ -141,11 +141,23 @@ def test_mesh_writes_what_meshio_reads(tmp_path: Path, capsys: pytest.CaptureFix
     assert meshio.read(tmp_path / "pinion.vtu").points.shape[1] == 3
 
 
-@pytest.mark.parametrize("kind", ["stage", "scene"])
+def test_bodies_of_a_planetary_set_mesh_and_tell_their_facts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("ring", "carrier"):
+        code, out, _ = call("mesh", "planetary54", "--gear", name, "--scale", 0.34, "--out", tmp_path, capsys=capsys)
+        assert code == 0 and "scaled_jacobian_min" in out and (tmp_path / f"{name}.vtu").is_file()
+    code, out, _ = call("inspect", ROOT / "reduced_models" / "planetary54" / "carrier.h5", capsys=capsys)
+    assert code == 0 and "krylov" in out and "trusted_to_Hz" in out and "bolt3" in out
+    code, out, _ = call("inspect", "planetary54", capsys=capsys)
+    assert code == 0 and "ring_least_tip_radius" in out and "0.065362" in out
+
+
+@pytest.mark.parametrize("kind", ["stage", "planetary", "scene"])
 def test_schema_is_json_and_knows_the_fields(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("schema", kind, "--out", tmp_path / "s.json", capsys=capsys)[0] == 0
     made = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))
-    assert {"stage": "gears", "scene": "coupling"}[kind] in made["properties"]
+    assert {"stage": "gears", "planetary": "carrier", "scene": "coupling"}[kind] in made["properties"]
 
 
 def test_variables_page_in_docs_is_the_kernels_table(capsys: pytest.CaptureFixture[str]) -> None:
@@ -280,6 +292,10 @@ def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "inspect stage.toml",
         "validate damaged.fmu",
         "new fzg_c/../x",
+        "te planetary54 --torque 1_N*m",
+        "export planetary54 -o new.fmu",
+        "simulate planetary54 --torque 1_N*m --speed 1_rpm",
+        "mesh planetary54 --gear wheel",
     ],
 )
 def test_bad_input_is_one_clear_error_and_nothing_half_written(
