@@ -45,9 +45,10 @@ def frf(stage: str, body: str, **options: Any) -> None:
 
     Prints a table, writes <body>_frf.csv (method, n, frequency_Hz, error) and a chart.
     """
+    entries = _entries(options)
     full = full_order_of(stage, body, options["scale"])
     full = full if options["free"] else full.grounded()
-    contest = _contest(full, options)
+    contest = _contest(full, entries, options)
     from gearfmu.reduction.comparison import compare
 
     tracemalloc.start()
@@ -121,14 +122,14 @@ def loaded_rows(labels: Sequence[tuple[str, str]], patterns: str) -> np.ndarray:
     return np.array(found)
 
 
-def _contest(full: Any, options: dict[str, Any]) -> Any:
+def _contest(full: Any, entries: list[tuple[str, Any]], options: dict[str, Any]) -> Any:
     from gearfmu.reduction.comparison import Contest
     from gearfmu.reduction.transfer import Judging
 
     judging = Judging.over(tuple(options["band"]), options["lines"], options["damping"])
     labels = [(i.name, c) for i in full.interfaces if i.name not in full.ground for c in i.components]
     loaded = loaded_rows(labels, options["loaded"]) if options["loaded"] else None
-    return Contest(tuple(_entries(options)), judging, loaded)
+    return Contest(tuple(entries), judging, loaded)
 
 
 def _entries(options: dict[str, Any]) -> list[tuple[str, Any]]:

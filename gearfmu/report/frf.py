@@ -34,6 +34,9 @@ def write_error_chart(curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path:
         for number, (label, (frequency, error)) in enumerate((k, v) for k, v in curves.items() if k != "norm"):
             colour = COLOURS[number % len(COLOURS)]
             axes[-1].loglog(frequency, np.maximum(error, 1e-16), color=colour, label=label)
+        for panel in axes:
+            _formatted(panel.yaxis, powers=True)
+            _formatted(panel.xaxis, powers=False)
         axes[0].set_title(title, loc="left")
         axes[-1].set_ylabel("relative error (Frobenius)")
         axes[-1].set_xlabel("frequency, Hz")
@@ -54,13 +57,22 @@ def write_growth_chart(rows: Sequence[Mapping[str, Any]], path: Path, title: str
             axes[1].loglog([row["seconds"] for row in line], error, **style)
         for axis in axes:
             axis.set_ylabel("largest relative error")
-        axes[1].xaxis.set_major_formatter("{x:g}")
-        axes[1].xaxis.set_minor_formatter("")
+            _formatted(axis.yaxis, powers=True)
+        _formatted(axes[1].xaxis, powers=False)
         axes[0].set_title(title, loc="left")
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes[0].set_xlabel("vectors n")
         axes[1].set_xlabel("processor time of the reduction, s")
         return _saved(figure, path)
+
+
+def _power(value: float, _: int) -> str:
+    return f"1e{round(np.log10(value))}"
+
+
+def _formatted(axis: Any, powers: bool) -> None:
+    axis.set_major_formatter(_power if powers else "{x:g}")
+    axis.set_minor_formatter("")
 
 
 def label_of(method: str) -> str:

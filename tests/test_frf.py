@@ -1,0 +1,63 @@
+"""The verb frf: table, CSV and chart of reduction methods on a body of a shipped stage, on a coarse mesh."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from gearfmu import cli
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    code = cli.outcome(["frf", *map(str, arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def errors(path: Path) -> dict[str, list[float]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    found: dict[str, list[float]] = {}
+    for row in rows:
+        found.setdefault(row["method"], []).append(float(row["error"]))
+    return found
+
+
+def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
+    options = ["--scale", 0.3, "--lines", 30, "--loaded", "bolt*.ux,bolt*.uy", "--out", tmp_path]
+    code, out, err = call(capsys, "planetary54", "carrier", *options)
+    assert code == 0, err
+    assert "24 inputs, held at its ground, rotations times 45 mm, 1 % damping" in out
+    worst = {method: max(values) for method, values in errors(tmp_path / "carrier_frf.csv").items()}
+    assert worst["krylov"] < 1e-2 * worst["rubin"] < 1e-4 * worst["craig_bampton"]
+    assert worst["craig_bampton"] < 0.1 and worst["modal"] < 0.1
+    assert {p.name for p in tmp_path.iterdir()} == {"carrier_frf.csv", "carrier_frf.svg", "carrier_frf.png"}
+
+
+@pytest.mark.full
+def test_gear_of_a_pair_reduced_free_with_sizes_of_their_own(tmp_path, capsys) -> None:
+    options = ["--scale", 0.3, "--lines", 12, "--free", "--methods", "modal:10, static:90", "--out", tmp_path]
+    code, out, err = call(capsys, "fzg_c", "pinion", *options)
+    assert code == 0, err
+    found = errors(tmp_path / "pinion_frf.csv")
+    assert set(found) == {"modal", "static"} and all(len(values) == 12 for values in found.values())
+    assert "reduced free, judged with bore held" in out and found["static"][0] < 1e-6 < found["modal"][0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["planetary54", "wheel"], "no body 'wheel'; the stage has sun, planet, ring, carrier"),
+        (["planetary54", "carrier", "--methods", "guyan"], "'guyan' is no method; there are modal, craig_bampton"),
+        (["planetary54", "carrier", "--scale", 0.4, "--loaded", "pin*"], "'pin\\*' matches none of bolt0.ux"),
+        (["planetary54", "carrier", "--scale", 0.4, "--methods", "krylov", "--size", 20], "give at least that"),
+        (["planetary54", "carrier", "--band", "5 kHz", "1 kHz", "--scale", 0.4], "from a lower to a higher frequency"),
+    ],
+)
+def test_bad_input_is_one_clear_message_and_nothing_written(arguments, message, tmp_path, capsys) -> None:
+    code, _, err = call(capsys, *arguments, "--out", tmp_path / "none")
+    assert code in (1, cli.USAGE_ERROR) and not (tmp_path / "none").exists()
+    assert re.search(message, " ".join(err.split()))
