@@ -20,21 +20,32 @@ GOLDEN = HERE.parents[1] / "tests" / "reference" / "calculix_fzg_c.json"
 
 
 def collected(version: str) -> dict[str, Any]:
-    """The goldens: secants at the pitch point and te by torque over the positions, µm."""
+    """The goldens: secants at the pitch point, te by torque over the positions (µm), frequencies of free bodies."""
     stiffness = {row["case"]: float(row["secant_N_per_mm_um"]) for row in read(HERE / "pitch_point.csv")}
-    te: dict[str, dict[int, float]] = {}
-    for row in read(HERE / "positions.csv"):
-        te.setdefault(row["torque_Nm"], {})[round(POSITIONS * float(row["position"]))] = float(row["te_um"])
+    frequencies: dict[str, list[float]] = {}
+    for row in read(HERE / "frequencies.csv"):
+        frequencies.setdefault(row["case"], []).append(float(row["frequency_Hz"]))
     return {
         "made_by": "python benchmarks/calculix/pitch_point.py; python benchmarks/calculix/positions.py; "
+        "python benchmarks/calculix/positions.py --bores clamped; python benchmarks/calculix/frequencies.py; "
         "python benchmarks/calculix/golden.py",
         "solver": version,
         "stage": "fzg_c",
         "pitch_point_secant_N_per_mm_um": stiffness,
         "line_load_N_per_mm": 300,
         "positions_per_pitch": POSITIONS,
-        "te_um_by_torque_Nm_and_position": te,
+        "te_um_by_torque_Nm_and_position": transmission_errors("positions.csv"),
+        "te_um_with_clamped_bores": transmission_errors("positions_clamped.csv"),
+        "frequencies_Hz": frequencies,
     }
+
+
+def transmission_errors(table: str) -> dict[str, dict[int, float]]:
+    """te (µm) by torque and number of the position."""
+    te: dict[str, dict[int, float]] = {}
+    for row in read(HERE / table):
+        te.setdefault(row["torque_Nm"], {})[round(POSITIONS * float(row["position"]))] = float(row["te_um"])
+    return te
 
 
 def main() -> None:
