@@ -83,7 +83,8 @@ def hex8(folder: Path, mesh: FeMesh) -> str:
 def keyway(folder: Path, mesh: FeMesh) -> str:
     """Without the elements on the bore within one pitch of tooth 0."""
     middle = mesh.nodes[mesh.elements].mean(axis=1)
-    near = (np.hypot(middle[:, 0], middle[:, 1]) < 19e-3) & (np.abs(np.arctan2(middle[:, 1], middle[:, 0])) < np.pi / 16)
+    radius, angle = np.hypot(middle[:, 0], middle[:, 1]), np.arctan2(middle[:, 1], middle[:, 0])
+    near = (radius < 1.05 * radius.min()) & (np.abs(angle) < np.pi / 16)
     used, cells = np.unique(mesh.elements[~near], return_inverse=True)
     meshio.Mesh(mesh.nodes[used], [("hexahedron20", cells.reshape(-1, 20))]).write(folder / "pinion.vtu")
     return SECTION.format(".vtu", "").replace("1 mm", "1 m")

@@ -15,37 +15,48 @@ from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
-from gearfmu.reduction.imported_gear import ImportedGear, Wanted, hinge_problem, imported_gear
+from gearfmu.reduction.imported_gear import (
+    BORE,
+    CheckedGear,
+    ImportedGear,
+    Wanted,
+    checked_gear,
+    hinge_problem,
+    imported_gear,
+)
 from gearfmu.reduction.imported_sector import ImportedSector
 from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.modal import Modes, Progress, elastic_modes
 from gearfmu.reduction.statics import Statics, static_tables
 
 
-def read_gear(gear: Any, geometry: Any) -> ImportedGear:
-    """The imported finite elements of a GearSpec, checked and placed. Raises MeshError."""
+def check_gear(gear: Any, geometry: Any) -> CheckedGear:
+    """The imported finite elements of a GearSpec, read, checked and placed. Raises MeshError."""
+    return checked_gear(gear.imported, _wanted(gear, geometry))
+
+
+def _wanted(gear: Any, geometry: Any) -> Wanted:
     flank, points = tooth_flank(geometry, gear)
-    wanted = Wanted(geometry.z, flank, points, 0.5 * gear.bore_diameter, gear.material)
-    return imported_gear(gear.imported, wanted)
+    return Wanted(geometry.z, flank, points, 0.5 * gear.bore_diameter, gear.material)
 
 
 def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:
     """The sector mesh of an imported gear, as of one meshed here, for pictures. BodyError where there is none: mean tooth,
     tetrahedra, ready-made matrices."""
-    found = read_gear(gear, geometry)
-    body = found.body
-    if not isinstance(body, ImportedSector) or set(body.cut.elements) != {"hexahedron20"} or gear.imported.stiffness:
+    found = check_gear(gear, geometry)
+    cut = found.cut
+    if cut is None or set(cut.elements) != {"hexahedron20"} or found.matrices is not None:
         raise BodyError(
             f"{gear.imported.file}: this needs hexahedra, our own matrices and a mesh that repeats itself from tooth to tooth; "
             "use the pictures of your own finite-element program"
         )
-    cut = body.cut
-    return FeMesh(cut.nodes, cut.elements["hexahedron20"], {"bore": body.bore}, geometry.z, cut.cut_minus, cut.cut_plus)
+    bore = np.flatnonzero(np.isin(cut.of_mesh, found.mesh.sets[BORE]))
+    return FeMesh(cut.nodes, cut.elements["hexahedron20"], {BORE: bore}, geometry.z, cut.cut_minus, cut.cut_plus)
 
 
 def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Parts:
     """Modes, static tables, error and pictures of an imported gear. cut : Hz, of the stored error. Raises MeshError."""
-    found = read_gear(gear, geometry)
+    found = imported_gear(gear.imported, _wanted(gear, geometry))
     case = FrfCase(gear.modal_damping, cut, geometry.r)
     drawn = sector_mesh(geometry, gear.face_width, DRAWN)
     try:

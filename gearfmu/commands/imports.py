@@ -32,11 +32,11 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if named is None:
         names = ", ".join(g.name for g in spec.gears)
         raise click.BadParameter(f"name a gear of the stage: {names}", param_hint="GEAR")
-    from gearfmu.body.imported import read_gear
+    from gearfmu.body.imported import check_gear
     from gearfmu.geometry import GearGeometry
 
     source = ImportSpec(file=str(file), **options)
-    found = read_gear(named.model_copy(update={"imported": source}), GearGeometry.of(named, spec.pair))
+    found = check_gear(named.model_copy(update={"imported": source}), GearGeometry.of(named, spec.pair))
     echo_pairs(found.facts)
     click.echo("\n" + section(file, gear, options))
 

@@ -27,9 +27,10 @@ _INWARD = 0.3  # smallest share of r_b by which a flank face's normal passes the
 _END = 1e-5  # of the flank: by how much nodes may lie outside form and tip circle and still be on the flank
 _ASIDE = 0.3  # of the half tooth thickness: faces further from their involute are no flank (cuts of half a gear)
 _OUTSIDE = 0.05  # natural coordinate by which a point may lie beyond the last face
-_LINES = 120  # at most so many mesh lines across a flank count as lines
+_GRID = 1.5  # crossings of mesh lines per corner up to which a mesh counts as a grid
 _GAUSS = np.polynomial.legendre.leggauss(5)
-_COARSE = 24  # intervals where the mesh has no lines
+_PER_FACE = 2.0  # intervals per length of a face where the mesh has no lines
+_FEWEST = 3
 
 
 def corner_geometry(nodes: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -153,12 +154,14 @@ def _side_loads(local: np.ndarray, part: Faces, flank: ToothFlank, points: Point
         raise MeshError("there is no face on one of the flanks")
     corners = np.unique(np.concatenate([part.quads[:, :4].ravel(), part.triangles[:, :3].ravel()]))
     half = 0.5 * flank.face_width
-    across, weight = _gauss(_breaks(local[corners, 2], -half, half))
-    legendre = np.polynomial.legendre.legvander(across / half, points.functions - 1) * (weight / (2 * half))[:, None]
     chart = np.column_stack([arc, local[:, 2]])
+    lines = _mesh_lines(chart[corners])
+    size = _face_size(chart, part)
+    across, weight = _gauss(_breaks(lines[1], -half, half, size))
+    legendre = np.polynomial.legendre.legvander(across / half, points.functions - 1) * (weight / (2 * half))[:, None]
     rows = []
     for first, last in zip(*flank.strip(points.rolls), strict=True):
-        cuts = np.sqrt(2 * flank.r_b * _breaks(arc[corners], first, last))
+        cuts = np.sqrt(2 * flank.r_b * _breaks(lines[0], first, last, size))
         roll, weight = _gauss(cuts)
         along = weight * roll / flank.r_b / (last - first)
         place = np.stack(np.meshgrid(roll**2 / (2 * flank.r_b), across, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -169,15 +172,27 @@ def _side_loads(local: np.ndarray, part: Faces, flank: ToothFlank, points: Point
     return sp.csr_array(sp.vstack(rows))
 
 
-def _breaks(values: np.ndarray, low: float, high: float) -> np.ndarray:
-    """low, high and the mesh lines between them; equal intervals where the mesh has no lines there."""
-    slack = 1e-6 * np.ptp(values)
-    levels = np.sort(values)
-    levels = levels[np.diff(levels, prepend=levels[0] - 2 * slack) > slack]
-    if len(levels) > _LINES:
-        return np.linspace(low, high, _COARSE + 1)
-    inner = levels[(levels > low + slack) & (levels < high - slack)]
-    return np.concatenate([[low], inner, [high]])
+def _face_size(chart: np.ndarray, part: Faces) -> float:
+    """Typical length (m) of the faces in arc length and width."""
+    boxes = [np.ptp(chart[block], axis=1).prod(axis=1) for block in (part.quads, part.triangles) if len(block)]
+    return float(np.sqrt(np.median(np.concatenate(boxes))))
+
+
+def _mesh_lines(corners: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Arc lengths and widths at which a structured mesh has its lines, from its corners (P, 2); None for a free mesh."""
+    lines = []
+    for values in corners.T:
+        levels, slack = np.sort(values), 1e-6 * np.ptp(values)
+        lines.append(levels[np.diff(levels, prepend=levels[0] - 2 * slack) > slack])
+    return tuple(lines) if len(lines[0]) * len(lines[1]) < _GRID * len(corners) else (None, None)
+
+
+def _breaks(lines: np.ndarray | None, low: float, high: float, size: float) -> np.ndarray:
+    """low, high and the mesh lines between them; equal intervals, shorter than faces of this size, without lines."""
+    if lines is None:
+        return np.linspace(low, high, max(_FEWEST, int(np.ceil(_PER_FACE * (high - low) / size))) + 1)
+    slack = 1e-6 * np.ptp(lines)
+    return np.concatenate([[low], lines[(lines > low + slack) & (lines < high - slack)], [high]])
 
 
 def _gauss(breaks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

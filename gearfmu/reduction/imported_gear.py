@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import solids
 from gearfmu.fem.matrices import read_matrix, read_unknowns
 from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
-from gearfmu.femesh.cyclic_cut import cyclic_cut, is_whole
+from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
 from gearfmu.femesh.imported import ImportedMesh, read_mesh
 from gearfmu.geometry.involute_fit import InvoluteFit
 from gearfmu.reduction.elastic import Elastic
@@ -51,39 +53,65 @@ class ImportedGear:
     facts: dict[str, Any]
 
 
-def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
+@dataclass(frozen=True)
+class CheckedGear:
+    """An imported gear that has been read, checked, fitted and placed: its mesh in the frame of the gear, ready-made
+    matrices or None, its sector or None, plain facts."""
+
+    mesh: ImportedMesh
+    matrices: Matrices | None
+    cut: CyclicCut | None
+    facts: dict[str, Any]
+
+
+def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
     """Read, check, fit and place the finite elements of a gear.
 
     source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, goes the cyclic
-    road; a whole mesh that is not, ready-made matrices and a rigid bore go by the mean tooth. MeshError lists what is
-    wrong with the files.
+    road; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore go by the mean tooth. MeshError
+    lists what is wrong with the files.
     """
     file = Path(source.file)
     mesh = read_mesh(file, source.length, tuple(source.ignore))
     mesh = replace(mesh, nodes=mesh.nodes[:, _AXES[source.axis]])
     if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
         raise MeshError(f"{file}: " + "; ".join(problems))
-    try:
+    with _naming(file):
         fit = _fit(mesh, source, wanted)
         placed = replace(mesh, nodes=fit.in_gear_frame(mesh.nodes))
         _same_gear(placed, fit, wanted)
         placed.sets[BORE] = _bore_nodes(placed, source.bore, wanted)
-        facts = _facts(placed, fit)
         matrices = _matrices(source, placed, fit, wanted)
-        cut = None
-        if source.bore_coupling == "averaging" and (matrices is None or not is_whole(placed.nodes, wanted.teeth)):
+        whole, cut = is_whole(placed.nodes, wanted.teeth), None
+        if source.bore_coupling == "averaging" and (matrices is None or not whole):
             cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
-        if cut is not None:
-            bore = np.flatnonzero(np.isin(cut.of_mesh, placed.sets[BORE]))
-            elastic = wanted.material if matrices is None else (matrices.stiffness, matrices.mass)
-            body = ImportedSector(cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
-            dofs = 3 * (len(cut.nodes) - len(cut.cut_plus))
-            return ImportedGear(body, placed.nodes, facts | {"road": "cyclic", "dof_sector": dofs, "dof_body": wanted.teeth * dofs})
-        if not is_whole(placed.nodes, wanted.teeth):
+        if cut is None and not whole:
             raise MeshError('a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear')
-        whole = _whole(placed, matrices, source.bore_coupling, wanted)
-        size = whole.body.size
-        return ImportedGear(whole, placed.nodes, facts | {"road": "mean tooth", "dof_sector": size // wanted.teeth, "dof_body": size})
+        road = "mean tooth" if cut is None else "cyclic"
+        dofs = 3 * (len(mesh.nodes) if cut is None else wanted.teeth * (len(cut.nodes) - len(cut.cut_plus)))
+        facts = _facts(placed, fit) | {"road": road, "dof_sector": dofs // wanted.teeth, "dof_body": dofs}
+        return CheckedGear(placed, matrices, cut, facts)
+
+
+def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
+    """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
+    found = checked_gear(source, wanted)
+    with _naming(Path(source.file)):
+        if found.cut is None:
+            body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
+        else:
+            bore = np.flatnonzero(np.isin(found.cut.of_mesh, found.mesh.sets[BORE]))
+            ready = found.matrices
+            elastic = wanted.material if ready is None else (ready.stiffness, ready.mass)
+            body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
+    return ImportedGear(body, found.mesh.nodes, found.facts)
+
+
+@contextmanager
+def _naming(file: Path) -> Iterator[None]:
+    """MeshErrors begin with the name of a file: this one, when they name none beside it."""
+    try:
+        yield
     except MeshError as error:
         raise MeshError(str(error) if str(error).startswith(str(file.parent)) else f"{file}: {error}") from error
 
