@@ -28,18 +28,18 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
     help="Methods, comma-separated: modal, craig_bampton, rubin, krylov, static, snapshots; 'krylov:240' has a size of "
     "its own.",
 )
-@click.option("--size", type=click.IntRange(1), default=120, show_default=True, help="Vectors n; rigid modes come on top.")
+@click.option("--size", type=click.IntRange(1), default=120, show_default=True, help="Vectors n, rigid modes aside.")
 @click.option("--tolerance", type=float, help="Instead of --size: the largest relative error allowed over the band.")
 @click.option(
     "--band", nargs=2, type=Quantity("Hz"), default=(50.0, 10e3), show_default="50 Hz to 10 kHz", help="From, to."
 )
-@click.option("--damping", type=click.FloatRange(0), default=0.01, show_default=True, help="Damping ratio, in both models.")
+@click.option("--damping", type=click.FloatRange(0), default=0.01, show_default=True, help="Damping ratio of both models.")
 @click.option("--lines", type=click.IntRange(2), default=400, show_default=True, help="Logarithmically spaced lines.")
 @click.option("--free/--held", default=False, help="Reduce the free body (as the kernel takes it) or, as the paper, "
               "with its ground held; judged with the ground held either way.  [default: held]")  # fmt: skip
 @click.option("--loaded", help="Rows that are really loaded, as patterns: 'bolt*.ux,bolt*.uy'; judged once more alone.")
 @click.option("--scale", type=click.FloatRange(0.05, 4), help="Factor on the element counts of the stage.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of table and chart.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of results.")
 def frf(stage: str, body: str, **options: Any) -> None:
     """Relative error of the transfer matrix (Frobenius norm) of BODY of STAGE, reduced by several methods.
 
@@ -55,8 +55,9 @@ def frf(stage: str, body: str, **options: Any) -> None:
     with progress_bar(body) as progress:
         found = compare(full, contest, by_text(progress))
     tracemalloc.stop()
-    click.echo(f"{body}: {full.size} unknowns, {len(found.reference.labels)} inputs, {_ground(full, options)}, "
-               f"rotations times {1e3 * full.length:.4g} mm, {100 * contest.judging.damping_ratio:g} % damping")  # fmt: skip
+    how = f"rotations times {1e3 * full.length:.4g} mm, {100 * options['damping']:g} % damping"
+    inputs = len(found.reference.labels)
+    click.echo(f"{body}: {full.size} unknowns, {inputs} inputs, {_ground(full, options)}, {how}")
     for line in table(found.trials, contest):
         click.echo(line)
     click.echo(f"reference: {found.reference.size} vectors, last change {found.reference.change:.1e}, "
@@ -113,7 +114,8 @@ def write(found: Any, contest: Any, base: Path, title: str) -> list[Path]:
 
 
 def loaded_rows(labels: Sequence[tuple[str, str]], patterns: str) -> np.ndarray:
-    """Indices of the rows "interface.component" that match one of the comma-separated patterns; a usage error for none."""
+    """Indices of the rows "interface.component" that match one of the patterns (comma-separated); a usage error for
+    none."""
     wanted = [pattern.strip() for pattern in patterns.split(",")]
     names = [".".join(label) for label in labels]
     found = [k for k, name in enumerate(names) if any(fnmatch.fnmatch(name, pattern) for pattern in wanted)]
@@ -153,4 +155,6 @@ def _entries(options: dict[str, Any]) -> list[tuple[str, Any]]:
 def _ground(full: Any, options: dict[str, Any]) -> str:
     if options["free"] and full.ground:
         return f"reduced free, judged with {', '.join(full.ground)} held"
-    return "held at its ground" if full.constraints is not None else "on its own mounts" if not full.rigid.size else "free"
+    if full.constraints is not None:
+        return "held at its ground"
+    return "free" if full.rigid.size else "on its own mounts"

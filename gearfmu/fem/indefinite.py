@@ -1,9 +1,9 @@
 """Sparse factorisation of symmetric matrices that need not be definite: K − σM at a real shift, K(1 + 2iζ) − Ω²M.
 
 As `factor.Factor`, front by front on nested dissection. A front that is positive definite is eliminated by Cholesky,
-any other by LU with partial pivoting among its own unknowns; far below a body's high frequencies those are only the last
-few fronts. Pivots never leave their front, so digits can be lost where the shift is an eigenvalue of a held part of the
-body: the solution is refined with its residual until it no longer improves.
+any other by LU with partial pivoting among its own unknowns; far below a body's high frequencies those are only the
+last few fronts. Pivots never leave their front, so digits can be lost where the shift is an eigenvalue of a held part
+of the body: the solution is refined with its residual until it no longer improves.
 Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; refinement: Arioli, Demmel & Duff, SIAM J. Matrix Anal. 10
 (1989) 165.
 """

@@ -50,8 +50,8 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Contest:
-    """What is compared: (method, size) pairs, lines and damping, rows of the transfer matrix that are really loaded (all
-    when None)."""
+    """What is compared: (method, size) pairs, lines and damping, rows of the transfer matrix that are really loaded
+    (all when None)."""
 
     entries: tuple[tuple[str, Size], ...]
     judging: Judging
@@ -59,7 +59,7 @@ class Contest:
 
 
 def compare(body: FullOrder, contest: Contest, progress: Progress | None = None) -> Comparison:
-    """Reduce `body` with every entry and judge it. Raises BodyError of the first method that cannot do what is asked."""
+    """Reduce `body` with every entry and judge it. Raises BodyError of the first method that cannot do its task."""
     started = time.process_time()
     reduced = []
     for number, (method, size) in enumerate(contest.entries):

@@ -4,7 +4,8 @@ With C q = 0 held and λ what holds it, at a real shift σ (rad²/s²)
     (K − σM) q + Cᵀλ = f,   C q = 0;        σ = 0 of a free body:  q = P K⁺ Pᵀ f,  P = I − R Rᵀ M
 (inertia relief and mean-axis gauge, R the rigid modes that nothing holds, mass-normalised). λ comes from the small
 Schur complement of the rows C, so that averaging couplings are held as exactly as nodes are.
-Source: inertia relief and attachment modes: Craig & Kurdila, Fundamentals of Structural Dynamics (2006), ch. 17.
+Theory, eqs. 18 to 20. Source: inertia relief and attachment modes: Craig & Kurdila, Fundamentals of Structural
+Dynamics (2006), ch. 17.
 """
 
 from __future__ import annotations

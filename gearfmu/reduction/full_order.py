@@ -1,7 +1,8 @@
 """A body before reduction, whatever it came from: matrices, rigid fields and the interfaces at which it is loaded.
 
-M q̈ + K q = Σ Bᵢᵀ fᵢ − Cᵀ λ,  C q = 0,  uᵢ = Bᵢ q. Unknowns q are nodal displacements; a rigid coupling (RBE2) has replaced those of its
-surface by the six of its master node, an averaging coupling (RBE3) adds none: the motion of its node is a mean.
+M q̈ + K q = Σ Bᵢᵀ fᵢ − Cᵀ λ,  C q = 0,  uᵢ = Bᵢ q. Unknowns q are nodal displacements; a rigid coupling (RBE2) has
+replaced those of its surface by the six of its master node, an averaging coupling (RBE3) adds none: the motion of its
+node is a mean.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Moments of the transfer matrix: Krylov blocks of (K − σM)⁻¹ at real shifts σ in Ω², zero among them.
 
-H(s) = B (K − sM)⁻¹ Bᵀ with s = Ω²/(1 + 2iζ) is, with structural damping, the undamped transfer matrix at a complex s,
-so that undamped real moments serve every damping ratio. The blocks X₁ = (K − σM)⁻¹ Bᵀ, X_{j+1} = (K − σM)⁻¹ M X_j, j ≤ p,
-make the projected H̄ agree with H at s = σ in value and the first 2p − 1 derivatives (symmetric projection doubles them).
+H(s) = B (K − sM)⁻¹ Bᵀ with s = Ω²/(1 + 2iζ) is, with structural damping, the undamped transfer matrix at a complex
+s, so that undamped real moments serve every damping ratio. The blocks
+    X₁ = (K − σM)⁻¹ Bᵀ,   X_{j+1} = (K − σM)⁻¹ M X_j,   j ≤ p,
+make the projected H̄ agree with H at s = σ in value and 2p − 1 derivatives (symmetric projection doubles them).
 For a free body rigid motion is taken out: at σ = 0 the blocks are those of the flexibility P K⁺ Pᵀ.
-Source: Grimme, thesis, Urbana 1997, th. 3.1; Lehner & Eberhard, Math. Comput. Model. Dyn. Syst. 13 (2007) 191 (for
-flexible multibody systems); Beattie & Gugercin, Syst. Control Lett. 58 (2009) 225 (structured systems).
+Theory, eqs. 24 and 26. Source: Grimme, thesis, Urbana 1997, th. 3.1; Lehner & Eberhard, Multibody Syst. Dyn. 17 (2007)
+157 (flexible multibody systems); Beattie & Gugercin, Syst. Control Lett. 58 (2009) 225 (structured systems).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """From any basis to what the kernel takes: mass-normalised oscillators in the mean-axis frame, rigid motion explicit.
 
-The projected problem VᵀKV y = ω² y is solved once more, so that every method gives the same kind of body (DESIGN 4.1):
+The projected problem VᵀKV y = ω² y is solved once more, so that every method gives the same kind of body:
 
     q̈_k + 2 ζ_k ω_k q̇_k + ω_k² q_k = Σ N_k,i f_i,     u_i = Σ_k N_k,i q_k + rigid motion + (C_static − Σ N Nᵀ/ω²) f
 

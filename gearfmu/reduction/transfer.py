@@ -2,12 +2,12 @@
 
     H(Ω) = Σ N Nᵀ/(ω²(1 + 2iζ) − Ω²) + rigid motion,    e(Ω) = ‖H − H̄‖_F / ‖H‖_F
 
-between the interfaces that are not ground, the ground interfaces of a free body held. Structural damping K(1 + 2iζ), the
-same in both, is modal damping ζ at resonance. Rotations are multiplied, moments divided, by the body's length.
+between the interfaces that are not ground, the ground interfaces of a free body held. Structural damping K(1 + 2iζ),
+the same in both, is modal damping ζ at resonance. Rotations are multiplied, moments divided, by the body's length.
 
-Reference: the full model on so many moments (`moments`: 0 and points in the band) that the next blocks change H nowhere
-in the band by more than 1e-12 of its norm or by what rounding leaves; `direct` solves the full model itself at one line,
-which is how a reference is verified.
+Reference: the full model on so many moments (`moments`: 0 and points in the band) that the next blocks change H
+nowhere in the band by more than 1e-12 of its norm or by what rounding leaves; `direct` solves the full model itself at
+one line, which is how a reference is verified. Theory, eqs. 26 and 27.
 """
 
 from __future__ import annotations

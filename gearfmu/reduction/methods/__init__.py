@@ -1,7 +1,7 @@
 """Reduction methods, one file each; every one is `reduce(body: FullOrder, size: Size) -> Basis`.
 
-What each matches stands at the head of its file; equations in docs/theory.md, section 7. `interpolation` works on bodies
-that another method has reduced.
+What each matches stands at the head of its file; equations in docs/theory.md, section 7. `interpolation` works on
+bodies that another method has reduced.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Matched: the static response to interface forces in equilibrium with each other,
 the interfaces rest. Not matched: inertia of the interfaces' own motion, hence slow convergence where they move much.
 An interface is held by its rows B q = 0, averaging couplings as exactly as nodes; on a free body the constraint modes
 are rigid motion and the response to self-equilibrated interface forces. n = (m − r) constraint modes + fixed-interface
-modes. Source: Craig & Bampton, AIAA J. 6 (1968) 1313.
+modes. Theory, eq. 22. Source: Craig & Bampton, AIAA J. 6 (1968) 1313.
 """
 
 from __future__ import annotations

@@ -7,8 +7,9 @@ of all of them, T_i = (Rᵀ M̄ V_i)⁻¹, so that equal coordinates mean nearly
 
 and those of rigid motion and static compliance are interpolated entry by entry with Lagrange weights. Matched: each
 sample exactly (a change of coordinates moves no transfer function); between them the error falls with the samples as
-fast as that of a polynomial, as long as the bases span nearly the same space. Source: Panzer, Mohring, Eid & Lohmann,
-at – Automatisierungstechnik 58 (2010) 475; compare Amsallem & Farhat, SIAM J. Sci. Comput. 33 (2011) 2169.
+fast as that of a polynomial, as long as the bases span nearly the same space. Theory, eq. 28. Source: Panzer,
+Mohring, Eid & Lohmann, at – Automatisierungstechnik 58 (2010) 475; compare Amsallem & Farhat, SIAM J. Sci. Comput. 33
+(2011) 2169.
 """
 
 from __future__ import annotations

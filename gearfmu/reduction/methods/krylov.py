@@ -2,8 +2,9 @@
 
 Matched: H and its first 2p − 1 derivatives in Ω² at each point, p its number of blocks; the static response among them.
 n = b·m for b blocks of m inputs, less what deflation leaves out and what fills no whole block: n floats. Points: 0, the
-middle and the end of the band (three factorisations); one that meets an eigenvalue moves. Source: Grimme, thesis, Urbana 1997; Lehner & Eberhard, Math. Comput.
-Model. Dyn. Syst. 13 (2007) 191; paper section 2 (four nodes · six directions · five moments = 120).
+middle and the end of the band (three factorisations); one that meets an eigenvalue moves. Theory, eq. 24.
+Source: Grimme, thesis, Urbana 1997; Lehner & Eberhard, Multibody Syst. Dyn. 17 (2007) 157; paper section 2 (four
+nodes · six directions · five moments = 120).
 """
 
 from __future__ import annotations

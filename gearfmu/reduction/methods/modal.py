@@ -1,8 +1,8 @@
 """Modal truncation: the n lowest elastic eigenmodes K φ = ω² M φ.
 
 Matched: the lowest poles with their residues. Not matched: static flexibility of the modes left out, which is added
-only as static residual (`Oscillators.residual`). Source: Craig & Kurdila, Fundamentals of Structural Dynamics (2006),
-ch. 11; paper section 2.
+only as static residual (`Oscillators.residual`). Theory, eq. 21. Source: Craig & Kurdila, Fundamentals
+of Structural Dynamics (2006), ch. 11; paper section 2.
 """
 
 from __future__ import annotations

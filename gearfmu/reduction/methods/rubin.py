@@ -4,7 +4,8 @@
 
 Matched: the static response to every interface force (on a free body in the mean-axis frame), and the lowest poles with
 their residues. Projecting mass and stiffness alike keeps the inertia of the attachment modes (Rubin); MacNeal leaves
-it out. Source: Rubin, AIAA J. 13 (1975) 995; MacNeal, Comput. Struct. 1 (1971) 581; paper section 2 (24 + 96).
+it out. Theory, eq. 23. Source: Rubin, AIAA J. 13 (1975) 995; MacNeal, Comput. Struct. 1 (1971) 581; paper section 2
+(24 + 96).
 """
 
 from __future__ import annotations

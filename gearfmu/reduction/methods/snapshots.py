@@ -4,8 +4,8 @@ The n left singular vectors of M^½ X, X the elastic displacements at all instan
 least of the run's mean kinetic measure ∫ uᵀMu dt. Nothing is matched elsewhere: a basis is as good as its training.
 Training run when none is given: the full model from rest by Newmark's average acceleration, a few load cases in which
 every interface row carries its own sum of lines in the band (fixed random phases). Rigid motion is left out (balanced
-loads). Source: Sirovich, Quart. Appl. Math. 45 (1987) 561; Newmark, ASCE J. Eng. Mech. 85 (1959) 67; paper section 2
-and its reference [10].
+loads). Theory, eq. 25. Source: Sirovich, Quart. Appl. Math. 45 (1987) 561; Newmark, ASCE J. Eng. Mech. 85 (1959) 67;
+paper section 2 and its reference [10].
 """
 
 from __future__ import annotations

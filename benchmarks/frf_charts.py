@@ -1,0 +1,172 @@
+"""Reduction methods on the carrier and the ring of planetary54: the paper's Figs. 2 and 5 and what it does not show.
+
+    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [inputs]      (all when none is named)
+
+carrier : n = 120, bore held, 24 inputs (Fig. 2). carrier_free : the same body reduced free, as the kernel takes it.
+ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 vectors for comparison.
+growth  : largest error against n and against processor time, carrier on a coarser mesh.
+inputs  : what each further bolt costs.
+Each writes benchmarks/frf_<name>.csv (ring and carrier also the curves) and charts in docs/pictures, and prints its
+table. References are verified by direct complex solutions of the full model at three lines.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import time
+import tracemalloc
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfmu.commands.frf import loaded_rows
+from gearfmu.files import write_text
+from gearfmu.reduction.basis import Size
+from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.comparison import Comparison, Contest, compare
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.toothed import ring_full_order
+from gearfmu.reduction.transfer import Judging, direct
+from gearfmu.report.frf import label_of, write_error_chart, write_growth_chart
+from gearfmu.spec.stage import load_stage
+
+HERE = Path(__file__).parent
+PICTURES = HERE.parent / "docs" / "pictures"
+FOUR = ("modal", "craig_bampton", "rubin", "krylov")
+SIZES = (24, 36, 48, 72, 96, 120, 168, 240)
+GROWTH_SCALE = 0.5
+RING_SCALE = 0.2
+IN_PLANE = "bolt*.ux,bolt*.uy"
+MESHING = "tooth0.ux,tooth0.uy,tooth13.ux,tooth13.uy,tooth27.ux,tooth27.uy,tooth40.ux,tooth40.uy"
+
+
+def carrier() -> None:
+    """Fig. 2."""
+    _carrier("carrier", True, "Carrier, n = 120, bore held")
+
+
+def carrier_free() -> None:
+    """The body of Fig. 2 as the kernel takes it."""
+    _carrier("carrier_free", False, "Carrier reduced free, n = 120, judged with the bore held")
+
+
+def _carrier(name: str, held: bool, title: str) -> None:
+    started, wall = time.process_time(), time.perf_counter()
+    body = carrier_full_order(load_stage("planetary54"))
+    body = body.grounded() if held else body
+    found = judged(body, [(method, 120) for method in FOUR], IN_PLANE)
+    cost = {"all_cpu_s": time.process_time() - started, "all_wall_s": time.perf_counter() - wall}
+    curves(found, f"frf_{name}", title)
+    write(HERE / f"frf_{name}.csv", [{**row, **cost} for row in summary(body, found)])
+
+
+def ring() -> None:
+    """Fig. 5."""
+    body = ring_full_order(load_stage("planetary54"), RING_SCALE)
+    found = judged(body, [("modal", 400), ("craig_bampton", 400), ("rubin", 400), ("krylov", 1782)], MESHING)
+    curves(found, "frf_ring", "Ring on six mounts, 54 · 3 inputs")
+    write(HERE / "frf_ring.csv", summary(body, found))
+
+
+def growth() -> None:
+    """Error against n and time, without and with the static residual."""
+    body = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE).grounded()
+    entries = [(method, n) for method in (*FOUR, "snapshots") for n in SIZES]
+    found = judged(body, entries, IN_PLANE)
+    rows = summary(body, found, verify=False)
+    mended = [{**r, "method": "modal + static residual", "max_error": r["max_with_residual"]} for r in rows]
+    shown = rows + [r for r, own in zip(mended, rows, strict=True) if own["method"] == "modal"]
+    write_growth_chart(shown, PICTURES / "frf_growth", f"Carrier, {body.size} unknowns, bore held, 24 inputs")
+    write(HERE / "frf_growth.csv", rows)
+
+
+def inputs() -> None:
+    """Cost against the number of inputs: five moments of one to four bolts, and Rubin of the same size."""
+    body, rows = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE), []
+    for bolts in (1, 2, 3, 4):
+        names = {"bore", *(f"bolt{k}" for k in range(bolts))}
+        part = replace(body, interfaces=tuple(i for i in body.interfaces if i.name in names)).grounded()
+        found = judged(part, [("rubin", 30 * bolts), ("krylov", 30 * bolts)])
+        rows += [{"case": f"{bolts} bolts", **row} for row in summary(part, found, verify=False)]
+    write(HERE / "frf_inputs.csv", rows)
+
+
+def judged(body: FullOrder, entries: Iterable[tuple[str, int]], loaded: str | None = None) -> Comparison:
+    """All entries (method, n) on `body`, memory traced."""
+    labels = [(i.name, c) for i in body.interfaces if i.name not in body.ground for c in i.components]
+    chosen = loaded_rows(labels, loaded) if loaded else None
+    contest = Contest(tuple((method, Size(n)) for method, n in entries), Judging.over(), chosen)
+    tracemalloc.start()
+    try:
+        return compare(body, contest)
+    finally:
+        tracemalloc.stop()
+
+
+def summary(body: FullOrder, found: Comparison, verify: bool = True) -> list[dict[str, Any]]:
+    """One row a trial."""
+    full = found.reference
+    lines = full.judging.frequency
+    checked = np.nan
+    if verify:
+        at = (0, len(lines) // 2, len(lines) - 1)
+        exact = {k: direct(body, lines[k], full.judging.damping_ratio) for k in at}
+        checked = max(np.linalg.norm(full.matrix[k] - h) / np.linalg.norm(h) for k, h in exact.items())
+    return [
+        {
+            "dof": body.size,
+            "inputs": full.matrix.shape[1],
+            "method": t.method,
+            "n": t.model.size,
+            "max_error": t.error.max(),
+            "at_Hz": lines[t.error.argmax()],
+            "median_error": np.median(t.error),
+            "max_with_residual": t.mended.max(),
+            "max_loaded_only": t.loaded.max(),
+            "seconds": t.seconds,
+            "memory_MB": 1e-6 * t.memory,
+            "reference_vectors": full.size,
+            "reference_change": full.change,
+            "reference_verified": checked,
+        }
+        for t in found.trials
+    ]
+
+
+def curves(found: Comparison, name: str, title: str) -> None:
+    """The curves as `method,n,frequency_Hz,error` and as a chart."""
+    frequency = found.reference.judging.frequency
+    drawn = {"norm": (frequency, np.linalg.norm(found.reference.matrix, axis=(1, 2)))}
+    lines = ["method,n,frequency_Hz,error"]
+    for t in found.trials:
+        drawn[f"{label_of(t.method)}, n = {t.model.size}"] = (frequency, t.error)
+        lines += [f"{t.method},{t.model.size},{f:.6g},{e:.4e}" for f, e in zip(frequency, t.error, strict=True)]
+    write_text(HERE / f"{name}_curves.csv", "\n".join(lines) + "\n")
+    write_error_chart(drawn, PICTURES / name, title)
+
+
+def write(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Rows as CSV, and on the terminal."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+    write_text(path, text.getvalue())
+    print(text.getvalue(), flush=True)
+
+
+def main() -> None:
+    parts = {"carrier": carrier, "carrier_free": carrier_free, "ring": ring, "growth": growth, "inputs": inputs}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("parts", nargs="*", choices=[*parts, []], help="what to measure")
+    for name in parser.parse_args().parts or parts:
+        parts[name]()
+
+
+if __name__ == "__main__":
+    main()
