@@ -55,7 +55,8 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
     lies above the last mode kept: no mode is missed. Raises ModesError when the eigensolver fails.
     """
     families = [(s, nu) for s in range(len(body.spaces)) for nu in body.diameters()]
-    share = int(np.ceil(1.15 * count / (body.teeth * len(body.spaces)))) + 4
+    mean = count / (body.teeth * len(body.spaces))
+    share = int(np.ceil(mean + np.sqrt(mean))) + 1
     wanted = dict.fromkeys(families, share)
     found: dict[tuple[int, int], _FamilyModes] = {}
     while True:

@@ -50,7 +50,7 @@ def test_shipped_bodies_are_current_small_and_trusted_over_the_band(shipped):
     for name, body in shipped.items():
         assert set_body_path(SPEC, name).stat().st_size <= 8e6
         error, band = (body.max_error, body.band) if name == "carrier" else (body.frf.max_error, body.frf.band)
-        assert error < 0.01 and band == (50.0, 10e3)
+        assert error < 0.01 and tuple(band) == pytest.approx((50.0, 10e3))
     assert [shipped[name].modes for name in ("sun", "planet", "ring", "carrier")] == [400, 400, 399, 120]  # 400 splits a pair
     assert shipped["carrier"].max_error < 1e-6
 
@@ -96,8 +96,9 @@ def test_ring_on_its_mounts(shipped):
     """Six modes that were rigid; one mean table for the residual, close to each tooth's own once 128 modes move."""
     ring = mounted(shipped["ring"])
     rigid = np.sqrt(6 * SPEC.ring.mounts.stiffness / shipped["ring"].mass) / (2 * np.pi)  # axial, on six springs
-    assert len(ring.frequency) == 406 and 0.6 * rigid < ring.frequency[0] < rigid
-    spread = [ring.residual_spread(0.5 * (ring.frequency[n - 1] + ring.frequency[n])) for n in (0, 36, 128)]
+    assert len(ring.frequency) == 6 + shipped["ring"].modes and 0.6 * rigid < ring.frequency[0] < rigid
+    cuts = [1.0, *(0.5 * (ring.frequency[n - 1] + ring.frequency[n]) for n in (36, 128))]
+    spread = [ring.residual_spread(cut) for cut in cuts]
     assert spread[0] > 0.2 and spread[1] < 0.02 and spread[2] < 0.008
 
 
