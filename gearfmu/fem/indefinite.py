@@ -3,7 +3,7 @@
 As `factor.Factor`, front by front on nested dissection. A front that is positive definite is eliminated by Cholesky,
 any other by LU with partial pivoting among its own unknowns; far below a body's high frequencies those are only the
 last few fronts. Pivots never leave their front, so digits can be lost where the shift is an eigenvalue of a held part
-of the body: the solution is refined with its residual until it no longer improves.
+of the body: a solution with a larger residual than rounding explains is refined until it no longer improves.
 Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; refinement: Arioli, Demmel & Duff, SIAM J. Matrix Anal. 10
 (1989) 165.
 """
@@ -21,7 +21,7 @@ from gearfmu.fem.dissection import nested_dissection
 from gearfmu.fem.factor import FactorError, Workspace, dof_groups, gathered
 
 _COLUMNS = 128
-_REFINED = 1e-14  # residual relative to the right-hand side at which nothing is left to refine
+_REFINED = 1e-9  # residual relative to the right-hand side; rounding leaves a tenth of it on solid bodies
 _ROUNDS = 3
 
 
