@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from gearfmu.geometry import involute
 
 _NEAR = 0.03  # share of r_b by which the normal of a flank face may miss the base circle
+_ASIDE = 0.3  # share of ψ_b by which the base angle of a flank face may miss those of its side
 _STEEP = 0.1  # largest axial component of a flank's normal
 
 
@@ -97,7 +98,7 @@ def flank_faces(centres: np.ndarray, normals: np.ndarray, teeth: int, r_b: float
     middle = places[0] - half
     number = np.round((beta - side * half - middle) / pitch)
     miss = beta - side * half - middle - pitch * number
-    side = np.where(np.abs(miss) * r_b < 2 * _NEAR * r_b * half, side, 0.0)
+    side = np.where(np.abs(miss) < _ASIDE * half, side, 0.0)
     return FlankPoints(centres, (number % teeth).astype(int), side.astype(int))
 
 
