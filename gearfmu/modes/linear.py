@@ -4,7 +4,7 @@ Unknowns q are those of the kernel at level full: x, y, φ of either gear's mean
 inertia of a chain in a port. Everything that couples them acts through rows R with flexibility of its own D and what
 the bodies yield beyond their stored modes, C_res (docs/theory.md eq. 2):
 
-    u = R q + C_res f,   f = −D⁻¹ u     ⇒     M q̈ + [diag(0, ω²) + Rᵀ (D + C_res)⁻¹ R] q = 0                          (18)
+    u = R q + C_res f,   f = −D⁻¹ u     ⇒     M q̈ + [diag(0, ω²) + Rᵀ (D + C_res)⁻¹ R] q = 0                          (29)
 
 Rows: how far each loaded slice closes (D: tangent of the local law, eq. 8, at the force of `te`), the bore in its
 bearing (D = 1/k), the bore's angle against port spring or chain. The position is frozen; gears do not turn.
@@ -63,7 +63,7 @@ def stage_modes(
 def linearised(
     model: StageModel, bodies: Sequence[ReducedBody], torque: float, position: float, kernel: Kernel | None = None
 ) -> Linearised:
-    """Equation (18) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
+    """Equation (29) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
     statics; made here when None."""
     contacts = loaded_contacts(model.spec, kernel or _prepared(model, bodies), torque, position)
     gears = [_gear(model.spec, bodies, index, position, contacts) for index in (0, 1)]
@@ -110,7 +110,7 @@ def loaded_contacts(spec: StageSpec, kernel: Kernel, torque: float, position: fl
 
 @dataclass(frozen=True)
 class _Gear:
-    """One gear's part of (18). mass (n,) of its unknowns x, y, φ, modes; omega (n,) rad/s, 0 for the rigid ones; rows
+    """One gear's part of (29). mass (n,) of its unknowns x, y, φ, modes; omega (n,) rad/s, 0 for the rigid ones; rows
     (c + 3, n): contacts, then the bore's x, y, φ; residual (c + 3, c + 3) m/N."""
 
     mass: np.ndarray
@@ -191,7 +191,7 @@ def _static(
 
 @dataclass(frozen=True)
 class Linearised:
-    """Equation (18). mass (n,), omega (n,), zeta (n,) of the unknowns; rows R (m, n); own D (m,) m/N, residual C_res
+    """Equation (29). mass (n,), omega (n,), zeta (n,) of the unknowns; rows R (m, n); own D (m,) m/N, residual C_res
     (m, m); group (m,) index into GROUPS; dashpot (m,) N·s/m across a row's own path (a contact's includes the residual
     of its tooth pair, `tooth` (m,) numbering those, −1 elsewhere)."""
 

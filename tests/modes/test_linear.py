@@ -60,8 +60,8 @@ def test_a_mode_of_a_body_keeps_its_damping() -> None:
 
 @pytest.mark.parametrize("rigid_bearings", [True, False])
 def test_tangent_stiffness_is_that_of_te(model: StageModel, bodies: list[ReducedBody], rigid_bearings: bool) -> None:
-    """Statics of (18) – modes, residual, local law, bearings – against a difference quotient of the contact routine,
-    where no tip edge carries (its contact moves along the edge, which (18) does not know)."""
+    """Statics of (29) – modes, residual, local law, bearings – against a difference quotient of the contact routine,
+    where no tip edge carries (its contact moves along the edge, which (29) does not know)."""
     theirs = loaded_te(model, [TORQUE], 8, rigid_bearings=rigid_bearings)
     r_b = bodies[0].r_b
     for place in (2, 3, 5, 7):
