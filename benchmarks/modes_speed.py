@@ -67,7 +67,8 @@ def measure(body: str, scale: float) -> dict[str, float | str | int]:
     total = time.process_time() - started
     sector = 3 * (len(mesh.nodes) - len(mesh.cut_plus))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    figures = (body, sector * mesh.teeth, mesh.teeth, sector, set_up, total - set_up, total, peak, modes.frequency[-1] / 1e3)
+    highest = modes.frequency[-1] / 1e3
+    figures = (body, sector * mesh.teeth, mesh.teeth, sector, set_up, total - set_up, total, peak, highest)
     return {n: round(v, 3) if isinstance(v, float) else v for n, v in zip(COLUMNS, figures, strict=True)}
 
 
@@ -79,8 +80,8 @@ def draw(rows: list[dict], path: Path) -> None:
 
     with styled():
         figure = Figure(figsize=(9, 3.8), layout="constrained")
-        panels = zip(figure.subplots(1, 2), ("total_s", "peak_memory_GB"), ("CPU time, s", "peak memory, GB"), strict=True)
-        for axis, column, label in panels:
+        names = {"total_s": "CPU time, s", "peak_memory_GB": "peak memory, GB"}
+        for axis, (column, label) in zip(figure.subplots(1, 2), names.items(), strict=True):
             for body in ("gear", "ring"):
                 own = [row for row in rows if row["body"] == body]
                 teeth = own[0]["sectors"]

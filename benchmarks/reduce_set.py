@@ -23,7 +23,8 @@ def main() -> None:
     parser.add_argument("--out", help="folder of the bodies; a temporary one when not given")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
-        command = [sys.executable, "-m", "gearfmu.cli", "reduce", "planetary54", "--force", "--out", given.out or temporary]
+        folder = given.out or temporary
+        command = [sys.executable, "-m", "gearfmu.cli", "reduce", "planetary54", "--force", "--out", folder]
         before, started, peak = os.times(), time.perf_counter(), 0.0
         process = subprocess.Popen(command)
         while process.poll() is None:

@@ -27,7 +27,7 @@ _PACKED = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "fletc
 class InterfaceBody:
     """A free body with m interface rows and n oscillators; shapes, units and meaning: `ENTRIES`.
 
-    interfaces : one entry an interface, in the order of the rows: name, kind ("rigid", "averaging", "nodes"), components.
+    interfaces : one entry an interface, in row order: name, kind ("rigid", "averaging", "nodes"), components.
     ground : interfaces held when the error was measured. method, provenance : how it was made. Raises BodyError naming
     every array that cannot be.
     """
@@ -90,7 +90,7 @@ class InterfaceBody:
 ENTRIES = (
     Entry("body/rigid_mass", "rigid_mass", (6, 6), "kg, kg.m, kg.m2", "mass matrix of rigid motion about the origin"),
     Entry("interfaces/point", "point", ("I", 3), "m", "where each interface lies"),
-    Entry("interfaces/rigid_rows", "rigid_rows", ("m", 6), "1, m, 1", "interface rows of rigid motion about the origin"),
+    Entry("interfaces/rigid_rows", "rigid_rows", ("m", 6), "1, m, 1", "rows of rigid motion about the origin"),
     Entry("modes/frequency", "frequency", ("n",), "Hz", "frequencies of the oscillators, ascending, none rigid"),
     Entry("modes/damping_ratio", "damping_ratio", ("n",), "", "modal damping ratio"),
     Entry("modes/rows", "rows", ("m", "n"), "kg-1/2, m-1.kg-1/2", "displacement and rotation of the interfaces"),
@@ -175,7 +175,10 @@ def _problems(body: InterfaceBody) -> list[str]:
         expected = tuple(s if isinstance(s, int) else sizes.get(s) for s in entry.shape)
         for symbol, length in zip(entry.shape, value.shape, strict=False):
             sizes.setdefault(str(symbol), length)
-        if len(value.shape) != len(expected) or any(e not in (None, n) for e, n in zip(expected, value.shape, strict=True)):
+        fits = len(value.shape) == len(expected) and all(
+            e in (None, n) for e, n in zip(expected, value.shape, strict=True)
+        )
+        if not fits:
             problems.append(f"{entry.path} has shape {value.shape}, expected {entry.shape}")
         elif not np.all(np.isfinite(value)):
             problems.append(f"{entry.path} holds a number that is not finite")

@@ -5,7 +5,7 @@ displacement of a patch of the rim; condensing what the residual gives way there
     κ = k (I + k C_res,mm)⁻¹,   M = diag(M_r, I),   K = diag(0, ω²) + [R N]_mᵀ κ [R N]_m,
 whose 6 + n modes Φ are those of the mounted ring. On tooth t
     N̂_f = ([R N]_f − C_res,fm κ [R N]_m) Φ,       Ĉ_res = C_res,ff − C_res,fm κ C_res,mf,
-so that Σ N̂ N̂ᵀ/Ω² + Ĉ_res is the static compliance of the mounted finite elements exactly; above the n-th free mode the
+so that Σ N̂ N̂ᵀ/Ω² + Ĉ_res is the static compliance of the mounted finite elements exactly; above the n-th mode the
 residual is quasi-static, as everywhere (theory, residual). Mounts break the cyclic symmetry of modes and rows; what is
 left to the residual of a cut is tooth-cyclic to a few parts in a thousand, so its mean over the teeth is taken.
 """
@@ -62,13 +62,13 @@ class MountedRing:
         return modal + self.stiffness @ self._flank_to_mounts(tooth).T
 
     def mean_residual(self, cut: float) -> np.ndarray:
-        """The one mean tooth table (z, 2·R·A, 2·R·A), m/N, by tooth offset: compliance of everything but the modes below
-        `cut` (Hz), averaged over the teeth."""
+        """The one mean tooth table (z, 2·R·A, 2·R·A), m/N, by tooth offset: compliance of everything but the modes
+        below `cut` (Hz), averaged over the teeth."""
         table, _ = self._residual_tables(cut)
         return table
 
     def residual_spread(self, cut: float) -> float:
-        """Largest deviation of a tooth's own residual of itself from the mean table, relative to the table's largest."""
+        """Largest deviation of a tooth's own residual from the mean table, relative to the table's largest entry."""
         table, own = self._residual_tables(cut)
         return float(np.abs(own - table[0]).max() / np.abs(table[0]).max())
 

@@ -20,7 +20,7 @@ class Rim:
     """Where mounts may hold an internal gear: the patch of the rim of each sector, in that sector's frame.
 
     patch_point (3,) m, of sector 0; patch_rows (3, n), kg^-½: its mean displacement x, y, z in the modes; flank_rigid
-    (2, R, A, 6): flank rows of tooth space 0 of the rigid motions about the origin; static_fp (2, z, R, A, 3), m/N: flank
+    (2, R, A, 6): flank rows of space 0 of the rigid motions about the origin; static_fp (2, z, R, A, 3), m/N: flank
     row of space 0 per unit force on the patch of sector m; static_pp (z, 3, 3), m/N: patch of sector 0 per unit force
     on that of sector m. mounts: number of them, at the sectors k·z/mounts; mount_stiffness: N/m of each, the same in
     all directions. No mounts: 0 and 0.
@@ -42,7 +42,7 @@ class ReducedBody:
     Shapes, units and meaning of every field stand in `layout.ENTRIES` and docs/file-formats.md. In short: frequency
     (n,) Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, z, R, R, A, A), m/N; static_fb (2, R, A, 6);
     static_bb (6, 6).
-    input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of an internal gear, whose
+    input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of a ring, whose
     rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one.
     Raises BodyError naming every field that cannot be.
     """

@@ -107,7 +107,7 @@ def _root_curve(ring: InternalGearGeometry, share: np.ndarray) -> np.ndarray:
 
 
 def _core_arc(ring: InternalGearGeometry, form: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, float]:
-    """Arc (P, 2) around the root from mid tooth to mid space, square to the symmetry line there; its depth there (m)."""
+    """Arc (P, 2) around the root from mid tooth to mid space, square to the symmetry line; its depth there (m)."""
     rim = ring.r_rim - ring.r_f
     if rim <= 0:
         raise MeshError(f"the rim of {1e3 * rim:.3g} mm leaves no room for elements: make its diameter larger")

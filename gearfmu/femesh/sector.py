@@ -38,7 +38,7 @@ def sector_of(section: Section, teeth: int, face_width: float, elements: int, he
     )
     if not (worst := float(scaled_jacobian(result).min())) > 0:
         raise MeshError(
-            f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape, bore or rim"
+            f"an element is folded (scaled Jacobian {worst:.2g}): use more elements, or another tooth shape or bore"
         )
     return result
 

@@ -23,7 +23,8 @@ class Modes:
     """n real elastic modes by ascending frequency; conventions of `body.ReducedBody`.
 
     frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
-    and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½. shapes : index of a mode → (3N,) sector displacement in kg^-½, complex for a pair's first mode.
+    and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½. shapes : index of a mode → (3N,) sector
+    displacement in kg^-½, complex for a pair's first mode.
     """
 
     frequency: np.ndarray

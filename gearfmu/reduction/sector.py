@@ -45,7 +45,8 @@ class Family:
 class SectorBody:
     """A free gear body: finite elements of one sector, flank loads of tooth 0 and the averaging node of the bore.
 
-    mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI. flank : ToothFlank. points : where the flanks are loaded.
+    mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI.
+    flank : ToothFlank. points : where the flanks are loaded.
     Raises MeshError when cuts, flanks or bore of the mesh are not as they should be.
     """
 
@@ -67,7 +68,7 @@ class SectorBody:
 
     @cached_property
     def patch_rows(self) -> np.ndarray:
-        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; none of a gear (0, 3N)."""
+        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
         if not self.internal:
             return np.zeros((0, self.mesh.nodes.size))
         return averaging_rows_at(self.mesh.nodes, self._held_faces, self.patch_point)[:3]

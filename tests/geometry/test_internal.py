@@ -1,4 +1,4 @@
-"""Internal gears and planetary sets: the involute equation by finite differences, tangents, areas, mesh and assembly."""
+"""Internal gears and planetary sets: involute by finite differences, tangents, areas, path of contact, assembly."""
 
 from __future__ import annotations
 

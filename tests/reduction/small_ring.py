@@ -1,4 +1,4 @@
-"""A small ring (z = 24, m = 2.5 mm, six mounts) on a coarse mesh: by one sector, and as one whole finite-element model."""
+"""A small ring (z = 24, m = 2.5 mm, six mounts) on a coarse mesh: by one sector, and as one whole model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Couplings at interfaces: rigid (RBE2) and averaging (RBE3) nodes against what they mean, carrier and gears with them."""
+"""Couplings at interfaces: rigid (RBE2) and averaging (RBE3) nodes against what they mean; carrier and gears."""
 
 from __future__ import annotations
 
