@@ -72,6 +72,11 @@ def _mounts(body: ReducedBody) -> dict[str, Any]:
         "mounts": body.rim.mounts,
         "mount_stiffness_N_per_m": body.rim.mount_stiffness,
         "mounted_frequencies_Hz": [float(f) for f in ring.frequency[:8]],
+        "spread_of_residual_between_teeth": {
+            f"{n} modes": ring.residual_spread(0.5 * float(ring.frequency[n - 1] + ring.frequency[n]))
+            for n in (36, 128)
+            if n < len(ring.frequency)
+        },
     }
 
 
