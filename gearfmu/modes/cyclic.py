@@ -12,7 +12,7 @@ from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh import FeMesh
 from gearfmu.modes.harmonics import main_harmonic
-from gearfmu.modes.shapes import BodyModes, Mode, energy_shares
+from gearfmu.modes.shapes import BodyModes, Mode, cylindrical, energy_shares
 
 Progress = Callable[[str, float], None]
 
@@ -52,6 +52,8 @@ def cyclic_modes(
         space = next(space for space in spaces if space.parity == family.parity)
         harmonic = space.harmonic(family.index)
         shape = space.to_nodes @ harmonic.expand(family.shapes[:, [k]])[:, 0] / np.sqrt(mesh.teeth)
+        energy = energy_shares(mesh.nodes, scalar_mass, shape.reshape(-1, 3))
+        shape = _turned(mesh.nodes, shape, int(np.argmax(energy)))
         whole = unfolded(shape * np.sqrt(2.0 if family.pair else 1.0), family.index, index)[:, used]
         diameter, share = main_harmonic(nodes[used], whole[0], family.index, mesh.teeth)
         numbers = (number, number + 1) if family.pair else (number,)
@@ -64,11 +66,18 @@ def cyclic_modes(
                 parity=family.parity,
                 nodal_diameter=diameter,
                 harmonic_share=share,
-                energy=energy_shares(mesh.nodes, scalar_mass, shape.reshape(-1, 3)),
+                energy=energy,
                 shape=whole,
             )
         )
     return BodyModes(name, nodes[used], local.reshape(-1, 8), tuple(modes))
+
+
+def _turned(nodes: np.ndarray, shape: np.ndarray, component: int) -> np.ndarray:
+    """The shape (3N,) with its free sign, or the free phase of a pair, such that the mean of its main cylindrical
+    component over sector 0 is real and positive: a lobe on tooth 0 where there is one."""
+    mean = cylindrical(nodes, shape.reshape(-1, 3))[:, component].sum()
+    return shape * (np.conj(mean) / abs(mean) if mean else 1.0)
 
 
 def outer_faces(mesh: FeMesh) -> np.ndarray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearfmu.modes.shapes import cylindrical
+
 MOST = 12
 CELLS = 24  # of radius and of width: points in one cell are compared with each other around the axis
 
@@ -15,8 +17,7 @@ def harmonic_shares(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
     ring-shaped cell (of radius and width) are fitted by least squares, one ν at a time.
     """
     angle, radius = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
-    c, s = np.cos(angle), np.sin(angle)
-    field = np.stack([c * shape[:, 0] + s * shape[:, 1], c * shape[:, 1] - s * shape[:, 0], shape[:, 2]], axis=1)
+    field = cylindrical(points, shape)
     cell = _cells(radius) * CELLS + _cells(points[:, 2])
     total, shares = (field**2).sum(), np.zeros(MOST + 1)
     for number in np.unique(cell):

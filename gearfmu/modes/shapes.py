@@ -74,8 +74,13 @@ def energy_shares(nodes: np.ndarray, mass: sp.csr_array, shape: np.ndarray) -> n
     applied to the nodal values of the cylindrical components; their sum differs from the energy by the turn of the
     axes within an element and is scaled to 1.
     """
-    radius = np.hypot(nodes[:, 0], nodes[:, 1])
-    c, s = (nodes[:, k] / np.where(radius > 0, radius, 1.0) for k in (0, 1))
-    radial, tangential = c * shape[:, 0] + s * shape[:, 1], c * shape[:, 1] - s * shape[:, 0]
-    parts = np.array([np.vdot(u, mass @ u).real for u in (radial, tangential, shape[:, 2])])
+    parts = np.array([np.vdot(u, mass @ u).real for u in cylindrical(nodes, shape).T])
     return parts / parts.sum()
+
+
+def cylindrical(points: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Radial, tangential and axial components (P, 3) of vectors (P, 3), real or complex, at points (P, 3)."""
+    radius = np.hypot(points[:, 0], points[:, 1])
+    c, s = (points[:, k] / np.where(radius > 0, radius, 1.0) for k in (0, 1))
+    radial, tangential = c * vectors[:, 0] + s * vectors[:, 1], c * vectors[:, 1] - s * vectors[:, 0]
+    return np.stack([radial, tangential, vectors[:, 2]], axis=1)

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from gearfmu.fem.surface import shape as face_shape
 from gearfmu.files import written_whole
 from gearfmu.modes import BodyModes, Mode
+from gearfmu.modes.shapes import cylindrical
 from gearfmu.report.style import INK, MUTED, styled
 
 SHARP = np.cos(np.radians(40.0))  # edges between faces that turn by more are drawn
@@ -102,18 +103,12 @@ def _component(mode: Mode) -> tuple[int, str]:
     return number, ("radial", "tangential", "axial")[number]
 
 
-def _cylindrical(points: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    direction = points[:, :2] / np.maximum(np.linalg.norm(points[:, :2], axis=1, keepdims=True), 1e-12)
-    x, y = direction.T
-    return np.stack([x * moved[:, 0] + y * moved[:, 1], x * moved[:, 1] - y * moved[:, 0], moved[:, 2]], axis=1)
-
-
 def _paint(axis: Axes, body: BodyModes, surface: _Surface, mode: Mode, view: int) -> None:
     moved, rest = surface.sample @ body.drawn(mode)[0], surface.sample @ body.points
     camera = np.eye(3) if view == ALONG_AXIS else _oblique()
     drawn, normal = (rest + moved) @ camera.T, _normals((rest + moved) @ camera.T, surface.quads)
     value = np.linalg.norm(moved, axis=1)
-    value = _cylindrical(rest, moved)[:, _component(mode)[0]] if view == ALONG_AXIS else value
+    value = cylindrical(rest, moved)[:, _component(mode)[0]] if view == ALONG_AXIS else value
     value = (value / np.abs(value).max())[surface.quads].mean(axis=1)
     colours = SIGNED(Normalize(-1, 1)(value)) if view == ALONG_AXIS else MAGNITUDE(value)
     colours[:, :3] *= (AMBIENT + (1 - AMBIENT) * np.clip(normal @ LIGHT, 0, 1))[:, None]
