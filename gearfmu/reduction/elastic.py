@@ -22,9 +22,9 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from gearfmu.fem.factor import Factor, FactorError
-from gearfmu.fem.indefinite import SymmetricFactor
+from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.fem.solver import Solves, definite_factor, symmetric_factor
 from gearfmu.reduction.full_order import FullOrder
 
 _NEAR = 1e-4  # relative distance of a shift to an eigenvalue at which it moves
@@ -115,17 +115,17 @@ class Elastic:
         return _SmallSystem((self.constraints @ self.constraints.T).toarray())
 
     @property
-    def _supported(self) -> tuple[np.ndarray, Factor]:
+    def _supported(self) -> tuple[np.ndarray, Solves]:
         """Unknowns left free by statically determinate supports of the kernel of K, and the factor of their K."""
         if self._twin is not None:
             return self._twin._supported
         return self._piece("factor of K", self._support)
 
-    def _support(self) -> tuple[np.ndarray, Factor]:
+    def _support(self) -> tuple[np.ndarray, Solves]:
         kernel = self._kernel
         held = sl.qr(kernel.T, mode="r", pivoting=True)[1][: kernel.shape[1]] if kernel.shape[1] else []
         free = np.setdiff1d(np.arange(self.size), held)
-        return free, Factor(self.stiffness[free][:, free], self.cells, self.node_of_dof[free])
+        return free, definite_factor(sp.csr_array(self.stiffness[free][:, free]), self.cells, self.node_of_dof[free])
 
     def _solve_supported(self, loads: np.ndarray) -> np.ndarray:
         free, factor = self._supported
@@ -190,7 +190,7 @@ class Shifted:
     def __init__(self, space: Elastic, shift: float):
         self.shift, self.space = shift, space
         matrix = sp.csr_array(space.stiffness - shift * space.mass_matrix)
-        self._factor = SymmetricFactor(matrix, space.cells, space.node_of_dof)
+        self._factor = symmetric_factor(matrix, space.cells, space.node_of_dof)
         self._response = self._factor.solve(space.constraints.T.toarray()) if space.constraints.shape[0] else None
         if self._response is not None:
             self._system = _SmallSystem(space.constraints @ self._response)

@@ -1,0 +1,41 @@
+"""Both sparse solvers give the same solutions; without pypardiso our own is used."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from blocks import STEEL, box
+
+from gearfmu.fem import hex20, solver
+from gearfmu.fem.factor import Factor
+from gearfmu.fem.indefinite import SymmetricFactor
+
+NODES, ELEMENTS = box((4, 3, 2), (0.09, 0.04, 0.02))
+STIFFNESS, MASS = hex20.assemble(NODES, ELEMENTS, STEEL)
+NODE_OF_DOF = np.arange(NODES.size) // 3
+SHIFT = (2 * np.pi * 3e4) ** 2
+RHS = np.random.default_rng(0).standard_normal((NODES.size, 3))
+
+
+def test_without_pypardiso_our_own_solver_is_used(monkeypatch) -> None:
+    monkeypatch.setattr(solver, "solver_name", lambda: "gearfmu")
+    assert isinstance(solver.definite_factor(STIFFNESS + SHIFT * MASS, ELEMENTS, NODE_OF_DOF), Factor)
+    assert isinstance(solver.symmetric_factor(STIFFNESS - SHIFT * MASS, ELEMENTS, NODE_OF_DOF), SymmetricFactor)
+
+
+@pytest.mark.needs("pypardiso")
+@pytest.mark.parametrize("sign", [1, -1])
+def test_pypardiso_gives_the_same_solutions(sign: int) -> None:
+    matrix = STIFFNESS + sign * SHIFT * MASS
+    own = SymmetricFactor(matrix, ELEMENTS, NODE_OF_DOF)
+    make = solver.definite_factor if sign > 0 else solver.symmetric_factor
+    fast = make(matrix, ELEMENTS, NODE_OF_DOF)
+    assert isinstance(fast, solver.PardisoFactor)
+    for rhs in (RHS, RHS + 1j * RHS[::-1]):
+        assert np.linalg.norm(fast.solve(rhs) - own.solve(rhs)) < 1e-9 * np.linalg.norm(own.solve(rhs))
+
+
+@pytest.mark.needs("pypardiso")
+def test_a_factor_that_pypardiso_cannot_make_is_our_own() -> None:
+    assert isinstance(solver.definite_factor(STIFFNESS + SHIFT * MASS, ELEMENTS, NODE_OF_DOF), solver.PardisoFactor)
+    assert solver._pardiso(STIFFNESS - SHIFT * MASS, 2) is None
