@@ -97,8 +97,7 @@ def _whole_display(drawn: Any, found: ImportedGear, modes: Modes, statics: Stati
     gear: WholeGear = found.body
     sector = outline(drawn, found.nodes)
     points, quads = whole_surface(sector, gear.teeth)
-    kept = np.unique(gear.body.node_of_dof[: gear.body.size - gear.body.size % 3])
-    kept = kept[kept < len(found.nodes)]
+    kept = np.unique(gear.body.node_of_dof[gear.body.node_of_dof < len(found.nodes)])
     nearest = cKDTree(found.nodes[kept]).query(points)[1]
     dofs = 3 * nearest[:, None] + np.arange(3)
     index = [k for k in sorted(modes.shapes) if k < PICTURE_MODES]

@@ -107,6 +107,20 @@ def test_hex8_is_raised_and_not_stiff(tmp_path: Path, native: ReducedBody) -> No
     assert np.abs(body.frequency[:30] / native.frequency[:30] - 1).max() < 0.02
 
 
+@pytest.mark.full
+def test_a_rigid_bore_moves_as_one_and_is_stiffer(tmp_path: Path, native: ReducedBody) -> None:
+    """RBE2 in the bore: the whole gear by the mean tooth; a turn of the bore needs no strain, teeth give way less."""
+    hex20_deck(tmp_path / "pinion.inp")
+    body = imported(tmp_path, SECTION + 'bore = "BORE"\nbore_coupling = "rigid"')
+    assert body.mesh["road"] == "mean tooth" and body.mesh["teeth_deviation"] < 1e-9
+    assert body.mass == pytest.approx(native.mass, rel=1e-9)
+    assert body.inertia == pytest.approx(native.inertia, rel=1e-6, abs=1e-9 * native.inertia[2, 2])
+    middle = (0, 0, 0, 4, 4, 0, 0)
+    assert 0.8 < body.static_ff[middle] / native.static_ff[middle] < 1.0
+    assert body.frequency[0] > native.frequency[0]
+    assert body.frf.max_error < 0.01
+
+
 @lru_cache(maxsize=1)
 def keyway_cells() -> np.ndarray:
     """The whole pinion without the elements of a keyway: on the bore, one pitch wide."""
