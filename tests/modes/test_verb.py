@@ -1,0 +1,68 @@
+"""The verb modes: table, files, messages."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from gearfmu import cli
+from gearfmu.spec.library import find_stage
+
+
+def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    code = cli.outcome(["modes", *map(str, arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+@pytest.fixture(scope="module")
+def coarse_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """planetary54 with few elements in its sun."""
+    path = tmp_path_factory.mktemp("set") / "stage.toml"
+    path.write_text(f'base = "{find_stage("planetary54")}"\n[sun.body.mesh]\nscale = 0.25\n', encoding="utf-8")
+    return path
+
+
+def test_a_body_with_its_files(coarse_set: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call(coarse_set, "--body", "sun", "--count", 3, "--out", tmp_path / "new" / "out", capsys=capsys)
+    assert (code, err) == (0, "")
+    with open(tmp_path / "new" / "out" / "sun_modes.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert sum(int(row["modes_of_this_frequency"]) for row in rows) >= 3
+    assert all(f"{float(row['frequency_Hz']):.1f}" in out for row in rows)
+    expected = {"sun_modes.csv", "sun_sheet.png"}
+    expected |= {f"sun_mode_{int(row['mode']):02d}.{kind}" for row in rows for kind in ("png", "vtu")}
+    assert {path.name for path in (tmp_path / "new" / "out").iterdir()} == expected
+
+
+def test_the_whole_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call("fzg_c", "--torque", "302 N*m", "--count", 7, "--out", tmp_path, capsys=capsys)
+    assert (code, err) == (0, "") and "linearised at 302 N·m, 12 positions" in out and "mesh order 6 meets mode 6" in out
+    assert {path.name for path in tmp_path.iterdir()} == {"fzg_c_frequencies.csv", "fzg_c_campbell.png"}
+    with open(tmp_path / "fzg_c_frequencies.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["mode"]) for row in rows] == list(range(1, 8))
+    assert all(float(row["lowest_Hz"]) <= float(row["frequency_Hz"]) <= float(row["highest_Hz"]) for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (("fzg_c", "--body", "gear"), 100, "no body 'gear'; the stage has pinion, wheel"),
+        (("planetary54", "--body", "pinion"), 100, "the stage has sun, planet, ring, carrier"),
+        (("planetary54", "--body", "sun", "--mounted"), 100, "only the ring of a planetary set has mounts"),
+        (("fzg_c", "--mounted"), 100, "goes with --body ring"),
+        (("fzg_c", "--body", "pinion", "--torque", "1 N*m"), 100, "know no torque"),
+        (("fzg_c", "--torque", "0 N*m"), 100, "must be above 0"),
+        (("fzg_c", "--torque", "302"), 100, "--torque"),
+        (("planetary54",), 1, "this needs a pair"),
+    ],
+)
+def test_messages(
+    arguments: tuple, code: int, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given, out, err = call(*arguments, "--out", tmp_path / "out", capsys=capsys)
+    assert given == code and message in " ".join(err.replace("│", " ").split()) and out == ""
+    assert not (tmp_path / "out").exists()
