@@ -1,11 +1,11 @@
 """Reduction methods on the carrier and the ring of planetary54: the paper's Figs. 2 and 5 and what it does not show.
 
-    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [inputs]      (all when none is named)
+    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [inputs] [points]  (all when none is named)
 
 carrier : n = 120, bore held, 24 inputs (Fig. 2). carrier_free : the same body reduced free, as the kernel takes it.
 ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 vectors for comparison.
 growth  : largest error against n and against processor time, carrier on a coarser mesh.
-inputs  : what each further bolt costs.
+inputs  : what each further bolt costs. points : where the Krylov method expands.
 Each writes benchmarks/frf_<name>.csv (ring and carrier also the curves) and charts in docs/pictures, and prints its
 table. References are verified by direct complex solutions of the full model at three lines.
 """
@@ -26,21 +26,30 @@ import numpy as np
 
 from gearfmu.commands.frf import loaded_rows
 from gearfmu.files import write_text
-from gearfmu.reduction.basis import Size
+from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.comparison import Comparison, Contest, compare
+from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.moments import Expansion, input_loads
+from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.toothed import ring_full_order
-from gearfmu.reduction.transfer import Judging, direct
+from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
 from gearfmu.report.frf import label_of, write_error_chart, write_growth_chart
 from gearfmu.spec.stage import load_stage
 
 HERE = Path(__file__).parent
 PICTURES = HERE.parent / "docs" / "pictures"
 FOUR = ("modal", "craig_bampton", "rubin", "krylov")
-SIZES = (24, 36, 48, 72, 96, 120, 168, 240)
+SIZES = (24, 48, 72, 120, 168, 240)
 GROWTH_SCALE = 0.5
 RING_SCALE = 0.2
+LAYOUTS = (
+    ((0, 0.25, 0.5, 0.75, 1), (1, 1, 1, 1, 1)),
+    ((0, 0.5, 1), (2, 2, 1)),
+    ((0, 0.7), (2, 3)),
+    ((0,), (5,)),
+)
 IN_PLANE = "bolt*.ux,bolt*.uy"
 MESHING = "tooth0.ux,tooth0.uy,tooth13.ux,tooth13.uy,tooth27.ux,tooth27.uy,tooth40.ux,tooth40.uy"
 
@@ -94,6 +103,24 @@ def inputs() -> None:
         found = judged(part, [("rubin", 30 * bolts), ("krylov", 30 * bolts)])
         rows += [{"case": f"{bolts} bolts", **row} for row in summary(part, found, verify=False)]
     write(HERE / "frf_inputs.csv", rows)
+
+
+def points() -> None:
+    """Where the Krylov method expands: five blocks on two to five points (parts of the band's end), same size."""
+    body = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE).grounded()
+    judging, loads, rows = Judging.over(lines=80), input_loads(body), []
+    full = reference(body, judging)
+    for shares, powers in LAYOUTS:
+        basis = Growing(elastic(body))
+        for share, power in zip(shares, powers, strict=True):
+            point = Expansion(basis.space, (2 * np.pi * share * judging.frequency[-1]) ** 2)
+            for _ in range(power):
+                point.advance(basis, loads)
+        model = oscillators(body, Basis("krylov", basis.vectors), judging.damping_ratio)
+        error = relative_error(full.matrix, transfer(model, judging, body.ground))
+        layout = {"points": " ".join(map(str, shares)), "powers": " ".join(map(str, powers)), "n": basis.size}
+        rows.append({**layout, "max_error": error.max(), "median_error": np.median(error)})
+    write(HERE / "frf_points.csv", rows)
 
 
 def judged(body: FullOrder, entries: Iterable[tuple[str, int]], loaded: str | None = None) -> Comparison:
@@ -161,7 +188,7 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parts = {"carrier": carrier, "carrier_free": carrier_free, "ring": ring, "growth": growth, "inputs": inputs}
+    parts = {"carrier": carrier, "carrier_free": carrier_free, "ring": ring, "growth": growth, "inputs": inputs, "points": points}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*parts, []], help="what to measure")
     for name in parser.parse_args().parts or parts:
