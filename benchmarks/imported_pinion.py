@@ -31,7 +31,12 @@ sys.path.insert(0, str(HERE.parent / "tests" / "imports"))
 from gears import tetrahedra  # noqa: E402
 
 TORQUE, POSITIONS, COMPARED = 302.0, 12, 60
-SETTINGS = {"modes = 400": "modes = 120", "roll_points = 28": "roll_points = 16", "# scale": "scale", "flank = 20": "flank = 20\nscale = 0.5"}
+SETTINGS = {
+    "modes = 400": "modes = 120",
+    "roll_points = 28": "roll_points = 16",
+    "# scale": "scale",
+    "flank = 20": "flank = 20\nscale = 0.5",
+}
 SECTION = '[gears.pinion.import]\nlength = "1 mm"\nfile = "pinion{}"\n{}\n'
 READY = 'stiffness = "pinion{}"\nmass = "pinion{}"\n{}mass_unit = "1 t"'
 

@@ -41,13 +41,14 @@ def _wanted(gear: Any, geometry: Any) -> Wanted:
 
 
 def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:
-    """The sector mesh of an imported gear, as of one meshed here, for pictures. BodyError where there is none: mean tooth,
-    tetrahedra, ready-made matrices."""
+    """The sector mesh of an imported gear, as of one meshed here, for pictures. BodyError where there is none: mean
+    tooth, tetrahedra, ready-made matrices."""
     found = check_gear(gear, geometry)
     cut = found.cut
     if cut is None or set(cut.elements) != {"hexahedron20"} or found.matrices is not None:
         raise BodyError(
-            f"{gear.imported.file}: this needs hexahedra, our own matrices and a mesh that repeats itself from tooth to tooth; "
+            f"{gear.imported.file}: this needs hexahedra, our own matrices and a mesh that repeats itself "
+            "from tooth to tooth; "
             "use the pictures of your own finite-element program"
         )
     bore = np.flatnonzero(np.isin(cut.of_mesh, found.mesh.sets[BORE]))
@@ -65,7 +66,8 @@ def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Pa
         return _by_mean_tooth(found, gear.body.modes, case, (drawn, report))
     except (FactorError, ModesError) as error:
         raise MeshError(
-            f"{gear.imported.file}: the stiffness matrix cannot be factorised ({error}): it is singular beyond the six rigid "
+            f"{gear.imported.file}: the stiffness matrix cannot be factorised ({error}): it is singular "
+            "beyond the six rigid "
             "motions (a hinge, a loose part), or not of a free body"
         ) from error
 

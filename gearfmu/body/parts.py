@@ -23,8 +23,8 @@ _PICTURE_LOADS = 5
 
 @dataclass(frozen=True)
 class Parts:
-    """A reduced gear without its names and numbers: modes, static tables, error, plain facts of the mesh, pictures, mass
-    matrix (6, 6) of the rigid body."""
+    """A reduced gear without its names and numbers: modes, static tables, error, plain facts of the mesh, pictures,
+    mass matrix (6, 6) of the rigid body."""
 
     modes: Modes
     statics: Statics
@@ -35,9 +35,16 @@ class Parts:
 
 
 def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[ToothFlank, Points]:
-    """Flank and load points of a gear: geometry (GearGeometry or InternalGearGeometry) and what a spec says about it."""
+    """Flank and load points of a gear: geometry (GearGeometry or InternalGearGeometry) and what a spec says about
+    it."""
     flank = ToothFlank(
-        geometry.r_b, geometry.psi_b, geometry.s_form, geometry.s_tip, gear.face_width, gear.body.strip_half_width, internal
+        geometry.r_b,
+        geometry.psi_b,
+        geometry.s_form,
+        geometry.s_tip,
+        gear.face_width,
+        gear.body.strip_half_width,
+        internal,
     )
     return flank, Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
 

@@ -15,12 +15,14 @@ from gearfmu.commands.shared import Quantity, echo_pairs
 @click.argument("stage", required=False)
 @click.argument("gear", required=False)
 @click.option("--length", type=Quantity("m"), required=True, help='One length unit of the file: "1 mm".')
-@click.option("--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file.")
+@click.option(
+    "--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file."
+)
 @click.option("--bore", default="", help="Node set of the bore; without it the nodes on the stage's bore diameter.")
 @click.option("--ignore", multiple=True, help="Node set of reference nodes that belong to no element.")
 def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> None:
-    """Check the finite elements in FILE: elements, quality, node sets. With STAGE and GEAR also fit the involutes and print
-    the section for the stage file. Writes nothing."""
+    """Check the finite elements in FILE: elements, quality, node sets. With STAGE and GEAR also fit the involutes and
+    print the section for the stage file. Writes nothing."""
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
@@ -53,7 +55,9 @@ def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) ->
     mesh = read_mesh(file, length, ignore)
     if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
         raise MeshError(f"{file}: " + "; ".join(problems))
-    quality = np.concatenate([solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()])
+    quality = np.concatenate(
+        [solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()]
+    )
     return {
         "file": str(file),
         "nodes": len(mesh.nodes),

@@ -1,9 +1,9 @@
 """Stiffness and mass matrices made by other programs.
 
 Read: Matrix Market (.mtx), SciPy sparse or dense (.npz, .npy), CalculiX matrix storage (.sti, .mas with .dof), Nastran
-DMIG cards (.pch, .dmig) and ASCII OUTPUT4 (.op4; dense, sparse and big-matrix form, real). Not read: binary OUTPUT4 (ask for
-`ASCII`/`FORMATTED`), OP2, complex matrices, Abaqus .mtx in its own layouts (write `MATRIX INPUT` as coordinate text), Ansys
-.full and Harwell–Boeing.
+DMIG cards (.pch, .dmig) and ASCII OUTPUT4 (.op4; dense, sparse and big-matrix form, real). Not read: binary OUTPUT4
+(ask for `ASCII`/`FORMATTED`), OP2, complex matrices, Abaqus .mtx in its own layouts (write `MATRIX INPUT` as coordinate
+text), Ansys .full and Harwell–Boeing.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ READ = ".mtx, .npz, .npy, .sti/.mas (CalculiX), .pch/.dmig (Nastran DMIG), .op4 
 def read_matrix(path: Path, unknowns: np.ndarray | None, labels: np.ndarray) -> sp.csr_array:
     """A symmetric matrix over the nodes of a mesh, unknown 3·node + component, in the file's units.
 
-    unknowns : (n, 2) node label and component 0 … 2 of each row; None when rows are x, y, z of node after node. labels :
-    (N,) node numbers of the mesh. Raises MeshError for what cannot be read, is not symmetric, or misses a node.
+    unknowns : (n, 2) node label and component 0 … 2 of each row; None when rows are x, y, z of node after node.
+    labels : (N,) node numbers of the mesh. Raises MeshError for what cannot be read, is not symmetric, or misses a
+    node.
     """
     matrix = _read(path)
     if isinstance(matrix, Labelled):
@@ -35,12 +36,15 @@ def read_matrix(path: Path, unknowns: np.ndarray | None, labels: np.ndarray) -> 
     if unknowns is None:
         if matrix.shape[0] != 3 * len(labels):
             raise MeshError(
-                f"{path}: {matrix.shape[0]} rows, but the mesh has {len(labels)} nodes, that is {3 * len(labels)} unknowns: "
+                f"{path}: {matrix.shape[0]} rows, but the mesh has {len(labels)} nodes, that is "
+                f"{3 * len(labels)} unknowns: "
                 "give `unknowns` when rows were left out or sorted differently"
             )
         return matrix
     if len(unknowns) != matrix.shape[0]:
-        raise MeshError(f"{path}: {matrix.shape[0]} rows, but `unknowns` names {len(unknowns)}: they belong to other runs")
+        raise MeshError(
+            f"{path}: {matrix.shape[0]} rows, but `unknowns` names {len(unknowns)}: they belong to other runs"
+        )
     return _sorted(path, matrix, unknowns, labels)
 
 
@@ -84,7 +88,9 @@ def _from_npz(path: Path) -> sp.csr_array:
         names = list(file.files)
         if "format" not in names:
             if len(names) != 1:
-                raise ValueError(f"holds {', '.join(names)}; expected one matrix, or one written by scipy.sparse.save_npz")
+                raise ValueError(
+                    f"holds {', '.join(names)}; expected one matrix, or one written by scipy.sparse.save_npz"
+                )
             return sp.csr_array(file[names[0]])
     return sp.csr_array(sp.load_npz(path))
 
@@ -104,7 +110,9 @@ def _from_triangle(path: Path) -> sp.csr_array:
 
 def _symmetric(path: Path, matrix: sp.csr_array) -> sp.csr_array:
     if matrix.shape[0] != matrix.shape[1]:
-        raise MeshError(f"{path}: the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns: it must be square")
+        raise MeshError(
+            f"{path}: the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns: it must be square"
+        )
     if np.iscomplexobj(matrix.data) or not np.isfinite(matrix.data).all():
         raise MeshError(f"{path}: the matrix holds complex numbers or numbers that are not finite: it must be real")
     largest = np.abs(matrix.data).max(initial=0.0)
@@ -120,12 +128,15 @@ def _sorted(path: Path, matrix: sp.csr_array, unknowns: np.ndarray, labels: np.n
     there = (labels[node] == unknowns[:, 0]) & (unknowns[:, 1] >= 0) & (unknowns[:, 1] < 3)
     if not there.all():
         label, component = unknowns[np.flatnonzero(~there)[0]]
-        raise MeshError(f"{path}: row {label}.{component + 1} is no displacement of a node of the mesh: export solids only")
+        raise MeshError(
+            f"{path}: row {label}.{component + 1} is no displacement of a node of the mesh: export solids only"
+        )
     target = 3 * node + unknowns[:, 1]
     missing = np.setdiff1d(np.arange(3 * len(labels)), target)
     if len(missing):
         raise MeshError(
-            f"{path}: {len(missing)} unknowns of the mesh have no row (first: node {labels[missing[0] // 3]}): export the free "
+            f"{path}: {len(missing)} unknowns of the mesh have no row (first: node "
+            f"{labels[missing[0] // 3]}): export the free "
             "body, without supports and constraints"
         )
     entries = matrix.tocoo()

@@ -42,8 +42,8 @@ def _inverted(nodes: np.ndarray, elements: Mapping[str, np.ndarray], labels: np.
         elif len(bad):
             corners = ", ".join(str(label) for label in labels[block[bad[0], :4]])
             found.append(
-                f"{len(bad)} of {len(block)} elements ({kind}) are inverted or folded (first: nodes {corners} …): mesh these "
-                "places again"
+                f"{len(bad)} of {len(block)} elements ({kind}) are inverted or folded (first: nodes {corners} …): "
+                "mesh these places again"
             )
     return found
 
@@ -53,7 +53,9 @@ def _same_place(nodes: np.ndarray, labels: np.ndarray) -> list[str]:
     if not len(pairs):
         return []
     a, b = labels[pairs[0]]
-    return [f"{len(pairs)} pairs of nodes lie at the same place (first: {a} and {b}): merge coincident nodes in the mesher"]
+    return [
+        f"{len(pairs)} pairs of nodes lie at the same place (first: {a} and {b}): merge coincident nodes in the mesher"
+    ]
 
 
 def _apart(nodes: np.ndarray, elements: Mapping[str, np.ndarray]) -> list[str]:
@@ -86,12 +88,15 @@ def _hinged(elements: Mapping[str, np.ndarray], labels: np.ndarray) -> list[str]
         return []
     blocks = list(elements.values())
     starts = np.cumsum([0, *(len(b) for b in blocks)])
-    nodes_of = [np.unique(np.concatenate([b[part[s : s + len(b)] == k].ravel() for b, s in zip(blocks, starts, strict=False)])) for k in range(count)]
+    nodes_of = [
+        np.unique(np.concatenate([b[part[s : s + len(b)] == k].ravel() for b, s in zip(blocks, starts, strict=False)]))
+        for k in range(count)
+    ]
     shared = np.intersect1d(nodes_of[0], np.concatenate(nodes_of[1:]))
     place = f" (at node {labels[shared[0]]})" if len(shared) else ""
     return [
-        f"{count} parts of the mesh hang together only by nodes or edges{place}, as by a hinge: they need common faces, "
-        "or the stiffness matrix has more than six rigid motions"
+        f"{count} parts of the mesh hang together only by nodes or edges{place}, as by a hinge: they need common "
+        "faces, or the stiffness matrix has more than six rigid motions"
     ]
 
 
@@ -104,16 +109,20 @@ def matrix_problems(stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarr
     found = []
     force, scale = np.abs(stiffness @ fields).max(axis=0), (abs(stiffness) @ np.abs(fields)).max(axis=0)
     if (force > _RIGID * scale).any():
-        moves = [name for name, bad in zip(("x", "y", "z", "about x", "about y", "about z"), force > _RIGID * scale, strict=True) if bad]
+        moves = [
+            name
+            for name, bad in zip(("x", "y", "z", "about x", "about y", "about z"), force > _RIGID * scale, strict=True)
+            if bad
+        ]
         found.append(
-            f"rigid motion ({', '.join(moves)}) needs force up to {(force / scale).max():.1e} of the stiffness: export the free "
-            "body, and check that the rows belong to these nodes and the coordinates have the unit `length`"
+            f"rigid motion ({', '.join(moves)}) needs force up to {(force / scale).max():.1e} of the stiffness: export "
+            "the free body, and check that the rows belong to these nodes and the coordinates have the unit `length`"
         )
     own_mass = float(np.mean(np.einsum("ij,ij->j", fields[:, :3], mass @ fields[:, :3])))
     if not 1 / _FACTOR < own_mass / expected_mass < _FACTOR:
         found.append(
-            f"the mass matrix weighs {own_mass:.3g} kg, mesh and density give {expected_mass:.3g} kg: check `mass_unit` and "
-            "`length`"
+            f"the mass matrix weighs {own_mass:.3g} kg, mesh and density give {expected_mass:.3g} kg: check "
+            "`mass_unit` and `length`"
         )
     return found
 
@@ -127,6 +136,6 @@ def speed_problem(stiffness: sp.csr_array, mass: sp.csr_array, nodes: np.ndarray
     if _SPEEDS[0] < own / speed < _SPEEDS[1]:
         return []
     return [
-        f"stiffness and mass give waves of {own:.2g} m/s, the material {speed:.2g} m/s: check `force_unit` (with `length`) and "
-        "`mass_unit`"
+        f"stiffness and mass give waves of {own:.2g} m/s, the material {speed:.2g} m/s: check `force_unit` (with "
+        "`length`) and `mass_unit`"
     ]

@@ -21,8 +21,8 @@ class Labelled:
 
 
 def read_dmig(path: Path) -> Labelled:
-    """The only DMIG matrix of a file, free, small or large field. Form 6 gives one triangle. ValueError when there is none
-    or more than one, or it is complex."""
+    """The only DMIG matrix of a file, free, small or large field. Form 6 gives one triangle. ValueError when there is
+    none or more than one, or it is complex."""
     cards = [card for card in _cards(path) if card[0].rstrip("*") == "DMIG"]
     heads = [card for card in cards if card[2] in ("0", "") and len(card) > 4]
     if len(heads) != 1:
@@ -113,7 +113,11 @@ def read_op4(path: Path) -> sp.csr_array:
         raise ValueError("no entries")
     row, col, value = (np.array(part) for part in zip(*entries, strict=True))
     matrix = sp.coo_array((value, (row, col)), (abs(rows), columns)).tocsr()
-    if form == 6 and abs(matrix - matrix.T).max() > 0 and min(abs(sp.triu(matrix, 1)).sum(), abs(sp.tril(matrix, -1)).sum()) == 0:
+    if (
+        form == 6
+        and abs(matrix - matrix.T).max() > 0
+        and min(abs(sp.triu(matrix, 1)).sum(), abs(sp.tril(matrix, -1)).sum()) == 0
+    ):
         matrix = matrix + matrix.T - sp.diags_array(matrix.diagonal())
     return sp.csr_array(matrix)
 

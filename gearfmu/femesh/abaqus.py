@@ -56,7 +56,9 @@ def read_deck(path: Path) -> Deck:
             try:
                 readers[block.keyword](deck, block)
             except (ValueError, IndexError) as error:
-                raise MeshError(f"{block.place}: *{block.keyword} cannot be read ({error}): correct this line") from None
+                raise MeshError(
+                    f"{block.place}: *{block.keyword} cannot be read ({error}): correct this line"
+                ) from None
     return deck
 
 
@@ -101,7 +103,9 @@ def _grouped(path: Path, text: str) -> Iterator[_Block]:
 def _keyword(line: str, place: str) -> _Block:
     head, *words = [word.strip() for word in line[1:].split(",")]
     pairs = [word.partition("=") for word in words]
-    return _Block(" ".join(head.upper().split()), {k.strip().upper(): v.strip().strip('"') for k, _, v in pairs}, [], place)
+    return _Block(
+        " ".join(head.upper().split()), {k.strip().upper(): v.strip().strip('"') for k, _, v in pairs}, [], place
+    )
 
 
 def _nodes(deck: Deck, block: _Block) -> None:

@@ -43,7 +43,8 @@ def cyclic_cut(nodes: np.ndarray, elements: dict[str, np.ndarray], teeth: int) -
     minus = np.flatnonzero(image >= 0)
     if len(minus) == 0:
         raise MeshError(
-            "this is neither a whole gear nor one sector: no node has an image one pitch further. Mesh the whole gear, or "
+            "this is neither a whole gear nor one sector: no node has an image one pitch further. Mesh the "
+            "whole gear, or "
             "one sector with equal meshes on both cut faces"
         )
     return _sector(nodes, elements, np.arange(len(nodes)), minus, image[minus], teeth)
@@ -61,9 +62,7 @@ def is_whole(nodes: np.ndarray, teeth: int) -> bool:
     return len(np.unique(np.round(angle * teeth / (2 * np.pi)) % teeth)) == teeth
 
 
-def _cut_out(
-    nodes: np.ndarray, elements: dict[str, np.ndarray], teeth: int, image: np.ndarray
-) -> CyclicCut | None:
+def _cut_out(nodes: np.ndarray, elements: dict[str, np.ndarray], teeth: int, image: np.ndarray) -> CyclicCut | None:
     chosen = {}
     for kind, block in elements.items():
         key = {tuple(sorted(row)) for row in block.tolist()}
@@ -87,7 +86,9 @@ def _cut_out(
     return _sector(nodes[own], local, own, new[minus], new[plus], teeth)
 
 
-def _sector(nodes: np.ndarray, elements: dict, of_mesh: np.ndarray, minus: np.ndarray, plus: np.ndarray, teeth: int) -> CyclicCut:
+def _sector(
+    nodes: np.ndarray, elements: dict, of_mesh: np.ndarray, minus: np.ndarray, plus: np.ndarray, teeth: int
+) -> CyclicCut:
     if np.isin(minus, plus).any():
         raise MeshError("nodes lie on both cut faces: the sector must be one pitch wide and must not reach the axis")
     nodes = _mirrored(nodes)

@@ -44,7 +44,9 @@ class ImportedMesh:
     @property
     def cells(self) -> np.ndarray:
         """(E, 20) node indices of every element, −1 where it has fewer nodes."""
-        rows = [np.pad(block, ((0, 0), (0, 20 - block.shape[1])), constant_values=-1) for block in self.elements.values()]
+        rows = [
+            np.pad(block, ((0, 0), (0, 20 - block.shape[1])), constant_values=-1) for block in self.elements.values()
+        ]
         return np.concatenate(rows)
 
     @property
@@ -168,7 +170,9 @@ def _refuse_others(cells: dict[str, np.ndarray], source: Path) -> None:
     remedies = {"tetra": "linear tetrahedra (tet4) are far too stiff: mesh with quadratic ones (tet10, C3D10)"}
     wrong = sorted(set(cells) - {"hexahedron", *QUADRATIC})
     if wrong:
-        told = [remedies.get(kind, f"elements of type {kind} are not taken: use hex8, hex20 or tet10") for kind in wrong]
+        told = [
+            remedies.get(kind, f"elements of type {kind} are not taken: use hex8, hex20 or tet10") for kind in wrong
+        ]
         raise MeshError(f"{source}: " + "; ".join(f"{len(cells[k])} {t}" for k, t in zip(wrong, told, strict=True)))
 
 

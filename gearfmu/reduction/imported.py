@@ -80,5 +80,6 @@ def _spanned(mesh: ImportedMesh, members: np.ndarray, name: str) -> None:
     fields = rigid_fields(points / max(np.abs(points).max(), 1e-300)).reshape(-1, 6)
     if np.linalg.matrix_rank(fields, tol=1e-6) < 6:
         raise MeshError(
-            f"{mesh.source}: the {len(members)} nodes of '{name}' lie in one line: a master node needs three that do not"
+            f"{mesh.source}: the {len(members)} nodes of '{name}' lie in one line: a master node needs three "
+            "that do not"
         )

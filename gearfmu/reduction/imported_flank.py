@@ -74,9 +74,11 @@ def fit_flanks(nodes: np.ndarray, faces: Faces, wanted: FitRange) -> InvoluteFit
         ) from None
     if fit.worst > wanted.tolerance:
         raise MeshError(
-            f"the flanks are no involutes: nodes lie up to {1e6 * fit.worst:.3g} µm (rms {1e6 * fit.rms:.3g} µm) off the "
+            f"the flanks are no involutes: nodes lie up to {1e6 * fit.worst:.3g} µm (rms {1e6 * fit.rms:.3g} "
+            "µm) off the "
             f"best one (base radius {1e3 * fit.r_b:.5g} mm, asked for {1e3 * wanted.r_b:.5g} mm), allowed are "
-            f"{1e6 * wanted.tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage file), or raise "
+            f"{1e6 * wanted.tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage "
+            "file), or raise "
             "`flank_tolerance`"
         )
     return fit
@@ -89,7 +91,9 @@ def _all_between(
     moment = centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0]
     low, high = (float(involute.radius_at_roll(s, wanted.r_b)) for s in (wanted.s_form, wanted.s_tip))
     radius = np.hypot(centre[:, 0], centre[:, 1])
-    chosen = (np.abs(normal[:, 2]) < _STEEP) & (np.abs(moment) > _INWARD * wanted.r_b) & (radius > low) & (radius < high)
+    chosen = (
+        (np.abs(normal[:, 2]) < _STEEP) & (np.abs(moment) > _INWARD * wanted.r_b) & (radius > low) & (radius < high)
+    )
     side = np.where(chosen, np.sign(moment), 0).astype(int)
     base = np.arctan2(centre[:, 1], centre[:, 0]) + side * (
         involute.inv(np.arccos(np.minimum(fit.r_b / np.maximum(radius, fit.r_b), 1.0))) - fit.psi_b
@@ -143,7 +147,9 @@ def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -
         radius = np.hypot(ring[..., 0], ring[..., 1])
         angle = sg * np.arctan2(centre[:, 1], centre[:, 0])
         low, high = (float(involute.radius_at_roll(s, flank.r_b)) for s in (flank.s_form, flank.s_tip))
-        chosen = (np.abs(normal[:, 2]) < _STEEP) & (moment > _INWARD * flank.r_b) & (angle > 0) & (angle < 1.5 * flank.psi_b)
+        chosen = (
+            (np.abs(normal[:, 2]) < _STEEP) & (moment > _INWARD * flank.r_b) & (angle > 0) & (angle < 1.5 * flank.psi_b)
+        )
         parts.append(block[chosen & (radius.max(axis=1) > low) & (radius.min(axis=1) < high)])
     return Faces(*parts)
 
@@ -179,7 +185,8 @@ def _face_size(chart: np.ndarray, part: Faces) -> float:
 
 
 def _mesh_lines(corners: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Arc lengths and widths at which a structured mesh has its lines, from its corners (P, 2); None for a free mesh."""
+    """Arc lengths and widths at which a structured mesh has its lines, from its corners (P, 2); None for a free
+    mesh."""
     lines = []
     for values in corners.T:
         levels, slack = np.sort(values), 1e-6 * np.ptp(values)
@@ -222,7 +229,8 @@ def _on_surface(chart: np.ndarray, part: Faces, place: np.ndarray) -> sp.csr_arr
         lost = place[best > _OUTSIDE]
         raise MeshError(
             f"the faces do not cover the flank: nothing at {1e3 * lost[0, 0]:.4g} mm along the involute, "
-            f"z = {1e3 * lost[0, 1]:.4g} mm from mid-width ({len(lost)} of {len(place)} points); does the mesh end before "
+            f"z = {1e3 * lost[0, 1]:.4g} mm from mid-width ({len(lost)} of {len(place)} points); does the "
+            "mesh end before "
             "the form or tip circle of the stage file?"
         )
     return answer
@@ -231,8 +239,8 @@ def _on_surface(chart: np.ndarray, part: Faces, place: np.ndarray) -> sp.csr_arr
 def _nearest(
     corners: np.ndarray, place: np.ndarray, element: tuple[Callable, Callable, Callable], start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For each place the face (P,) that holds it, or comes nearest, with natural coordinates (P, 2) inside it and by how
-    much these had to be moved (P,)."""
+    """For each place the face (P,) that holds it, or comes nearest, with natural coordinates (P, 2) inside it and by
+    how much these had to be moved (P,)."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     room = 0.1 * (high - low)
     inside = (place[:, None] >= low - room) & (place[:, None] <= high + room)

@@ -45,8 +45,8 @@ class Wanted:
 
 @dataclass(frozen=True)
 class ImportedGear:
-    """An imported gear ready to be reduced: its body, on one sector or whole; the nodes (N, 3), m, of the whole file in the
-    frame of the gear; plain facts about mesh and fit."""
+    """An imported gear ready to be reduced: its body, on one sector or whole; the nodes (N, 3), m, of the whole file in
+    the frame of the gear; plain facts about mesh and fit."""
 
     body: ImportedSector | WholeGear
     nodes: np.ndarray
@@ -67,9 +67,9 @@ class CheckedGear:
 def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
     """Read, check, fit and place the finite elements of a gear.
 
-    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, goes the cyclic
-    road; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore go by the mean tooth. MeshError
-    lists what is wrong with the files.
+    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, goes the
+    cyclic road; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore go by the mean tooth.
+    MeshError lists what is wrong with the files.
     """
     file = Path(source.file)
     mesh = read_mesh(file, source.length, tuple(source.ignore))
@@ -86,7 +86,9 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
         if source.bore_coupling == "averaging" and (matrices is None or not whole):
             cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
         if cut is None and not whole:
-            raise MeshError('a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear')
+            raise MeshError(
+                'a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear'
+            )
         road = "mean tooth" if cut is None else "cyclic"
         dofs = 3 * (len(mesh.nodes) if cut is None else wanted.teeth * (len(cut.nodes) - len(cut.cut_plus)))
         facts = _facts(placed, fit) | {"road": road, "dof_sector": dofs // wanted.teeth, "dof_body": dofs}
@@ -118,7 +120,11 @@ def _naming(file: Path) -> Iterator[None]:
 
 def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:
     flank = wanted.flank
-    middle = mesh.nodes[mesh.node_set(source.bore)].mean(axis=0) if source.bore and _around(mesh, source.bore) else np.zeros(3)
+    middle = (
+        mesh.nodes[mesh.node_set(source.bore)].mean(axis=0)
+        if source.bore and _around(mesh, source.bore)
+        else np.zeros(3)
+    )
     search = FitRange(wanted.teeth, flank.r_b, flank.s_form, flank.s_tip, source.flank_tolerance)
     fit = fit_flanks(mesh.nodes - middle, solids.boundary(mesh.elements), search)
     return replace(fit, origin=fit.origin + middle)
@@ -147,7 +153,9 @@ def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
         if abs(own - meant) > slack.get(name, _WIDTH) * meant
     ]
     if wrong:
-        raise MeshError(f"this is not the gear of the stage file: {', '.join(wrong)}; correct one of them, or the unit `length`")
+        raise MeshError(
+            f"this is not the gear of the stage file: {', '.join(wrong)}; correct one of them, or the unit `length`"
+        )
 
 
 def _flank_nodes(mesh: ImportedMesh, wanted: Wanted) -> np.ndarray:
@@ -164,14 +172,17 @@ def _bore_nodes(mesh: ImportedMesh, name: str, wanted: Wanted) -> np.ndarray:
     faces = solids.boundary(mesh.elements).within(found)
     if len(faces.nodes) == 0:
         raise MeshError(
-            f"no face lies on the bore of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the bore in `bore`, or "
+            f"no face lies on the bore of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the bore in "
+            "`bore`, or "
             "correct bore_diameter"
         )
     return faces.nodes
 
 
 def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
-    quality = np.concatenate([solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()])
+    quality = np.concatenate(
+        [solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()]
+    )
     return {
         "file": mesh.source.name,
         "teeth": fit.teeth,
@@ -206,7 +217,9 @@ def _matrices(source: Any, mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted)
     )
     own = solids.assemble(mesh.nodes, mesh.elements, wanted.material)[1]
     problems = matrix_problems(stiffness, mass, mesh.nodes, float(own.sum()) / 3)
-    problems += [] if problems else speed_problem(stiffness, mass, mesh.nodes, np.sqrt(wanted.material.youngs_modulus / wanted.material.density))
+    if not problems:
+        speed = np.sqrt(wanted.material.youngs_modulus / wanted.material.density)
+        problems = speed_problem(stiffness, mass, mesh.nodes, speed)
     if problems:
         raise MeshError("; ".join(problems))
     return Matrices(stiffness, mass)
@@ -236,6 +249,7 @@ def hinge_problem(space: Elastic, first_squared: float) -> str | None:
     if first_squared > _HINGE**2 * stiffest:
         return None
     return (
-        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: connect it, or "
+        "the stiffness matrix is singular beyond the six rigid motions, as with a hinge or a loose part: "
+        "connect it, or "
         "export it without mechanisms"
     )

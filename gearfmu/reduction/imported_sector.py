@@ -21,8 +21,8 @@ from gearfmu.reduction.sector import SectorBody, turned_sum
 class ImportedSector(SectorBody):
     """`SectorBody` on a cut of an imported mesh.
 
-    cut : the sector in the gear's frame. bore : its nodes on the bore. elastic : a material, or ready-made stiffness (N/m)
-    and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
+    cut : the sector in the gear's frame. bore : its nodes on the bore. elastic : a material, or ready-made stiffness
+    (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
     """
 
     def __init__(
@@ -37,7 +37,11 @@ class ImportedSector(SectorBody):
         self.flank, self.points = flank
         self.internal = False
         self.mesh = SimpleNamespace(
-            nodes=cut.nodes, cut_minus=cut.cut_minus, cut_plus=cut.cut_plus, elements=_repeated(cut.elements), teeth=teeth
+            nodes=cut.nodes,
+            cut_minus=cut.cut_minus,
+            cut_plus=cut.cut_plus,
+            elements=_repeated(cut.elements),
+            teeth=teeth,
         )
         self.faces = solids.boundary(cut.elements)
         ready = isinstance(elastic, tuple)

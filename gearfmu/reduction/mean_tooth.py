@@ -1,13 +1,14 @@
 """A whole gear of any mesh, brought to the form of a cyclic body: the mean over all its teeth.
 
 The kernel reads rows of one tooth and a nodal diameter for each mode. Of a body that is only nearly cyclic (free mesh,
-keyway, a web with other than z holes) it gets the mean of the transfer matrix over all turns by one tooth, which has that
-form exactly. With r_k(j) the rows of mode k on tooth j, in that tooth's frame, and R_k(ν) = 1/z Σ_j r_k(j) e^{−2πiνj/z},
+keyway, a web with other than z holes) it gets the mean of the transfer matrix over all turns by one tooth, which has
+that form exactly. With r_k(j) the rows of mode k on tooth j, in that tooth's frame, and
+    R_k(ν) = 1/z Σ_j r_k(j) e^{−2πiνj/z},
     1/z Σ_g r_k(i + g) r_k(j + g)ᵀ = Σ_ν R_k(ν) R_k(ν)ᴴ e^{2πiν(i−j)/z}:
-mode k adds one pair with amplitude √2 R_k(ν) to every 0 < ν < z/2 and one single mode to ν = 0 and z/2. Contributions of
-nearly equal frequency are gathered by their principal directions (two modes of a split pair give one pair); what is left
-out as too weak goes into the static compliance, whose mean over the teeth is exact. The bore, seen from each tooth, is
-treated like rows of that tooth. How far single teeth are from the mean is reported.
+mode k adds one pair with amplitude √2 R_k(ν) to every 0 < ν < z/2 and one single mode to ν = 0 and z/2. Contributions
+of nearly equal frequency are gathered by their principal directions (two modes of a split pair give one pair); what is
+left out as too weak goes into the static compliance, whose mean over the teeth is exact. The bore, seen from each
+tooth, is treated like rows of that tooth. How far single teeth are from the mean is reported.
 Source: the mean over a group of turns is the nearest block-circulant matrix: Chan, SIAM J. Sci. Stat. Comput. 9 (1988).
 """
 
@@ -32,8 +33,8 @@ _PURE = 1e-3  # share of the other parity's rows up to which a mode counts as sy
 
 @dataclass(frozen=True)
 class WholeGear:
-    """A gear with all its teeth: `body` with the interface "bore"; flank_rows: one (2·R·A, N) matrix a tooth, in the order
-    side, roll, function; points: where the flanks are loaded."""
+    """A gear with all its teeth: `body` with the interface "bore"; flank_rows: one (2·R·A, N) matrix a tooth, in the
+    order side, roll, function; points: where the flanks are loaded."""
 
     body: FullOrder
     flank_rows: tuple[sp.csr_array, ...]
@@ -58,7 +59,8 @@ class WholeGear:
 
 @dataclass(frozen=True)
 class _Found:
-    """One oscillator of the mean tooth: ω², nodal diameter, amplitude (L + 6,) with the bore last, strongest whole mode."""
+    """One oscillator of the mean tooth: ω², nodal diameter, amplitude (L + 6,) with the bore last, strongest whole
+    mode."""
 
     squared: float
     nodal_diameter: int
@@ -72,7 +74,12 @@ def mean_modes(gear: WholeGear, space: Elastic, count: int, progress: Progress |
     if progress:
         progress("modes of the whole gear", 0.0)
     squared, shapes = space.modes(count)
-    rows = np.stack([np.vstack([r @ shapes, turn.T @ (gear.bore_rows @ shapes)]) for r, turn in zip(gear.flank_rows, _frames(gear.teeth), strict=True)])
+    rows = np.stack(
+        [
+            np.vstack([r @ shapes, turn.T @ (gear.bore_rows @ shapes)])
+            for r, turn in zip(gear.flank_rows, _frames(gear.teeth), strict=True)
+        ]
+    )
     flank = rows.shape[1] - 6
     scale = np.ones(flank + 6)
     scale[flank:] = np.abs(rows[:, :flank]).max() / np.abs(rows[:, flank:]).max(axis=(0, 2)) / np.sqrt(flank)
@@ -168,8 +175,8 @@ def _of_one_parity(flank: np.ndarray, odd: np.ndarray) -> tuple[np.ndarray, int]
 def mean_statics(
     gear: WholeGear, space: Elastic, picture_loads: list[int], progress: Progress | None = None
 ) -> tuple[Statics, float]:
-    """Static tables of the mean tooth, and how far teeth are from it: largest relative deviation of the compliance under
-    the uniform load at mid flank. Pictures: displacement (p, N) under loads on tooth 0."""
+    """Static tables of the mean tooth, and how far teeth are from it: largest relative deviation of the compliance
+    under the uniform load at mid flank. Pictures: displacement (p, N) under loads on tooth 0."""
     z, points = gear.teeth, gear.points
     size, turns = gear.flank_rows[0].shape[0], _frames(z)
     bore = space.flexibility(gear.bore_rows.T.toarray())

@@ -15,7 +15,8 @@ _FILES = ("file", "stiffness", "mass", "unknowns")
 
 
 class ImportSpec(Spec):
-    """Mesh of the body, its units, and, where they are ready-made, its matrices. Paths are relative to the stage file."""
+    """Mesh of the body, its units, and, where they are ready-made, its matrices. Paths are relative to the stage
+    file."""
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
     length: Annotated[float, Quantity("m", above=0)] = Field(

@@ -51,7 +51,10 @@ def write_deck(path: Path, nodes: np.ndarray, cells: dict[str, np.ndarray], sets
         for row in block + 1:
             label += 1
             words = [str(label), *map(str, row)]
-            lines += [", ".join(words[:11]) + ("," if len(words) > 11 else ""), *([", ".join(words[11:])] * (len(words) > 11))]
+            lines += [
+                ", ".join(words[:11]) + ("," if len(words) > 11 else ""),
+                *([", ".join(words[11:])] * (len(words) > 11)),
+            ]
     for name, members in (sets or {}).items():
         lines.append(f"*NSET, NSET={name}")
         words = [str(m + 1) for m in members]

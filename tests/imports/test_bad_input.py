@@ -77,7 +77,11 @@ def hinge_by_an_edge(folder: Path) -> str:
     distance = np.abs(other[:, None] - nodes[None]).sum(axis=2)
     same = np.where(distance.min(axis=1) < 1e-9, distance.argmin(axis=1), -1)
     new = np.where(same >= 0, same, len(nodes) + np.cumsum(same < 0) - 1)
-    write_deck(folder / "pinion.inp", np.concatenate([nodes, other[same < 0]]), {"hexahedron20": np.vstack([cells, new[cells]])})
+    write_deck(
+        folder / "pinion.inp",
+        np.concatenate([nodes, other[same < 0]]),
+        {"hexahedron20": np.vstack([cells, new[cells]])},
+    )
     return "2 parts of the mesh hang together only by nodes or edges"
 
 
@@ -109,7 +113,9 @@ def no_involute(folder: Path) -> str:
         low, high = grid.roll.min(), grid.roll.max()
         depth = 30e-6 * np.sin(np.pi * (grid.roll - low) / (high - low))
         t = 0.1213458 - grid.roll / 0.0338289
-        nodes[grid.quads] = mesh.nodes[grid.quads] - depth[..., None] * np.stack([-np.sin(t), (1 - 2 * side) * np.cos(t), 0 * t], axis=-1)
+        nodes[grid.quads] = mesh.nodes[grid.quads] - depth[..., None] * np.stack(
+            [-np.sin(t), (1 - 2 * side) * np.cos(t), 0 * t], axis=-1
+        )
     deck(folder, nodes, mesh.elements)
     return r"the flanks are no involutes: nodes lie up to \d+(\.\d+)? µm .* allowed are 5 µm"
 
@@ -126,8 +132,8 @@ def half_a_gear(folder: Path) -> str:
 
 @pytest.mark.parametrize(
     "make",
-    [inverted, mirrored, duplicate_nodes, disconnected, hinge_by_an_edge, loose_node, wrong_length, other_gear, narrow_gear,
-     no_involute, half_a_gear],
+    [inverted, mirrored, duplicate_nodes, disconnected, hinge_by_an_edge, loose_node, wrong_length, other_gear,
+    narrow_gear, no_involute, half_a_gear],
     ids=lambda make: make.__name__,
 )  # fmt: skip
 def test_a_bad_mesh_is_refused(tmp_path: Path, make: Callable[[Path], str]) -> None:
@@ -161,7 +167,11 @@ READY = SECTION + 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
 
 
 def grounded(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return k + sp.diags_array(np.where(np.arange(k.shape[0]) < 30, 1e9, 0.0)), m, r"rigid motion \(x, y, z.*export the free body"
+    return (
+        k + sp.diags_array(np.where(np.arange(k.shape[0]) < 30, 1e9, 0.0)),
+        m,
+        r"rigid motion \(x, y, z.*export the free body",
+    )
 
 
 def light(k: sp.csr_array, m: sp.csr_array) -> tuple:
@@ -178,7 +188,11 @@ def shuffled(k: sp.csr_array, m: sp.csr_array) -> tuple:
 
 
 def short(k: sp.csr_array, m: sp.csr_array) -> tuple:
-    return k[:-3][:, :-3], m[:-3][:, :-3], "2628 rows, but the mesh has 877 nodes, that is 2631 unknowns: give `unknowns`"
+    return (
+        k[:-3][:, :-3],
+        m[:-3][:, :-3],
+        "2628 rows, but the mesh has 877 nodes, that is 2631 unknowns: give `unknowns`",
+    )
 
 
 def lopsided(k: sp.csr_array, m: sp.csr_array) -> tuple:
@@ -219,8 +233,8 @@ def test_a_body_that_is_no_solid_is_told_by_its_first_frequency() -> None:
 
 @pytest.mark.full
 def test_a_hinge_in_the_matrices_is_refused(tmp_path: Path) -> None:
-    """The whole gear, one element without stiffness of its own at a corner node: that node flies away. Each rigid motion
-    still needs no force."""
+    """The whole gear, one element without stiffness of its own at a corner node: that node flies away. Each rigid
+    motion still needs no force."""
     mesh = pinion()
     stiffness, mass = solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, STEEL)
     lone = int(mesh.elements[np.bincount(mesh.elements.ravel())[mesh.elements] == 1][0])
@@ -234,11 +248,13 @@ def test_a_hinge_in_the_matrices_is_refused(tmp_path: Path) -> None:
 
 
 DECKS = {
-    "C3D4": ("*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4\n1,1,2,3,4", "linear tetrahedra .* quadratic"),
+    "C3D4": ("*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4\n1,1,2,3,4", "linear tetrahedra "
+    ".* quadratic"),
     "C3D6": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D6\n1,1,1,1,1,1,1", "elements of type wedge are not taken"),
     "C3D8E": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=C3D8E\n1,1", r"pinion.inp:3: solid elements of type C3D8E are not known"),
     "shells": ("*NODE\n1,0,0,0\n*ELEMENT, TYPE=S4\n1,1,1,1,1", "no solid elements"),
-    "instance moved": ("*INSTANCE, NAME=A, PART=P\n0.,0.,5.\n*NODE\n1,0,0,0", "pinion.inp:1: this \\*INSTANCE is moved"),
+    "instance moved": ("*INSTANCE, NAME=A, PART=P\n0.,0.,5.\n*NODE\n1,0,0,0", "pinion.inp:1: this "
+    "\\*INSTANCE is moved"),
     "two instances": ("*INSTANCE, NAME=A\n*NODE\n1,0,0,0\n*END INSTANCE\n*INSTANCE, NAME=B\n", "a second \\*INSTANCE"),
     "system": ("*SYSTEM\n0,0,1\n*NODE\n1,0,0,0", "\\*SYSTEM moves the nodes"),
     "cylindrical": ("*NODE, SYSTEM=C\n1,0,0,0", "cylindrical"),

@@ -26,7 +26,11 @@ def nastran(path: Path, nodes: np.ndarray, kind: str, cells: np.ndarray, system:
     lines = [f"SET 1 = {', '.join(map(str, left[:8]))},", f"  {', '.join(map(str, left[8:]))}", "BEGIN BULK"]
     lines += [f"GRID,{k},{system},{x:.9g},{y:.9g},{z:.9g}" for k, (x, y, z) in enumerate(np.round(nodes, 9), 1)]
     name = {"hexahedron20": "CHEXA", "tetra10": "CTETRA", "hexahedron": "CHEXA"}[kind]
-    order = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15] if kind == "hexahedron20" else range(cells.shape[1])
+    order = (
+        [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 16, 17, 18, 19, 12, 13, 14, 15]
+        if kind == "hexahedron20"
+        else range(cells.shape[1])
+    )
     for k, row in enumerate(cells[:, list(order)] + 1, 1):
         fields = [f"{name:<8}", f"{k:<8}", f"{1:<8}", *(f"{n:<8}" for n in row)]
         lines += ["".join(fields[:9]) + "+"] if len(fields) > 9 else ["".join(fields)]
@@ -47,7 +51,10 @@ def as_file(folder: Path, suffix: str, kind: str) -> tuple[Path, np.ndarray, np.
         meshio.Mesh(nodes, [(kind, cells)], {"left": np.isin(np.arange(len(nodes)), left).astype(float)}).write(path)
     else:
         mesh = meshio.Mesh(nodes, [("vertex", left[:, None]), (kind, cells)])
-        mesh.cell_data = {"gmsh:physical": [np.full(len(left), 7), np.full(len(cells), 8)], "gmsh:geometrical": [np.full(len(left), 1), np.full(len(cells), 1)]}
+        mesh.cell_data = {
+            "gmsh:physical": [np.full(len(left), 7), np.full(len(cells), 8)],
+            "gmsh:geometrical": [np.full(len(left), 1), np.full(len(cells), 1)],
+        }
         mesh.field_data = {"left": np.array([7, 0]), "solid": np.array([8, 3])}
         meshio.gmsh.write(path, mesh, "2.2", binary=False)
     return path, nodes, left
@@ -87,13 +94,18 @@ def test_traps_of_decks(tmp_path: Path) -> None:
     nodes, cells = brick("hexahedron", (1, 1, 1), (1.0, 1.0, 1.0))
     rows = [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(nodes, 11)]
     (tmp_path / "more.inp").write_text("*node\n" + "\n".join(rows[4:]) + "\n", encoding="utf-8")
-    text = ["*Heading", "a brick", "*node, nset=low", *rows[:4], "*include, input=more.inp", "*element, type=c3d8r, elset=e1",
-            "1, " + ", ".join(str(n + 11) for n in cells[0]), "*nset, nset=\"High\", generate", "15, 18", "*nset, nset=all",
-            "low, High", "*nset, nset=Body, elset=e1"]  # fmt: skip
+    text = ["*Heading", "a brick", "*node, nset=low", *rows[:4], "*include, input=more.inp"]
+    text += ["*element, type=c3d8r, elset=e1", "1, " + ", ".join(str(n + 11) for n in cells[0])]
+    text += ['*nset, nset="High", generate', "15, 18", "*nset, nset=all", "low, High", "*nset, nset=Body, elset=e1"]
     path = tmp_path / "brick.inp"
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
     mesh = read_mesh(path, 1.0)
-    assert {name: len(set(members) & set(range(8))) for name, members in mesh.sets.items()} == {"LOW": 4, "HIGH": 4, "ALL": 8, "BODY": 8}
+    assert {name: len(set(members) & set(range(8))) for name, members in mesh.sets.items()} == {
+        "LOW": 4,
+        "HIGH": 4,
+        "ALL": 8,
+        "BODY": 8,
+    }
     assert list(mesh.labels[:8]) == list(range(11, 19)) and mesh.raised == 1
 
 
@@ -148,7 +160,11 @@ def op4(path: Path, values: np.ndarray, sparse: bool, big: bool = False) -> Path
 def dmig(path: Path, values: np.ndarray, wide: bool) -> Path:
     """Lower triangle by columns, as Nastran punches a symmetric DMIG."""
     star, width = ("*", 16) if wide else ("", 8)
-    lines = [f"{'DMIG' + star:<8}" + "".join(f"{v:<{width}}" for v in ("KAAX", "0", "6", "2")) if not wide else "DMIG    KAAX    0       6       2       0"]
+    lines = [
+        f"{'DMIG' + star:<8}" + "".join(f"{v:<{width}}" for v in ("KAAX", "0", "6", "2"))
+        if not wide
+        else "DMIG    KAAX    0       6       2       0"
+    ]
     for k, (node, component) in enumerate(NODES):
         lines.append(f"{'DMIG' + star:<8}{'KAAX':<{width}}{node:<{width}}{component + 1:<{width}}")
         for j in range(k, 6):
@@ -162,7 +178,9 @@ def in_mesh_order(values: np.ndarray) -> np.ndarray:
     return values[np.ix_([3, 4, 5, 0, 1, 2], [3, 4, 5, 0, 1, 2])]
 
 
-@pytest.mark.parametrize("form", ["mtx", "mtx symmetric", "npz", "npz dense", "npy", "sti", "op4", "op4 sparse", "op4 big"])
+@pytest.mark.parametrize(
+    "form", ["mtx", "mtx symmetric", "npz", "npz dense", "npy", "sti", "op4", "op4 sparse", "op4 big"]
+)
 def test_matrices_by_rows(tmp_path: Path, matrix: np.ndarray, form: str) -> None:
     path = tmp_path / f"k.{form.split()[0]}"
     writers = {
@@ -172,7 +190,8 @@ def test_matrices_by_rows(tmp_path: Path, matrix: np.ndarray, form: str) -> None
         "npz dense": lambda: np.savez(path, k=matrix),
         "npy": lambda: np.save(path, matrix),
         "sti": lambda: path.write_text(
-            "".join(f"{i + 1} {j + 1} {matrix[i, j]:20.13e}\n" for j in range(6) for i in range(j + 1)), encoding="ascii"
+            "".join(f"{i + 1} {j + 1} {matrix[i, j]:20.13e}\n" for j in range(6) for i in range(j + 1)),
+            encoding="ascii",
         ),
         "op4": lambda: op4(path, matrix, False),
         "op4 sparse": lambda: op4(path, matrix, True),
@@ -188,7 +207,9 @@ def test_matrices_by_rows(tmp_path: Path, matrix: np.ndarray, form: str) -> None
 @pytest.mark.parametrize("wide", [True, False])
 def test_dmig_names_its_own_rows(tmp_path: Path, matrix: np.ndarray, wide: bool) -> None:
     path = dmig(tmp_path / "k.pch", matrix, wide)
-    assert np.allclose(read_matrix(path, None, LABELS).toarray(), in_mesh_order(matrix), rtol=0, atol=2e-8 if wide else 1e-4)
+    assert np.allclose(
+        read_matrix(path, None, LABELS).toarray(), in_mesh_order(matrix), rtol=0, atol=2e-8 if wide else 1e-4
+    )
 
 
 BAD = {

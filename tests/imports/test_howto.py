@@ -32,15 +32,31 @@ def commands() -> str:
 
 
 def test_the_deck_of_the_page_is_the_one_that_mesh_writes(tmp_path: Path) -> None:
-    command = re.search(r"`gearfmu (mesh fzg_c .*?)`", (ROOT / "docs" / "howto-import.md").read_text(encoding="utf-8"))[1]
+    command = re.search(r"`gearfmu (mesh fzg_c .*?)`", (ROOT / "docs" / "howto-import.md").read_text(encoding="utf-8"))[
+        1
+    ]
     run = [sys.executable, "-m", "gearfmu.cli", *command.split(), "--out", str(tmp_path)]
     subprocess.run(run, check=True, capture_output=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
     assert (tmp_path / "pinion.inp").read_text(encoding="utf-8") == DECK.read_text(encoding="utf-8")
 
 
 def test_import_prints_the_section(tmp_path: Path) -> None:
-    run = [sys.executable, "-m", "gearfmu.cli", "import", str(DECK), "fzg_c", "pinion", "--length", "1 mm", "--bore", "BORE"]
-    done = subprocess.run(run, check=True, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    run = [
+        sys.executable,
+        "-m",
+        "gearfmu.cli",
+        "import",
+        str(DECK),
+        "fzg_c",
+        "pinion",
+        "--length",
+        "1 mm",
+        "--bore",
+        "BORE",
+    ]
+    done = subprocess.run(
+        run, check=True, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}
+    )
     assert '[gears.pinion.import]\nfile = "pinion.inp"\nlength = "1 mm"\nbore = "BORE"' in done.stdout
     assert re.search(r"base_radius_m +0\.0338289", done.stdout) and re.search(r"road +cyclic", done.stdout)
     assert not list(tmp_path.iterdir())
@@ -52,17 +68,22 @@ def test_the_page_runs_as_it_stands(tmp_path: Path) -> None:
     for name in ("examples", "reduced_models"):
         (tmp_path / name).symlink_to(ROOT / name)
     script = f'set -e\ngearfmu() {{ "{sys.executable}" -m gearfmu.cli "$@"; }}\n' + commands()
-    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    done = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}
+    )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
-    body, shipped = load_body(tmp_path / "mine" / "pinion.h5"), load_body(ROOT / "reduced_models" / "fzg_c" / "pinion.h5")
+    body, shipped = (
+        load_body(tmp_path / "mine" / "pinion.h5"),
+        load_body(ROOT / "reduced_models" / "fzg_c" / "pinion.h5"),
+    )
     assert body.mesh["road"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
     assert np.abs(body.frequency[:60] / shipped.frequency[:60] - 1).max() < 0.015  # a coarse mesh
     te = re.search(r"302\.0 N·m: mean ([\d.]+) µm, peak to peak ([\d.]+) µm", done.stdout)
     assert te, done.stdout
     mean = subprocess.run(
-        [sys.executable, "-m", "gearfmu.cli", "te", "fzg_c", "--torque", "302 N*m", "--positions", "12", "--out", str(tmp_path / "te.csv")],
-        capture_output=True, text=True, check=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
-    ).stdout  # fmt: skip
+        [sys.executable, "-m", "gearfmu.cli", "te", "fzg_c", "--torque", "302 N*m", "--positions", "12", "--out",
+        str(tmp_path / "te.csv")], capture_output=True, text=True, check=True, cwd=tmp_path, env=os.environ |
+        {"PYTHONPATH": str(ROOT)}, ).stdout  # fmt: skip
     assert float(te[1]) == pytest.approx(float(re.search(r"mean ([\d.]+)", mean)[1]), rel=0.02)
     trace = Trace.load(next((tmp_path / "mine").rglob("trace.h5")))
     late = trace.time > 5e-3
@@ -75,13 +96,15 @@ STEP = "{bore}*STEP\n*FREQUENCY\n{count}\n*END STEP\n"
 @pytest.mark.full
 @pytest.mark.needs("ccx")
 def test_with_calculix_matrices_our_frequencies_are_calculix_own(tmp_path: Path) -> None:
-    """The sector of the deck: K and M as CalculiX stores them, its first 20 frequencies as it prints them. With the bore
-    held to the last printed digit; free, CalculiX solves with a singular matrix and its own figures are 5e-5 off those of
-    ARPACK on the same matrices."""
+    """The sector of the deck: K and M as CalculiX stores them, its first 20 frequencies as it prints them. With the
+    bore held to the last printed digit; free, CalculiX solves with a singular matrix and its own figures are 5e-5 off
+    those of ARPACK on the same matrices."""
     text = DECK.read_text(encoding="utf-8")
     mesh_only = text.split("** CalculiX writes")[0]
     (tmp_path / "pinion.inp").write_text(text, encoding="utf-8")
-    (tmp_path / "held.inp").write_text(mesh_only + STEP.format(bore="*BOUNDARY\nBORE, 1, 3\n", count=40), encoding="utf-8")
+    (tmp_path / "held.inp").write_text(
+        mesh_only + STEP.format(bore="*BOUNDARY\nBORE, 1, 3\n", count=40), encoding="utf-8"
+    )
     (tmp_path / "free.inp").write_text(mesh_only + STEP.format(bore="", count=40), encoding="utf-8")
     for job in ("pinion", "held", "free"):
         subprocess.run(["ccx", job], cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)

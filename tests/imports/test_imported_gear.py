@@ -101,7 +101,11 @@ def test_hex8_is_raised_and_not_stiff(tmp_path: Path, native: ReducedBody) -> No
     corners = np.unique(pinion(whole=False).elements[:, :8])
     new = np.full(len(pinion(whole=False).nodes), -1)
     new[corners] = np.arange(len(corners))
-    write_deck(tmp_path / "pinion.inp", 1e3 * pinion(whole=False).nodes[corners], {"hexahedron": new[pinion(whole=False).elements[:, :8]]})
+    write_deck(
+        tmp_path / "pinion.inp",
+        1e3 * pinion(whole=False).nodes[corners],
+        {"hexahedron": new[pinion(whole=False).elements[:, :8]]},
+    )
     body = imported(tmp_path)
     assert body.mesh["raised_to_quadratic"] == len(pinion(whole=False).elements)
     assert np.abs(body.frequency[:30] / native.frequency[:30] - 1).max() < 0.02

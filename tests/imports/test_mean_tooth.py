@@ -31,7 +31,9 @@ def whole() -> WholeGear:
     mesh = coarse().mesh.full()
     elements = {"hexahedron20": mesh.elements}
     faces = solids.boundary(elements)
-    rows = tuple(tooth_loads(mesh.nodes, faces, flank(), coarse().points, 2 * np.pi * k / GEAR.z) for k in range(GEAR.z))
+    rows = tuple(
+        tooth_loads(mesh.nodes, faces, flank(), coarse().points, 2 * np.pi * k / GEAR.z) for k in range(GEAR.z)
+    )
     bore = sp.csr_array(patches.averaging_rows(mesh.nodes, faces.within(mesh.sets["bore"])))
     body = FullOrder(
         "gear", *solids.assemble(mesh.nodes, elements, STEEL), rigid_modes(mesh.nodes),
@@ -48,7 +50,10 @@ def unequal() -> WholeGear:
     place = coarse().mesh.full().nodes
     lump = np.exp(-np.sum((place - [11e-3, 2e-3, 0]) ** 2, axis=1) / (3e-3) ** 2)
     mass = body.mass + sp.diags_array(np.repeat(3e-6 * lump, 3))
-    values = {name: getattr(body, name) for name in ("name", "stiffness", "rigid", "interfaces", "ground", "length", "cells", "node_of_dof")}
+    values = {
+        name: getattr(body, name)
+        for name in ("name", "stiffness", "rigid", "interfaces", "ground", "length", "cells", "node_of_dof")
+    }
     return WholeGear(FullOrder(mass=sp.csr_array(mass), **values), whole().flank_rows, whole().points)
 
 
@@ -95,7 +100,8 @@ def test_of_an_unequal_body_it_is_the_mean_of_the_transfer_matrices() -> None:
         for offset in (0, 1, 5):
             static = statics.static_ff[:, :, offset].transpose(0, 2, 4, 1, 3, 5).reshape(size, size)
             exact = static + np.mean(
-                [(rows[j] * (s / squared / (squared - s))) @ rows[(j + offset) % GEAR.z].T for j in range(GEAR.z)], axis=0
+                [(rows[j] * (s / squared / (squared - s))) @ rows[(j + offset) % GEAR.z].T for j in range(GEAR.z)],
+                axis=0,
             )
             ours = static + (modes.flank_rows * (s / own / (own - s))) @ _on_tooth(modes, offset).T
             assert np.abs(ours - exact).max() < 5e-3 * np.abs(statics.static_ff[:, :, 0]).max()

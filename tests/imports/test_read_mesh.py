@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from decks import STEEL, brick, write_deck
 
+from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, solids
 from gearfmu.fem.free import FreeBody
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.errors import MeshError
 from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.imported import Matrices, SetInterface, full_order
@@ -29,7 +29,11 @@ def test_a_deck_gives_the_frequencies_of_our_own_elements(tmp_path: Path) -> Non
     nodes, hexes = brick("hexahedron20")
     ends = {"LEFT": np.flatnonzero(nodes[:, 0] == 0), "RIGHT": np.flatnonzero(nodes[:, 0] == 40)}
     mesh = read_mesh(write_deck(tmp_path / "b.inp", nodes, {"hexahedron20": hexes}, ends), MM)
-    body = full_order(mesh, Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL)), [SetInterface("left", "rigid"), SetInterface("RIGHT")])
+    body = full_order(
+        mesh,
+        Matrices(*solids.assemble(mesh.nodes, mesh.elements, STEEL)),
+        [SetInterface("left", "rigid"), SetInterface("RIGHT")],
+    )
     own = hex20.assemble(MM * nodes, hexes, STEEL)
     found = frequencies(mesh.nodes, mesh.elements, *solids.assemble(mesh.nodes, mesh.elements, STEEL))
     assert found == pytest.approx(frequencies(MM * nodes, {"": hexes}, *own), rel=1e-12)

@@ -20,7 +20,7 @@ def bar() -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 
 def test_rules_and_shape_functions() -> None:
-    for points, weights in (tet10.rule_4(), tet10.rule_24()):
+    for _, weights in (tet10.rule_4(), tet10.rule_24()):
         assert weights.sum() == pytest.approx(1 / 6, rel=1e-13)
     points, weights = tet10.rule_24()
     x, y, z = points.T
@@ -77,7 +77,9 @@ def test_patches_of_triangles_average_like_surfaces(bar) -> None:
     assert np.allclose(rows @ (rigid_fields(nodes) @ motion).ravel(), motion, rtol=1e-10)
     stretched = np.zeros_like(nodes)
     stretched[:, 0] = (nodes[:, 1] / 0.01) ** 2
-    assert (rows @ stretched.ravel())[0] + (rows @ stretched.ravel())[4] * 0.006 - (rows @ stretched.ravel())[5] * 0.005 == pytest.approx(1 / 3, rel=1e-9)
+    assert (rows @ stretched.ravel())[0] + (rows @ stretched.ravel())[4] * 0.006 - (rows @ stretched.ravel())[
+        5
+    ] * 0.005 == pytest.approx(1 / 3, rel=1e-9)
     uniform = averaging_rows_uniform(nodes, faces.nodes)
     assert abs((uniform @ stretched.ravel())[0] - (rows @ stretched.ravel())[0]) > 1e-3
 
