@@ -69,9 +69,9 @@ def test_rigid_motion_costs_nothing_and_every_node_follows_it(name, request):
 
 def test_mass_and_inertia_are_the_analytic_ones(carrier):
     geometry, mass = CarrierGeometry.of(SPEC), carrier.rigid.T @ (carrier.mass @ carrier.rigid)
-    assert mass[0, 0] == pytest.approx(7850 * geometry.volume, rel=1e-3)
-    assert mass[5, 5] == pytest.approx(7850 * geometry.polar_moment, rel=1e-3)
-    assert mass[0, 4] / mass[0, 0] == pytest.approx(geometry.centre_of_mass, rel=1e-3)
+    assert mass[0, 0] == pytest.approx(7850 * geometry.volume, rel=2e-3)
+    assert mass[5, 5] == pytest.approx(7850 * geometry.polar_moment, rel=2e-3)
+    assert mass[0, 4] / mass[0, 0] == pytest.approx(geometry.centre_of_mass, rel=2e-3)
 
 
 def test_rigid_coupling_is_the_body_with_its_slaves_moved_by_hand(carrier, elements):
