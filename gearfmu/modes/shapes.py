@@ -50,7 +50,7 @@ class Mode:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BodyModes:
     """Modes of one body by ascending frequency. points (P, 3) m: nodes of the finite elements' surface; faces (F, 8):
     quadratic quadrilaterals (VTK order), normals outward."""

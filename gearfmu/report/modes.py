@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,7 @@ def _frame(axis: Axes, points: np.ndarray, margin: float) -> None:
     axis.axis("off")
 
 
+@lru_cache(maxsize=1)
 def _surface(body: BodyModes) -> _Surface:
     """Faces are divided until their sides are below `LARGEST` of the body's diameter."""
     corners = body.points[body.faces[:, :4]]

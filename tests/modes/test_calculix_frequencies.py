@@ -38,12 +38,16 @@ def test_the_same_mesh_has_the_same_frequencies(benchmark_module: ModuleType, na
 @pytest.mark.full
 @pytest.mark.parametrize("name", [name for name in GOLDEN if not name.endswith("_coarse")])
 def test_finer_meshes(benchmark_module: ModuleType, name: str) -> None:
-    """The same mesh again, and the mesh that the stage file asks for: within 0.3 %."""
-    case, theirs = benchmark_module.CASES[name], np.array(GOLDEN[name])
-    assert np.allclose(benchmark_module.ours(case), theirs, rtol=PRINTED)
-    difference = benchmark_module.ours(replace(case, scale=1.0)) / theirs - 1
-    print(f"{name}: {100 * difference.min():+.3f} … {100 * difference.max():+.3f} %")
-    assert np.abs(difference).max() < 3e-3
+    assert np.allclose(benchmark_module.ours(benchmark_module.CASES[name]), np.array(GOLDEN[name]), rtol=PRINTED)
+
+
+@pytest.mark.full
+def test_the_shipped_pinion_lies_within_what_refinement_moves(benchmark_module: ModuleType) -> None:
+    """The mesh of the stage file against CalculiX on 0.7 of its element counts: at most 0.3 %, and below it."""
+    shipped = benchmark_module.ours(replace(benchmark_module.CASES["pinion"], scale=1.0))
+    difference = shipped / np.array(GOLDEN["pinion"]) - 1
+    print(f"{100 * difference.min():+.3f} … {100 * difference.max():+.3f} %")
+    assert np.all((difference < 0) & (difference > -3e-3))
 
 
 def test_goldens_are_those_of_the_table() -> None:
