@@ -14,7 +14,8 @@ def harmonic_shares(points: np.ndarray, shape: np.ndarray) -> np.ndarray:
     """Parts (MOST + 1,) of a shape's mean square that go with cos and sin of ν times the angle, ν = 0 … MOST.
 
     points (P, 3) m of a body of revolution or nearly so, shape (P, 3). The cylindrical components of the points in each
-    ring-shaped cell (of radius and width) are fitted by least squares, one ν at a time.
+    ring-shaped cell (of radius and width) are fitted by least squares, one ν at a time: where points stand at few
+    angles, as on bolts, several ν fit and the parts add up to more than 1.
     """
     angle, radius = np.arctan2(points[:, 1], points[:, 0]), np.hypot(points[:, 0], points[:, 1])
     field = cylindrical(points, shape)
@@ -36,7 +37,7 @@ def main_harmonic(points: np.ndarray, shape: np.ndarray, cyclic_index: int, sect
         return cyclic_index, 1.0
     possible = [nu for nu in range(MOST + 1) if (nu - cyclic_index) % sectors == 0 or (nu + cyclic_index) % sectors == 0]
     shares = harmonic_shares(points, shape)[possible]
-    return possible[int(np.argmax(shares))], float(shares.max() / max(shares.sum(), 1e-300))
+    return possible[int(np.argmax(shares))], float(shares.max())
 
 
 def _cells(values: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ class Mode:
 
     numbers : which modes of the body, counted from 1. frequency : Hz. damping_ratio. parity : +1 symmetric about
     mid-width (motion in the plane), −1 antisymmetric (out of it), 0 no such symmetry. nodal_diameter : ν, and
-    `harmonic_share` the part of the kinetic energy that has it (1 in a cyclic body).
+    `harmonic_share` the part of the surface's mean square that has it (1 in a body of many equal sectors).
     energy : (3,) shares of the kinetic energy in radial, tangential and axial motion.
     shape : (1 or 2, P, 3) displacement of the surface's points in kg^-½, mass-normalised, of the mode or of either one
     of the pair.

@@ -68,7 +68,7 @@ def _mode(
         damping_ratio=float("nan"),
         parity=_parity(mesh.nodes, shapes[0]),
         nodal_diameter=int(np.argmax(shares)),
-        harmonic_share=float(shares.max() / shares.sum()),
+        harmonic_share=float(shares.max()),
         energy=energy,
         shape=shapes[:, used],
     )

@@ -26,7 +26,7 @@ from gearfmu.report.style import INK, MUTED, styled
 SHARP = np.cos(np.radians(40.0))  # edges between faces that turn by more are drawn
 MAGNITUDE = LinearSegmentedColormap.from_list("turbo between its dark ends", colormaps["turbo"](np.linspace(0.06, 0.93, 256)))
 SIGNED = colormaps["RdBu_r"]
-LARGEST, MOST_PIECES = 0.012, 4  # sides of drawn quadrilaterals, parts of the body's diameter
+LARGEST, MOST_PIECES = 0.012, 6  # sides of drawn quadrilaterals, parts of the body's diameter
 AMBIENT = 0.66
 DEPTH_CELL = 0.015
 ELEVATION, AZIMUTH = np.radians(38.0), np.radians(-24.0)
