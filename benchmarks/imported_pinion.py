@@ -113,6 +113,7 @@ def cases(sector: FeMesh, material: object) -> dict[str, Callable[[Path], str]]:
 def row(name: str, spec: StageSpec, body: ReducedBody, native: ReducedBody, wheel: ReducedBody) -> dict:
     te = 1e6 * loaded_te(assemble(spec, [body, wheel]), [TORQUE], POSITIONS, rigid_bearings=True).te[0]
     facts = body.mesh
+    unequal = facts.get("teeth_deviation", 0.0) > 1e-3  # its oscillators cannot be numbered like the native modes
     middle = len(body.roll) // 2
     own, other = (b.static_ff[0, 0, 0, middle, middle, 0, 0] for b in (body, native))
     return {
@@ -121,7 +122,9 @@ def row(name: str, spec: StageSpec, body: ReducedBody, native: ReducedBody, whee
         "dof_body": facts["dof_body"],
         "cpu_s": body.provenance["cpu_s"],
         "fit_max_um": f"{facts['fit']['residual_max_um']:.1e}" if "fit" in facts else "",
-        "frequencies_off": f"{np.abs(body.frequency[:COMPARED] / native.frequency[:COMPARED] - 1).max():.1e}",
+        "frequencies_off": ""
+        if unequal
+        else f"{np.abs(body.frequency[:COMPARED] / native.frequency[:COMPARED] - 1).max():.1e}",
         "tooth_compliance_off": f"{own / other - 1:.1e}",
         "te_mean_um": f"{te.mean():.4f}",
         "te_peak_to_peak_um": f"{np.ptp(te):.4f}",
