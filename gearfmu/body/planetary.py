@@ -71,22 +71,25 @@ def reduce_set(
     force: bool = False,
     progress: Progress | None = None,
 ) -> list[Body]:
-    """Reduce what is missing or stale of a set, in two processes where there are two processors, and store it.
+    """Reduce what is missing or stale of a set and store it: gears in two processes where there are two processors, then
+    the carrier, which takes the most memory, alone.
 
     Where processes are spawned (Windows, macOS) a script that calls this needs `if __name__ == "__main__":`.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
     wanted = [name for name in SET_BODIES if force or not _is_current(spec, name, folder)]
     paths = {name: set_body_path(spec, name, folder) for name in wanted}
-    longest_first = sorted(wanted, key=("ring", "carrier", "sun", "planet").index)
-    if len(wanted) > 1 and (os.cpu_count() or 1) > 1:
+    longest_first = sorted(wanted, key=("ring", "sun", "planet", "carrier").index)
+    gears = [name for name in longest_first if name != "carrier"]
+    together = gears if len(gears) > 1 and (os.cpu_count() or 1) > 1 else []
+    if together:
         with ProcessPoolExecutor(2) as pool:
-            jobs = {name: pool.submit(_make, spec, name, paths[name]) for name in longest_first}
-            for number, name in enumerate(longest_first):
+            jobs = [pool.submit(_make, spec, name, paths[name]) for name in together]
+            for number, (name, job) in enumerate(zip(together, jobs, strict=True)):
                 _tell(progress, f"reducing {name}", number / len(jobs))
-                jobs[name].result()
-    else:
-        for name in longest_first:
+                job.result()
+    for name in longest_first:
+        if name not in together:
             _make(spec, name, paths[name], progress)
     return load_set_bodies(spec, folder)
 

@@ -25,6 +25,7 @@ from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError, SpecError
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.planetary_body import SET_BODIES
 from gearfmu.spec.stage import load_stage
 
@@ -155,6 +156,23 @@ def test_missing_and_stale_bodies_are_refused(carrier, tmp_path):
     save_interface_body(carrier, tmp_path / "carrier.h5")
     with pytest.raises(BodyError, match="carrier.h5: stale"):
         load_set_bodies(SPEC, tmp_path)
+
+
+def test_a_set_is_reduced_whole_and_left_alone_when_it_is_current(carrier, tmp_path):
+    mesh = MeshSpec(flank=3, thickness=1, root=2, rim=1, width=1)
+    small = {"mesh": mesh, "modes": 12, "roll_points": 4, "width_functions": 1}
+    gears = {g.name: g.model_copy(update={"body": g.body.model_copy(update=small)}) for g in COARSE.gears}
+    spec = COARSE.model_copy(update=gears)
+    save_interface_body(carrier, tmp_path / "carrier.h5")  # current already
+    before, said = (tmp_path / "carrier.h5").stat().st_mtime_ns, []
+    bodies = reduce_set(spec, tmp_path, progress=lambda what, share: said.append(what))
+    assert [body.name for body in bodies] == list(SET_BODIES) and any("ring" in what for what in said)
+    assert (tmp_path / "carrier.h5").stat().st_mtime_ns == before and bodies[2].internal
+    (tmp_path / "sun.h5").unlink()
+    stamps = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+    reduce_set(spec, tmp_path)
+    assert (tmp_path / "sun.h5").is_file()
+    assert stamps == {name: (tmp_path / name).stat().st_mtime_ns for name in stamps}
 
 
 def test_pair_functions_refuse_a_set():
