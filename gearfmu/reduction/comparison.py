@@ -76,7 +76,7 @@ def compare(body: FullOrder, contest: Contest, progress: Progress | None = None)
 def _reduced(body: FullOrder, method: str, size: Size, damping_ratio: float) -> tuple:
     """Oscillators, facts, processor seconds and bytes of one method, with what it used of the others' making."""
     space = elastic(body)
-    there = set(space.pieces)
+    there = dict(space.pieces)
     space.touched.clear()
     traced, _ = tracemalloc.get_traced_memory()
     tracemalloc.reset_peak() if tracemalloc.is_tracing() else None
@@ -84,7 +84,7 @@ def _reduced(body: FullOrder, method: str, size: Size, damping_ratio: float) -> 
     basis = METHODS[method](body, size)
     model = oscillators(body, basis, damping_ratio)
     seconds, peak = time.process_time() - clock, tracemalloc.get_traced_memory()[1] - traced
-    before = [space.pieces[name] for name in space.touched & there if name in space.pieces]
+    before = [piece for name, piece in there.items() if name in space.touched and space.pieces.get(name) is piece]
     seconds += sum(piece.seconds for piece in before)
     return model, basis.facts, seconds, max(peak, 0) + sum(piece.memory for piece in before)
 
