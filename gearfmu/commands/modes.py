@@ -14,14 +14,14 @@ from gearfmu.commands.shared import Quantity, progress_bar
 
 @click.command()
 @click.argument("stage")
-@click.option("--body", "name", metavar="NAME", help="Modes of this body, with pictures; without: those of the whole stage.")
-@click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair counts as two.")
+@click.option("--body", "name", metavar="NAME", help="Modes of this body, with pictures; without: of the whole stage.")
+@click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
 @click.option(
     "--torque", type=Quantity("N*m"), help='Without --body: torque on the pinion, "302 N*m"; torque_max when not given.'
 )
 @click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder of what is written."
+    "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
 )
 def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float | None, out: Path) -> None:
     """Natural frequencies of STAGE.
@@ -81,7 +81,8 @@ def stage_table(found: Any) -> list[str]:
         f, share = found.frequency[:, k], 100 * found.shares[:, k].mean(axis=0)
         lines.append(
             f"{k + 1:6d} {f.mean():10.0f} {f.min():8.0f} {f.max():8.0f} {100 * found.damping_ratio[:, k].mean():8.2f} "
-            f"{1e-6 * found.mesh_force[:, k].mean():13.1f} {share[0]:6.0f} {share[1]:8.0f} {share[2]:6.0f} {share[3]:6.0f}"
+            f"{1e-6 * found.mesh_force[:, k].mean():13.1f} {share[0]:6.0f} {share[1]:8.0f} {share[2]:6.0f} "
+            f"{share[3]:6.0f}"
         )
     return lines
 
@@ -95,7 +96,8 @@ def table(body: Any) -> list[str]:
         numbers = "–".join(map(str, mode.numbers))
         share = "" if mode.harmonic_share > 0.995 else f" ({100 * mode.harmonic_share:.0f} %)"
         lines.append(
-            f"{numbers:>8} {mode.frequency:12.1f} {100 * mode.damping_ratio:8.2f}  {f'{mode.nodal_diameter}{share}':<9}  "
+            f"{numbers:>8} {mode.frequency:12.1f} {100 * mode.damping_ratio:8.2f}  "
+            f"{f'{mode.nodal_diameter}{share}':<9}  "
             f"{mode.motion:<12} {radial:6.0f} {tangential:8.0f} {axial:6.0f}    {mode.name}"
         )
     return lines

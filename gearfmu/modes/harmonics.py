@@ -35,7 +35,7 @@ def main_harmonic(points: np.ndarray, shape: np.ndarray, cyclic_index: int, sect
     them the strongest of those with this index (ν = index, N − index, N + index …)."""
     if sectors > MOST:
         return cyclic_index, 1.0
-    possible = [nu for nu in range(MOST + 1) if (nu - cyclic_index) % sectors == 0 or (nu + cyclic_index) % sectors == 0]
+    possible = [nu for nu in range(MOST + 1) if 0 in ((nu - cyclic_index) % sectors, (nu + cyclic_index) % sectors)]
     shares = harmonic_shares(points, shape)[possible]
     return possible[int(np.argmax(shares))], float(shares.max())
 

@@ -1,10 +1,10 @@
-"""The stage linearised about a loaded position: natural frequencies of pair, bearings, shafts and elastic bodies together.
+"""The stage linearised about a loaded position: natural frequencies of pair, bearings, shafts and bodies together.
 
 Unknowns q are those of the kernel at level full: x, y, φ of either gear's mean-axis frame and its stored modes, and the
 inertia of a chain in a port. Everything that couples them acts through rows R with flexibility of its own D and what
 the bodies yield beyond their stored modes, C_res (docs/theory.md eq. 2):
 
-    u = R q + C_res f,   f = −D⁻¹ u     ⇒     M q̈ + [diag(0, ω²) + Rᵀ (D + C_res)⁻¹ R] q = 0                          (29)
+    u = R q + C_res f,   f = −D⁻¹ u     ⇒     M q̈ + [diag(0, ω²) + Rᵀ (D + C_res)⁻¹ R] q = 0                    (29)
 
 Rows: how far each loaded slice closes (D: tangent of the local law, eq. 8, at the force of `te`), the bore in its
 bearing (D = 1/k), the bore's angle against port spring or chain. The position is frozen; gears do not turn.

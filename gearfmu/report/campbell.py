@@ -53,7 +53,8 @@ def write_campbell(modes: StageModes, shafts: Sequence[tuple[str, int]], speed_m
         for k in np.flatnonzero(modes.frequency.min(axis=0) < top):
             _line(figure, modes, int(k), strong[k], limit, used)
         for _, number, speed in crossings(modes, teeth, speed_max):
-            axis.plot(speed * RPM, modes.frequency[:, number - 1].mean(), "o", ms=4.5, mfc="white", mec=INK, mew=0.9, zorder=4)
+            height = modes.frequency[:, number - 1].mean()
+            axis.plot(speed * RPM, height, "o", ms=4.5, mfc="white", mec=INK, mew=0.9, zorder=4)
         axis.set(xlim=(0, limit), ylim=(0, top), xlabel=f"speed of the {name} in rpm", ylabel="frequency in Hz")
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1, title=None)
         axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS} (right)", loc="right", color=MUTED)
@@ -69,7 +70,8 @@ def _line(figure: Figure, modes: StageModes, k: int, strong: bool, limit: float,
     label = None if group in used else f"energy mostly in {group}"
     used.add(group)
     axis.fill_between([0, limit], low, high, color=colour, alpha=0.22, lw=0, zorder=2)
-    axis.plot([0, limit], [mean, mean], color=colour, lw=1.8 if strong else 0.8, alpha=1 if strong else 0.6, label=label)
+    look = {"lw": 1.8, "alpha": 1} if strong else {"lw": 0.8, "alpha": 0.6}
+    axis.plot([0, limit], [mean, mean], color=colour, label=label, **look)
 
 
 def campbell_columns(modes: StageModes) -> dict[str, np.ndarray]:

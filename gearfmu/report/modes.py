@@ -24,7 +24,8 @@ from gearfmu.modes.shapes import cylindrical
 from gearfmu.report.style import INK, MUTED, styled
 
 SHARP = np.cos(np.radians(40.0))  # edges between faces that turn by more are drawn
-MAGNITUDE = LinearSegmentedColormap.from_list("turbo between its dark ends", colormaps["turbo"](np.linspace(0.06, 0.93, 256)))
+_BRIGHT = np.linspace(0.06, 0.93, 256)  # of turbo, without its dark ends
+MAGNITUDE = LinearSegmentedColormap.from_list("bright turbo", colormaps["turbo"](_BRIGHT))
 SIGNED = colormaps["RdBu_r"]
 LARGEST, MOST_PIECES = 0.012, 6  # sides of drawn quadrilaterals, parts of the body's diameter
 AMBIENT = 0.66
@@ -56,9 +57,8 @@ def write_mode_picture(body: BodyModes, mode: Mode, path: Path) -> None:
         left.set_title("displacement, parts of the largest", loc="left", color=MUTED)
         right.set_title(f"{_component(mode)[1]} displacement, seen along the axis", loc="left", color=MUTED)
         for axis, norm, colours in ((left, Normalize(0, 1), MAGNITUDE), (right, Normalize(-1, 1), SIGNED)):
-            figure.colorbar(ScalarMappable(norm, colours), ax=axis, shrink=0.6, aspect=26, pad=0.01).outline.set_visible(
-                False
-            )
+            bar = figure.colorbar(ScalarMappable(norm, colours), ax=axis, shrink=0.6, aspect=26, pad=0.01)
+            bar.outline.set_visible(False)
         figure.suptitle(f"{body.name}, {heading(mode)}", x=0.012, ha="left", color=INK, fontsize=12)
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150, format="png")
@@ -91,7 +91,8 @@ def heading(mode: Mode, short: bool = False) -> str:
     frequency = f"{mode.frequency:.0f} Hz" if short else f"{mode.frequency:.1f} Hz"
     name = mode.name if short else f"{mode.motion} ({mode.name})"
     separator = "\n" if short else ", "
-    return f"{'mode' if len(mode.numbers) == 1 else 'modes'} {numbers}: {frequency}{separator}{diameters}{share}, {name}"
+    word = "mode" if len(mode.numbers) == 1 else "modes"
+    return f"{word} {numbers}: {frequency}{separator}{diameters}{share}, {name}"
 
 
 def _plural(diameters: int) -> str:
