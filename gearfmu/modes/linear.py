@@ -24,9 +24,10 @@ from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.stage import PortSpec, StageSpec
-from gearfmu.stage import StageModel, assemble
+from gearfmu.stage import StageModel
 from gearfmu.stage.model import FIXED_K
 from gearfmu.stage.tables import BORE, excited_modes, resampling, symmetric_functions
+from gearfmu.stage.te import statics_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 DRIVE = 0
@@ -55,7 +56,7 @@ def stage_modes(
 
     SimulationError(no_equilibrium) where the pair finds none.
     """
-    position, kernel = np.arange(positions) / positions, _prepared(model, bodies)
+    position, kernel = np.arange(positions) / positions, statics_of(model)
     found = [linearised(model, bodies, torque, part, kernel).modes(count) for part in position]
     return StageModes(torque, position, *(np.stack(part) for part in zip(*found, strict=True)))
 
@@ -65,20 +66,9 @@ def linearised(
 ) -> Linearised:
     """Equation (29) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
     statics; made here when None."""
-    contacts = loaded_contacts(model.spec, kernel or _prepared(model, bodies), torque, position)
+    contacts = loaded_contacts(model.spec, kernel or statics_of(model), torque, position)
     gears = [_gear(model.spec, bodies, index, position, contacts) for index in (0, 1)]
     return _coupled(model.spec, gears, contacts)
-
-
-def _prepared(model: StageModel, bodies: Sequence[ReducedBody]) -> Kernel:
-    """The kernel for statics. Without chains: their clutches are open at the start and hold no torque."""
-    spec = model.spec
-    if any(port.chain for port in spec.ports.values()):
-        bare = {shaft: port.model_copy(update={"chain": None}) for shaft, port in spec.ports.items()}
-        model = assemble(spec.model_copy(update={"ports": bare}), bodies)
-    kernel = model.kernel(level=0.0)
-    kernel.prepare()
-    return kernel
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ H_MAX = 7.5e-6
 FIXED_K = 1e7
 SHARPEST_EDGE = 1e-6
 BEARING_K = 16  # place of the bearing stiffness among the numbers of a gear
+PORT_CHAIN = 1  # place of the chain's flag among the numbers of a port
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.model import BEARING_K, StageModel
+from gearfmu.stage.model import BEARING_K, PORT_CHAIN, StageModel
 
 TANGENT = 1e-4
 LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
@@ -44,8 +44,7 @@ def loaded_te(
     transmission error. rigid_bearings: the bore nodes are held on their axes. parameters: of the kernel, e.g.
     slices=10. SimulationError(no_equilibrium) where there is none.
     """
-    kernel = (on_rigid_bearings(model) if rigid_bearings else model).kernel(**{"level": 0.0, **parameters})
-    kernel.prepare()
+    kernel = statics_of(on_rigid_bearings(model) if rigid_bearings else model, **parameters)
     pitch = 2 * math.pi / model.spec.gears[1].teeth
     base_radius = (
         model.spec.pair.normal_module * model.spec.gears[0].teeth / 2 * math.cos(model.spec.pair.pressure_angle)
@@ -66,6 +65,19 @@ def loaded_te(
             stiffness[i, j] = tangent / base_radius
             shares[i, j] = _shares(state)
     return TeResult(np.asarray(torques, float), position, te, stiffness, shares)
+
+
+def statics_of(model: StageModel, **parameters: float) -> Kernel:
+    """The kernel prepared for statics: level `rigid` (all flexibility static), and without the chains of the ports, whose
+    clutches are open at the start and would hold no torque. parameters: of the kernel."""
+    sections = read_blob(model.blob)
+    for name in ("port0", "port1"):
+        numbers = np.array(sections[name])
+        numbers[PORT_CHAIN] = 0.0
+        sections[name] = numbers
+    kernel = replace(model, blob=write_blob(sections)).kernel(**{"level": 0.0, **parameters})
+    kernel.prepare()
+    return kernel
 
 
 def on_rigid_bearings(model: StageModel) -> StageModel:

@@ -11,7 +11,7 @@ import pytest
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.stage import ChainSpec, StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 LOAD = 302.0  # N·m on the pinion
@@ -129,6 +129,14 @@ def test_level_does_not_change_the_static_te(plain: StageModel) -> None:
     rigid = te(ready(plain, level=0.0), LOAD)
     for level in (1.0, 2.0, 3.0):
         assert np.allclose(te(ready(plain, level=level), LOAD), rigid, rtol=1e-6, atol=0)
+
+
+def test_a_chain_in_a_port_changes_nothing(plain: StageModel, spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Torque and reaction act on the bores: what an open clutch in a port would hold does not count."""
+    chain = ChainSpec(inertia=0.05, disc_inertia=0.01, shaft_k=2e4, shaft_c=1.0)
+    ports = {shaft: port.model_copy(update={"chain": chain}) for shaft, port in spec.ports.items()}
+    chained = assemble(spec.model_copy(update={"ports": ports}), bodies)
+    assert np.array_equal(loaded_te(chained, [LOAD], 5).te, loaded_te(plain, [LOAD], 5).te)
 
 
 def test_converges_with_slices(plain: StageModel) -> None:
