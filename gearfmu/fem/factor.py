@@ -8,7 +8,9 @@ Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; Liu, SIAM Review 34 (
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
@@ -49,7 +51,7 @@ class Factor:
         assert len(self._order) == matrix.shape[0], "every unknown must belong to a node of some element"
         ordered = sp.csr_array(matrix)[self._order][:, self._order].tocsr()
         ends = np.cumsum([len(group) for group in groups])
-        self._fronts = _factorise(ordered, ends)
+        self._fronts = eliminated(ordered, ends, _eliminate)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """A⁻¹ rhs for real or complex rhs (n, k)."""
@@ -88,7 +90,12 @@ def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.nda
     return result
 
 
-def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
+def eliminated(matrix: sp.csr_array, ends: np.ndarray, eliminate: Callable[..., tuple[Any, np.ndarray]]) -> list[Any]:
+    """Fronts of an ordered matrix (n, n), group by group up to `ends`.
+
+    eliminate(dense, start, stop, below): of a gathered front with rows start:stop and `below` first, what is kept of it
+    and the update that it leaves to the rows below.
+    """
     group_of = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
     waiting: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in ends]
     fronts, workspace = [], Workspace()
@@ -99,7 +106,7 @@ def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
         touched = np.unique(np.concatenate([rows.indices, *(index for index, _ in children)]))
         below = touched[touched >= stop]
         dense = gathered(rows, start, below, children, workspace)
-        front, update = _eliminate(dense, start, int(stop), below)
+        front, update = eliminate(dense, start, int(stop), below)
         fronts.append(front)
         if len(below):
             waiting[group_of[below[0]]].append((below, update))

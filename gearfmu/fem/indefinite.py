@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from scipy.linalg.blas import dtrsm
 
 from gearfmu.fem.dissection import nested_dissection
-from gearfmu.fem.factor import FactorError, Workspace, dof_groups, gathered
+from gearfmu.fem.factor import FactorError, dof_groups, eliminated
 
 _COLUMNS = 128
 _REFINED = 1e-9  # residual relative to the right-hand side; rounding leaves a tenth of it on solid bodies
@@ -54,7 +54,7 @@ class SymmetricFactor:
         self._order = np.concatenate(groups)
         assert len(self._order) == matrix.shape[0], "every unknown must belong to a node of some element"
         ordered = self._matrix[self._order][:, self._order].tocsr()
-        self._fronts = _factorise(ordered, np.cumsum([len(group) for group in groups]))
+        self._fronts = eliminated(ordered, np.cumsum([len(group) for group in groups]), _eliminate)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """A⁻¹ rhs, rhs (n, k); refined."""
@@ -90,24 +90,6 @@ class SymmetricFactor:
         for front in reversed(self._fronts):
             own = work[front.start : front.stop]
             own[:] = front.solve(own) - front.influence @ work[front.below]
-
-
-def _factorise(matrix: sp.csr_array, ends: np.ndarray) -> list[_Front]:
-    group_of = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
-    waiting: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in ends]
-    fronts, workspace = [], Workspace()
-    for number, stop in enumerate(ends):
-        start = int(ends[number - 1]) if number else 0
-        rows = matrix[start:stop]
-        children, waiting[number] = waiting[number], []
-        touched = np.unique(np.concatenate([rows.indices, *(index for index, _ in children)]))
-        below = touched[touched >= stop]
-        dense = gathered(rows, start, below, children, workspace)
-        front, update = _eliminate(dense, start, int(stop), below)
-        fronts.append(front)
-        if len(below):
-            waiting[group_of[below[0]]].append((below, update))
-    return fronts
 
 
 def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[_Front, np.ndarray]:
