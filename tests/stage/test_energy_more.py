@@ -54,7 +54,7 @@ def test_level_explicit_is_central_with_all_modes_below_its_limit(pair_free: Sta
 
 
 def test_central_is_warned_above_its_limit_and_refused_far_above(pair_free: StageModel) -> None:
-    limit = central.predicted_limit(pair_free, FAST)
+    limit = central.predicted_limit(started(pair_free, Rattle(), {"level": FAST, "integrator": CENTRAL}))
     parameters = {"level": FAST, "integrator": CENTRAL}
     assert started(pair_free, Rattle(), {**parameters, "h": 0.95 * limit}).warning == ""
     assert "limit of stability" in started(pair_free, Rattle(), {**parameters, "h": 1.1 * limit}).warning
@@ -64,7 +64,7 @@ def test_central_is_warned_above_its_limit_and_refused_far_above(pair_free: Stag
 
 def test_runs_confirm_the_predicted_limit(pair_free: StageModel) -> None:
     """Stable just below it; unstable some way above (the prediction is for the stiffest roll position)."""
-    predicted = central.predicted_limit(pair_free, FAST)
+    predicted = central.predicted_limit(started(pair_free, Rattle(), {"level": FAST, "integrator": CENTRAL}))
     measured = central.measured_limit(pair_free, FAST, predicted)
     print(f"predicted {1e6 * predicted:.2f} µs, measured {1e6 * measured:.2f} µs")
     assert 0.95 * predicted < measured < 1.3 * predicted
