@@ -28,6 +28,7 @@ from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.modes.planetary import set_sector
 from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
+from positions import read
 
 COUNT, RIGID = 20, 6
 HERE = Path(__file__).parent
@@ -122,14 +123,6 @@ def solved(case: Case, work: Path) -> list[dict[str, Any]]:
         {"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size}
         for k, f in enumerate(frequencies(deck.with_suffix(".dat")), start=1)
     ]
-
-
-def read(path: Path) -> list[dict[str, Any]]:
-    """The table's rows, none where there is no table."""
-    if not path.exists():
-        return []
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def write(path: Path, rows: list[dict[str, Any]]) -> None:

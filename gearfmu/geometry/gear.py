@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
+from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.geometry.root import RackRounding
 
 _GAUSS = np.polynomial.legendre.leggauss(40)
 
 
 @dataclass(frozen=True)
-class GearGeometry:
+class GearGeometry(ReferenceGear):
     """An external spur gear in its body frame: tooth 0 centred on +x (ISO 21771 symbols; lengths m, angles rad).
 
     z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient. r_b, r, r_a: base, reference and tip
@@ -24,10 +25,6 @@ class GearGeometry:
     the basic rack (m, not factors).
     """
 
-    z: int
-    m: float
-    alpha: float
-    x: float
     r_a: float
     r_bore: float
     tip_edge: float
@@ -45,27 +42,9 @@ class GearGeometry:
         )  # fmt: skip
 
     @property
-    def r(self) -> float:
-        return self.m * self.z / 2
-
-    @property
-    def r_b(self) -> float:
-        return self.r * math.cos(self.alpha)
-
-    @property
     def r_f(self) -> float:
         """Root radius r − h_fP + x m (ISO 21771)."""
         return self.r - self.h_fp + self.x * self.m
-
-    @property
-    def half_pitch(self) -> float:
-        """Half the angle of a tooth and a space, π/z."""
-        return math.pi / self.z
-
-    @property
-    def psi_b(self) -> float:
-        """Half tooth-thickness angle at the base circle: ψ + inv α (ISO 21771)."""
-        return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha))
 
     @property
     def rounding(self) -> RackRounding:

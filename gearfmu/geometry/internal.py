@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearfmu.geometry import involute
+from gearfmu.geometry.reference import ReferenceGear
 
 _GAUSS = np.polynomial.legendre.leggauss(40)
 
 
 @dataclass(frozen=True)
-class InternalGearGeometry:
+class InternalGearGeometry(ReferenceGear):
     """An internal spur gear in its body frame: tooth space 0 centred on +x (lengths m, angles rad).
 
     z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient (positive outwards). r_a: tip radius, the
@@ -31,10 +32,6 @@ class InternalGearGeometry:
     its motion along the trochoid).
     """
 
-    z: int
-    m: float
-    alpha: float
-    x: float
     r_a: float
     r_f: float
     r_rim: float
@@ -50,24 +47,6 @@ class InternalGearGeometry:
             r_f=m * (ring.teeth / 2 + ring.profile_shift + ring.dedendum), r_rim=ring.rim_diameter / 2,
             tip_edge=ring.tip_edge_radius, fillet=ring.fillet_radius * m,
         )  # fmt: skip
-
-    @property
-    def r(self) -> float:
-        return self.m * self.z / 2
-
-    @property
-    def r_b(self) -> float:
-        return self.r * math.cos(self.alpha)
-
-    @property
-    def half_pitch(self) -> float:
-        """Half the angle of a tooth and a space, π/z."""
-        return math.pi / self.z
-
-    @property
-    def psi_b(self) -> float:
-        """Half angle of the tooth space at the base circle."""
-        return (math.pi / 2 + 2 * self.x * math.tan(self.alpha)) / self.z + float(involute.inv(self.alpha))
 
     @property
     def s_a(self) -> float:
