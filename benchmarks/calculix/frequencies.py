@@ -1,4 +1,5 @@
-"""Elastic frequencies of free bodies by CalculiX: our meshes, all teeth, 20-node hexahedra (C3D20).
+"""Elastic frequencies of free bodies by CalculiX: our meshes, 20-node hexahedra (C3D20), all teeth or, where these are
+too many, one sector with CalculiX's own cyclic symmetry and every nodal diameter.
 
     python benchmarks/calculix/frequencies.py [CASE …] [--work DIR] [--out frequencies.csv] [--compare]
 
@@ -37,12 +38,13 @@ FIELDS = ("case", "mode", "frequency_Hz", "nodes", "elements", "seconds", "deck_
 
 @dataclass(frozen=True)
 class Case:
-    """A body of a shipped stage. scale: of all element counts of its mesh."""
+    """A body of a shipped stage. scale: of all element counts of its mesh. by_sector: CalculiX gets one sector."""
 
     name: str
     stage: str
     body: str
     scale: float
+    by_sector: bool = False
 
 
 CASES = {
@@ -54,6 +56,12 @@ CASES = {
         Case("ring", "planetary54", "ring", 0.4),
         Case("carrier_coarse", "planetary54", "carrier", 0.5),
         Case("carrier", "planetary54", "carrier", 1.0),
+        Case("pinion_sector_coarse", "fzg_c", "pinion", 0.4, by_sector=True),
+        Case("pinion_file", "fzg_c", "pinion", 1.0, by_sector=True),
+        Case("pinion_finer", "fzg_c", "pinion", 1.4, by_sector=True),
+        Case("ring_file", "planetary54", "ring", 1.0, by_sector=True),
+        Case("ring_finer", "planetary54", "ring", 1.3, by_sector=True),
+        Case("carrier_finer", "planetary54", "carrier", 1.5, by_sector=True),
     )
 }
 
@@ -86,7 +94,7 @@ def compare(rows: list[dict[str, Any]]) -> None:
 
 
 def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
-    """Free vibration of the whole body, in mm, N, tonnes and s."""
+    """Free vibration of a body, whole or (`mesh.teeth` > 1) by one sector, in mm, N, tonnes and s."""
     lines = ["*NODE, NSET=ALL"]
     lines += [f"{k}, {x:.14g}, {y:.14g}, {z:.14g}" for k, (x, y, z) in enumerate(1e3 * mesh.nodes, start=1)]
     lines += ["*ELEMENT, TYPE=C3D20, ELSET=BODY"]
@@ -95,8 +103,19 @@ def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
         lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}"]
     lines += ["*DENSITY", f"{1e-12 * material.density:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL"]
-    lines += ["*STEP", "*FREQUENCY", f"{COUNT + RIGID}", "*END STEP"]
+    symmetry, choice = _symmetry(mesh) if mesh.teeth > 1 else ([], [])
+    lines += [*symmetry, "*STEP", "*FREQUENCY", f"{COUNT + RIGID}", *choice, "*END STEP"]
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _symmetry(sector: FeMesh) -> tuple[list[str], list[str]]:
+    """CalculiX's cyclic symmetry about z: the tie of both cuts, and the choice of all nodal diameters in the step."""
+    lines = []
+    for name, cut in (("MINUS", sector.cut_minus), ("PLUS", sector.cut_plus)):
+        lines += [f"*NSET, NSET={name}", *(f"{node}," for node in cut + 1), f"*SURFACE, NAME=S{name}, TYPE=NODE", name]
+    lines += ["*TIE, NAME=CUT, CYCLIC SYMMETRY, POSITION TOLERANCE=1e-3", "SMINUS, SPLUS"]
+    lines += [f"*CYCLIC SYMMETRY MODEL, N={sector.teeth}, TIE=CUT", "0, 0, 0, 0, 0, 1"]
+    return lines, [f"*SELECT CYCLIC SYMMETRY MODES, NMIN=0, NMAX={sector.teeth // 2}"]
 
 
 def frequencies(path: Path) -> np.ndarray:
@@ -108,20 +127,36 @@ def frequencies(path: Path) -> np.ndarray:
     return np.sqrt(values[RIGID:]) / (2 * np.pi)
 
 
+def sector_frequencies(path: Path, teeth: int) -> np.ndarray:
+    """The same of a .dat file of one sector: a table for each nodal diameter. CalculiX lists real modes, those of
+    diameter 0 and half the teeth, twice as well."""
+    found = []
+    for diameter, table in enumerate(path.read_text(encoding="ascii").split("E I G E N V A L U E")[1:]):
+        rows = re.findall(rf"^ +{diameter} +\d+ +(\S+) +\S+ +\S+ +\S+\s*$", table, re.MULTILINE)
+        values = np.array([float(row) for row in rows])[:: 2 if 2 * diameter in (0, teeth) else 1]
+        rigid = {0: 2, 1: 4}.get(diameter, 0)
+        assert len(values) >= COUNT / 2 and np.all(np.abs(values[:rigid]) < 1e-4 * values[rigid])
+        found.append(values[rigid:])
+    assert len(found) == teeth // 2 + 1
+    return np.sqrt(np.sort(np.concatenate(found))[:COUNT]) / (2 * np.pi)
+
+
 def solved(case: Case, work: Path) -> list[dict[str, Any]]:
     """The table's rows of a case, made by running it."""
     material, sector = body_of(case)
-    mesh = sector.full()
+    mesh = sector if case.by_sector else sector.full()
     folder = work / f"frequencies_{case.name}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "free.inp"
     write_deck(mesh, material, deck)
     seconds = run(deck)
+    result = deck.with_suffix(".dat")
+    found = sector_frequencies(result, sector.teeth) if case.by_sector else frequencies(result)
     digest = hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
     size = {"nodes": len(mesh.nodes), "elements": len(mesh.elements), "seconds": f"{seconds:.0f}", "deck_sha256": digest}
     return [
         {"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size}
-        for k, f in enumerate(frequencies(deck.with_suffix(".dat")), start=1)
+        for k, f in enumerate(found, start=1)
     ]
 
 
