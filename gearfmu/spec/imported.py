@@ -10,8 +10,10 @@ from pydantic import Field, model_validator
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.base import Quantity, Spec, Text, refuse
+from gearfmu.spec.layers import Layers
 
 _FILES = ("file", "stiffness", "mass", "unknowns")
+_SET_BODIES = ("sun", "planet", "carrier")
 
 
 class ImportSpec(Spec):
@@ -53,10 +55,37 @@ class ImportSpec(Spec):
             raise refuse("unknowns sorts the rows of ready-made matrices: give stiffness and mass too")
         return self
 
-    def located(self, source: Path) -> ImportSpec:
-        """The same with the files as seen from here, not from the stage file `source`."""
-        files = {field: str(source.parent / getattr(self, field)) for field in _FILES if getattr(self, field)}
+    def located(self, layers: Layers, place: str) -> ImportSpec:
+        """The same with the files as seen from here. Paths are relative to the file that holds them. place : the
+        section, "gears.pinion.import"."""
+        named = [field for field in _FILES if getattr(self, field)]
+        files = {field: str(_path(layers, f"{place}.{field}", getattr(self, field))) for field in named}
         return self.model_copy(update=files)
+
+
+def missing_files(layers: Layers) -> list[Problem]:
+    """A problem for every file that a section `import` names and that is not there, whatever else is wrong with the
+    stage file."""
+    return [
+        Problem(str(layers.path), f"{place}.{field}", name, f"there is no file {path}: write the path relative to the stage file")
+        for place, section in _sections(layers.tables).items()
+        for field in _FILES
+        if isinstance(name := section.get(field), str) and name
+        if not (path := _path(layers, f"{place}.{field}", name)).is_file()
+    ]
+
+
+def _path(layers: Layers, field: str, name: str) -> Path:
+    return layers.holder(field).parent / name
+
+
+def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The tables `import` of a stage file by their place."""
+    gears = tables.get("gears")
+    bodies = {f"gears.{name}": table for name, table in gears.items()} if isinstance(gears, dict) else {}
+    bodies |= {name: tables[name] for name in _SET_BODIES if name in tables}
+    found = {f"{place}.import": table.get("import") for place, table in bodies.items() if isinstance(table, dict)}
+    return {place: section for place, section in found.items() if isinstance(section, dict)}
 
 
 def import_inputs(spec: ImportSpec, source: Path, gear: str) -> dict[str, Any]:

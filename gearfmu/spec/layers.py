@@ -31,9 +31,12 @@ class Layers:
 
     def attributed(self, problem: Problem) -> Problem:
         """The problem with the name of the file that holds the field, or of the nearest file when none does."""
-        keys = problem.field.split(".")
-        holder = next((path for path, raw in self.files if _holds(raw, keys)), self.path)
-        return replace(problem, file=str(holder))
+        return replace(problem, file=str(self.holder(problem.field)))
+
+    def holder(self, field: str) -> Path:
+        """The nearest file that says something about a field ("gears.pinion.import.file"); `path` when none does."""
+        keys = field.split(".")
+        return next((path for path, raw in self.files if _holds(raw, keys)), self.path)
 
 
 def read_layers(path: Path) -> Layers:

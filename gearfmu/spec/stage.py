@@ -13,6 +13,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse, validate
 from gearfmu.spec.checks import geometry_problems
 from gearfmu.spec.gear import GearSpec, PairSpec
+from gearfmu.spec.imported import missing_files
 from gearfmu.spec.layers import Layers, read_layers
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
@@ -153,9 +154,10 @@ def _load_pair(layers: Layers) -> StageSpec:
         problems += geometry_problems(str(path), spec.pair, spec.gears, spec.torque_max)
     else:
         problems += _geometry_of_what_can_be_read(layers)
+    problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
-    return _with_relief_rolls(_with_import_paths(spec))
+    return _with_relief_rolls(_with_import_paths(spec, layers))
 
 
 def _load_set(layers: Layers) -> PlanetarySpec:
@@ -196,10 +198,12 @@ def _geometry_of_what_can_be_read(layers: Layers) -> list[Problem]:
     return geometry_problems(file, pair, gears, torque)
 
 
-def _with_import_paths(spec: StageSpec) -> StageSpec:
+def _with_import_paths(spec: StageSpec, layers: Layers) -> StageSpec:
     """The same stage with the files of imported bodies named as seen from here."""
     gears = tuple(
-        gear if gear.imported is None else gear.model_copy(update={"imported": gear.imported.located(spec.source)})
+        gear
+        if gear.imported is None
+        else gear.model_copy(update={"imported": gear.imported.located(layers, f"gears.{gear.name}.import")})
         for gear in spec.gears
     )
     return spec.model_copy(update={"gears": gears})

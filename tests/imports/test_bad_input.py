@@ -21,6 +21,7 @@ from gearfmu.femesh.imported import read_mesh
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_gear import hinge_problem
+from gearfmu.spec.stage import load_stage
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 MM = 1e-3
@@ -155,6 +156,26 @@ def test_a_missing_file_and_a_wrong_pair_of_fields(tmp_path: Path) -> None:
         stage(tmp_path, SECTION + 'mass = "m.npz"')
     with pytest.raises(SpecError, match='gears.pinion.import.lenght = "1 mm": unknown key: did you mean "length"'):
         stage(tmp_path, SECTION + 'lenght = "1 mm"')
+
+
+def test_missing_files_are_told_at_load_with_all_other_problems(tmp_path: Path) -> None:
+    """Also where the file could not be read for another reason."""
+    files = READY + 'unknowns = "pinion.dof"\n'
+    for wrong, also in (("bore_coupling = 3", "bore_coupling"), ('flank_tolerance = "5 kg"', "flank_tolerance")):
+        with pytest.raises(SpecError) as caught:
+            stage(tmp_path, files + wrong)
+        fields = [problem.field.removeprefix("gears.pinion.import.") for problem in caught.value.problems]
+        assert sorted(fields) == sorted([also, "file", "stiffness", "mass", "unknowns"])
+
+
+def test_paths_are_relative_to_the_file_that_holds_them(tmp_path: Path) -> None:
+    """A variant in another folder takes the import from its base."""
+    hex20_deck(tmp_path / "pinion.inp", whole=False)
+    stage(tmp_path, SECTION)
+    (tmp_path / "variants").mkdir()
+    variant = tmp_path / "variants" / "stage.toml"
+    variant.write_text('base = "../stage.toml"\nname = "variant"\n', encoding="utf-8")
+    assert Path(load_stage(variant).gears[0].imported.file).resolve() == (tmp_path / "pinion.inp").resolve()
 
 
 @pytest.fixture(scope="module")
