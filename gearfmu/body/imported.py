@@ -15,6 +15,7 @@ from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
+from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_gear import (
     BORE,
     CheckedGear,
@@ -25,6 +26,7 @@ from gearfmu.reduction.imported_gear import (
     imported_gear,
 )
 from gearfmu.reduction.imported_sector import ImportedSector
+from gearfmu.reduction.imported_whole import imported_gear_order
 from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.modal import Modes, Progress, elastic_modes
 from gearfmu.reduction.statics import Statics, static_tables
@@ -38,6 +40,15 @@ def check_gear(gear: Any, geometry: Any) -> CheckedGear:
 def _wanted(gear: Any, geometry: Any) -> Wanted:
     flank, points = tooth_flank(geometry, gear)
     return Wanted(geometry.z, flank, points, 0.5 * gear.bore_diameter, gear.material)
+
+
+def imported_full_order(gear: Any, geometry: Any) -> FullOrder:
+    """The whole imported gear before reduction, for every method: interfaces tooth0 … and bore. Raises MeshError."""
+    found, wanted = check_gear(gear, geometry), _wanted(gear, geometry)
+    try:
+        return imported_gear_order(found, wanted, gear.imported.bore_coupling, (gear.name, geometry.r))
+    except MeshError as error:
+        raise MeshError(f"{gear.imported.file}: {error}") from error
 
 
 def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:

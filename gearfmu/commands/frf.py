@@ -81,7 +81,22 @@ def full_order_of(stage: str, body: str, scale: float | None = None) -> Any:
         return carrier_full_order(spec, **factor)
     if body == "ring" and spec.kind == "planetary_set":
         return ring_full_order(spec, **factor)
-    return gear_full_order(spec, body, **factor)
+    gear = next(gear for gear in spec.gears if gear.name == body)
+    if getattr(gear, "imported", None) is None:
+        return gear_full_order(spec, body, **factor)
+    return _imported(spec, gear, scale)
+
+
+def _imported(spec: Any, gear: Any, scale: float | None) -> Any:
+    """The FullOrder of a gear from finite elements made elsewhere."""
+    if scale is not None:
+        remedy = f"the finite elements of '{gear.name}' are yours: coarsen your mesh, or leave --scale away"
+        raise click.BadParameter(remedy, param_hint="--scale")
+    from gearfmu.body.imported import imported_full_order
+    from gearfmu.geometry import GearGeometry
+
+    pair = spec.set if spec.kind == "planetary_set" else spec.pair
+    return imported_full_order(gear, GearGeometry.of(gear, pair))
 
 
 def table(trials: Sequence[Any], contest: Any) -> list[str]:

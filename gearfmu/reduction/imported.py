@@ -57,11 +57,12 @@ def full_order(
     faces = solids.boundary(mesh.elements)
     reach = float(np.linalg.norm(mesh.nodes, axis=1).max()) if length is None else length
     body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
-    couplings = [_coupling(mesh, faces, interface) for interface in interfaces]
+    couplings = [set_coupling(mesh, faces, interface) for interface in interfaces]
     return coupled(mesh.source.stem, body, couplings, Judgement(ground, reach))
 
 
-def _coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterface) -> Coupling:
+def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterface) -> Coupling:
+    """The coupling of a node set to its master. faces : the boundary of the mesh. MeshError as `full_order`."""
     if interface.kind not in KINDS:
         raise MeshError(f"{mesh.source}: '{interface.kind}' is no kind of interface: one of {', '.join(KINDS)}")
     members = mesh.node_set(interface.node_set)

@@ -133,6 +133,22 @@ def tooth_loads(
     return rows if tooth_angle == 0.0 else sp.csr_array(rows @ turn)
 
 
+def middle_node(nodes: np.ndarray, faces: Faces, flank: ToothFlank, tooth_angle: float = 0.0) -> int:
+    """The node of flank sg = +1 of a tooth nearest to the flank's middle, half-way along the involute at mid-width.
+
+    nodes (N, 3) m in the frame of the gear. MeshError without a face on the flank.
+    """
+    c, s = np.cos(tooth_angle), np.sin(tooth_angle)
+    local = nodes @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    own = _flank_part(local, faces, flank, 0).nodes
+    if len(own) == 0:
+        raise MeshError("there is no face on one of the flanks")
+    squared = local[own, 0] ** 2 + local[own, 1] ** 2 - flank.r_b**2
+    low, high = flank.s_form**2, flank.s_tip**2
+    along, across = (squared - 0.5 * (low + high)) / (high - low), local[own, 2] / flank.face_width
+    return int(own[(along**2 + across**2).argmin()])
+
+
 def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -> Faces:
     """Faces of one flank of the tooth on +x, with those that reach beyond form and tip circle."""
     sg = 1 - 2 * side

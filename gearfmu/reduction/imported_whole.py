@@ -1,0 +1,85 @@
+"""An imported gear before reduction, with all its teeth: what `toothed` makes of our own meshes, for every method.
+
+A sector is unfolded: its nodes and elements turned tooth by tooth, and so are ready-made matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from gearfmu.fem import solids
+from gearfmu.femesh.cyclic_cut import CyclicCut
+from gearfmu.femesh.imported import ImportedMesh
+from gearfmu.femesh.mesh import FeMesh
+from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported import Matrices, SetInterface, set_coupling
+from gearfmu.reduction.imported_flank import middle_node
+from gearfmu.reduction.imported_gear import BORE, CheckedGear, Wanted
+
+
+def imported_gear_order(found: CheckedGear, wanted: Wanted, coupling: str, named: tuple[str, float]) -> FullOrder:
+    """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, which is the ground when
+    it is judged.
+
+    coupling : of the bore, "averaging" or "rigid". named : name of the body and the length (m) that scales rotations.
+    Raises MeshError.
+    """
+    mesh, matrices = _whole(found, wanted)
+    faces, body = solids.boundary(mesh.elements), Elements(mesh.nodes, mesh.repeated_cells, *_pair(matrices))
+    couplings = []
+    for tooth in range(wanted.teeth):
+        node = middle_node(mesh.nodes, faces, wanted.flank, 2 * np.pi * tooth / wanted.teeth)
+        couplings.append(Coupling(f"tooth{tooth}", "nodes", np.array([node]), mesh.nodes[node]))
+    couplings.append(set_coupling(mesh, faces, SetInterface(BORE, coupling, np.zeros(3))))
+    name, length = named
+    return full_order(name, body, couplings, Judgement((BORE,), length))
+
+
+def _pair(matrices: Matrices) -> tuple[sp.csr_array, sp.csr_array]:
+    return matrices.stiffness, matrices.mass
+
+
+def _whole(found: CheckedGear, wanted: Wanted) -> tuple[ImportedMesh, Matrices]:
+    """All teeth of a checked gear, and its matrices: ready-made or of our elements."""
+    mesh, ready = found.mesh, found.matrices
+    if found.cut is not None:
+        mesh = _unfolded(mesh, found.cut, wanted.teeth)
+        ready = ready and Matrices(*(unfolded_matrix(m, found.cut, wanted.teeth) for m in _pair(ready)))
+    return mesh, ready or Matrices(*solids.assemble(mesh.nodes, mesh.elements, wanted.material))
+
+
+def _unfolded(mesh: ImportedMesh, cut: CyclicCut, teeth: int) -> ImportedMesh:
+    nodes, numbers = _numbers(cut, teeth)
+    bore = np.flatnonzero(np.isin(cut.of_mesh, mesh.sets[BORE]))
+    return replace(
+        mesh,
+        nodes=nodes,
+        elements={kind: np.concatenate([n[block] for n in numbers]) for kind, block in cut.elements.items()},
+        sets={BORE: np.unique(np.concatenate([n[bore] for n in numbers]))},
+        labels=np.full(len(nodes), -1),
+    )
+
+
+def unfolded_matrix(matrix: sp.csr_array, cut: CyclicCut, teeth: int) -> sp.csr_array:
+    """Matrix of the whole body, over the nodes of all sectors, from the (3n, 3n) one of a sector: its turned copies
+    added at the nodes that they share."""
+    nodes, numbers = _numbers(cut, teeth)
+    whole = sp.csr_array((nodes.size, nodes.size))
+    for tooth, number in enumerate(numbers):
+        c, s = np.cos(2 * np.pi * tooth / teeth), np.sin(2 * np.pi * tooth / teeth)
+        turn = sp.kron(sp.identity(len(number)), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), format="csr")
+        dofs = (3 * number[:, None] + np.arange(3)).ravel()
+        turned = sp.coo_array(turn @ matrix @ turn.T)
+        row, column = turned.coords
+        whole = whole + sp.coo_array((turned.data, (dofs[row], dofs[column])), whole.shape).tocsr()
+    return sp.csr_array(whole)
+
+
+def _numbers(cut: CyclicCut, teeth: int) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Nodes (N, 3) of the whole body, and for each sector the numbers (n,) of its nodes among them."""
+    sector = FeMesh(cut.nodes, np.empty((0, 20), int), {}, teeth, cut.cut_minus, cut.cut_plus)
+    return sector.full().nodes, [sector.sector_nodes(k) for k in range(teeth)]

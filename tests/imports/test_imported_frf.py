@@ -1,0 +1,87 @@
+"""Frequency response of imported bodies before reduction: the same as of our own, for every method."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from gears import hex20_deck, pinion, stage
+from scipy.spatial import cKDTree
+
+from gearfmu import cli
+from gearfmu.body.imported import imported_full_order
+from gearfmu.fem import solids
+from gearfmu.geometry import GearGeometry
+from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.toothed import gear_full_order
+
+SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
+READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
+
+
+def imported(folder: Path, section: str = SECTION) -> FullOrder:
+    spec = stage(folder, section)
+    return imported_full_order(spec.gears[0], GearGeometry.of(spec.gears[0], spec.pair))
+
+
+def store_matrices(folder: Path, whole: bool) -> None:
+    mesh, material = pinion(whole), stage(folder).gears[0].material
+    for name, matrix in zip(("k", "m"), solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, material), strict=True):
+        sp.save_npz(folder / f"{name}.npz", sp.csr_matrix(matrix))
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory) -> FullOrder:
+    return gear_full_order(stage(tmp_path_factory.mktemp("native")), "pinion", 1.0)
+
+
+def places(body: FullOrder) -> np.ndarray:
+    """(N, 3) m of the nodes, from the rigid rotations of the body."""
+    turn_x, turn_z = body.rigid[:, 3].reshape(-1, 3), body.rigid[:, 5].reshape(-1, 3)
+    return np.column_stack([turn_z[:, 1], -turn_z[:, 0], -turn_x[:, 1]])
+
+
+@pytest.mark.parametrize(("whole", "ready"), [(True, False), (False, False), (False, True), pytest.param(True, True, marks=pytest.mark.full)])
+def test_the_same_full_model_whatever_the_road(tmp_path: Path, native: FullOrder, whole: bool, ready: bool) -> None:
+    """Whole mesh or sector, our elements or ready-made matrices: K, M and the rows of all interfaces."""
+    hex20_deck(tmp_path / "pinion.inp", whole=whole)
+    if ready:
+        store_matrices(tmp_path, whole)
+    body = imported(tmp_path, SECTION + (READY if ready else ""))
+    assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces] and body.ground == ("bore",)
+    assert body.length == native.length and body.size == native.size
+    for own, other in zip(body.interfaces, native.interfaces, strict=True):
+        assert np.allclose(own.point, other.point, atol=1e-8)
+    distance, order = cKDTree(places(body)).query(places(native))
+    dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    assert distance.max() < 1e-8 and len(np.unique(order)) == len(order)
+    for name in ("stiffness", "mass"):
+        own, other = getattr(body, name)[dofs][:, dofs], getattr(native, name)
+        assert np.abs(own - other).max() < 1e-6 * np.abs(other).max(), name
+    assert np.abs(body.rows()[:, dofs] - native.rows()).max() < 1e-6 * np.abs(native.rows("bore")).max()
+
+
+@pytest.mark.full
+def test_the_verb_takes_imported_bodies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hex20_deck(tmp_path / "pinion.inp", whole=False)
+    stage(tmp_path, SECTION)
+    options = ["--methods", "rubin:120,modal:60", "--lines", "8", "--out", str(tmp_path / "out")]
+    code = cli.outcome(["frf", str(tmp_path), "pinion", *options])
+    said = capsys.readouterr()
+    assert code == 0, said.err
+    assert "48 inputs, held at its ground" in said.out
+    with open(tmp_path / "out" / "pinion_frf.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    worst = {m: max(float(row["error"]) for row in rows if row["method"] == m) for m in ("rubin", "modal")}
+    assert worst["rubin"] < 1e-4 < worst["modal"]
+
+
+def test_your_mesh_is_not_scaled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hex20_deck(tmp_path / "pinion.inp", whole=False)
+    stage(tmp_path, SECTION)
+    code = cli.outcome(["frf", str(tmp_path), "pinion", "--scale", "0.5", "--out", str(tmp_path / "out")])
+    assert code == cli.USAGE_ERROR and not (tmp_path / "out").exists()
+    assert "coarsen your mesh" in " ".join(capsys.readouterr().err.split())
