@@ -12,10 +12,12 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
+from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.display import Display, outline, whole_surface
-from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported_carrier import imported_carrier
 from gearfmu.reduction.imported_gear import (
     BORE,
     CheckedGear,
@@ -64,6 +66,30 @@ def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:
         )
     bore = np.flatnonzero(np.isin(cut.of_mesh, found.mesh.sets[BORE]))
     return FeMesh(cut.nodes, cut.elements["hexahedron20"], {BORE: bore}, geometry.z, cut.cut_minus, cut.cut_plus)
+
+
+def imported_set_sector(spec: Any, name: str) -> FeMesh:
+    """`imported_sector_mesh` of a body of a PlanetarySpec. BodyError for the carrier, which has no sectors."""
+    part = getattr(spec, name)
+    if name != "carrier":
+        return imported_sector_mesh(part, GearGeometry.of(part, spec.set))
+    raise BodyError(
+        f"{part.imported.file}: an imported carrier is taken as a whole and has no sector: use the pictures of your own "
+        "finite-element program"
+    )
+
+
+def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
+    """The imported carrier of a PlanetarySpec before reduction, known to be one solid, and plain facts. MeshError."""
+    found = imported_carrier(spec)
+    problem, space = None, elastic(found.full)
+    try:
+        problem = hinge_problem(space, float(space.modes(1)[0][0]))
+    except (FactorError, ModesError) as error:
+        problem = f"the stiffness matrix cannot be factorised ({error}): it is not of one free solid body"
+    if problem:
+        raise MeshError(f"{spec.carrier.imported.file}: {problem}")
+    return found.full, found.facts
 
 
 def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Parts:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.reduced import ReducedBody
@@ -128,7 +129,10 @@ def _is_current(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] |
 def _carrier(spec: PlanetarySpec, progress: Progress | None) -> InterfaceBody:
     started = time.process_time()
     _tell(progress, "carrier: mesh and finite elements", 0.0)
-    full = carrier_full_order(spec)
+    if spec.carrier.imported is None:
+        full, mesh = carrier_full_order(spec), None
+    else:
+        full, mesh = imported_carrier_order(spec)
     _tell(progress, f"carrier: {spec.carrier.method}", 0.2)
     basis = METHODS[spec.carrier.method](full, Size(spec.carrier.modes))
     model = oscillators(full, basis, spec.carrier.modal_damping)
@@ -136,10 +140,15 @@ def _carrier(spec: PlanetarySpec, progress: Progress | None) -> InterfaceBody:
     judging = Judging.over(damping_ratio=spec.carrier.modal_damping)
     exact = reference(full, judging)
     error = relative_error(exact.matrix, transfer(model, judging, full.ground, residual=True))
-    facts = mesh_report(carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh))
-    mesh = {**facts, "counts": spec.carrier.mesh.model_dump(), "dof_body": full.size, "dof_sector": facts["dof"]}
+    mesh = mesh or _carrier_facts(spec, full.size)
     evidence = _Evidence(judging.frequency, error)
     return _interface_body(full, model, evidence, spec, {"mesh": mesh, "started": started})
+
+
+def _carrier_facts(spec: PlanetarySpec, size: int) -> dict[str, Any]:
+    """Plain facts about our own mesh of a carrier of `size` unknowns."""
+    facts = mesh_report(carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh))
+    return {**facts, "counts": spec.carrier.mesh.model_dump(), "dof_body": size, "dof_sector": facts["dof"]}
 
 
 class _Evidence:

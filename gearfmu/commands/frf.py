@@ -78,20 +78,26 @@ def full_order_of(stage: str, body: str, scale: float | None = None) -> Any:
     from gearfmu.reduction.toothed import gear_full_order, ring_full_order
 
     if body == "carrier" and spec.kind == "planetary_set":
+        _keep_scale(spec.carrier, body, scale)
         return carrier_full_order(spec, **factor)
     if body == "ring" and spec.kind == "planetary_set":
         return ring_full_order(spec, **factor)
     gear = next(gear for gear in spec.gears if gear.name == body)
+    _keep_scale(gear, body, scale)
     if getattr(gear, "imported", None) is None:
         return gear_full_order(spec, body, **factor)
-    return _imported(spec, gear, scale)
+    return _imported(spec, gear)
 
 
-def _imported(spec: Any, gear: Any, scale: float | None) -> Any:
-    """The FullOrder of a gear from finite elements made elsewhere."""
-    if scale is not None:
-        remedy = f"the finite elements of '{gear.name}' are yours: coarsen your mesh, or leave --scale away"
+def _keep_scale(part: Any, name: str, scale: float | None) -> None:
+    """A usage error for a scale of finite elements made elsewhere."""
+    if getattr(part, "imported", None) is not None and scale is not None:
+        remedy = f"the finite elements of '{name}' are yours: coarsen your mesh, or leave --scale away"
         raise click.BadParameter(remedy, param_hint="--scale")
+
+
+def _imported(spec: Any, gear: Any) -> Any:
+    """The FullOrder of a gear from finite elements made elsewhere."""
     from gearfmu.body.imported import imported_full_order
     from gearfmu.geometry import GearGeometry
 

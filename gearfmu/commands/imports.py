@@ -19,6 +19,7 @@ from gearfmu.commands.shared import Quantity, echo_pairs
     "--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file."
 )
 @click.option("--bore", default="", help="Node set of the bore; without it the nodes on the stage's bore diameter.")
+@click.option("--bolt", "bolts", multiple=True, help="Of a carrier: node set of a bolt's seat, in order from +x.")
 @click.option("--ignore", multiple=True, help="Node set of reference nodes that belong to no element.")
 def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> None:
     """Check the finite elements in FILE: elements, quality, node sets. With STAGE and GEAR also fit the involutes and
@@ -26,21 +27,34 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
-    from gearfmu.spec.imported import ImportSpec
-    from gearfmu.spec.stage import load_pair
+    from gearfmu.spec.stage import load_stage
 
-    spec = load_pair(stage)
-    named = next((g for g in spec.gears if g.name == gear), None)
-    if named is None:
-        names = ", ".join(g.name for g in spec.gears)
-        raise click.BadParameter(f"name a gear of the stage: {names}", param_hint="GEAR")
+    spec = load_stage(stage)
+    names = ["sun", "planet", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
+    if gear not in names:
+        raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
+    echo_pairs(body_facts(spec, gear, str(file), options))
+    place = gear if spec.kind == "planetary_set" else f"gears.{gear}"
+    click.echo("\n" + section(file, place, options))
+
+
+def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
+    """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
     from gearfmu.geometry import GearGeometry
+    from gearfmu.reduction.imported_carrier import imported_carrier
+    from gearfmu.spec.imported import CarrierImportSpec, ImportSpec
 
-    source = ImportSpec(file=str(file), **options)
-    found = check_gear(named.model_copy(update={"imported": source}), GearGeometry.of(named, spec.pair))
-    echo_pairs(found.facts)
-    click.echo("\n" + section(file, gear, options))
+    if name == "carrier":
+        if not options["bore"] or len(options["bolts"]) != spec.set.planets:
+            raise click.UsageError(f"a carrier needs --bore and {spec.set.planets} times --bolt, each a node set")
+        part = spec.carrier.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
+        return imported_carrier(spec.model_copy(update={"carrier": part})).facts
+    gear = next(g for g in spec.gears if g.name == name)
+    pair = spec.set if spec.kind == "planetary_set" else spec.pair
+    chosen = {key: value for key, value in options.items() if key != "bolts"}
+    source = ImportSpec(file=file, **chosen)
+    return check_gear(gear.model_copy(update={"imported": source}), GearGeometry.of(gear, pair)).facts
 
 
 def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) -> dict[str, Any]:
@@ -71,10 +85,11 @@ def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) ->
     }
 
 
-def section(file: Path, gear: str | None, options: dict[str, Any]) -> str:
+def section(file: Path, place: str, options: dict[str, Any]) -> str:
     """The lines for the stage file."""
-    lines = [f"[gears.{gear}.import]", f'file = "{file.name}"', f'length = "{1e3 * options["length"]:g} mm"']
+    lines = [f"[{place}.import]", f'file = "{file.name}"', f'length = "{1e3 * options["length"]:g} mm"']
     lines += [f'bore = "{options["bore"]}"'] if options["bore"] else []
+    lines += [f"bolts = {list(options['bolts'])}".replace("'", '"')] if options["bolts"] else []
     lines += [f'axis = "{options["axis"]}"'] if options["axis"] != "z" else []
     lines += [f"ignore = {list(options['ignore'])}".replace("'", '"')] if options["ignore"] else []
     return "\n".join(lines)

@@ -111,7 +111,7 @@ def _body(spec: Any, name: str) -> Any:
 
 def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
-    from gearfmu.body.imported import imported_sector_mesh
+    from gearfmu.body.imported import imported_sector_mesh, imported_set_sector
     from gearfmu.femesh import sector_mesh
     from gearfmu.femesh.carrier import carrier_sector
     from gearfmu.geometry import GearGeometry
@@ -119,6 +119,8 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     from gearfmu.geometry.internal import InternalGearGeometry
 
     body = _body(spec, name)
+    if spec.kind == "planetary_set" and getattr(body, "imported", None):
+        return imported_set_sector(spec, name), ()
     own = body.mesh if name == "carrier" else body.body.mesh
     counts = own.model_copy(update={"scale": own.scale * scale})
     if name == "carrier":

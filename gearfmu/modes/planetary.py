@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body.imported import imported_set_sector
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
@@ -32,7 +33,7 @@ def set_body_modes(
     scale : factor on all element counts.
     """
     gear = getattr(spec, name)
-    if name == "carrier":
+    if name == "carrier" and gear.imported is None:
         found = _carrier(spec, count, progress, scale)
     else:
         found = cyclic_modes(name, set_sector(spec, name, scale), gear.material, count, progress)
@@ -56,8 +57,11 @@ def mounted_ring_modes(
 
 
 def set_sector(spec: Any, name: str, scale: float = 1.0) -> FeMesh:
-    """Finite elements of one sector of a body of a PlanetarySpec. scale : factor on all element counts."""
+    """Finite elements of one sector of a body of a PlanetarySpec. scale : factor on all element counts, those of an
+    imported gear excepted. BodyError for an imported carrier and for imported gears without a sector of hexahedra."""
     part = getattr(spec, name)
+    if name != "ring" and part.imported is not None:
+        return imported_set_sector(spec, name)
     if name == "carrier":
         counts = part.mesh.model_copy(update={"scale": part.mesh.scale * scale})
         return carrier_sector(CarrierGeometry.of(spec), counts)

@@ -9,13 +9,17 @@ from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.imported_carrier import imported_carrier
 
 
 def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
     """The carrier of a PlanetarySpec: interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
 
-    scale : factor on all element counts (1: about 70 000 unknowns). Rotations count with the bolt circle's radius.
+    scale : factor on all element counts (1: about 70 000 unknowns); an imported carrier has none and is taken as it is.
+    Rotations count with the bolt circle's radius. Raises MeshError.
     """
+    if spec.carrier.imported is not None:
+        return imported_carrier(spec).full
     geometry = CarrierGeometry.of(spec)
     counts = spec.carrier.mesh
     sector = carrier_sector(geometry, counts.model_copy(update={"scale": counts.scale * scale}))

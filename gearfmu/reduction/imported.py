@@ -61,8 +61,9 @@ def full_order(
     return coupled(mesh.source.stem, body, couplings, Judgement(ground, reach))
 
 
-def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterface) -> Coupling:
-    """The coupling of a node set to its master. faces : the boundary of the mesh. MeshError as `full_order`."""
+def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterface, name: str = "") -> Coupling:
+    """The coupling of a node set to its master, called `name` or like the set. faces : the boundary of the mesh.
+    MeshError as `full_order`."""
     if interface.kind not in KINDS:
         raise MeshError(f"{mesh.source}: '{interface.kind}' is no kind of interface: one of {', '.join(KINDS)}")
     members = mesh.node_set(interface.node_set)
@@ -73,7 +74,7 @@ def set_coupling(mesh: ImportedMesh, faces: solids.Faces, interface: SetInterfac
         own, about = faces.within(members), mesh.nodes - point
         if len(own.quads) + len(own.triangles):
             rows = sp.csr_array(patches.averaging_rows(about, own))
-    return Coupling(interface.node_set, interface.kind, members, point, rows)
+    return Coupling(name or interface.node_set, interface.kind, members, point, rows)
 
 
 def _spanned(mesh: ImportedMesh, members: np.ndarray, name: str) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,20 +11,18 @@ import scipy.sparse as sp
 
 from gearfmu.errors import MeshError
 from gearfmu.fem import solids
-from gearfmu.fem.matrices import read_matrix, read_unknowns
-from gearfmu.fem.mesh_checks import matrix_problems, mesh_problems, speed_problem
 from gearfmu.femesh.cyclic_cut import CyclicCut, cyclic_cut, is_whole
-from gearfmu.femesh.imported import ImportedMesh, read_mesh
+from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.geometry.involute_fit import InvoluteFit
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.imported import Matrices, SetInterface, full_order
+from gearfmu.reduction.imported_files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.imported_flank import FitRange, fit_flanks, tooth_loads
 from gearfmu.reduction.imported_sector import ImportedSector
 from gearfmu.reduction.mean_tooth import WholeGear
 
 BORE = "bore"
-_AXES = {"x": [1, 2, 0], "y": [2, 0, 1], "z": [0, 1, 2]}
 _ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
 _WIDTH = 2e-3  # relative difference of face width, base radius and tooth thickness to the stage file
 _HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibration of a solid body
@@ -72,16 +68,13 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
     MeshError lists what is wrong with the files.
     """
     file = Path(source.file)
-    mesh = read_mesh(file, source.length, tuple(source.ignore))
-    mesh = replace(mesh, nodes=mesh.nodes[:, _AXES[source.axis]])
-    if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
-        raise MeshError(f"{file}: " + "; ".join(problems))
-    with _naming(file):
+    mesh = sound_mesh(source)
+    with naming(file):
         fit = _fit(mesh, source, wanted)
         placed = replace(mesh, nodes=fit.in_gear_frame(mesh.nodes))
         _same_gear(placed, fit, wanted)
         placed.sets[BORE] = _bore_nodes(placed, source.bore, wanted)
-        matrices = _matrices(source, placed, fit, wanted)
+        matrices = ready_matrices(source, placed, fit.turn(), wanted.material)
         whole, cut = is_whole(placed.nodes, wanted.teeth), None
         if source.bore_coupling == "averaging" and (matrices is None or not whole):
             cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
@@ -98,7 +91,7 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
 def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
     """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
     found = checked_gear(source, wanted)
-    with _naming(Path(source.file)):
+    with naming(Path(source.file)):
         if found.cut is None:
             body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
         else:
@@ -107,15 +100,6 @@ def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
             elastic = wanted.material if ready is None else (ready.stiffness, ready.mass)
             body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
     return ImportedGear(body, found.mesh.nodes, found.facts)
-
-
-@contextmanager
-def _naming(file: Path) -> Iterator[None]:
-    """MeshErrors begin with the name of a file: this one, when they name none beside it."""
-    try:
-        yield
-    except MeshError as error:
-        raise MeshError(str(error) if str(error).startswith(str(file.parent)) else f"{file}: {error}") from error
 
 
 def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:
@@ -180,17 +164,8 @@ def _bore_nodes(mesh: ImportedMesh, name: str, wanted: Wanted) -> np.ndarray:
 
 
 def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
-    quality = np.concatenate(
-        [solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()]
-    )
-    return {
-        "file": mesh.source.name,
+    return mesh_facts(mesh) | {
         "teeth": fit.teeth,
-        "nodes": len(mesh.nodes),
-        "elements": {kind: len(block) for kind, block in mesh.elements.items()},
-        "raised_to_quadratic": mesh.raised,
-        "scaled_jacobian_min": float(quality.min()),
-        "scaled_jacobian_mean": float(quality.mean()),
         "fit": {
             "base_radius_m": fit.r_b,
             "half_tooth_angle_rad": fit.psi_b,
@@ -199,30 +174,6 @@ def _facts(mesh: ImportedMesh, fit: InvoluteFit) -> dict[str, Any]:
             "points": len(fit.residual),
         },
     }
-
-
-def _matrices(source: Any, mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> Matrices | None:
-    """Ready-made matrices in SI and in the frame of the gear, checked against mesh and material; None without files."""
-    if not source.stiffness:
-        return None
-    if mesh.raised:
-        raise MeshError("matrices of linear elements (hex8) do not go with quadratic faces: mesh with C3D20 or C3D10")
-    unknowns = read_unknowns(Path(source.unknowns)) if source.unknowns else None
-    units = source.force_unit / source.length, source.mass_unit
-    permute = np.eye(3)[_AXES[source.axis]]
-    turn = sp.kron(sp.identity(len(mesh.nodes)), sp.csr_array(fit.turn() @ permute), format="csr")
-    stiffness, mass = (
-        sp.csr_array(turn @ (factor * read_matrix(Path(name), unknowns, mesh.labels)) @ turn.T)
-        for factor, name in zip(units, (source.stiffness, source.mass), strict=True)
-    )
-    own = solids.assemble(mesh.nodes, mesh.elements, wanted.material)[1]
-    problems = matrix_problems(stiffness, mass, mesh.nodes, float(own.sum()) / 3)
-    if not problems:
-        speed = np.sqrt(wanted.material.youngs_modulus / wanted.material.density)
-        problems = speed_problem(stiffness, mass, mesh.nodes, speed)
-    if problems:
-        raise MeshError("; ".join(problems))
-    return Matrices(stiffness, mass)
 
 
 def _whole(mesh: ImportedMesh, matrices: Matrices | None, coupling: str, wanted: Wanted) -> WholeGear:

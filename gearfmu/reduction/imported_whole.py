@@ -22,8 +22,7 @@ from gearfmu.reduction.imported_gear import BORE, CheckedGear, Wanted
 
 
 def imported_gear_order(found: CheckedGear, wanted: Wanted, coupling: str, named: tuple[str, float]) -> FullOrder:
-    """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, which is the ground when
-    it is judged.
+    """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, its ground when judged.
 
     coupling : of the bore, "averaging" or "rigid". named : name of the body and the length (m) that scales rotations.
     Raises MeshError.

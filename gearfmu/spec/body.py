@@ -36,7 +36,7 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
         "body": gear.body.model_dump(),
     }
     if gear.imported is not None:
-        inputs["import"] = import_inputs(gear.imported, spec.source, gear.name)
+        inputs["import"] = import_inputs(gear.imported, spec.source, f"gears.{gear.name}.import")
         inputs["body"].pop("mesh")
     return inputs
 

@@ -1,10 +1,11 @@
-"""[gears.<name>.import]: a gear body from finite elements made elsewhere (docs/howto-import.md)."""
+"""[gears.<name>.import], [sun.import], [planet.import], [carrier.import]: a body from finite elements made elsewhere
+(docs/howto-import.md)."""
 
 from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -15,26 +16,19 @@ from gearfmu.spec.layers import Layers
 _FILES = ("file", "stiffness", "mass", "unknowns")
 _SET_BODIES = ("sun", "planet", "carrier")
 
+Files = TypeVar("Files", bound="FilesSpec")
 
-class ImportSpec(Spec):
-    """Mesh of the body, its units, and, where they are ready-made, its matrices. Paths are relative to the stage
-    file."""
+
+class FilesSpec(Spec):
+    """Mesh of a body, its units, and, where they are ready-made, its matrices. Paths are relative to the file that holds
+    them."""
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
     length: Annotated[float, Quantity("m", above=0)] = Field(
         description='one length unit of the file, "1 mm" for a mesh in millimetres'
     )
-    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the gear in the file")
-    bore: Text = Field(
-        default="", description="node set of the bore; without it the nodes on the stage's bore diameter"
-    )
-    bore_coupling: Literal["averaging", "rigid"] = Field(
-        default="averaging", description="averaging (RBE3) or rigid (RBE2) master node of the bore"
-    )
+    axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the body in the file")
     ignore: tuple[Text, ...] = Field(default=(), description="node sets of reference nodes that belong to no element")
-    flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
-        default=5e-6, description="largest distance of a corner node from the best involute"
-    )
     stiffness: Text = Field(default="", description="ready-made stiffness matrix: .mtx, .npz, .sti, .op4 or .pch")
     mass: Text = Field(default="", description="ready-made mass matrix, with stiffness")
     unknowns: Text = Field(
@@ -48,14 +42,14 @@ class ImportSpec(Spec):
     )
 
     @model_validator(mode="after")
-    def _both_matrices(self) -> ImportSpec:
+    def _both_matrices(self) -> FilesSpec:
         if bool(self.stiffness) != bool(self.mass):
             raise refuse("stiffness and mass come together: give both files or none")
         if self.unknowns and not self.stiffness:
             raise refuse("unknowns sorts the rows of ready-made matrices: give stiffness and mass too")
         return self
 
-    def located(self, layers: Layers, place: str) -> ImportSpec:
+    def located(self: Files, layers: Layers, place: str) -> Files:
         """The same with the files as seen from here. Paths are relative to the file that holds them. place : the
         section, "gears.pinion.import"."""
         named = [field for field in _FILES if getattr(self, field)]
@@ -63,11 +57,32 @@ class ImportSpec(Spec):
         return self.model_copy(update=files)
 
 
+class ImportSpec(FilesSpec):
+    """The finite elements of a gear; its place, tilt and the angle of its teeth are found by the involute fit."""
+
+    bore: Text = Field(
+        default="", description="node set of the bore; without it the nodes on the stage's bore diameter"
+    )
+    bore_coupling: Literal["averaging", "rigid"] = Field(
+        default="averaging", description="averaging (RBE3) or rigid (RBE2) master node of the bore"
+    )
+    flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
+        default=5e-6, description="largest distance of a corner node from the best involute"
+    )
+
+
+class CarrierImportSpec(FilesSpec):
+    """The finite elements of a carrier, in the set's frame: z = 0 at the planets' mid-width, bolt 0 on +x."""
+
+    bore: Text = Field(description="node set of the bore")
+    bolts: tuple[Text, ...] = Field(description="node sets of the bolts' seats, counter-clockwise from bolt 0 on +x")
+
+
 def missing_files(layers: Layers) -> list[Problem]:
     """A problem for every file that a section `import` names and that is not there, whatever else is wrong with the
     stage file."""
     return [
-        Problem(str(layers.path), f"{place}.{field}", name, f"there is no file {path}: write the path relative to the stage file")
+        Problem(str(layers.path), f"{place}.{field}", name, f"there is no file {path}: write it relative to the stage file")
         for place, section in _sections(layers.tables).items()
         for field in _FILES
         if isinstance(name := section.get(field), str) and name
@@ -88,11 +103,11 @@ def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {place: section for place, section in found.items() if isinstance(section, dict)}
 
 
-def import_inputs(spec: ImportSpec, source: Path, gear: str) -> dict[str, Any]:
+def import_inputs(spec: FilesSpec, source: Path, section: str) -> dict[str, Any]:
     """What the import contributes to the body's fingerprint: its fields, with the SHA-256 of each file for its name.
 
-    spec : its files as they can be opened (`located`). source, gear : for the message. SpecError for every file that is
-    not there.
+    spec : its files as they can be opened (`located`). source, section ("gears.pinion.import") : for the message.
+    SpecError for every file that is not there.
     """
     values, problems = spec.model_dump(), []
     for field in _FILES:
@@ -102,7 +117,7 @@ def import_inputs(spec: ImportSpec, source: Path, gear: str) -> dict[str, Any]:
         try:
             values[field] = hashlib.sha256(path.read_bytes()).hexdigest()
         except OSError as error:
-            place = f"gears.{gear}.import.{field}"
+            place = f"{section}.{field}"
             remedy = f"{path} cannot be read ({error.strerror}): write the path relative to the stage file"
             problems.append(Problem(str(source), place, path.name, remedy))
     if problems:

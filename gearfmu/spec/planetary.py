@@ -6,10 +6,11 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
 from gearfmu.spec.gear import BodySpec, Factor, Length, Material, RackSpec, Ratio, Size
+from gearfmu.spec.imported import CarrierImportSpec, ImportSpec
 
 CouplingKind = Literal["rigid", "averaging"]
 
@@ -35,6 +36,8 @@ class SetSpec(Spec):
 class SetGearSpec(Spec):
     """Sun or planet: an external gear."""
 
+    model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
+
     name: Name
     teeth: Annotated[Count, Field(ge=6, le=400)] = Field(description="number of teeth z")
     profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(
@@ -48,6 +51,9 @@ class SetGearSpec(Spec):
     material: Material = Field(description="material")
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
     body: BodySpec = Field(description="mesh and reduction")
+    imported: ImportSpec | None = Field(
+        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    )
 
     @property
     def index_deviation(self) -> dict[int, float]:
@@ -116,6 +122,8 @@ class CarrierMeshSpec(Spec):
 class CarrierSpec(Spec):
     """A plate with a bore, beside the planets, and a bolt for each of them, made of one piece."""
 
+    model_config = ConfigDict(populate_by_name=True)
+
     bore_diameter: Length = Field(description="diameter of the bore")
     outer_diameter: Length = Field(description="outer diameter of the plate")
     thickness: Length = Field(description="thickness of the plate")
@@ -131,6 +139,9 @@ class CarrierSpec(Spec):
     )
     modes: Annotated[Count, Field(ge=24, le=2000)] = Field(default=120, description="number of oscillators stored")
     mesh: CarrierMeshSpec = Field(default_factory=CarrierMeshSpec, description="element counts")
+    imported: CarrierImportSpec | None = Field(
+        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    )
 
     def coupling_of(self, interface: str) -> str:
         """Kind of coupling of "bore", "bolt0" …; rigid where the file says nothing."""

@@ -181,6 +181,9 @@ def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
     if g.r_bolt >= g.a * math.sin(math.pi / g.planets):
         largest = millimetres(2 * g.a * math.sin(math.pi / g.planets))
         yield "carrier.bolt_diameter", carrier.bolt_diameter, f"neighbouring bolts touch: less than {largest}"
+    if carrier.imported is not None and len(set(carrier.imported.bolts)) != g.planets:
+        named = ", ".join(carrier.imported.bolts) or "none"
+        yield "carrier.import.bolts", named, f"one node set for each of the {g.planets} bolts, each its own"
     known = ["bore", *(f"bolt{k}" for k in range(g.planets))]
     for name in carrier.coupling:
         if name not in known:

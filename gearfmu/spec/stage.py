@@ -168,9 +168,16 @@ def _load_set(layers: Layers) -> PlanetarySpec:
     problems += found
     if spec is not None:
         problems += set_problems(str(path), spec)
+    problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
-    return spec
+    parts = {name: getattr(spec, name) for name in ("sun", "planet", "carrier")}
+    located = {
+        name: part.model_copy(update={"imported": part.imported.located(layers, f"{name}.import")})
+        for name, part in parts.items()
+        if part.imported is not None
+    }
+    return spec.model_copy(update=located)
 
 
 def _unknown(key: str, raw: dict[str, Any]) -> Problem:

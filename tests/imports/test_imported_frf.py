@@ -29,7 +29,8 @@ def imported(folder: Path, section: str = SECTION) -> FullOrder:
 
 def store_matrices(folder: Path, whole: bool) -> None:
     mesh, material = pinion(whole), stage(folder).gears[0].material
-    for name, matrix in zip(("k", "m"), solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, material), strict=True):
+    matrices = solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, material)
+    for name, matrix in zip(("k", "m"), matrices, strict=True):
         sp.save_npz(folder / f"{name}.npz", sp.csr_matrix(matrix))
 
 
@@ -44,7 +45,10 @@ def places(body: FullOrder) -> np.ndarray:
     return np.column_stack([turn_z[:, 1], -turn_z[:, 0], -turn_x[:, 1]])
 
 
-@pytest.mark.parametrize(("whole", "ready"), [(True, False), (False, False), (False, True), pytest.param(True, True, marks=pytest.mark.full)])
+@pytest.mark.parametrize(
+    ("whole", "ready"),
+    [(True, False), (False, False), (False, True), pytest.param(True, True, marks=pytest.mark.full)],
+)
 def test_the_same_full_model_whatever_the_road(tmp_path: Path, native: FullOrder, whole: bool, ready: bool) -> None:
     """Whole mesh or sector, our elements or ready-made matrices: K, M and the rows of all interfaces."""
     hex20_deck(tmp_path / "pinion.inp", whole=whole)

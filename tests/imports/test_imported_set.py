@@ -1,0 +1,159 @@
+"""Planetary sets with bodies made elsewhere: sun, planet and carrier; our own meshes come back as the same bodies."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from decks import write_deck
+
+from gearfmu import cli
+from gearfmu.body.planetary import reduce_set_body, set_hash
+from gearfmu.errors import MeshError, SpecError
+from gearfmu.fem import hex20
+from gearfmu.femesh import FeMesh
+from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.modes.planetary import set_sector
+from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.imported_carrier import circle_centre
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.stage import load_stage
+
+BOLTS = ["PIN_A", "PIN_B", "PIN_C", "PIN_D"]
+CARRIER = '[carrier.import]\nfile = "carrier.inp"\nlength = "1 mm"\nbore = "SHAFT"\n'
+CARRIER += f"bolts = {BOLTS}\n".replace("'", '"')
+PLANET = '[planet.import]\nfile = "planet.inp"\nlength = "1 mm"\nbore = "BORE"\n'
+
+
+def stage(folder: Path, section: str = "") -> PlanetarySpec:
+    """planetary54 on coarse meshes, with import sections at its end."""
+    text = find_stage("planetary54").read_text(encoding="utf-8")
+    coarse = re.sub(r"(?m)^(\[(?:sun|planet|ring)\.body\.mesh\]|\[carrier\.mesh\])$", r"\1\nscale = 0.35", text)
+    coarse = re.sub(r"(?m)^modes = 400", "modes = 40", coarse)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "stage.toml").write_text(coarse + "\n" + section, encoding="utf-8")
+    return load_stage(folder / "stage.toml")
+
+
+@lru_cache(maxsize=1)
+def carrier_parts() -> tuple[FeMesh, dict[str, np.ndarray]]:
+    spec = load_stage("planetary54")
+    sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh.model_copy(update={"scale": 0.35}))
+    mesh = sector.full()
+    sets = {name: sector.sector_nodes(k)[sector.sets["bolt"]] for k, name in enumerate(BOLTS)}
+    return mesh, sets | {"SHAFT": mesh.sets["bore"]}
+
+
+def carrier_deck(folder: Path, nodes: np.ndarray | None = None) -> Path:
+    mesh, sets = carrier_parts()
+    folder.mkdir(parents=True, exist_ok=True)
+    points = 1e3 * (mesh.nodes if nodes is None else nodes)
+    return write_deck(folder / "carrier.inp", points, {"hexahedron20": mesh.elements}, sets)
+
+
+@pytest.mark.parametrize("ready", [False, True])
+def test_our_own_carrier_comes_back_as_the_same_full_model(tmp_path: Path, ready: bool) -> None:
+    carrier_deck(tmp_path)
+    own = stage(tmp_path / "own")
+    section = CARRIER
+    if ready:
+        mesh, _ = carrier_parts()
+        for name, matrix in zip("km", hex20.assemble(mesh.nodes, mesh.elements, own.carrier.material), strict=True):
+            sp.save_npz(tmp_path / f"{name}.npz", sp.csr_matrix(matrix))
+        section += 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
+    body, native = carrier_full_order(stage(tmp_path, section)), carrier_full_order(own)
+    assert [(i.name, i.kind) for i in body.interfaces] == [(i.name, i.kind) for i in native.interfaces]
+    assert body.ground == native.ground and body.length == native.length
+    for one, other in zip(body.interfaces, native.interfaces, strict=True):
+        assert np.allclose(one.point, other.point, atol=1e-9)
+    for name in ("stiffness", "mass"):
+        assert np.abs(getattr(body, name) - getattr(native, name)).max() < 1e-9 * getattr(native, name).max(), name
+    assert np.abs(body.rows() - native.rows()).max() < 1e-9
+
+
+def test_an_imported_carrier_is_reduced_and_its_hash_covers_the_file(tmp_path: Path) -> None:
+    deck = carrier_deck(tmp_path)
+    spec, own = stage(tmp_path, CARRIER), stage(tmp_path / "own")
+    body, native = reduce_set_body(spec, "carrier"), reduce_set_body(own, "carrier")
+    assert body.input_hash == set_hash(spec, "carrier") != native.input_hash
+    assert body.mass == pytest.approx(native.mass, rel=1e-9) and body.modes == native.modes
+    assert np.allclose(body.frequency[:30], native.frequency[:30], rtol=1e-7)
+    assert np.allclose(body.static, native.static, atol=1e-7 * np.abs(native.static).max())
+    assert body.mesh["elements"] == {"hexahedron20": len(carrier_parts()[0].elements)}
+    deck.write_text(deck.read_text(encoding="utf-8") + "** edited\n", encoding="utf-8")
+    assert set_hash(spec, "carrier") != body.input_hash and set_hash(spec, "sun") == set_hash(own, "sun")
+
+
+def test_an_imported_planet_is_the_planet(tmp_path: Path) -> None:
+    own = stage(tmp_path / "own")
+    mesh = set_sector(own, "planet")
+    write_deck(tmp_path / "planet.inp", 1e3 * mesh.nodes, {"hexahedron20": mesh.elements}, {"BORE": mesh.sets["bore"]})
+    body, native = (reduce_set_body(spec, "planet") for spec in (stage(tmp_path, PLANET), own))
+    assert body.mesh["road"] == "cyclic" and body.modes == native.modes
+    assert np.abs(body.frequency / native.frequency - 1).max() < 1e-9
+    assert np.abs(body.static_ff - native.static_ff).max() < 1e-9 * np.abs(native.static_ff).max()
+
+
+def turned(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return carrier_parts()[0].nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("nodes", "message"),
+    [
+        (lambda: turned(0.3), r"axis of 'PIN_A' \(bolt0\) .* at \(42.99, 13.3\) and \(45, .*'PIN_D' .* bolt 0 on \+x"),
+        (lambda: turned(-np.pi / 2), r"'PIN_B' \(bolt1\) .* counter-clockwise"),
+        (lambda: carrier_parts()[0].nodes + [0, 0, 0.03], r"'PIN_A' \(bolt0\) at z = .* not where the planet sits"),
+        (lambda: carrier_parts()[0].nodes + [2e-3, 0, 0], r"'SHAFT' \(bore\)"),
+        (lambda: 1e-3 * carrier_parts()[0].nodes, r"axis of 'PIN_A' .* at \(0.045, .*\) and \(45"),
+        (lambda: carrier_parts()[0].nodes * [1, 1, -1], "inside out"),
+    ],
+    ids=["turned", "a quarter off", "too high", "off the axis", "wrong unit", "mirrored"],
+)  # fmt: skip
+def test_a_carrier_that_lies_elsewhere_is_refused(tmp_path: Path, nodes, message: str) -> None:
+    carrier_deck(tmp_path, nodes())
+    with pytest.raises(MeshError, match=message) as caught:
+        carrier_full_order(stage(tmp_path, CARRIER))
+    assert str(tmp_path / "carrier.inp") in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_what_the_file_says_is_checked_at_load(tmp_path: Path) -> None:
+    """Missing files of several bodies, and a bolt without a set, in one list; a ring cannot be imported."""
+    with pytest.raises(SpecError) as caught:
+        stage(tmp_path, CARRIER.replace(', "PIN_D"', "") + PLANET + "[ring.import]\nfile = 'ring.inp'\n")
+    fields = {problem.field for problem in caught.value.problems}
+    assert {"ring.import", "carrier.import.file", "planet.import.file"} <= fields
+    carrier_deck(tmp_path)
+    with pytest.raises(SpecError, match="carrier.import.bolts = PIN_A, PIN_B, PIN_C: one node set for each of the 4"):
+        stage(tmp_path, CARRIER.replace(', "PIN_D"', ""))
+
+
+def test_circles_are_found_from_any_part_of_them() -> None:
+    angle = np.array([0.1, 0.2, 0.25, 0.9, 1.5])
+    points = np.array([0.045, -0.01]) + 6e-3 * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert np.allclose(circle_centre(points), [0.045, -0.01], atol=1e-12)
+    with pytest.raises(MeshError, match="in one line"):
+        circle_centre(np.column_stack([angle, 2 * angle]))
+
+
+def test_the_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """import checks and prints the section; frf keeps your mesh; mesh has no sector of it."""
+    deck = carrier_deck(tmp_path)
+    own = stage(tmp_path / "own")
+    bolts = [word for name in BOLTS for word in ("--bolt", name)]
+    call = ["import", str(deck), str(own.source), "carrier", "--length", "1 mm", "--bore", "SHAFT"]
+    assert cli.outcome([*call, *bolts]) == 0
+    assert f"bolts = {BOLTS}".replace("'", '"') in capsys.readouterr().out
+    assert cli.outcome(call) == cli.USAGE_ERROR and "4 times --bolt" in capsys.readouterr().err
+    stage(tmp_path, CARRIER)
+    out = ["--out", str(tmp_path / "o")]
+    assert cli.outcome(["frf", str(tmp_path), "carrier", "--scale", "0.5", *out]) == cli.USAGE_ERROR
+    assert cli.outcome(["mesh", str(tmp_path), "--gear", "carrier", *out]) == 1
+    assert "no sector" in capsys.readouterr().err and not (tmp_path / "o").exists()
