@@ -16,6 +16,7 @@ from deck import Problem, starts
 FORCES = re.compile(r" forces \(fx,fy,fz\) for set (\S+) and time")
 PRESSURES = re.compile(r"pressure ratio \(smallest/largest pressure over all contact areas\) =\s*(\S+)")
 TENSION = 1e-3  # largest tensile contact pressure, parts of the largest pressure
+MOST_ITERATIONS = 60  # what converges took 7 to 26
 END_OF_LOG = 1500  # characters shown of a failed run
 
 
@@ -27,16 +28,27 @@ def require_ccx() -> None:
 
 def run(path: Path) -> float:
     """Run ccx on a deck on one thread, its log beside it; wall time (s). RuntimeError with the end of the log when it
-    fails."""
+    fails, also when it is at its contact for more than MOST_ITERATIONS: it then goes round in circles."""
     start = time.perf_counter()
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     log = path.with_suffix(".log")
     with open(log, "w", encoding="utf-8") as file:
-        code = subprocess.run(["ccx", path.stem], cwd=path.parent, stdout=file, env=environment, check=False).returncode
+        process = subprocess.Popen(["ccx", path.stem], cwd=path.parent, stdout=file, env=environment)
+        while (code := _waited(process)) is None:
+            if log.read_text(encoding="utf-8").count("\n iteration ") > MOST_ITERATIONS:
+                process.kill()
     text = log.read_text(encoding="utf-8")
     if code != 0 or "Job finished" not in text:
         raise RuntimeError(f"ccx gave up on {path}:\n{text[-END_OF_LOG:]}")
     return time.perf_counter() - start
+
+
+def _waited(process: subprocess.Popen) -> int | None:
+    """Exit status of a process, None while it still runs after a second."""
+    try:
+        return process.wait(timeout=1.0)
+    except subprocess.TimeoutExpired:
+        return None
 
 
 def run_deck(path: Path) -> float:

@@ -74,8 +74,8 @@ def imported_set_sector(spec: Any, name: str) -> FeMesh:
     if name != "carrier":
         return imported_sector_mesh(part, GearGeometry.of(part, spec.set))
     raise BodyError(
-        f"{part.imported.file}: an imported carrier is taken as a whole and has no sector: use the pictures of your own "
-        "finite-element program"
+        f"{part.imported.file}: an imported carrier is taken as a whole and has no sector: use the pictures of your "
+        "own finite-element program"
     )
 
 

@@ -69,13 +69,14 @@ def _points(
         centre, meant = circle_centre(nodes[:, :2]), points[interface][:2]
         if np.linalg.norm(centre - meant) > _OFF * geometry.a:
             where = " and ".join(f"({1e3 * x:.4g}, {1e3 * y:.4g})" for x, y in (centre, meant))
-            problems.append(f"the axis of '{names[interface]}' ({interface}) and that of the set lie apart, at {where} mm")
+            whose = f"'{names[interface]}' ({interface})"
+            problems.append(f"the axis of {whose} and that of the set lie apart, at {where} mm")
         elif bolt and not low < 0 < high:
-            span = f"{1e3 * low:.4g} … {1e3 * high:.4g} mm"
-            problems.append(f"'{names[interface]}' ({interface}) at z = {span} is not where the planet sits, about z = 0")
+            span = f"z = {1e3 * low:.4g} … {1e3 * high:.4g} mm"
+            problems.append(f"'{names[interface]}' ({interface}) at {span} is not where the planet sits, about z = 0")
     if problems:
-        raise MeshError("; ".join(problems) + ". Model the carrier in the set's frame: axis z through the origin, z = 0 "
-                        "at the planets' mid-width, bolt 0 on +x, bolts counter-clockwise")  # fmt: skip
+        frame = "axis z through the origin, z = 0 at the planets' mid-width, bolt 0 on +x, bolts counter-clockwise"
+        raise MeshError("; ".join(problems) + f". Model the carrier in the set's frame: {frame}")
     return points
 
 

@@ -20,8 +20,8 @@ Files = TypeVar("Files", bound="FilesSpec")
 
 
 class FilesSpec(Spec):
-    """Mesh of a body, its units, and, where they are ready-made, its matrices. Paths are relative to the file that holds
-    them."""
+    """Mesh of a body, its units, and, where they are ready-made, its matrices; paths relative to the file that says so.
+    """
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
     length: Annotated[float, Quantity("m", above=0)] = Field(
@@ -82,7 +82,7 @@ def missing_files(layers: Layers) -> list[Problem]:
     """A problem for every file that a section `import` names and that is not there, whatever else is wrong with the
     stage file."""
     return [
-        Problem(str(layers.path), f"{place}.{field}", name, f"there is no file {path}: write it relative to the stage file")
+        Problem(str(layers.path), f"{place}.{field}", name, f"no file {path}: write it relative to the stage file")
         for place, section in _sections(layers.tables).items()
         for field in _FILES
         if isinstance(name := section.get(field), str) and name
