@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from scipy.linalg.blas import dtrsm
+from scipy.linalg.blas import dsyrk, dtrsm
 
 from gearfmu.fem.dissection import nested_dissection
 
@@ -27,7 +27,7 @@ class FactorError(ArithmeticError):
 
 
 @dataclass
-class _Front:
+class CholeskyFront:
     """Rows start:stop of L: the triangle (own × own) and the part below it, on the rows `below`."""
 
     start: int
@@ -35,6 +35,18 @@ class _Front:
     below: np.ndarray
     triangle: np.ndarray
     rest: np.ndarray
+
+    def forward(self, work: np.ndarray) -> None:
+        """L⁻¹ of the own rows of `work` (n, k) in place, and their part taken off the rows below."""
+        own = work[self.start : self.stop]
+        own[:] = dtrsm(1.0, self.triangle, own.T, side=1, lower=1, trans_a=1).T
+        work[self.below] -= self.rest @ own
+
+    def backward(self, work: np.ndarray) -> None:
+        """L⁻ᵀ of the own rows, those below being solved for already."""
+        own = work[self.start : self.stop]
+        own -= self.rest.T @ work[self.below]
+        own[:] = dtrsm(1.0, self.triangle, own.T, side=1, lower=1).T
 
 
 class Factor:
@@ -48,10 +60,7 @@ class Factor:
         self.shape = matrix.shape
         groups = dof_groups(nested_dissection(cells), node_of_dof)
         self._order = np.concatenate(groups)
-        assert len(self._order) == matrix.shape[0], "every unknown must belong to a node of some element"
-        ordered = sp.csr_array(matrix)[self._order][:, self._order].tocsr()
-        ends = np.cumsum([len(group) for group in groups])
-        self._fronts = eliminated(ordered, ends, _eliminate)
+        self._fronts = eliminated(sp.csr_array(matrix), groups, _eliminate)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """A⁻¹ rhs for real or complex rhs (n, k)."""
@@ -61,20 +70,17 @@ class Factor:
         for first in range(0, rhs.shape[1], _COLUMNS):
             columns = slice(first, first + _COLUMNS)
             work = np.ascontiguousarray(rhs[self._order, columns], dtype=float)
-            self._substitute(work)
+            substitute(self._fronts, work)
             result[self._order, columns] = work
         return result
 
-    def _substitute(self, work: np.ndarray) -> None:
-        """Forward and back substitution in place; (n, k) in C order, so that a group's rows are one block."""
-        for front in self._fronts:
-            own = work[front.start : front.stop]
-            own[:] = dtrsm(1.0, front.triangle, own.T, side=1, lower=1, trans_a=1).T
-            work[front.below] -= front.rest @ own
-        for front in reversed(self._fronts):
-            own = work[front.start : front.stop]
-            own -= front.rest.T @ work[front.below]
-            own[:] = dtrsm(1.0, front.triangle, own.T, side=1, lower=1).T
+
+def substitute(fronts: list[Any], work: np.ndarray) -> None:
+    """Forward and back substitution in place; (n, k) in C order, so that a group's rows are one block."""
+    for front in fronts:
+        front.forward(work)
+    for front in reversed(fronts):
+        front.backward(work)
 
 
 def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.ndarray]:
@@ -90,27 +96,45 @@ def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.nda
     return result
 
 
-def eliminated(matrix: sp.csr_array, ends: np.ndarray, eliminate: Callable[..., tuple[Any, np.ndarray]]) -> list[Any]:
-    """Fronts of an ordered matrix (n, n), group by group up to `ends`.
+def eliminated(
+    matrix: sp.csr_array, groups: list[np.ndarray], eliminate: Callable[..., tuple[Any, np.ndarray]]
+) -> list[Any]:
+    """Fronts of a symmetric matrix (n, n) whose unknowns are eliminated group by group.
 
     eliminate(dense, start, stop, below): of a gathered front with rows start:stop and `below` first, what is kept of it
-    and the update that it leaves to the rows below.
+    and the update that it leaves to the rows below. All numbers count in the order of elimination.
     """
+    place = np.full(matrix.shape[0], -1)
+    ends = np.cumsum([len(group) for group in groups])
+    place[np.concatenate(groups)] = np.arange(ends[-1])
+    assert place.min() >= 0, "every unknown must belong to a node of some element"
     group_of = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
     waiting: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in ends]
     fronts, workspace = [], Workspace()
     for number, stop in enumerate(ends):
         start = int(ends[number - 1]) if number else 0
-        rows = matrix[start:stop]
+        rows = matrix[groups[number]].tocoo()
+        column = place[rows.col]
+        ahead = column >= start
+        own = Entries(rows.row[ahead], column[ahead], rows.data[ahead])
         children, waiting[number] = waiting[number], []
-        touched = np.unique(np.concatenate([rows.indices, *(index for index, _ in children)]))
+        touched = np.unique(np.concatenate([own.column, *(index for index, _ in children)]))
         below = touched[touched >= stop]
-        dense = gathered(rows, start, below, children, workspace)
+        dense = gathered(own, range(start, stop), below, children, workspace)
         front, update = eliminate(dense, start, int(stop), below)
         fronts.append(front)
         if len(below):
             waiting[group_of[below[0]]].append((below, update))
     return fronts
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Entries of a front's own rows, row counted from its first, at columns that are not eliminated yet."""
+
+    row: np.ndarray
+    column: np.ndarray
+    value: np.ndarray
 
 
 class Workspace:
@@ -128,22 +152,20 @@ class Workspace:
         return dense
 
 
-def gathered(rows: sp.csr_array, start: int, below: np.ndarray, children: list, workspace: Workspace) -> np.ndarray:
-    """Lower triangle of a front (complex as `rows`): own columns of A and the children's Schur complements.
+def gathered(own: Entries, rows: range, below: np.ndarray, children: list, workspace: Workspace) -> np.ndarray:
+    """Lower triangle of a front (complex as its entries): own columns of A and the children's Schur complements.
 
     children : (places, Schur complement), of which the upper triangle is read.
     """
-    own = rows.shape[0]
-    size = own + len(below)
-    position = np.empty(rows.shape[1], int)
-    position[start : start + own] = np.arange(own)
-    position[below] = np.arange(own, size)
-    dense = workspace.square(size, rows.dtype)
-    entries = rows.tocoo()
-    ahead = entries.col >= start
-    dense[position[entries.col[ahead]], entries.row[ahead]] = entries.data[ahead]
+    count = len(rows)
+    dense = workspace.square(count + len(below), own.value.dtype)
+
+    def position(place: np.ndarray) -> np.ndarray:
+        return np.where(place < rows.stop, place - rows.start, count + np.searchsorted(below, place))
+
+    dense[position(own.column), own.row] = own.value
     for index, update in children:
-        _add_lower(dense, position[index], update)
+        _add_lower(dense, position(index), update)
     return dense
 
 
@@ -159,15 +181,26 @@ def _add_lower(dense: np.ndarray, place: np.ndarray, update: np.ndarray) -> None
         first = last
 
 
-def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[_Front, np.ndarray]:
+def cholesky_front(
+    dense: np.ndarray, start: int, stop: int, below: np.ndarray
+) -> tuple[CholeskyFront, np.ndarray] | None:
+    """A gathered real front eliminated: what is kept and the update of the rows below; None when it is not positive
+    definite."""
     own = stop - start
     try:
         triangle = sl.cholesky(dense[:own, :own], lower=True, check_finite=False)
-    except np.linalg.LinAlgError as error:
-        raise FactorError(
-            "the stiffness matrix is not positive definite: is the body held, are all elements sound?"
-        ) from error
+    except np.linalg.LinAlgError:
+        return None
+    triangle = np.asfortranarray(triangle)
     rest = dtrsm(1.0, triangle, dense[own:, :own], side=1, lower=1, trans_a=1)
-    product = np.matmul(rest, rest.T)
-    update = np.subtract(dense.T[own:, own:], product, out=product)
-    return _Front(start, stop, below, np.asfortranarray(triangle), rest), update
+    update = dense[own:, own:].copy(order="F")
+    if rest.size:
+        update = dsyrk(-1.0, rest, beta=1.0, c=update, lower=1, overwrite_c=1)
+    return CholeskyFront(start, stop, below, triangle, rest), update.T
+
+
+def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[CholeskyFront, np.ndarray]:
+    found = cholesky_front(dense, start, stop, below)
+    if found is None:
+        raise FactorError("the stiffness matrix is not positive definite: is the body held, are all elements sound?")
+    return found

@@ -11,14 +11,14 @@ Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; refinement: Arioli, D
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from scipy.linalg.blas import dtrsm
 
 from gearfmu.fem.dissection import nested_dissection
-from gearfmu.fem.factor import FactorError, dof_groups, eliminated
+from gearfmu.fem.factor import FactorError, cholesky_front, dof_groups, eliminated, substitute
 
 _COLUMNS = 128
 _REFINED = 1e-9  # residual relative to the right-hand side; rounding leaves a tenth of it on solid bodies
@@ -26,20 +26,23 @@ _ROUNDS = 3
 
 
 @dataclass
-class _Front:
-    """Unknowns start:stop with A⁻¹ of their block (`own`) and W = A⁻¹ Bᵀ, B the coupling to the rows `below`."""
+class _PivotedFront:
+    """Unknowns start:stop with the LU factors of their block A and W = A⁻¹ Bᵀ, B the coupling to the rows `below`."""
 
     start: int
     stop: int
     below: np.ndarray
-    own: tuple[np.ndarray, ...]
+    own: tuple[np.ndarray, np.ndarray]
     influence: np.ndarray
 
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """A⁻¹ rhs of the front's own block."""
-        if len(self.own) == 1:
-            return sl.cho_solve((self.own[0], True), rhs, check_finite=False)
-        return sl.lu_solve(self.own, rhs, check_finite=False)
+    def forward(self, work: np.ndarray) -> None:
+        """The own rows' part taken off the rows of `work` (n, k) below."""
+        work[self.below] -= self.influence.T @ work[self.start : self.stop]
+
+    def backward(self, work: np.ndarray) -> None:
+        """The own rows, those below being solved for already."""
+        own = work[self.start : self.stop]
+        own[:] = sl.lu_solve(self.own, own, check_finite=False) - self.influence @ work[self.below]
 
 
 class SymmetricFactor:
@@ -52,9 +55,7 @@ class SymmetricFactor:
         self.shape, self._matrix = matrix.shape, sp.csr_array(matrix)
         groups = dof_groups(nested_dissection(cells), node_of_dof)
         self._order = np.concatenate(groups)
-        assert len(self._order) == matrix.shape[0], "every unknown must belong to a node of some element"
-        ordered = self._matrix[self._order][:, self._order].tocsr()
-        self._fronts = eliminated(ordered, np.cumsum([len(group) for group in groups]), _eliminate)
+        self._fronts = eliminated(self._matrix, groups, _eliminate)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """A⁻¹ rhs, rhs (n, k); refined."""
@@ -76,36 +77,28 @@ class SymmetricFactor:
         return solution
 
     def _solve_once(self, rhs: np.ndarray) -> np.ndarray:
+        if np.iscomplexobj(rhs) and not np.iscomplexobj(self._matrix.data):
+            return self._solve_once(np.ascontiguousarray(rhs).view(float)).view(complex)
         result = np.empty(rhs.shape, np.result_type(self._matrix.dtype, rhs.dtype))
         for first in range(0, rhs.shape[1], _COLUMNS):
             columns = slice(first, first + _COLUMNS)
             work = np.ascontiguousarray(rhs[self._order, columns], dtype=result.dtype)
-            self._substitute(work)
+            substitute(self._fronts, work)
             result[self._order, columns] = work
         return result
 
-    def _substitute(self, work: np.ndarray) -> None:
-        for front in self._fronts:
-            work[front.below] -= front.influence.T @ work[front.start : front.stop]
-        for front in reversed(self._fronts):
-            own = work[front.start : front.stop]
-            own[:] = front.solve(own) - front.influence @ work[front.below]
 
-
-def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[_Front, np.ndarray]:
+def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
+    found = None if np.iscomplexobj(dense) else cholesky_front(dense, start, stop, below)
+    if found is not None:
+        return found
     size = stop - start
     block, coupling = dense[:size, :size], dense[size:, :size]
-    own = _cholesky(block) if not np.iscomplexobj(dense) else None
-    if own is not None:
-        half = dtrsm(1.0, own[0], coupling.T, lower=1)
-        front = _Front(start, stop, below, own, dtrsm(1.0, own[0], half, lower=1, trans_a=1))
-        product = half.T @ half
-    else:
-        own = _lu(np.tril(block) + np.tril(block, -1).T)
-        front = _Front(start, stop, below, own, np.empty((size, 0)))
-        front.influence = front.solve(np.asfortranarray(coupling.T))
-        product = coupling @ front.influence
-    return front, np.subtract(dense.T[size:, size:], product, out=product)
+    own = _lu(np.tril(block) + np.tril(block, -1).T)
+    influence = sl.lu_solve(own, np.asfortranarray(coupling.T), check_finite=False)
+    product = coupling @ influence
+    update = np.subtract(dense.T[size:, size:], product, out=product)
+    return _PivotedFront(start, stop, below, own, influence), update
 
 
 def _lu(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,10 +107,3 @@ def _lu(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if info or not diagonal.min() > 1e-14 * diagonal.max():
         raise FactorError("the shifted stiffness matrix is singular: the shift is an eigenvalue; move it")
     return factors, pivots
-
-
-def _cholesky(block: np.ndarray) -> tuple[np.ndarray] | None:
-    try:
-        return (sl.cholesky(block, lower=True, check_finite=False),)
-    except np.linalg.LinAlgError:
-        return None
