@@ -16,7 +16,7 @@ from deck import Problem, starts
 FORCES = re.compile(r" forces \(fx,fy,fz\) for set (\S+) and time")
 PRESSURES = re.compile(r"pressure ratio \(smallest/largest pressure over all contact areas\) =\s*(\S+)")
 TENSION = 1e-3  # largest tensile contact pressure, parts of the largest pressure
-MOST_ITERATIONS = 60  # what converges took 7 to 26
+MOST_ITERATIONS = 40  # what converges took 7 to 26
 END_OF_LOG = 1500  # characters shown of a failed run
 
 

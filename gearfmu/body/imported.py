@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gearfmu.body.parts import DRAWN, PICTURE_MODES, Parts, pictured_loads, sector_display, tooth_flank
+from gearfmu.body.parts import DRAWN, PICTURE_MODES, Parts, pictured_loads, rim_of, sector_display, tooth_flank
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -28,7 +29,7 @@ from gearfmu.reduction.imported_gear import (
     imported_gear,
 )
 from gearfmu.reduction.imported_sector import ImportedSector
-from gearfmu.reduction.imported_whole import imported_gear_order
+from gearfmu.reduction.imported_whole import Held, imported_gear_order
 from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.modal import Modes, Progress, elastic_modes
 from gearfmu.reduction.statics import Statics, static_tables
@@ -40,15 +41,19 @@ def check_gear(gear: Any, geometry: Any) -> CheckedGear:
 
 
 def _wanted(gear: Any, geometry: Any) -> Wanted:
-    flank, points = tooth_flank(geometry, gear)
-    return Wanted(geometry.z, flank, points, 0.5 * gear.bore_diameter, gear.material)
+    internal = isinstance(geometry, InternalGearGeometry)
+    flank, points = tooth_flank(geometry, gear, internal)
+    held = gear.rim_diameter if internal else gear.bore_diameter
+    return Wanted(geometry.z, flank, points, 0.5 * held, gear.material)
 
 
 def imported_full_order(gear: Any, geometry: Any) -> FullOrder:
-    """The whole imported gear before reduction, for every method: interfaces tooth0 … and bore. Raises MeshError."""
+    """The whole imported gear or ring before reduction, for every method: interfaces tooth0 … and bore, or on its
+    mounts. Raises MeshError."""
     found, wanted = check_gear(gear, geometry), _wanted(gear, geometry)
+    held = Held(gear.name, geometry.r, gear.imported.bore_coupling, getattr(gear, "mounts", None))
     try:
-        return imported_gear_order(found, wanted, gear.imported.bore_coupling, (gear.name, geometry.r))
+        return imported_gear_order(found, wanted, held)
     except MeshError as error:
         raise MeshError(f"{gear.imported.file}: {error}") from error
 
@@ -65,18 +70,24 @@ def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:
             "use the pictures of your own finite-element program"
         )
     bore = np.flatnonzero(np.isin(cut.of_mesh, found.mesh.sets[BORE]))
-    return FeMesh(cut.nodes, cut.elements["hexahedron20"], {BORE: bore}, geometry.z, cut.cut_minus, cut.cut_plus)
+    sets = {"rim" if isinstance(geometry, InternalGearGeometry) else BORE: bore}
+    return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, geometry.z, cut.cut_minus, cut.cut_plus)
 
 
 def imported_set_sector(spec: Any, name: str) -> FeMesh:
     """`imported_sector_mesh` of a body of a PlanetarySpec. BodyError for the carrier, which has no sectors."""
     part = getattr(spec, name)
     if name != "carrier":
-        return imported_sector_mesh(part, GearGeometry.of(part, spec.set))
+        return imported_sector_mesh(part, set_geometry(spec, name))
     raise BodyError(
         f"{part.imported.file}: an imported carrier is taken as a whole and has no sector: use the pictures of your "
         "own finite-element program"
     )
+
+
+def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:
+    """The geometry of sun, planet or ring of a PlanetarySpec."""
+    return (InternalGearGeometry if name == "ring" else GearGeometry).of(getattr(spec, name), spec.set)
 
 
 def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
@@ -99,7 +110,7 @@ def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Pa
     drawn = sector_mesh(geometry, gear.face_width, DRAWN)
     try:
         if isinstance(found.body, ImportedSector):
-            return _by_sector(found, gear.body.modes, case, (drawn, report))
+            return _by_sector(found, gear, case, (drawn, report))
         return _by_mean_tooth(found, gear.body.modes, case, (drawn, report))
     except (FactorError, ModesError) as error:
         raise MeshError(
@@ -109,13 +120,14 @@ def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Pa
         ) from error
 
 
-def _by_sector(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
+def _by_sector(found: ImportedGear, gear: Any, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
     body, (drawn, report) = found.body, drawing
-    modes = elastic_modes(body, count, report)
+    modes = elastic_modes(body, gear.body.modes, report)
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)
-    return Parts(modes, statics, frf, found.facts, sector_display(drawn, body, modes, statics), body.inertia)
+    rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
+    return Parts(modes, statics, frf, found.facts, sector_display(drawn, body, modes, statics), body.inertia, rim)
 
 
 def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:

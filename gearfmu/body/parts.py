@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body.reduced import Rim
 from gearfmu.femesh import FeMesh
 from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
@@ -24,7 +25,7 @@ _PICTURE_LOADS = 5
 @dataclass(frozen=True)
 class Parts:
     """A reduced gear without its names and numbers: modes, static tables, error, plain facts of the mesh, pictures,
-    mass matrix (6, 6) of the rigid body."""
+    mass matrix (6, 6) of the rigid body, and of a ring what its mounts need."""
 
     modes: Modes
     statics: Statics
@@ -32,6 +33,7 @@ class Parts:
     facts: dict[str, Any]
     display: Display
     inertia: np.ndarray
+    rim: Rim | None = None
 
 
 def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[ToothFlank, Points]:
@@ -47,6 +49,21 @@ def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[Tooth
         internal,
     )
     return flank, Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
+
+
+def rim_of(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim | None:
+    """What a ring's mounts (MountsSpec or None) need; None of an external gear."""
+    if not body.internal:
+        return None
+    return Rim(
+        patch_point=body.patch_point,
+        patch_rows=modes.patch_rows,
+        flank_rigid=body.rigid_rows().reshape(2, len(body.points.rolls), body.points.functions, 6),
+        static_fp=np.ascontiguousarray(statics.static_fp),
+        static_pp=np.ascontiguousarray(statics.static_pp),
+        mounts=mounts.points if mounts else 0,
+        mount_stiffness=mounts.stiffness if mounts else 0.0,
+    )
 
 
 def pictured_loads(points: Points) -> list[int]:

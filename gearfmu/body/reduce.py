@@ -13,9 +13,9 @@ import numpy as np
 
 from gearfmu.body.imported import imported_parts
 from gearfmu.body.layout import ALGORITHM_VERSION
-from gearfmu.body.parts import DRAWN, Parts, pictured_loads, sector_display, tooth_flank
+from gearfmu.body.parts import DRAWN, Parts, pictured_loads, rim_of, sector_display, tooth_flank
 from gearfmu.body.provenance import provenance
-from gearfmu.body.reduced import ReducedBody, Rim
+from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report, sector_mesh
@@ -23,9 +23,9 @@ from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
-from gearfmu.reduction.modal import Modes, elastic_modes
+from gearfmu.reduction.modal import elastic_modes
 from gearfmu.reduction.sector import SectorBody
-from gearfmu.reduction.statics import Statics, static_tables
+from gearfmu.reduction.statics import static_tables
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import StageSpec, require_pair
@@ -105,11 +105,10 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
     started = time.process_time()
     report("mesh and finite elements", 0.0)
     flank, points = tooth_flank(geometry, gear, isinstance(geometry, InternalGearGeometry))
-    rim = None
     if getattr(gear, "imported", None):
         made = imported_parts(gear, geometry, FRF_CUT, report)
     else:
-        made, rim = _made_here(gear, geometry, (flank, points), report)
+        made = _made_here(gear, geometry, (flank, points), report)
     modes, statics = made.modes, made.statics
     return ReducedBody(
         name=gear.name,
@@ -138,13 +137,11 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         static_bb=statics.static_bb,
         frf=made.frf,
         display=made.display,
-        rim=rim,
+        rim=made.rim,
     )
 
 
-def _made_here(
-    gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Points], report: Progress
-) -> tuple[Parts, Rim | None]:
+def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Points], report: Progress) -> Parts:
     """A gear meshed here, reduced by cyclic symmetry."""
     flank, points = load_points
     body = SectorBody(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
@@ -153,23 +150,8 @@ def _made_here(
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
     display = sector_display(sector_mesh(geometry, gear.face_width, DRAWN), body, modes, statics)
-    made = Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia)
-    return made, _rim(body, modes, statics, getattr(gear, "mounts", None))
-
-
-def _rim(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim | None:
-    """What a ring's mounts need; nothing of an external gear."""
-    if not body.internal:
-        return None
-    return Rim(
-        patch_point=body.patch_point,
-        patch_rows=modes.patch_rows,
-        flank_rigid=body.rigid_rows().reshape(2, len(body.points.rolls), body.points.functions, 6),
-        static_fp=np.ascontiguousarray(statics.static_fp),
-        static_pp=np.ascontiguousarray(statics.static_pp),
-        mounts=mounts.points if mounts else 0,
-        mount_stiffness=mounts.stiffness if mounts else 0.0,
-    )
+    rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
+    return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim)
 
 
 def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:

@@ -80,13 +80,13 @@ def full_order_of(stage: str, body: str, scale: float | None = None) -> Any:
     if body == "carrier" and spec.kind == "planetary_set":
         _keep_scale(spec.carrier, body, scale)
         return carrier_full_order(spec, **factor)
-    if body == "ring" and spec.kind == "planetary_set":
-        return ring_full_order(spec, **factor)
     gear = next(gear for gear in spec.gears if gear.name == body)
     _keep_scale(gear, body, scale)
-    if getattr(gear, "imported", None) is None:
-        return gear_full_order(spec, body, **factor)
-    return _imported(spec, gear)
+    if gear.imported is not None:
+        return _imported(spec, gear)
+    if body == "ring" and spec.kind == "planetary_set":
+        return ring_full_order(spec, **factor)
+    return gear_full_order(spec, body, **factor)
 
 
 def _keep_scale(part: Any, name: str, scale: float | None) -> None:
@@ -98,11 +98,11 @@ def _keep_scale(part: Any, name: str, scale: float | None) -> None:
 
 def _imported(spec: Any, gear: Any) -> Any:
     """The FullOrder of a gear from finite elements made elsewhere."""
-    from gearfmu.body.imported import imported_full_order
+    from gearfmu.body.imported import imported_full_order, set_geometry
     from gearfmu.geometry import GearGeometry
 
-    pair = spec.set if spec.kind == "planetary_set" else spec.pair
-    return imported_full_order(gear, GearGeometry.of(gear, pair))
+    is_set = spec.kind == "planetary_set"
+    return imported_full_order(gear, set_geometry(spec, gear.name) if is_set else GearGeometry.of(gear, spec.pair))
 
 
 def table(trials: Sequence[Any], contest: Any) -> list[str]:

@@ -18,7 +18,7 @@ from gearfmu.commands.shared import Quantity, echo_pairs
 @click.option(
     "--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file."
 )
-@click.option("--bore", default="", help="Node set of the bore; without it the nodes on the stage's bore diameter.")
+@click.option("--bore", default="", help="Node set of the bore (of a ring: of its rim); without it the nodes on the stage's diameter.")
 @click.option("--bolt", "bolts", multiple=True, help="Of a carrier: node set of a bolt's seat, in order from +x.")
 @click.option("--ignore", multiple=True, help="Node set of reference nodes that belong to no element.")
 def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> None:
@@ -30,7 +30,7 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    names = ["sun", "planet", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
+    names = ["sun", "planet", "ring", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
     if gear not in names:
         raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
     echo_pairs(body_facts(spec, gear, str(file), options))
@@ -40,10 +40,10 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 
 def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
-    from gearfmu.body.imported import check_gear
+    from gearfmu.body.imported import check_gear, set_geometry
     from gearfmu.geometry import GearGeometry
     from gearfmu.reduction.imported_carrier import imported_carrier
-    from gearfmu.spec.imported import CarrierImportSpec, ImportSpec
+    from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
     if name == "carrier":
         if not options["bore"] or len(options["bolts"]) != spec.set.planets:
@@ -51,10 +51,11 @@ def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict
         part = spec.carrier.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
         return imported_carrier(spec.model_copy(update={"carrier": part})).facts
     gear = next(g for g in spec.gears if g.name == name)
-    pair = spec.set if spec.kind == "planetary_set" else spec.pair
-    chosen = {key: value for key, value in options.items() if key != "bolts"}
-    source = ImportSpec(file=file, **chosen)
-    return check_gear(gear.model_copy(update={"imported": source}), GearGeometry.of(gear, pair)).facts
+    ring = spec.kind == "planetary_set" and name == "ring"
+    chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}
+    source = (RingImportSpec if ring else ImportSpec)(file=file, **chosen)
+    geometry = set_geometry(spec, name) if spec.kind == "planetary_set" else GearGeometry.of(gear, spec.pair)
+    return check_gear(gear.model_copy(update={"imported": source}), geometry).facts
 
 
 def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) -> dict[str, Any]:
@@ -88,7 +89,8 @@ def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) ->
 def section(file: Path, place: str, options: dict[str, Any]) -> str:
     """The lines for the stage file."""
     lines = [f"[{place}.import]", f'file = "{file.name}"', f'length = "{1e3 * options["length"]:g} mm"']
-    lines += [f'bore = "{options["bore"]}"'] if options["bore"] else []
+    held = "rim" if place == "ring" else "bore"
+    lines += [f'{held} = "{options["bore"]}"'] if options["bore"] else []
     lines += [f"bolts = {list(options['bolts'])}".replace("'", '"')] if options["bolts"] else []
     lines += [f'axis = "{options["axis"]}"'] if options["axis"] != "z" else []
     lines += [f"ignore = {list(options['ignore'])}".replace("'", '"')] if options["ignore"] else []

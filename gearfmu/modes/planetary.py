@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.imported import imported_set_sector
+from gearfmu.body.imported import imported_full_order, imported_set_sector, set_geometry
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.femesh.ring import sector_mesh
-from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes
@@ -52,7 +50,11 @@ def mounted_ring_modes(
     if progress:
         progress("finite elements", 0.1)
     mesh = set_sector(spec, "ring", scale).full()
-    found = whole_modes(ring_full_order(spec, scale), mesh, {}, spec.ring.material, count)
+    if spec.ring.imported is None:
+        full = ring_full_order(spec, scale)
+    else:
+        full = imported_full_order(spec.ring, set_geometry(spec, "ring"))
+    found = whole_modes(full, mesh, {}, spec.ring.material, count)
     return _damped(replace(found, name="ring_on_mounts"), spec.ring.modal_damping)
 
 
@@ -60,14 +62,13 @@ def set_sector(spec: Any, name: str, scale: float = 1.0) -> FeMesh:
     """Finite elements of one sector of a body of a PlanetarySpec. scale : factor on all element counts, those of an
     imported gear excepted. BodyError for an imported carrier and for imported gears without a sector of hexahedra."""
     part = getattr(spec, name)
-    if name != "ring" and part.imported is not None:
+    if part.imported is not None:
         return imported_set_sector(spec, name)
     if name == "carrier":
         counts = part.mesh.model_copy(update={"scale": part.mesh.scale * scale})
         return carrier_sector(CarrierGeometry.of(spec), counts)
     counts = part.body.mesh.model_copy(update={"scale": part.body.mesh.scale * scale})
-    geometry = InternalGearGeometry if name == "ring" else GearGeometry
-    return sector_mesh(geometry.of(part, spec.set), part.face_width, counts)
+    return sector_mesh(set_geometry(spec, name), part.face_width, counts)
 
 
 def _carrier(spec: Any, count: int, progress: Progress | None, scale: float) -> BodyModes:

@@ -33,25 +33,31 @@ _PER_FACE = 2.0  # intervals per length of a face where the mesh has no lines
 _FEWEST = 3
 
 
-def corner_geometry(nodes: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corner nodes (F, 4) of all faces (a triangle's third twice), their centres (F, 3) and outward unit normals."""
+def corner_geometry(
+    nodes: np.ndarray, faces: Faces, internal: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corner nodes (F, 4) of all faces (a triangle's third twice), their centres (F, 3) and unit normals out of the
+    body; of an internal gear into it, as of the external gear that fills its spaces."""
     corners = np.vstack([faces.quads[:, :4], faces.triangles[:, [0, 1, 2, 2]]])
     normal = np.cross(nodes[corners[:, 2]] - nodes[corners[:, 0]], nodes[corners[:, 3]] - nodes[corners[:, 1]])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     centre = np.concatenate([nodes[faces.quads[:, :4]].mean(axis=1), nodes[faces.triangles[:, :3]].mean(axis=1)])
-    return corners, centre, normal / np.maximum(length, 1e-300)
+    return corners, centre, (-1 if internal else 1) * normal / np.maximum(length, 1e-300)
 
 
 @dataclass(frozen=True)
 class FitRange:
-    """Where flanks are looked for and how good they must be: teeth z, base radius, form and tip roll of the gear meant,
-    and the largest distance (m) of a node from its involute."""
+    """Where flanks are looked for and how good they must be: teeth z, the flank meant, and the largest distance (m) of
+    a node from its involute."""
 
     teeth: int
-    r_b: float
-    s_form: float
-    s_tip: float
+    flank: ToothFlank
     tolerance: float
+
+    def radii(self, slack: float = 0.0) -> tuple[float, float]:
+        """Smallest and largest radius (m) of the flank, `slack` (m) of roll wider."""
+        low, high = self.flank.roll_range
+        return tuple(float(involute.radius_at_roll(s, self.flank.r_b)) for s in (low - slack, high + slack))
 
 
 def fit_flanks(nodes: np.ndarray, faces: Faces, wanted: FitRange) -> InvoluteFit:
@@ -59,12 +65,13 @@ def fit_flanks(nodes: np.ndarray, faces: Faces, wanted: FitRange) -> InvoluteFit
 
     MeshError when there are no flanks, or when a node lies further from them than the tolerance: no involute.
     """
-    corners, centre, normal = corner_geometry(nodes, faces)
+    r_b, internal = wanted.flank.r_b, wanted.flank.internal
+    corners, centre, normal = corner_geometry(nodes, faces, internal)
     try:
-        found = flank_faces(centre, normal, wanted.teeth, wanted.r_b)
-        first = fit_involute(_nodes_of(nodes, corners, found, wanted), wanted.teeth, wanted.r_b)
+        found = flank_faces(centre, normal, wanted.teeth, r_b)
+        first = fit_involute(_nodes_of(nodes, corners, found, wanted), wanted.teeth, r_b)
         local = first.in_gear_frame(nodes)
-        corners, centre, normal = corner_geometry(local, faces)
+        corners, centre, normal = corner_geometry(local, faces, internal)
         every = _all_between(local, centre, normal, first, wanted)
         fit = fit_involute(_nodes_of(nodes, corners, every, wanted), wanted.teeth, first.r_b)
     except FitError as error:
@@ -76,7 +83,7 @@ def fit_flanks(nodes: np.ndarray, faces: Faces, wanted: FitRange) -> InvoluteFit
         raise MeshError(
             f"the flanks are no involutes: nodes lie up to {1e6 * fit.worst:.3g} µm (rms {1e6 * fit.rms:.3g} "
             "µm) off the "
-            f"best one (base radius {1e3 * fit.r_b:.5g} mm, asked for {1e3 * wanted.r_b:.5g} mm), allowed are "
+            f"best one (base radius {1e3 * fit.r_b:.5g} mm, asked for {1e3 * r_b:.5g} mm), allowed are "
             f"{1e6 * wanted.tolerance:.3g} µm. Mesh the unmodified flank (reliefs belong into the stage "
             "file), or raise "
             "`flank_tolerance`"
@@ -89,10 +96,10 @@ def _all_between(
 ) -> FlankPoints:
     """All steep faces between form and tip circle, whether they lie on an involute or not."""
     moment = centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0]
-    low, high = (float(involute.radius_at_roll(s, wanted.r_b)) for s in (wanted.s_form, wanted.s_tip))
+    low, high = wanted.radii()
     radius = np.hypot(centre[:, 0], centre[:, 1])
     chosen = (
-        (np.abs(normal[:, 2]) < _STEEP) & (np.abs(moment) > _INWARD * wanted.r_b) & (radius > low) & (radius < high)
+        (np.abs(normal[:, 2]) < _STEEP) & (np.abs(moment) > _INWARD * wanted.flank.r_b) & (radius > low) & (radius < high)
     )
     side = np.where(chosen, np.sign(moment), 0).astype(int)
     base = np.arctan2(centre[:, 1], centre[:, 0]) + side * (
@@ -110,8 +117,7 @@ def _nodes_of(nodes: np.ndarray, corners: np.ndarray, faces: FlankPoints, wanted
     owner = chosen[first // 4]
     points = FlankPoints(nodes[index], faces.tooth[owner], faces.side[owner])
     radius = np.hypot(points.points[:, 0], points.points[:, 1])
-    slack = _END * (wanted.s_tip - wanted.s_form)
-    low, high = (float(involute.radius_at_roll(s, wanted.r_b)) for s in (wanted.s_form - slack, wanted.s_tip + slack))
+    low, high = wanted.radii(_END * abs(wanted.flank.s_tip - wanted.flank.s_form))
     return points.of((radius > low) & (radius < high))
 
 
@@ -144,14 +150,14 @@ def middle_node(nodes: np.ndarray, faces: Faces, flank: ToothFlank, tooth_angle:
     if len(own) == 0:
         raise MeshError("there is no face on one of the flanks")
     squared = local[own, 0] ** 2 + local[own, 1] ** 2 - flank.r_b**2
-    low, high = flank.s_form**2, flank.s_tip**2
+    low, high = np.square(flank.roll_range)
     along, across = (squared - 0.5 * (low + high)) / (high - low), local[own, 2] / flank.face_width
     return int(own[(along**2 + across**2).argmin()])
 
 
 def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -> Faces:
     """Faces of one flank of the tooth on +x, with those that reach beyond form and tip circle."""
-    sg = 1 - 2 * side
+    sg, out = 1 - 2 * side, -1 if flank.internal else 1
     parts = []
     for block, corners in ((faces.quads, 4), (faces.triangles, 3)):
         ring = local[block[:, :corners]]
@@ -159,10 +165,10 @@ def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -
         normal = np.cross(ring[:, 2] - ring[:, 0], last - ring[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         centre = ring.mean(axis=1)
-        moment = sg * (centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0])
+        moment = sg * out * (centre[:, 0] * normal[:, 1] - centre[:, 1] * normal[:, 0])
         radius = np.hypot(ring[..., 0], ring[..., 1])
         angle = sg * np.arctan2(centre[:, 1], centre[:, 0])
-        low, high = (float(involute.radius_at_roll(s, flank.r_b)) for s in (flank.s_form, flank.s_tip))
+        low, high = (float(involute.radius_at_roll(s, flank.r_b)) for s in flank.roll_range)
         chosen = (
             (np.abs(normal[:, 2]) < _STEEP) & (moment > _INWARD * flank.r_b) & (angle > 0) & (angle < 1.5 * flank.psi_b)
         )

@@ -30,7 +30,8 @@ _HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibrat
 
 @dataclass(frozen=True)
 class Wanted:
-    """The gear that the stage file describes: teeth, flank and its load points, radius of the bore (m), material."""
+    """The gear that the stage file describes: teeth, flank and its load points, radius (m) of the bore (internal: of
+    the rim), material."""
 
     teeth: int
     flank: ToothFlank
@@ -78,6 +79,11 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
         whole, cut = is_whole(placed.nodes, wanted.teeth), None
         if source.bore_coupling == "averaging" and (matrices is None or not whole):
             cut = cyclic_cut(placed.nodes, placed.elements, wanted.teeth)
+        if cut is None and wanted.flank.internal:
+            raise MeshError(
+                "a ring is taken by sectors only, for the sake of its mounts: give one sector that holds a whole tooth "
+                "space, with its matrices if they are ready-made, or a whole mesh that repeats itself from space to space"
+            )
         if cut is None and not whole:
             raise MeshError(
                 'a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear'
@@ -109,7 +115,7 @@ def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:
         if source.bore and _around(mesh, source.bore)
         else np.zeros(3)
     )
-    search = FitRange(wanted.teeth, flank.r_b, flank.s_form, flank.s_tip, source.flank_tolerance)
+    search = FitRange(wanted.teeth, flank, source.flank_tolerance)
     fit = fit_flanks(mesh.nodes - middle, solids.boundary(mesh.elements), search)
     return replace(fit, origin=fit.origin + middle)
 
@@ -144,7 +150,7 @@ def _same_gear(mesh: ImportedMesh, fit: InvoluteFit, wanted: Wanted) -> None:
 
 def _flank_nodes(mesh: ImportedMesh, wanted: Wanted) -> np.ndarray:
     radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
-    low, high = (np.hypot(wanted.flank.r_b, s) for s in (wanted.flank.s_form, wanted.flank.s_tip))
+    low, high = (np.hypot(wanted.flank.r_b, s) for s in wanted.flank.roll_range)
     return (radius > low) & (radius < high)
 
 
@@ -155,10 +161,10 @@ def _bore_nodes(mesh: ImportedMesh, name: str, wanted: Wanted) -> np.ndarray:
     found = np.flatnonzero(np.abs(radius - wanted.bore_radius) < _ON_BORE * wanted.bore_radius)
     faces = solids.boundary(mesh.elements).within(found)
     if len(faces.nodes) == 0:
+        where = "rim" if wanted.flank.internal else "bore"
         raise MeshError(
-            f"no face lies on the bore of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the bore in "
-            "`bore`, or "
-            "correct bore_diameter"
+            f"no face lies on the {where} of {2e3 * wanted.bore_radius:.4g} mm: name the node set of the {where} in "
+            f"`{where}`, or correct {where}_diameter"
         )
     return faces.nodes
 

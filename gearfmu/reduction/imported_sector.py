@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from gearfmu.fem import solids
 from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.hex20 import Material
-from gearfmu.fem.patches import patch_moments
+from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.imported_flank import tooth_loads
@@ -21,7 +21,7 @@ from gearfmu.reduction.sector import SectorBody, turned_sum
 class ImportedSector(SectorBody):
     """`SectorBody` on a cut of an imported mesh.
 
-    cut : the sector in the gear's frame. bore : its nodes on the bore. elastic : a material, or ready-made stiffness
+    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). elastic : a material, or ready-made stiffness
     (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
     """
 
@@ -35,7 +35,7 @@ class ImportedSector(SectorBody):
     ):
         self.cut, self.bore, self.teeth = cut, bore, teeth
         self.flank, self.points = flank
-        self.internal = False
+        self.internal = self.flank.internal
         self.mesh = SimpleNamespace(
             nodes=cut.nodes,
             cut_minus=cut.cut_minus,
@@ -55,6 +55,18 @@ class ImportedSector(SectorBody):
     def flank_rows(self) -> np.ndarray:
         """Unit flank loads of tooth 0 as rows over the sector's nodes: (2·R·A, 3N)."""
         return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points).toarray()
+
+    @cached_property
+    def patch_rows(self) -> np.ndarray:
+        """Mean displacement x, y, z of the sector's patch of the rim, (3, 3N), at `patch_point`; (0, 3N) of a gear."""
+        if not self.internal:
+            return np.zeros((0, self.cut.nodes.size))
+        return averaging_rows(self.cut.nodes - self.patch_point, self.faces.within(self.bore))[:3]
+
+    @property
+    def patch_point(self) -> np.ndarray:
+        """Where the patch's displacement is read: the mean of its nodes, (3,) m."""
+        return self.cut.nodes[self.bore].mean(axis=0)
 
     @cached_property
     def bore_moments(self) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,8 @@ A sector is unfolded: its nodes and elements turned tooth by tooth, and so are r
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,51 +15,65 @@ from gearfmu.fem import solids
 from gearfmu.femesh.cyclic_cut import CyclicCut
 from gearfmu.femesh.imported import ImportedMesh
 from gearfmu.femesh.mesh import FeMesh
-from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
+from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported import Matrices, SetInterface, set_coupling
 from gearfmu.reduction.imported_flank import middle_node
 from gearfmu.reduction.imported_gear import BORE, CheckedGear, Wanted
 
 
-def imported_gear_order(found: CheckedGear, wanted: Wanted, coupling: str, named: tuple[str, float]) -> FullOrder:
-    """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, its ground when judged.
+@dataclass(frozen=True)
+class Held:
+    """How a gear is called, judged and held: name, length (m) that scales rotations, coupling of its bore, mounts of a
+    ring (MountsSpec) or None."""
 
-    coupling : of the bore, "averaging" or "rigid". named : name of the body and the length (m) that scales rotations.
-    Raises MeshError.
-    """
-    mesh, matrices = _whole(found, wanted)
+    name: str
+    length: float
+    coupling: str
+    mounts: Any = None
+
+
+def imported_gear_order(found: CheckedGear, wanted: Wanted, held: Held) -> FullOrder:
+    """The whole imported gear with one input node a tooth, tooth0 …, and the node of its bore, its ground when judged;
+    a ring (one node a space) on the springs of its mounts, or free without them. Raises MeshError."""
+    mesh, matrices = _whole(found, wanted, held)
     faces, body = solids.boundary(mesh.elements), Elements(mesh.nodes, mesh.repeated_cells, *_pair(matrices))
     couplings = []
     for tooth in range(wanted.teeth):
         node = middle_node(mesh.nodes, faces, wanted.flank, 2 * np.pi * tooth / wanted.teeth)
         couplings.append(Coupling(f"tooth{tooth}", "nodes", np.array([node]), mesh.nodes[node]))
-    couplings.append(set_coupling(mesh, faces, SetInterface(BORE, coupling, np.zeros(3))))
-    name, length = named
-    return full_order(name, body, couplings, Judgement((BORE,), length))
+    if not wanted.flank.internal:
+        couplings.append(set_coupling(mesh, faces, SetInterface(BORE, held.coupling, np.zeros(3))))
+        return full_order(held.name, body, couplings, Judgement((BORE,), held.length))
+    names = [name for name in mesh.sets if name != BORE]
+    rows = [set_coupling(mesh, faces, SetInterface(name)).rows[:3] for name in names]
+    springs = Springs(sp.csr_array(sp.vstack(rows)), np.full(3 * len(rows), held.mounts.stiffness)) if rows else None
+    return full_order(held.name, body, couplings, Judgement((), held.length), springs)
 
 
 def _pair(matrices: Matrices) -> tuple[sp.csr_array, sp.csr_array]:
     return matrices.stiffness, matrices.mass
 
 
-def _whole(found: CheckedGear, wanted: Wanted) -> tuple[ImportedMesh, Matrices]:
+def _whole(found: CheckedGear, wanted: Wanted, held: Held) -> tuple[ImportedMesh, Matrices]:
     """All teeth of a checked gear, and its matrices: ready-made or of our elements."""
     mesh, ready = found.mesh, found.matrices
     if found.cut is not None:
-        mesh = _unfolded(mesh, found.cut, wanted.teeth)
+        mesh = _unfolded(mesh, found.cut, wanted.teeth, held.mounts.points if held.mounts else 0)
         ready = ready and Matrices(*(unfolded_matrix(m, found.cut, wanted.teeth) for m in _pair(ready)))
     return mesh, ready or Matrices(*solids.assemble(mesh.nodes, mesh.elements, wanted.material))
 
 
-def _unfolded(mesh: ImportedMesh, cut: CyclicCut, teeth: int) -> ImportedMesh:
+def _unfolded(mesh: ImportedMesh, cut: CyclicCut, teeth: int, mounts: int) -> ImportedMesh:
+    """All sectors, with the sets of bore or rim and of the patches that the mounts hold."""
     nodes, numbers = _numbers(cut, teeth)
     bore = np.flatnonzero(np.isin(cut.of_mesh, mesh.sets[BORE]))
     return replace(
         mesh,
         nodes=nodes,
         elements={kind: np.concatenate([n[block] for n in numbers]) for kind, block in cut.elements.items()},
-        sets={BORE: np.unique(np.concatenate([n[bore] for n in numbers]))},
+        sets={BORE: np.unique(np.concatenate([n[bore] for n in numbers]))}
+        | {f"mount{k}": numbers[k * teeth // mounts][bore] for k in range(mounts)},
         labels=np.full(len(nodes), -1),
     )
 

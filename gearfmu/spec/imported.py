@@ -1,4 +1,4 @@
-"""[gears.<name>.import], [sun.import], [planet.import], [carrier.import]: a body from finite elements made elsewhere
+"""[gears.<name>.import], of a planetary set [sun.import], [planet.import], [ring.import], [carrier.import]: a body from finite elements made elsewhere
 (docs/howto-import.md)."""
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from gearfmu.spec.base import Quantity, Spec, Text, refuse
 from gearfmu.spec.layers import Layers
 
 _FILES = ("file", "stiffness", "mass", "unknowns")
-_SET_BODIES = ("sun", "planet", "carrier")
+_SET_BODIES = ("sun", "planet", "ring", "carrier")
 
 Files = TypeVar("Files", bound="FilesSpec")
 
@@ -69,6 +69,25 @@ class ImportSpec(FilesSpec):
     flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
         default=5e-6, description="largest distance of a corner node from the best involute"
     )
+
+
+class RingImportSpec(FilesSpec):
+    """The finite elements of a ring, placed by the involute fit of its tooth spaces."""
+
+    rim: Text = Field(default="", description="node set of the rim; without it the nodes on the stage's rim diameter")
+    flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
+        default=5e-6, description="largest distance of a corner node from the best involute"
+    )
+
+    @property
+    def bore(self) -> str:
+        """The rim takes the place of the bore."""
+        return self.rim
+
+    @property
+    def bore_coupling(self) -> str:
+        """A rim is averaged, whole and by its patches."""
+        return "averaging"
 
 
 class CarrierImportSpec(FilesSpec):

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
 from gearfmu.spec.gear import BodySpec, Factor, Length, Material, RackSpec, Ratio, Size
-from gearfmu.spec.imported import CarrierImportSpec, ImportSpec
+from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
 CouplingKind = Literal["rigid", "averaging"]
 
@@ -80,6 +80,8 @@ class MountsSpec(Spec):
 class RingSpec(Spec):
     """The internal gear. Its profile shift is positive outwards, as for the external gear that fills its spaces."""
 
+    model_config = ConfigDict(populate_by_name=True)
+
     name: Name = "ring"
     teeth: Annotated[Count, Field(ge=12, le=600)] = Field(description="number of teeth z")
     profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(
@@ -97,6 +99,9 @@ class RingSpec(Spec):
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
     mounts: MountsSpec | None = Field(default=None, description="elastic mounts; none when the table is absent")
     body: BodySpec = Field(description="mesh and reduction")
+    imported: RingImportSpec | None = Field(
+        default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
+    )
 
 
 class CarrierMeshSpec(Spec):

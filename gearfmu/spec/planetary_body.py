@@ -29,7 +29,7 @@ def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
     gear = spec.gears[SET_BODIES.index(name)].model_dump(exclude={"name", "imported"})
     if name != "ring":
         gear["rack"].pop("addendum")  # the tip diameter says where the tooth ends
-        if (imported := getattr(spec, name).imported) is not None:
-            gear["body"].pop("mesh")
-            gear["import"] = import_inputs(imported, spec.source, f"{name}.import")
+    if (imported := getattr(spec, name).imported) is not None:
+        gear["body"].pop("mesh")
+        gear["import"] = import_inputs(imported, spec.source, f"{name}.import")
     return common | tooth | gear

@@ -171,7 +171,7 @@ def _load_set(layers: Layers) -> PlanetarySpec:
     problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
-    parts = {name: getattr(spec, name) for name in ("sun", "planet", "carrier")}
+    parts = {name: getattr(spec, name) for name in ("sun", "planet", "ring", "carrier")}
     located = {
         name: part.model_copy(update={"imported": part.imported.located(layers, f"{name}.import")})
         for name, part in parts.items()

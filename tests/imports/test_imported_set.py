@@ -1,9 +1,11 @@
-"""Planetary sets with bodies made elsewhere: sun, planet and carrier; our own meshes come back as the same bodies."""
+"""Planetary sets with bodies made elsewhere: planet, ring and carrier; our own meshes come back as the same bodies."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import lru_cache
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,8 @@ import scipy.sparse as sp
 from decks import write_deck
 
 from gearfmu import cli
+from gearfmu.body.imported import imported_full_order, set_geometry
+from gearfmu.body.mounted import mounted
 from gearfmu.body.planetary import reduce_set_body, set_hash
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
@@ -21,6 +25,7 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.modes.planetary import set_sector
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported_carrier import circle_centre
+from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
@@ -100,6 +105,64 @@ def test_an_imported_planet_is_the_planet(tmp_path: Path) -> None:
     assert np.abs(body.static_ff - native.static_ff).max() < 1e-9 * np.abs(native.static_ff).max()
 
 
+RING = '[ring.import]\nfile = "ring.inp"\nlength = "1 mm"\n'
+
+
+def ring_deck(folder: Path, mesh: FeMesh, angle: float = 0.0) -> Path:
+    c, s = np.cos(angle), np.sin(angle)
+    points = 1e3 * mesh.nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    folder.mkdir(parents=True, exist_ok=True)
+    return write_deck(folder / "ring.inp", points, {"hexahedron20": mesh.elements}, {"RIM": mesh.sets["rim"]})
+
+
+@pytest.mark.parametrize(
+    ("whole", "rim"), [(False, ""), pytest.param(True, 'rim = "RIM"\n', marks=pytest.mark.full)], ids=["sector", "whole"]
+)
+def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> None:
+    """One sector, or the whole ring turned by an angle; rows, tables and what the mounts need."""
+    own = stage(tmp_path / "own")
+    sector = set_sector(own, "ring")
+    ring_deck(tmp_path, sector.full() if whole else sector, 0.02 if whole else 0.0)
+    body, native = (reduce_set_body(spec, "ring") for spec in (stage(tmp_path, RING + rim), own))
+    assert body.internal and body.mesh["road"] == "cyclic" and body.modes == native.modes
+    assert np.abs(body.frequency / native.frequency - 1).max() < 1e-8
+    for name in ("static_ff", "static_fb", "static_bb", "inertia", "rim.static_fp", "rim.static_pp", "rim.flank_rigid"):
+        one, other = (attrgetter(name)(b) for b in (body, native))
+        assert np.abs(one - other).max() < 1e-7 * np.abs(other).max(), name
+    assert body.rim.mounts == native.rim.mounts == 6
+    lowest = [mounted(b).frequency[:20] for b in (body, native)]
+    assert np.abs(lowest[0] / lowest[1] - 1).max() < 1e-7
+
+
+@pytest.mark.full
+def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
+    """Before reduction, for every method: K with the springs, M and the inputs of our own."""
+    own = stage(tmp_path / "own")
+    ring_deck(tmp_path, set_sector(own, "ring"))
+    spec = stage(tmp_path, RING)
+    body, native = imported_full_order(spec.ring, set_geometry(spec, "ring")), ring_full_order(own, 1.0)
+    assert body.rigid.size == 0 and body.ground == () and body.length == native.length
+    assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces]
+    for name in ("stiffness", "mass"):
+        one, other = getattr(body, name), getattr(native, name)
+        assert np.abs(one - other).max() < 1e-6 * np.abs(other).max(), name
+    assert np.abs(body.rows() - native.rows()).max() < 1e-9
+
+
+def test_rings_by_the_mean_tooth_and_other_rings_are_refused(tmp_path: Path) -> None:
+    own = stage(tmp_path / "own")
+    sector = set_sector(own, "ring")
+    whole = sector.full()
+    used, cells = np.unique(whole.elements[1:], return_inverse=True)
+    rim = np.flatnonzero(np.isin(used, whole.sets["rim"]))
+    ring_deck(tmp_path, FeMesh(whole.nodes[used], cells.reshape(-1, 20), {"rim": rim}))
+    with pytest.raises(MeshError, match="sectors only"):
+        reduce_set_body(stage(tmp_path, RING), "ring")
+    ring_deck(tmp_path, replace(sector, nodes=1.01 * sector.nodes))
+    with pytest.raises(MeshError, match="not the gear of the stage file|no involute"):
+        reduce_set_body(stage(tmp_path, RING), "ring")
+
+
 def turned(angle: float) -> np.ndarray:
     c, s = np.cos(angle), np.sin(angle)
     return carrier_parts()[0].nodes @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
@@ -125,11 +188,11 @@ def test_a_carrier_that_lies_elsewhere_is_refused(tmp_path: Path, nodes, message
 
 
 def test_what_the_file_says_is_checked_at_load(tmp_path: Path) -> None:
-    """Missing files of several bodies, and a bolt without a set, in one list; a ring cannot be imported."""
+    """Missing files of several bodies in one list; a bolt without a set."""
     with pytest.raises(SpecError) as caught:
         stage(tmp_path, CARRIER.replace(', "PIN_D"', "") + PLANET + "[ring.import]\nfile = 'ring.inp'\n")
     fields = {problem.field for problem in caught.value.problems}
-    assert {"ring.import", "carrier.import.file", "planet.import.file"} <= fields
+    assert {"ring.import.length", "ring.import.file", "carrier.import.file", "planet.import.file"} <= fields
     carrier_deck(tmp_path)
     with pytest.raises(SpecError, match="carrier.import.bolts = PIN_A, PIN_B, PIN_C: one node set for each of the 4"):
         stage(tmp_path, CARRIER.replace(', "PIN_D"', ""))
