@@ -1,7 +1,8 @@
 """Free frequencies of gear, ring and carrier against CalculiX: the same mesh, and the mesh of the stage file.
 
-The goldens come from CalculiX's own elements (C3D20) and eigensolver on all teeth (benchmarks/calculix/frequencies.py);
-ours from one sector.
+The goldens come from CalculiX's own elements (C3D20) and eigensolver on all teeth, or, on the meshes of the stage files,
+on one sector with its own cyclic symmetry and every nodal diameter (benchmarks/calculix/frequencies.py); ours from one
+sector.
 """
 
 from __future__ import annotations
@@ -36,9 +37,29 @@ def test_the_same_mesh_has_the_same_frequencies(benchmark_module: ModuleType, na
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("name", [name for name in GOLDEN if not name.endswith("_coarse")])
+@pytest.mark.parametrize("name", ["pinion", "ring"])
 def test_finer_meshes(benchmark_module: ModuleType, name: str) -> None:
     assert np.allclose(benchmark_module.ours(benchmark_module.CASES[name]), np.array(GOLDEN[name]), rtol=PRINTED)
+
+
+def test_both_of_its_roads_agree() -> None:
+    """All teeth, and one sector with CalculiX's cyclic symmetry."""
+    assert np.allclose(GOLDEN["pinion_sector_coarse"], GOLDEN["pinion_coarse"], rtol=PRINTED)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "coarser"), [("pinion_file", "pinion"), ("ring_file", "ring"), ("carrier", None)])
+def test_gear_ring_and_carrier_on_the_meshes_of_the_stage_files(
+    benchmark_module: ModuleType, name: str, coarser: str | None
+) -> None:
+    """CalculiX on equally fine meshes: within 0.3 %, in truth to its printed digits. What refinement from 0.7 (pinion)
+    and 0.4 (ring) of the counts moves is less than ½ %: the meshes themselves are fine enough."""
+    case = benchmark_module.CASES[name]
+    assert case.scale == 1.0
+    ours = benchmark_module.ours(case)
+    assert np.allclose(ours, GOLDEN[name], rtol=3e-3) and np.allclose(ours, GOLDEN[name], rtol=PRINTED)
+    if coarser:
+        assert np.allclose(GOLDEN[coarser], GOLDEN[name], rtol=5e-3)
 
 
 @pytest.mark.full

@@ -58,7 +58,8 @@ def test_transmission_error_over_one_pitch(plain: StageModel, torque: str) -> No
 
 @pytest.mark.full
 def test_transmission_error_on_rigid_bores(spec: StageSpec, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bores clamped node by node there, rigid here: what is 4 % stiffer than averaged bores agrees as well."""
+    """Bores clamped node by node there, rigid here, all positions and loads: mean and peak to peak within 3 %, as for
+    averaged bores, which are 4 % softer; in truth single positions stay within 1 %."""
     monkeypatch.syspath_prepend(str(TABLES))
     bodies = importlib.import_module("rigid_bores").rigid_bore_bodies(spec)
     golden, count = GOLDEN["te_um_with_clamped_bores"], GOLDEN["positions_per_pitch"]
@@ -67,7 +68,9 @@ def test_transmission_error_on_rigid_bores(spec: StageSpec, monkeypatch: pytest.
         here, values = curve[[int(k) for k in theirs]], np.array(list(theirs.values()))
         print(f"{torque} N·m: {len(values)} positions, {100 * (here / values - 1).min():+.2f} … "
               f"{100 * (here / values - 1).max():+.2f} %")  # fmt: skip
-        assert np.allclose(here, values, rtol=0.02) and here.mean() == pytest.approx(values.mean(), rel=0.015)
+        assert here.mean() == pytest.approx(values.mean(), rel=0.015)
+        assert np.ptp(here) == pytest.approx(np.ptp(values), rel=0.01)
+        assert np.allclose(here, values, rtol=0.015)
 
 
 def test_goldens_are_those_of_the_tables() -> None:
@@ -76,7 +79,7 @@ def test_goldens_are_those_of_the_tables() -> None:
     for table, name in (("positions", "te_um_by_torque_Nm_and_position"), ("positions_clamped", "te_um_with_clamped_bores")):
         with open(TABLES / f"{table}.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        assert len(rows) == sum(len(curve) for curve in GOLDEN[name].values())
+        assert len(rows) == sum(len(curve) for curve in GOLDEN[name].values()) == 3 * GOLDEN["positions_per_pitch"]
         for row in rows:
             place = str(round(GOLDEN["positions_per_pitch"] * float(row["position"])))
             assert GOLDEN[name][row["torque_Nm"]][place] == float(row["te_um"])
