@@ -70,13 +70,9 @@ class _Krylov:
             return False
         self._append(block, inertia)
         image = self.body.flexibility(inertia)
-        column = np.zeros((self.size, self.last), self.body.dtype)
-        for _ in range(2):
-            part = self._project(image)
-            image = image - self.basis() @ part
-            column += part
+        column = self._project(image)
         self.t[: self.size, self.size - self.last : self.size] = column
-        self.next = image
+        self.next = image - self.basis() @ column
         return True
 
     def ritz(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -29,6 +29,7 @@ from gearfmu.reduction.full_order import FullOrder
 
 _NEAR = 1e-4  # relative distance of a shift to an eigenvalue at which it moves
 _MOVE = 3e-3  # by how much it moves
+_SHAPES = 1e-7  # residual of mode shapes, relative; ω² is then exact to 1e-14
 _RANK = 1e-12  # relative size at which a small symmetric system counts as singular
 _KNOWN: WeakKeyDictionary[FullOrder, Elastic] = WeakKeyDictionary()
 
@@ -180,7 +181,8 @@ class Elastic:
         Raises ModesError."""
         if "modes" in self.pieces and len(self.pieces["modes"].made[0]) < min(count, self.elastic):
             del self.pieces["modes"]
-        squared, shapes = self._piece("modes", lambda: lowest_modes(self, count, block=16 if count > 60 else 8))
+        block = 24 if count > 60 else 8
+        squared, shapes = self._piece("modes", lambda: lowest_modes(self, count, _SHAPES, block))
         return squared[:count], shapes[:, :count]
 
 
