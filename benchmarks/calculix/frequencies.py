@@ -58,9 +58,7 @@ CASES = {
         Case("carrier", "planetary54", "carrier", 1.0),
         Case("pinion_sector_coarse", "fzg_c", "pinion", 0.4, by_sector=True),
         Case("pinion_file", "fzg_c", "pinion", 1.0, by_sector=True),
-        Case("pinion_finer", "fzg_c", "pinion", 1.4, by_sector=True),
         Case("ring_file", "planetary54", "ring", 1.0, by_sector=True),
-        Case("ring_finer", "planetary54", "ring", 1.3, by_sector=True),
         Case("carrier_finer", "planetary54", "carrier", 1.5, by_sector=True),
     )
 }

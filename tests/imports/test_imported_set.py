@@ -22,7 +22,7 @@ from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.modes.planetary import set_sector
+from gearfmu.modes.planetary import mounted_ring_modes, set_sector
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported_carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order
@@ -99,7 +99,9 @@ def test_an_imported_planet_is_the_planet(tmp_path: Path) -> None:
     own = stage(tmp_path / "own")
     mesh = set_sector(own, "planet")
     write_deck(tmp_path / "planet.inp", 1e3 * mesh.nodes, {"hexahedron20": mesh.elements}, {"BORE": mesh.sets["bore"]})
-    body, native = (reduce_set_body(spec, "planet") for spec in (stage(tmp_path, PLANET), own))
+    spec = stage(tmp_path, PLANET)
+    assert np.allclose(set_sector(spec, "planet").nodes, mesh.nodes, atol=1e-9)
+    body, native = (reduce_set_body(one, "planet") for one in (spec, own))
     assert body.mesh["road"] == "cyclic" and body.modes == native.modes
     assert np.abs(body.frequency / native.frequency - 1).max() < 1e-9
     assert np.abs(body.static_ff - native.static_ff).max() < 1e-9 * np.abs(native.static_ff).max()
@@ -136,7 +138,7 @@ def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> 
 
 @pytest.mark.full
 def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
-    """Before reduction, for every method: K with the springs, M and the inputs of our own."""
+    """Before reduction, for every method: K with the springs, M and the inputs of our own; and its modes."""
     own = stage(tmp_path / "own")
     ring_deck(tmp_path, set_sector(own, "ring"))
     spec = stage(tmp_path, RING)
@@ -147,6 +149,8 @@ def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
         one, other = getattr(body, name), getattr(native, name)
         assert np.abs(one - other).max() < 1e-6 * np.abs(other).max(), name
     assert np.abs(body.rows() - native.rows()).max() < 1e-9
+    modes = [mounted_ring_modes(one, 6, scale=1.0).modes for one in (spec, own)]
+    assert np.allclose([m.frequency for m in modes[0]], [m.frequency for m in modes[1]], rtol=1e-7)
 
 
 def test_rings_by_the_mean_tooth_and_other_rings_are_refused(tmp_path: Path) -> None:
@@ -215,6 +219,10 @@ def test_the_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.outcome([*call, *bolts]) == 0
     assert f"bolts = {BOLTS}".replace("'", '"') in capsys.readouterr().out
     assert cli.outcome(call) == cli.USAGE_ERROR and "4 times --bolt" in capsys.readouterr().err
+    ring = ring_deck(tmp_path, set_sector(own, "ring"))
+    call = ["import", str(ring), str(own.source), "ring", "--length", "1 mm", "--bore", "RIM"]
+    assert cli.outcome(call) == 0
+    assert '[ring.import]\nfile = "ring.inp"\nlength = "1 mm"\nrim = "RIM"' in capsys.readouterr().out
     stage(tmp_path, CARRIER)
     out = ["--out", str(tmp_path / "o")]
     assert cli.outcome(["frf", str(tmp_path), "carrier", "--scale", "0.5", *out]) == cli.USAGE_ERROR
