@@ -31,7 +31,7 @@ from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.comparison import Comparison, Contest, compare
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import Expansion, input_loads
+from gearfmu.reduction.moments import Expansion
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
@@ -108,14 +108,14 @@ def inputs() -> None:
 def points() -> None:
     """Where the Krylov method expands: five blocks on two to five points (parts of the band's end), same size."""
     body = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE).grounded()
-    judging, loads, rows = Judging.over(lines=80), input_loads(body), []
+    judging, rows = Judging.over(lines=80), []
     full = reference(body, judging)
     for shares, powers in LAYOUTS:
         basis = Growing(elastic(body))
         for share, power in zip(shares, powers, strict=True):
-            point = Expansion(basis.space, (2 * np.pi * share * judging.frequency[-1]) ** 2)
+            point = Expansion(body, (2 * np.pi * share * judging.frequency[-1]) ** 2)
             for _ in range(power):
-                point.advance(basis, loads)
+                point.advance(basis)
         model = oscillators(body, Basis("krylov", basis.vectors), judging.damping_ratio)
         error = relative_error(full.matrix, transfer(model, judging, body.ground))
         layout = {"points": " ".join(map(str, shares)), "powers": " ".join(map(str, powers)), "n": basis.size}

@@ -20,6 +20,7 @@ from scipy.linalg.blas import dsyrk, dtrsm
 from gearfmu.fem.dissection import nested_dissection
 
 _COLUMNS = 128
+_BLOCKED = 12  # mean length of a run from which on blocks are faster than columns
 
 
 class FactorError(ArithmeticError):
@@ -172,13 +173,17 @@ def gathered(own: Entries, rows: range, below: np.ndarray, children: list, works
 def _add_lower(dense: np.ndarray, place: np.ndarray, update: np.ndarray) -> None:
     """Add the upper triangle of `update` (C order) to the lower one of `dense` (Fortran order) at ascending places.
 
-    Run by run of consecutive places, so that whole columns are added at once.
+    Run by run of consecutive places, so that whole blocks are added at once; where runs are many and short, columns.
     """
-    ends = np.append(np.flatnonzero(np.diff(place) > 1) + 1, len(place))
-    columns, first = dense.T, 0
-    for last in ends:
-        columns[place[first] : place[last - 1] + 1, place[first:]] += update[first:last, first:]
-        first = last
+    ends = np.append(np.flatnonzero(np.diff(place) > 1) + 1, len(place)).tolist()
+    starts, columns = [0, *ends[:-1]], dense.T
+    to = [slice(place[first], place[last - 1] + 1) for first, last in zip(starts, ends, strict=True)]
+    for k, (first, last) in enumerate(zip(starts, ends, strict=True)):
+        if len(place) > _BLOCKED * len(ends):
+            for j in range(k, len(ends)):
+                columns[to[k], to[j]] += update[first:last, starts[j] : ends[j]]
+        else:
+            columns[to[k], place[first:]] += update[first:last, first:]
 
 
 def cholesky_front(

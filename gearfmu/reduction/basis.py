@@ -78,12 +78,9 @@ class Growing:
         """M V (N, n)."""
         return self._mv[:, : self.size]
 
-    def add(self, block: np.ndarray, at_most: int | None = None) -> np.ndarray:
-        """Append what is new in `block` (N, k), the strongest `at_most` directions of it; returns M times the new
-        vectors (N, ≤ k)."""
+    def add(self, block: np.ndarray) -> np.ndarray:
+        """Append what is new in `block` (N, k); returns M times the new vectors (N, ≤ k)."""
         block, inertia = self._new(block)
-        if at_most is not None:
-            block, inertia = block[:, :at_most], inertia[:, :at_most]
         first, self.size = self.size, self.size + block.shape[1]
         self._reserve()
         self._v[:, first : self.size], self._mv[:, first : self.size] = block, inertia

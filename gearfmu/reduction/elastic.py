@@ -28,6 +28,7 @@ from gearfmu.fem.solver import Solves, definite_factor, symmetric_factor
 from gearfmu.reduction.full_order import FullOrder
 
 _NEAR = 1e-4  # relative distance of a shift to an eigenvalue at which it moves
+_GUESSED = 1e-3  # the same for an eigenvalue that is only estimated
 _MOVE = 3e-3  # by how much it moves
 _SHAPES = 1e-7  # residual of mode shapes, relative; ω² is then exact to 1e-14
 _RANK = 1e-12  # relative size at which a small symmetric system counts as singular
@@ -74,7 +75,7 @@ class Elastic:
         self._mass_rigid = self.mass_matrix @ self.rigid
         self.elastic = body.size - self.rigid.shape[1] - self.constraints.shape[0]
 
-    def _piece(self, name: str, make: Callable[[], Any]) -> Any:
+    def kept(self, name: str, make: Callable[[], Any]) -> Any:
         """What is kept under `name`, made now if it is not there."""
         self.touched.add(name)
         if name not in self.pieces:
@@ -120,7 +121,7 @@ class Elastic:
         """Unknowns left free by statically determinate supports of the kernel of K, and the factor of their K."""
         if self._twin is not None:
             return self._twin._supported
-        return self._piece("factor of K", self._support)
+        return self.kept("factor of K", self._support)
 
     def _support(self) -> tuple[np.ndarray, Solves]:
         kernel = self._kernel
@@ -154,22 +155,25 @@ class Elastic:
             solution = solution - response @ small[:rows] + self._kernel @ small[rows:]
         return self.gauge(solution)
 
-    def shifted(self, shift: float) -> Shifted:
+    def shifted(self, shift: float, near: np.ndarray | None = None) -> Shifted:
         """Solutions at a shift, rad²/s²; one within 1e-4 of an eigenvalue moves by 0.3 % and more until it is not.
 
+        near : estimates of eigenvalues, as far as they are known; a shift at one of them moves before it is factorised.
         The last two are kept."""
         name = f"factor at {shift:.12g}"
         for old in [key for key in self.pieces if key.startswith("factor at") and key != name][:-1]:
             if name not in self.pieces:
                 del self.pieces[old]
-        return self._piece(name, lambda: self._clear_of_eigenvalues(shift))
+        return self.kept(name, lambda: self._clear_of_eigenvalues(shift, near))
 
-    def _clear_of_eigenvalues(self, shift: float) -> Shifted:
+    def _clear_of_eigenvalues(self, shift: float, near: np.ndarray | None) -> Shifted:
+        known = np.empty(0) if near is None else near
         for attempt in range(1, 9):
             try:
-                found = Shifted(self, shift)
-                if shift <= 0 or found.distance() > _NEAR * shift:
-                    return found
+                if not np.any(np.abs(known - shift) < _GUESSED * shift):
+                    found = Shifted(self, shift)
+                    if shift <= 0 or found.distance() > _NEAR * shift:
+                        return found
             except FactorError:
                 assert shift > 0, "K − σM of a negative shift is positive definite"
             shift *= 1 + attempt * _MOVE
@@ -182,7 +186,7 @@ class Elastic:
         if "modes" in self.pieces and len(self.pieces["modes"].made[0]) < min(count, self.elastic):
             del self.pieces["modes"]
         block = 24 if count > 60 else 8
-        squared, shapes = self._piece("modes", lambda: lowest_modes(self, count, _SHAPES, block))
+        squared, shapes = self.kept("modes", lambda: lowest_modes(self, count, _SHAPES, block))
         return squared[:count], shapes[:, :count]
 
 

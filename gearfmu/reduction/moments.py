@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearfmu.reduction.basis import Growing
-from gearfmu.reduction.elastic import Elastic
+from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 
 
@@ -23,27 +23,43 @@ def input_loads(body: FullOrder) -> np.ndarray:
     return body.rows().T.toarray() / body.scales()
 
 
-class Expansion:
-    """One expansion point: `advance` adds the next block of moments to a basis.
+def static_response(body: FullOrder) -> np.ndarray:
+    """Displacement under the `input_loads`: (N, m), the first block of moments at 0. Made once for each body."""
+    space = elastic(body)
+    return space.kept("static response", lambda: space.flexibility(input_loads(body)))
 
+
+class Expansion:
+    """One expansion point of a body: `advance` adds the next block of moments to a basis.
+
+    known : vectors whose Rayleigh quotients tell of eigenvalues at which the point must not lie.
     shift : σ as used, rad²/s² (moved when it was an eigenvalue). powers : blocks added so far.
     """
 
-    def __init__(self, space: Elastic, shift: float):
-        self.space, self.powers = space, 0
-        self._solver = space.shifted(shift) if shift else None
+    def __init__(self, body: FullOrder, shift: float, known: Growing | None = None):
+        self.body, self.powers = body, 0
+        estimates = None if known is None else _ritz_values(body, known)
+        self._solver = elastic(body).shifted(shift, estimates) if shift else None
         self.shift = self._solver.shift if self._solver else 0.0
         self._loads: np.ndarray | None = None
 
-    def advance(self, basis: Growing, loads: np.ndarray, at_most: int | None = None) -> int:
-        """Add the next power of this point to `basis`; loads Bᵀ (N, m) for the first one. Returns how many vectors."""
-        right = loads if self._loads is None else self._loads
-        if not right.shape[1]:
+    def advance(self, basis: Growing) -> int:
+        """Add the next power of this point to `basis`. Returns how many vectors."""
+        if self._loads is not None and not self._loads.shape[1]:
             return 0
-        response = self._solver.solve(right) if self._solver else self.space.flexibility(right)
-        self._loads = basis.add(response, at_most)
+        self._loads = basis.add(self._next())
         self.powers += 1
         return self._loads.shape[1]
+
+    def _next(self) -> np.ndarray:
+        if self._solver:
+            return self._solver.solve(input_loads(self.body) if self._loads is None else self._loads)
+        return static_response(self.body) if self._loads is None else elastic(self.body).flexibility(self._loads)
+
+
+def _ritz_values(body: FullOrder, basis: Growing) -> np.ndarray:
+    """Eigenvalues of K projected on a basis, rad²/s²."""
+    return np.linalg.eigvalsh(basis.vectors.T @ (body.stiffness @ basis.vectors))
 
 
 def expansion_points(count: int, band: tuple[float, float]) -> np.ndarray:

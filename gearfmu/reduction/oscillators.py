@@ -17,6 +17,7 @@ import numpy as np
 from gearfmu.reduction.basis import Basis
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.moments import static_response
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,10 @@ class Oscillators:
 
 def oscillators(body: FullOrder, basis: Basis, damping_ratio: float) -> Oscillators:
     """Oscillators of `body` in `basis`, all with modal damping `damping_ratio`; costs n products with K and the static
-    response to all interfaces."""
+    response to all interfaces, which is kept."""
     projected = basis.vectors.T @ (body.stiffness @ basis.vectors)
     rows = body.rows()
-    static = rows @ elastic(body).flexibility(rows.T.toarray())
+    static = (rows @ static_response(body)) * body.scales()
     static = 0.5 * (static + static.T)
     return decoupled(body, Projection(basis.method, projected, rows @ basis.vectors, static), damping_ratio)
 

@@ -22,7 +22,7 @@ from gearfmu.fem.indefinite import SymmetricFactor
 from gearfmu.reduction.basis import BAND, Growing
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.moments import Expansion, input_loads
+from gearfmu.reduction.moments import Expansion
 from gearfmu.reduction.oscillators import Oscillators, Projection, decoupled
 
 LINES = 400
@@ -118,15 +118,15 @@ class _Moments:
     """The full model on a growing number of moments, projected as it grows."""
 
     def __init__(self, body: FullOrder, shifts: list[float]):
-        self.body, self.basis, self.loads = body, Growing(elastic(body)), input_loads(body)
-        self.points = [Expansion(self.basis.space, shift) for shift in shifts]
+        self.body, self.basis = body, Growing(elastic(body))
+        self.points = [Expansion(body, shift) for shift in shifts]
         self.stiffness = np.zeros((0, 0))
 
     def grow(self) -> int:
         """One more power at every point; returns how many vectors came."""
         before = self.basis.size
         for point in self.points:
-            point.advance(self.basis, self.loads)
+            point.advance(self.basis)
         new = self.basis.vectors.T @ (self.body.stiffness @ self.basis.vectors[:, before:])
         grown = np.empty((self.basis.size,) * 2)
         grown[:before, :before], grown[:, before:], grown[before:, :] = self.stiffness, new, new.T

@@ -17,7 +17,7 @@ from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods.sizing import sized
-from gearfmu.reduction.moments import input_loads
+from gearfmu.reduction.moments import input_loads, static_response
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
@@ -27,7 +27,7 @@ def reduce(body: FullOrder, size: Size) -> Basis:
 
 def _build(body: FullOrder, size: Size) -> Basis:
     space, basis = elastic(body), Growing(elastic(body))
-    basis.add(space.flexibility(balanced_loads(space, input_loads(body))))
+    basis.add(static_response(body) @ balanced(space, input_loads(body)))
     constraint = basis.size
     if size.count < constraint:
         raise BodyError(
@@ -41,10 +41,10 @@ def _build(body: FullOrder, size: Size) -> Basis:
     return Basis("craig_bampton", np.array(basis.vectors), {"constraint_modes": constraint, "fixed_modes": wanted})
 
 
-def balanced_loads(space: Elastic, loads: np.ndarray) -> np.ndarray:
-    """Combinations (N, m − r) of loads (N, m) that exert no rigid resultant."""
+def balanced(space: Elastic, loads: np.ndarray) -> np.ndarray:
+    """Combinations (m, m − r) of loads (N, m) that exert no rigid resultant."""
     resultant = space.rigid.T @ loads
     if not len(resultant):
-        return loads
+        return np.eye(loads.shape[1])
     norm = np.abs(resultant).max(axis=1, keepdims=True) + np.finfo(float).tiny
-    return loads @ sl.null_space(resultant / norm, rcond=1e-9)
+    return sl.null_space(resultant / norm, rcond=1e-9)

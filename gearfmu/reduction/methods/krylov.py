@@ -16,7 +16,7 @@ from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods.sizing import sized
-from gearfmu.reduction.moments import Expansion, expansion_points, input_loads
+from gearfmu.reduction.moments import Expansion, expansion_points
 
 _POINTS = 3  # expansion points; more blocks than that become higher powers at the same points
 
@@ -27,20 +27,20 @@ def reduce(body: FullOrder, size: Size) -> Basis:
 
 
 def _blocks(body: FullOrder, size: Size) -> Basis:
-    loads = input_loads(body)
-    blocks = size.count // loads.shape[1]
+    inputs = body.rows().shape[0]
+    blocks = size.count // inputs
     if not blocks:
         raise BodyError(
             f"{body.name}: Krylov subspaces come in blocks of one vector per input: n = {size.count} is less than the "
-            f"{loads.shape[1]} inputs of this body; give at least that"
+            f"{inputs} inputs of this body; give at least that"
         )
     points = expansion_points(min(blocks, _POINTS), size.band)
     powers = [blocks // len(points) + (k < blocks % len(points)) for k in range(len(points))]
     basis, used = Growing(elastic(body)), []
     for shift, power in zip(points, powers, strict=True):
-        point = Expansion(basis.space, shift)
+        point = Expansion(body, shift, basis)
         for _ in range(power):
-            point.advance(basis, loads)
+            point.advance(basis)
         used.append(point.shift)
-    facts = {"inputs": loads.shape[1], "points_Hz": [float(np.sqrt(s) / (2 * np.pi)) for s in used], "powers": powers}
+    facts = {"inputs": inputs, "points_Hz": [float(np.sqrt(s) / (2 * np.pi)) for s in used], "powers": powers}
     return Basis("krylov", np.array(basis.vectors), facts)

@@ -17,7 +17,7 @@ from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods.sizing import sized
-from gearfmu.reduction.moments import input_loads
+from gearfmu.reduction.moments import static_response
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
@@ -26,8 +26,7 @@ def reduce(body: FullOrder, size: Size) -> Basis:
 
 
 def _build(body: FullOrder, size: Size) -> Basis:
-    space, loads = elastic(body), input_loads(body)
-    inputs = loads.shape[1]
+    space, inputs = elastic(body), body.rows().shape[0]
     if size.count < inputs:
         raise BodyError(
             f"{body.name}: Rubin's method needs one attachment mode for each of the {inputs} inputs of this body: "
@@ -37,5 +36,5 @@ def _build(body: FullOrder, size: Size) -> Basis:
     if size.count > inputs:
         basis.add(space.modes(min(size.count, space.elastic) - inputs)[1])
     modes = basis.size
-    basis.add(space.flexibility(loads))
+    basis.add(static_response(body))
     return Basis("rubin", np.array(basis.vectors), {"free_modes": modes, "attachment_modes": basis.size - modes})

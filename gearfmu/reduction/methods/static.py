@@ -13,7 +13,7 @@ from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods.sizing import sized
-from gearfmu.reduction.moments import input_loads
+from gearfmu.reduction.moments import input_loads, static_response
 
 
 def reduce(body: FullOrder, size: Size) -> Basis:
@@ -23,7 +23,7 @@ def reduce(body: FullOrder, size: Size) -> Basis:
 
 def _build(body: FullOrder, size: Size) -> Basis:
     loads = input_loads(body)
-    response = elastic(body).flexibility(loads)
+    response = static_response(body)
     if size.count < loads.shape[1]:
         compliance = loads.T @ response
         response = response @ np.linalg.eigh(0.5 * (compliance + compliance.T))[1][:, : -size.count - 1 : -1]
