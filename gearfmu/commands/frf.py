@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import os
 import tracemalloc
 from collections.abc import Sequence
 from dataclasses import replace
@@ -39,6 +40,8 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
               "with its ground held; judged with the ground held either way.  [default: held]")  # fmt: skip
 @click.option("--loaded", help="Rows that are really loaded, as patterns: 'bolt*.ux,bolt*.uy'; judged once more alone.")
 @click.option("--scale", type=click.FloatRange(0.05, 4), help="Factor on the element counts of the stage.")
+@click.option("--jobs", type=click.IntRange(1, 64), default=min(os.cpu_count() or 1, 3), show_default="cores, up to 3",
+              help="Processes (one where the system cannot fork).")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of results.")
 def frf(stage: str, body: str, **options: Any) -> None:
     """Relative error of the transfer matrix (Frobenius norm) of BODY of STAGE, reduced by several methods.
@@ -53,7 +56,7 @@ def frf(stage: str, body: str, **options: Any) -> None:
 
     tracemalloc.start()
     with progress_bar(body) as progress:
-        found = compare(full, contest, by_text(progress))
+        found = compare(full, contest, by_text(progress), options["jobs"])
     tracemalloc.stop()
     how = f"rotations times {1e3 * full.length:.4g} mm, {100 * options['damping']:g} % damping"
     inputs = len(found.reference.labels)

@@ -1,13 +1,18 @@
 """Reduction methods side by side on one body: error over frequency, size, processor time and memory of each.
 
 Factors and modes that several methods need are made once; each method is charged for all it uses, whoever asked first.
+What shares modes or shifted factors is a lane; lanes may run in processes of their own (Linux), which start from the
+factor of K that all of them use.
 """
 
 from __future__ import annotations
 
+import multiprocessing
+import sys
 import time
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +22,15 @@ from gearfmu.reduction.basis import Size
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.moments import static_response
 from gearfmu.reduction.oscillators import Oscillators, oscillators
 from gearfmu.reduction.transfer import Judging, Reference, reference, relative_error, transfer
 
 Progress = Callable[[str, float], None]
+
+_REFERENCE = "reference"
+_LANES = ({"modal", "rubin"}, {"krylov", _REFERENCE})  # free modes, shifted factors; any other method is a lane
+_STARTED: list[Any] = []  # body and contest of a worker: they come with the fork
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All trials against one reference; seconds : processor time of everything together."""
+    """All trials against one reference; seconds : processor time of everything together, in all processes."""
 
     reference: Reference
     trials: tuple[Trial, ...]
@@ -58,19 +68,63 @@ class Contest:
     loaded: np.ndarray | None = None
 
 
-def compare(body: FullOrder, contest: Contest, progress: Progress | None = None) -> Comparison:
-    """Reduce `body` with every entry and judge it. Raises BodyError of the first method that cannot do its task."""
-    started = time.process_time()
-    reduced = []
-    for number, (method, size) in enumerate(contest.entries):
-        _tell(progress, method, number / (len(contest.entries) + 1))
-        reduced.append((method, *_reduced(body, method, size, contest.judging.damping_ratio)))
-    _tell(progress, "reference", len(reduced) / (len(reduced) + 1))
+def compare(body: FullOrder, contest: Contest, progress: Progress | None = None, processes: int = 1) -> Comparison:
+    """Reduce `body` with every entry and judge it, in up to `processes` processes where the system can fork.
+
+    Raises BodyError of the first method that cannot do its task."""
     clock = time.process_time()
-    full = reference(body, contest.judging)
-    reference_seconds = time.process_time() - clock
-    trials = tuple(_judged(body, full, entry, contest) for entry in reduced)
-    return Comparison(full, trials, reference_seconds, time.process_time() - started)
+    made: dict[int, Any] = {}
+    elsewhere = 0.0
+    for lane, seconds in _finished(body, contest, processes):
+        made |= lane
+        elsewhere += seconds
+        last = max(lane)
+        _tell(progress, contest.entries[last][0] if last >= 0 else _REFERENCE, len(made) / (len(contest.entries) + 1))
+    full, reference_seconds = made.pop(-1)
+    trials = tuple(_judged(body, full, (contest.entries[k][0], *made[k]), contest) for k in sorted(made))
+    return Comparison(full, trials, reference_seconds, time.process_time() - clock + elsewhere)
+
+
+def _finished(body: FullOrder, contest: Contest, processes: int) -> Iterator[tuple[dict[int, Any], float]]:
+    """What the lanes made, as they end, and processor seconds that other processes took for it."""
+    lanes = _lanes(contest)
+    if processes < 2 or len(lanes) < 2 or sys.platform != "linux":
+        for lane in lanes:
+            yield _run(body, contest, lane), 0.0
+        return
+    static_response(body)
+    context = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(processes, context, _STARTED.extend, ((body, contest),)) as pool:
+        waiting: list[Future] = [pool.submit(_lane, lane) for lane in lanes]
+        for future in as_completed(waiting):
+            yield future.result()
+
+
+def _lanes(contest: Contest) -> list[list[int]]:
+    """Numbers of the entries (−1: the reference) that share what they make, the longest lanes first."""
+    names = [*(method for method, _ in contest.entries), _REFERENCE]
+    keys = [next((str(k) for k, lane in enumerate(_LANES) if name in lane), name) for name in names]
+    lanes = [[k for k, own in enumerate(keys) if own == key] for key in dict.fromkeys(keys)]
+    lanes = [[-1 if k == len(contest.entries) else k for k in lane] for lane in lanes]
+    return sorted(lanes, key=len, reverse=True)
+
+
+def _lane(lane: list[int]) -> tuple[dict[int, Any], float]:
+    """A lane in a process of its own, and the processor seconds that it took there."""
+    clock = time.process_time()
+    body, contest = _STARTED
+    return _run(body, contest, lane), time.process_time() - clock
+
+
+def _run(body: FullOrder, contest: Contest, lane: list[int]) -> dict[int, Any]:
+    made: dict[int, Any] = {}
+    for number in lane:
+        if number < 0:
+            clock = time.process_time()
+            made[number] = (reference(body, contest.judging), time.process_time() - clock)
+        else:
+            made[number] = _reduced(body, *contest.entries[number], contest.judging.damping_ratio)
+    return made
 
 
 def _reduced(body: FullOrder, method: str, size: Size, damping_ratio: float) -> tuple:
@@ -89,7 +143,7 @@ def _reduced(body: FullOrder, method: str, size: Size, damping_ratio: float) -> 
     return model, basis.facts, seconds, max(peak, 0) + sum(piece.memory for piece in before)
 
 
-def _judged(body: FullOrder, full: Reference, entry: Sequence[Any], contest: Contest) -> Trial:
+def _judged(body: FullOrder, full: Reference, entry: tuple, contest: Contest) -> Trial:
     method, model, facts, seconds, memory = entry
     h = transfer(model, contest.judging, body.ground)
     with_residual = transfer(model, contest.judging, body.ground, residual=True)
