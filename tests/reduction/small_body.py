@@ -34,19 +34,42 @@ def ring_body(cells: tuple[int, int, int] = (2, 12, 1), bolts: int = 2, outer: f
     nodes, elements = ring(cells, INNER, OUTER, HEIGHT)
     radius = np.hypot(nodes[:, 0], nodes[:, 1])
     nodes[:, :2] *= ((INNER + (radius - INNER) * (outer - INNER) / (OUTER - INNER)) / radius)[:, None]
-    stiffness, mass = hex20.assemble(nodes, elements, STEEL)
-    radius, angle = np.hypot(nodes[:, 0], nodes[:, 1]), np.arctan2(nodes[:, 1], nodes[:, 0])
-    interfaces = [averaging("bore", nodes, np.flatnonzero(radius < INNER * 1.0001))]
+    radius = np.hypot(nodes[:, 0], nodes[:, 1])
+    chosen = {"bore": radius < INNER * 1.0001}
     for k in range(bolts):
-        near = np.abs((angle - 2 * np.pi * k / bolts + np.pi) % (2 * np.pi) - np.pi) < 0.32
-        patch = near & (nodes[:, 2] > 0.49 * HEIGHT) & (radius > 0.6 * INNER + 0.4 * outer)
-        interfaces.append(averaging(f"bolt_{k + 1}", nodes, np.flatnonzero(patch)))
+        at_face = (nodes[:, 2] > 0.49 * HEIGHT) & (radius > 0.6 * INNER + 0.4 * outer)
+        chosen[f"bolt_{k + 1}"] = at_face & _near(nodes, 2 * np.pi * k / bolts)
+    return _free("ring", nodes, elements, chosen)
+
+
+def web_body(thickness: float) -> FullOrder:
+    """A wheel of hub, web and rim whose web is `thickness` (m) thick; the bore is ground, two patches of the rim's
+    outside are loaded. One mesh, squeezed in the web."""
+    nodes, elements = ring((5, 10, 1), INNER, OUTER, HEIGHT)
+    radius = np.hypot(nodes[:, 0], nodes[:, 1])
+    chosen = {"bore": radius < INNER * 1.0001}
+    for k in range(2):
+        chosen[f"tooth_{k + 1}"] = (radius > 0.999 * OUTER) & _near(nodes, np.pi * k)
+    ends = np.linspace(INNER, OUTER, 6)
+    nodes[:, 2] *= np.interp(radius, ends, np.array([1, 1, thickness / HEIGHT, thickness / HEIGHT, 1, 1]))
+    return _free("wheel", nodes, elements, chosen)
+
+
+def _near(nodes: np.ndarray, angle: float) -> np.ndarray:
+    """True for nodes within 0.32 rad of an angle about z."""
+    off = np.arctan2(nodes[:, 1], nodes[:, 0]) - angle
+    return np.abs((off + np.pi) % (2 * np.pi) - np.pi) < 0.32
+
+
+def _free(name: str, nodes: np.ndarray, elements: np.ndarray, chosen: dict[str, np.ndarray]) -> FullOrder:
+    """A free body with averaging nodes of the chosen nodes (N,) bool; the bore is ground."""
+    stiffness, mass = hex20.assemble(nodes, elements, STEEL)
     return FullOrder(
-        name="ring",
+        name=name,
         stiffness=stiffness,
         mass=mass,
         rigid=rigid_modes(nodes),
-        interfaces=tuple(interfaces),
+        interfaces=tuple(averaging(own, nodes, np.flatnonzero(which)) for own, which in chosen.items()),
         ground=("bore",),
         length=0.04,
         cells=elements,
