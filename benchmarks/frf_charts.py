@@ -1,11 +1,13 @@
 """Reduction methods on the carrier and the ring of planetary54: the paper's Figs. 2 and 5 and what it does not show.
 
-    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [inputs] [points]  (all when none is named)
+    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [inputs] [points] [thickness]
+                                    (all when none is named)
 
 carrier : n = 120, bore held, 24 inputs (Fig. 2). carrier_free : reduced free, as the kernel takes it.
 ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 vectors for comparison.
 growth  : largest error against n and against processor time, carrier on a coarser mesh.
 inputs  : what each further bolt costs. points : where the Krylov method expands.
+thickness : carriers interpolated between plates of 9.6 to 14.4 mm.
 Each writes benchmarks/frf_<name>.csv (ring and carrier also the curves) and charts in docs/pictures, and prints its
 table. References are verified by direct complex solutions of the full model at three lines.
 """
@@ -29,12 +31,15 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np
 
 from gearfmu.commands.frf import loaded_rows
+from gearfmu.errors import BodyError
 from gearfmu.files import write_text
 from gearfmu.reduction.basis import Basis, Growing, Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.comparison import Comparison, Contest, compare
 from gearfmu.reduction.elastic import elastic
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.methods.interpolation import Sample, interpolate
 from gearfmu.reduction.moments import Expansion
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.toothed import ring_full_order
@@ -129,6 +134,34 @@ def points() -> None:
     write(HERE / "frf_points.csv", rows)
 
 
+def thickness() -> None:
+    """Interpolation between reduced carriers over the thickness of the plate, judged between the samples against the
+    carrier reduced at that very thickness."""
+    spec, rows = load_stage("planetary54"), []
+    nominal = spec.carrier.thickness
+
+    def made(factor: float, method: str, size: int) -> Sample:
+        plate = spec.carrier.model_copy(update={"thickness": factor * nominal})
+        body = carrier_full_order(spec.model_copy(update={"carrier": plate}), GROWTH_SCALE).grounded()
+        return Sample(factor * nominal, body, METHODS[method](body, Size(size)))
+
+    judging = Judging.over(lines=120)
+    for method, size in (("krylov", 72), ("modal", 60)):
+        own = made(0.93, method, size)
+        exact = transfer(oscillators(own.body, own.basis, judging.damping_ratio), judging)
+        samples = {factor: made(factor, method, size) for factor in (0.8, 0.9, 1.0, 1.1, 1.2)}
+        for factors in ((0.8, 1.2), (0.8, 1.0, 1.2), (0.8, 0.9, 1.0, 1.1, 1.2)):
+            plates = " ".join(f"{1e3 * f * nominal:g}" for f in factors)
+            case = {"method": method, "n": size, "samples_mm": plates, "at_mm": 1e3 * own.value}
+            try:
+                between = interpolate([samples[f] for f in factors], judging.damping_ratio)
+                error = relative_error(exact, transfer(between.at(own.value), judging))
+                rows.append({**case, "max_error": error.max(), "median_error": np.median(error)})
+            except BodyError:
+                rows.append({**case, "max_error": "refused", "median_error": "refused"})
+    write(HERE / "frf_thickness.csv", rows)
+
+
 def judged(
     body: FullOrder, entries: Iterable[tuple[str, int]], loaded: str | None = None, processes: int = 1
 ) -> Comparison:
@@ -196,7 +229,8 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    parts = {"carrier": carrier, "carrier_free": carrier_free, "ring": ring, "growth": growth, "inputs": inputs, "points": points}
+    measured = (carrier, carrier_free, ring, growth, inputs, points, thickness)
+    parts = {part.__name__: part for part in measured}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*parts, []], help="what to measure")
     for name in parser.parse_args().parts or parts:
