@@ -33,6 +33,7 @@ class Case:
     fine: Fineness = field(default_factory=Fineness)
     penalty: float = 3e16
     element: str = "C3D20R"
+    increments: int = 1
 
     def levels(self, face_width: float) -> np.ndarray:
         """Corner levels z (m) of the elements."""
@@ -125,6 +126,7 @@ def problem_of(case: Case, pair: PairGeometry, face_width: float, load: Load) ->
         sides="both" if case.condition == "plane_strain" else "low",
         penalty=case.penalty,
         element=case.element,
+        increments=case.increments,
     )
 
 

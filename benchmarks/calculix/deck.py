@@ -39,7 +39,8 @@ class Placed:
 @dataclass(frozen=True)
 class Problem:
     """gears: pinion, wheel. pairs: their teeth that may touch. sides: which end faces are held along z: "low" (half
-    the width, plane of symmetry) or "both" (plane strain). youngs, poisson: Pa, –. penalty: Pa/m."""
+    the width, plane of symmetry) or "both" (plane strain). youngs, poisson: Pa, –. penalty: Pa/m. increments: equal
+    parts in which the pinion is turned."""
 
     gears: tuple[Placed, Placed]
     pairs: Sequence[tuple[int, int]]
@@ -48,6 +49,7 @@ class Problem:
     poisson: float = 0.3
     penalty: float = 3e16
     element: str = "C3D20R"
+    increments: int = 1
 
 
 def write_deck(problem: Problem, path: Path) -> None:
@@ -133,7 +135,8 @@ def _averaging(gear: Placed, dummy: int, start: int) -> list[str]:
 
 
 def _step(problem: Problem) -> list[str]:
-    lines = ["*STEP, INC=100", "*STATIC, DIRECT", "1., 1.", "*BOUNDARY"]
+    share = "1." if problem.increments == 1 else f"{1 / problem.increments + 1e-3:.3f}"  # the last one is shorter
+    lines = ["*STEP, INC=100", "*STATIC, DIRECT", f"{share}, 1.", "*BOUNDARY"]
     for gear, dummy, (node, _) in zip(problem.gears, _dummies(problem), starts(problem), strict=True):
         angle = gear.turned
         if gear.held == "averaged":

@@ -1,7 +1,7 @@
 """Loaded transmission error over one pitch by CalculiX: 12 positions, three torques, beside what `gearfmu te` says.
 
     python benchmarks/calculix/positions.py [POSITION …] [--torque T …] [--bores averaged|clamped] [--work DIR]
-                                            [--out FILE] [--compare]
+                                            [--increments N] [--out FILE] [--compare]
 
 Bores averaged: their mean displacement and rotation are prescribed (as `gearfmu te --rigid-bearings` does), into
 positions.csv. Clamped: all nodes of a bore move as one rigid body, in both codes (`rigid_bores.py`: minutes before the
@@ -19,7 +19,7 @@ import argparse
 import csv
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,11 +46,12 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Place:
-    """A row to come: torque (N·m), number of the position, bores "averaged" or "clamped"."""
+    """A row to come: torque (N·m), number of the position, bores "averaged" or "clamped", increments of the load."""
 
     torque: float
     position: int
     bores: str
+    increments: int = 1
 
 
 def te_of_gearfmu(spec: StageSpec, bores: str) -> TeResult:
@@ -83,7 +84,8 @@ def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path) -> dict[st
     for nudge in NUDGES:
         load = Load(turn, nudge * ours.te[row, position], MARGIN)
         try:
-            solution = solve(case_at(spec, pair, torque, place.bores), pair, width, [load], folder)
+            case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)
+            solution = solve(case, pair, width, [load], folder)
         except RuntimeError as failure:
             refused = failure
         else:
@@ -144,6 +146,7 @@ def main() -> None:
     parser.add_argument("--stage", default="fzg_c")
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="decks, logs and results of ccx")
     parser.add_argument("--bores", choices=("averaged", "clamped"), default="averaged")
+    parser.add_argument("--increments", type=int, default=1, help="in which the load is brought up; give --out as well")
     parser.add_argument("--out", type=Path, help="table; positions.csv or positions_clamped.csv beside this file")
     parser.add_argument("--compare", action="store_true")
     chosen = parser.parse_args()
@@ -157,7 +160,7 @@ def main() -> None:
     for torque in chosen.torque or TORQUES:
         for position in chosen.positions or [k for k in range(POSITIONS) if (torque, k) not in done]:
             try:
-                fresh = solved(spec, ours, Place(torque, position, chosen.bores), chosen.work)
+                fresh = solved(spec, ours, Place(torque, position, chosen.bores, chosen.increments), chosen.work)
             except RuntimeError as failure:
                 failed.append(f"{torque:g} N·m, position {position}: {failure}")
                 continue
