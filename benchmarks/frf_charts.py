@@ -1,12 +1,12 @@
 """Reduction methods on the carrier and the ring of planetary54: the paper's Figs. 2 and 5 and what it does not show.
 
-    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [inputs] [points] [thickness]
+    python benchmarks/frf_charts.py [carrier] [carrier_free] [ring] [growth] [cost] [points] [thickness]
                                     (all when none is named)
 
 carrier : n = 120, bore held, 24 inputs (Fig. 2). carrier_free : reduced free, as the kernel takes it.
 ring    : n = 400 on six mounts, 54 · 3 inputs (Fig. 5), and Krylov with 1782 vectors for comparison.
 growth  : largest error against n and against processor time, carrier on a coarser mesh.
-inputs  : what each further bolt costs. points : where the Krylov method expands.
+cost    : time and memory against the number of unknowns and of inputs. points : where the Krylov method expands.
 thickness : carriers interpolated between plates of 9.6 to 14.4 mm.
 Each writes benchmarks/frf_<name>.csv (ring and carrier also the curves) and charts in docs/pictures, and prints its
 table. References are verified by direct complex solutions of the full model at three lines.
@@ -44,7 +44,7 @@ from gearfmu.reduction.moments import Expansion
 from gearfmu.reduction.oscillators import oscillators
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.reduction.transfer import Judging, direct, reference, relative_error, transfer
-from gearfmu.report.frf import label_of, write_error_chart, write_growth_chart
+from gearfmu.report.frf import label_of, write_cost_chart, write_error_chart, write_growth_chart
 from gearfmu.spec.stage import load_stage
 
 HERE = Path(__file__).parent
@@ -53,6 +53,7 @@ FOUR = ("modal", "craig_bampton", "rubin", "krylov")
 SIZES = (24, 48, 72, 120, 168)
 PROCESSES = 2
 GROWTH_SCALE = 0.5
+MESH_SCALES = (0.35, 0.5, 0.7, 1.0)  # of the counts of the stage file's mesh
 RING_SCALE = 0.2
 LAYOUTS = (
     ((0, 0.25, 0.5, 0.75, 1), (1, 1, 1, 1, 1)),
@@ -97,23 +98,36 @@ def growth() -> None:
     """Error against n and time, without and with the static residual."""
     body = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE).grounded()
     entries = [(method, n) for n in SIZES for method in (*FOUR, "snapshots")]
-    found = judged(body, entries, IN_PLANE)
+    found = judged(body, entries, IN_PLANE, PROCESSES)
     rows = summary(body, found, verify=False)
+    for row in rows:
+        del row["memory_MB"]  # not traced
     mended = [{**r, "method": "modal + static residual", "max_error": r["max_with_residual"]} for r in rows]
     shown = rows + [r for r, own in zip(mended, rows, strict=True) if own["method"] == "modal"]
     write_growth_chart(shown, PICTURES / "frf_growth", f"Carrier, {body.size} unknowns, bore held, 24 inputs")
     write(HERE / "frf_growth.csv", rows)
 
 
-def inputs() -> None:
-    """Cost against the number of inputs: five moments of one to four bolts, and Rubin of the same size."""
-    body, rows = carrier_full_order(load_stage("planetary54"), GROWTH_SCALE), []
+def cost() -> None:
+    """Time and memory against unknowns (carriers of finer and finer mesh, n = 120) and against inputs (one to four
+    bolts, n = 30 each)."""
+    stage = load_stage("planetary54")
+    meshes = [carrier_full_order(stage, scale).grounded() for scale in MESH_SCALES]
+    by_mesh = [row for body in meshes for row in priced(body, 120)]
+    coarse, by_inputs = carrier_full_order(stage, GROWTH_SCALE), []
     for bolts in (1, 2, 3, 4):
         names = {"bore", *(f"bolt{k}" for k in range(bolts))}
-        part = replace(body, interfaces=tuple(i for i in body.interfaces if i.name in names)).grounded()
-        found = judged(part, [("rubin", 30 * bolts), ("krylov", 30 * bolts)])
-        rows += [{"case": f"{bolts} bolts", **row} for row in summary(part, found, verify=False)]
-    write(HERE / "frf_inputs.csv", rows)
+        part = replace(coarse, interfaces=tuple(i for i in coarse.interfaces if i.name in names)).grounded()
+        by_inputs += priced(part, 30 * bolts)
+    write(HERE / "frf_dof.csv", by_mesh)
+    write(HERE / "frf_inputs.csv", by_inputs)
+    write_cost_chart(by_mesh, by_inputs, PICTURES / "frf_cost", f"Carrier, n = 120; inputs: {coarse.size} unknowns")
+
+
+def priced(body: FullOrder, size: int) -> list[dict[str, Any]]:
+    """Rows of the four methods, alone in the process: what each costs."""
+    found = judged(body, [(method, size) for method in FOUR])
+    return summary(body, with_memory(body, found), verify=False)
 
 
 def points() -> None:
@@ -239,7 +253,7 @@ def write(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    measured = (carrier, carrier_free, ring, growth, inputs, points, thickness)
+    measured = (carrier, carrier_free, ring, growth, cost, points, thickness)
     parts = {part.__name__: part for part in measured}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*parts, []], help="what to measure")

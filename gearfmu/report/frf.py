@@ -66,6 +66,32 @@ def write_growth_chart(rows: Sequence[Mapping[str, Any]], path: Path, title: str
         return _saved(figure, path)
 
 
+def write_cost_chart(
+    by_mesh: Sequence[Mapping[str, Any]], by_inputs: Sequence[Mapping[str, Any]], path: Path, title: str
+) -> list[Path]:
+    """Processor time and memory against the number of unknowns, time against the number of inputs, one line a method;
+    rows with method, dof, inputs, seconds, memory_MB."""
+    shown = ((by_mesh, "dof", "seconds"), (by_mesh, "dof", "memory_MB"), (by_inputs, "inputs", "seconds"))
+    named = {"dof": "unknowns", "inputs": "inputs", "seconds": "processor time, s", "memory_MB": "memory, MB"}
+    methods = list(dict.fromkeys(row["method"] for row in by_mesh))
+    with styled(), rc_context({"svg.hashsalt": path.stem}):
+        figure, axes = panels((2.6,) * len(shown), share=False)
+        for axis, (rows, x, y) in zip(axes, shown, strict=True):
+            for number, method in enumerate(methods):
+                line = [row for row in rows if row["method"] == method]
+                style = {"color": COLOURS[number % len(COLOURS)], "marker": "o", "markersize": 3.5}
+                axis.loglog([row[x] for row in line], [row[y] for row in line], label=label_of(method), **style)
+            axis.set_xlabel(named[x])
+            axis.set_ylabel(named[y])
+            axis.set_xticks(sorted({row[x] for row in rows}))
+            _formatted(axis.xaxis, powers=False)
+            _formatted(axis.yaxis, powers=False)
+            axis.set_ylim(bottom=0.5 * min(row[y] for row in rows))
+        axes[0].set_title(title, loc="left")
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        return _saved(figure, path)
+
+
 def _power(value: float, _: int) -> str:
     return f"1e{round(np.log10(value))}"
 
