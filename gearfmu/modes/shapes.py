@@ -46,7 +46,7 @@ class Mode:
             )
         turning = tangential > 0.8 * (radial + tangential)
         return {0: "torsion" if turning else "breathing", 1: "shifting"}.get(
-            self.nodal_diameter, "tooth and rim shear" if turning else f"{self.nodal_diameter} lobes"
+            self.nodal_diameter, "tangential shear" if turning else f"{self.nodal_diameter} lobes"
         )
 
 
