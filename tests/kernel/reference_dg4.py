@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 EXPONENTIAL_LIMIT = 1.2
+MEMORY = 0.75  # of a dashpot's force at the end of a step
 ROUNDS = 12
 
 
@@ -127,6 +128,19 @@ class Step:
     lagged: np.ndarray
 
 
+@dataclass(frozen=True)
+class Dashpots:
+    """η_d = lag (λ₁ − λ₀) + fixed, f_d = beta η_d + tail: lag (m, m), the others (m,). lag: rate times the rows' paths;
+    opened: contacts that let go."""
+
+    rate: np.ndarray
+    opened: np.ndarray
+    lag: np.ndarray
+    fixed: np.ndarray
+    beta: np.ndarray
+    tail: np.ndarray
+
+
 class Reference:
     """The scheme applied to a problem: coefficients once, then `start` and `step`."""
 
@@ -198,59 +212,75 @@ class Reference:
         none = np.zeros_like(gap)
         if not was.any() and np.all(gap >= 0):
             return none, none, none, none
-        force, active, lag, early = self._with_dashpot(gap, state, was)
+        force, active, dashpots = self._with_dashpot(gap, state, was)
         changed = bool(np.any(active != was))
         self.changes += changed
         eta = none
         if changed and s.energy:
-            late = self._late(state)
-            step = Step(gap - late @ lag @ state.force + self.q @ early, before, state.force, self.d + late @ lag)
-            force, eta = self._conserve(step, force, active, was)
+            for _ in range(ROUNDS):  # what η opens or closes changes the dashpots
+                step = Step(self._shifted(gap, state, dashpots), before, state.force, self.d + self._late(dashpots) @ dashpots.lag)
+                force, eta, active = self._conserve(step, force, active, was)
+                if np.array_equal(was & ~active, dashpots.opened):
+                    break
+                dashpots = self._dashpots(state, dashpots.rate, was & ~active)
         elif not changed and s.epsilon:
-            force, active = self._closed(gap, state, lag, early, was, 2 * s.epsilon)
+            force, active = self._closed(gap, state, dashpots, was, 2 * s.epsilon)
             eta = 2 * s.epsilon * (force - state.force)
-        dash = lag @ (force - state.force)
-        return force, eta + dash, dash, _beta(state) * dash + early
+        dash = dashpots.lag @ (force - state.force) + dashpots.fixed
+        return force, eta + dash, dash, dashpots.beta * dash + dashpots.tail
 
     def _lag(self, dash: np.ndarray, late: np.ndarray) -> np.ndarray:
         """What the dashpots' force deflects outside their paths: Q late − ½K dash, K = Q − A."""
         return self.q @ (late - 0.5 * dash) + self.a @ (0.5 * dash)
 
-    def _late(self, state: State) -> np.ndarray:
+    def _late(self, dashpots: Dashpots) -> np.ndarray:
         """(m, m): what η_d does to the gaps."""
-        return self.d + 0.5 * self.a + self.q * (_beta(state) - 0.5)
+        return self.d + 0.5 * self.a + self.q * (dashpots.beta - 0.5)
 
-    def _closed(self, gap: np.ndarray, state: State, lag: np.ndarray, early: np.ndarray,
+    def _shifted(self, gap: np.ndarray, state: State, dashpots: Dashpots) -> np.ndarray:
+        """(m,): the gaps with all of the dashpots' force that does not depend on λ₁."""
+        return gap + self._late(dashpots) @ (dashpots.fixed - dashpots.lag @ state.force) + self.q @ dashpots.tail
+
+    def _closed(self, gap: np.ndarray, state: State, dashpots: Dashpots,
                 start: np.ndarray, slow: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """λ₁ and active set for η = (lag + slow)(λ₁ − λ₀); what is outside the paths carries β lag Δλ + early too."""
-        lagged = self._late(state) @ lag + slow * self.d
-        shifted = gap - lagged @ state.force + self.q @ early
+        """λ₁ and active set for η = η_d + slow (λ₁ − λ₀)."""
+        lagged = self._late(dashpots) @ dashpots.lag + slow * self.d
+        shifted = self._shifted(gap, state, dashpots) - slow * self.d @ state.force
         return solve_lcp(self.d + lagged + self.c, shifted, self.problem.bilateral, start)
 
     def _with_dashpot(self, gap: np.ndarray, state: State, was: np.ndarray) -> tuple:
-        """λ₁, active set, lag (m, m) of the dashpots, η_d = (2c/h) P (λ₁ − λ₀), and what the last step's adds at the end.
+        """λ₁, active set and the dashpots, η_d = (2c/h) P (λ₁ − λ₀) of closed contacts.
 
-        A dashpot acts on a contact closed at both ends and at most doubles or cancels its elastic force λ₀ + λ₁. Its
-        force at the end of the step is ½η_d + ¼(η_d − η_d0) where the last step had one, else ½η_d."""
+        A dashpot at most doubles or cancels the elastic force λ₀ + λ₁; that of a contact which lets go holds back what
+        λ₀ pushes. Its force at the end of the step has a memory where the last step had one too (theory, 10a)."""
         p, force0 = self.problem, state.force
-        rate = np.where(was, 2 * p.dashpot / self.scheme.h, 0.0)
-        acts = rate > 0
+        damping = 2 * p.dashpot / self.scheme.h
+        rate, opened = damping, np.zeros_like(was)
         for _ in range(200):
-            early = np.where(acts, (0.5 - _beta(state)) * state.dash, 0.0)
-            lag = rate[:, None] * p.path
-            force, active = self._closed(gap, state, lag, early, was)
-            wished = np.abs(lag @ (force - force0))
-            limit = np.where(p.bilateral, np.inf, force0 + force) * active
-            over = wished > limit * (1 + 1e-13)
-            if not over.any() and np.array_equal(acts, acts & active):
-                return force, active, lag, early
-            acts = acts & active
-            rate = np.where(over, rate * limit / np.where(over, wished, 1.0), rate)
+            dashpots = self._dashpots(state, rate, opened)
+            force, active = self._closed(gap, state, dashpots, was)
+            wished = np.abs(dashpots.lag @ (force - force0))
+            limit = np.where(active, np.where(p.bilateral, np.inf, force0 + force), 0.0)
+            over, let_go = wished > limit * (1 + 1e-13), was & ~active
+            if not over.any() and np.array_equal(let_go, opened):
+                return force, active, dashpots
+            lowered = np.where(over, rate * np.divide(limit, wished, out=np.ones_like(rate), where=over), rate)
+            rate, opened = np.where(opened & active, damping, lowered), let_go
         raise AssertionError("the limit of the dashpots was not found")
 
+    def _dashpots(self, state: State, rate: np.ndarray, opened: np.ndarray) -> Dashpots:
+        """Those of closed contacts with η_d per change of their path, and of the ones that let go."""
+        p = self.problem
+        acted = (state.dash != 0.0) & ((state.force > 0) | p.bilateral)
+        springs_back = -np.minimum(2 * p.dashpot / self.scheme.h * (p.path @ state.force), state.force)
+        rate = np.where(opened, 0.0, rate)
+        beta = np.where(opened, 0.0, np.where(acted, 0.25 * (3 + MEMORY), 0.5))
+        tail = np.where((rate > 0) & acted, -0.25 * (1 - MEMORY) * state.dash - MEMORY * state.late, 0.0)
+        return Dashpots(rate, opened, rate[:, None] * p.path, np.where(opened, springs_back, 0.0), beta, tail)
+
     def _conserve(self, step: Step, force: np.ndarray, active: np.ndarray,
-                  was: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """λ₁ and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
+                  was: np.ndarray) -> tuple[np.ndarray, ...]:
+        """λ₁, η = α·Δg and the active set with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
         c, d, bilateral, before, force0 = self.c, self.d, self.problem.bilateral, step.before, step.force0
         lagged, g = step.lagged, step.gap
         stored = 0.5 * force0 @ c @ force0
@@ -262,7 +292,7 @@ class Reference:
             defect = 0.5 * force @ c @ force - stored + 0.5 * (force0 + z) @ moved
             rounding = 4e-16 * (np.abs(force0) + np.abs(force)) @ np.abs(moved)  # decides where flanks just graze
             if abs(defect) <= self.scheme.tolerance * (stored + 0.5 * np.diag(c) @ force**2) + rounding:
-                return force, alpha * direction
+                return force, alpha * direction, active
             self.rounds += 1
             p = np.zeros_like(force)
             if active.any():
@@ -276,12 +306,7 @@ class Reference:
             if np.any(active & ~bilateral & (force <= 0)) or np.any(~active & (shifted + (lagged + c) @ force < 0)):
                 force, active = solve_lcp(lagged + c, shifted, bilateral, active)
         self.failures += 1
-        return force, alpha * direction
-
-
-def _beta(state: State) -> np.ndarray:
-    """Weight of η_d in the dashpot's force at the end of the step: extrapolated where there was one in the last step."""
-    return np.where(state.dash != 0.0, 0.75, 0.5)
+        return force, alpha * direction, active
 
 
 def _corrections(omega: np.ndarray, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:

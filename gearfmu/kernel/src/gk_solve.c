@@ -2,7 +2,7 @@
  *
  *   closed contact, bilateral row, sticking clutch:  gap + deflection = 0;   open contact: λ = 0 and gap + deflection ≥ 0;   slipping clutch: z = ±bound
  *   gap = g + D z + lag,   deflection = Aλ + Pλ + δ(λ),   z = λ + η,   η = α·direction + η_d
- *   dashpot of a row that is closed at both ends: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to |λ0 + λ1| (no pull)
+ *   dashpot of a row: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to |λ0 + λ1| (no pull); its path is straight while a contact is open
  *
  * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last one (block principal pivoting, Júdice & Pires 1994). */
 #include "gk_core.h"
@@ -59,6 +59,9 @@ void gk_solve_path(const gk_system *s, const double *x, double *y)
     for (int i = s->contacts; i < s->n; i++) y[i] = s->spring[i] * x[i];
 }
 
+/* a contact that let go in this step: its path springs back, against the dashpot, as far as that does not pull */
+static int opened(const gk_system *s, int i) { return is_contact(s, i) && !s->active[i] && s->force0[i] > 0.0; }
+
 void gk_solve_set(gk_system *s, int i, double force)
 {
     s->force[i] = force;
@@ -72,9 +75,9 @@ void gk_solve_settle(gk_system *s)
     gk_solve_path(s, s->force, s->linear);
     for (int i = 0; i < s->n; i++) {
         s->squeeze[i] = s->linear[i] + (is_contact(s, i) ? s->law[i].delta : 0.0);
-        s->dash[i] = 0.0;
+        s->dash[i] = opened(s, i) ? gk_max(-s->damping[i] * s->squeeze0[i], -s->force0[i]) : 0.0;
         if (s->active[i] && s->clip[i] != 2) s->dash[i] = s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (s->squeeze[i] - s->squeeze0[i]);
-        s->end[i] = s->clip[i] == 2 ? 0.0 : s->beta[i] * s->dash[i] - (s->beta[i] - 0.5) * s->dash0[i];
+        s->end[i] = s->clip[i] == 2 ? 0.0 : s->beta[i] * s->dash[i] + s->tail[i];
         dashpots |= s->end[i] != 0.0 || s->dash[i] != 0.0;
         s->eta[i] = s->alpha * s->direction[i] + s->dash[i];
         if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
@@ -118,9 +121,7 @@ static void bend(const gk_system *s, const double *e, double *r)
     memset(r, 0, (size_t)s->stride * sizeof *r);
     for (int j = 0; j < s->contacts; j++) {
         if (!s->active[j] || s->clip[j] != 0 || s->damping[j] == 0.0) continue;
-        gk_axpy(-s->damping[j] * e[j], s->D + j * s->stride, r, 0, quads);
-        gk_axpy(-(s->beta[j] - 0.5) * s->damping[j] * e[j], s->Q + j * s->stride, r, 0, quads);
-        gk_axpy(-0.5 * s->damping[j] * e[j], s->A + j * s->stride, r, 0, quads);
+        gk_axpy(-s->damping[j] * e[j], s->B + j * s->stride, r, 0, quads);
     }
     for (int i = 0; i < s->n; i++) r[i] = !s->active[i] ? 0.0 : i < s->contacts ? r[i] - e[i] : r[i];
 }
@@ -162,18 +163,18 @@ static void flip(gk_system *s, int i)
         if (!s->active[i]) s->z[i] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
         s->force[i] = 0.0;
     } else {
-        if (!s->active[i]) s->clip[i] = 2; /* a contact that opened has no dashpot */
+        if (!s->active[i]) s->clip[i] = 2; /* linear dashpots belong to closed contacts */
         gk_solve_set(s, i, s->active[i] ? s->force[i] : 0.0);
     }
 }
 
-/* dashpots: act where closed at both ends; limited so that they never pull */
+/* dashpots of closed contacts: limited so that they never pull */
 static int limit_dashpots(gk_system *s)
 {
     int changed = 0;
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2;
-        if (s->active[i] && s->force0[i] > 0.0 && s->damping[i] > 0.0) {
+        if (s->active[i] && s->damping[i] > 0.0) {
             const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i];
             clip = free > limit ? 1 : free < -limit ? -1 : 0;
         }

@@ -4,6 +4,7 @@
 
 static const double PAYABLE = 1e-4; /* of the energy of the massless part: what a contact that only grazes cannot repay waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
+static const double MEMORY = 0.75; /* of a dashpot's force at the end of the step: how much of the last one's goes into it (docs/theory, 3.4) */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
@@ -105,7 +106,9 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
     for (int i = 0; i < s->n; i++) {
         s->clip[i] = 2;
-        s->beta[i] = s->dash0[i] != 0.0 ? 0.75 : 0.5;
+        const int acted = s->dash0[i] != 0.0 && (s->kind[i] != ROW_CONTACT || s->force0[i] > 0.0);
+        s->beta[i] = acted ? 0.25 * (3.0 + MEMORY) : 0.5;
+        s->tail[i] = acted ? -0.25 * (1.0 - MEMORY) * s->dash0[i] - MEMORY * s->end0[i] : 0.0;
         s->active[i] = s->kind[i] == ROW_CLUTCH ? (unsigned char)data->locked[s->link_of[i] - CLUTCH_0] : 1;
         s->z[i] = 0.0;
         if (s->kind[i] == ROW_CLUTCH && !s->active[i]) s->z[i] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
@@ -137,7 +140,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
             break;
         case ROW_CLUTCH: s->g0[i] = s->g[i];
         }
-        s->end[i] = s->clip[i] == 2 ? 0.0 : (0.5 - s->beta[i]) * s->dash0[i];
+        s->end[i] = s->clip[i] == 2 ? 0.0 : s->tail[i];
         goes_on |= s->end[i] != 0.0;
     }
     if (given) gk_solve_settle(s);

@@ -14,7 +14,7 @@ static void gather(const gk_setup *setup, const gk_work *work, int g, const gk_r
     for (int i = 0; i < rows; i++) read[i] = n && row_of(&work->system, g, i) >= 0 ? gk_dot(work->basis[g] + (size_t)i * n, y, n) : 0.0;
 }
 
-/* B diag(mobility) Bᵀ and −B diag(κ) Bᵀ, added to the upper triangles of D and A: for a step that has no table */
+/* B diag(mobility) Bᵀ and −B diag(κ) Bᵀ, added to D and A: for a step that has no table */
 static void gram(const gk_setup *setup, gk_work *work, int g, const gk_coefficients *k, double *D, double *A)
 {
     const gk_system *s = &work->system;
@@ -32,8 +32,10 @@ static void gram(const gk_setup *setup, gk_work *work, int g, const gk_coefficie
             const int column = row_of(s, g, j);
             if (column < 0) continue;
             const double sign = (i < s->contacts) == (j < s->contacts) ? 1.0 : -1.0;
-            if (!k->timeless) D[row * s->stride + column] += sign * gk_dot(moves, other, n);
-            if (flow->exact) A[row * s->stride + column] -= sign * (gk_dot(yields, other, flow->exact) + gk_dot(yields + P, other + P, flow->exact));
+            const double moved = k->timeless ? 0.0 : sign * gk_dot(moves, other, n);
+            const double yielded = flow->exact ? sign * (gk_dot(yields, other, flow->exact) + gk_dot(yields + P, other + P, flow->exact)) : 0.0;
+            D[row * s->stride + column] += moved, A[row * s->stride + column] -= yielded;
+            if (row != column) D[column * s->stride + row] += moved, A[column * s->stride + row] -= yielded;
         }
     }
 }
@@ -152,35 +154,29 @@ void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const 
     }
 }
 
-static void mirror(gk_system *s)
+/* R = Σ rowᵀrow/m over the rigid coordinates: D takes mobility·R, A gives κ·R */
+GK_INLINE void add_rows(const gk_setup *setup, const gk_coefficients *k, gk_system *s, const int quads)
 {
-    const int n = s->n, stride = s->stride;
-    for (int i = 0; i < n; i++)
-        for (int j = i + 1; j < n; j++) {
-            s->D[j * stride + i] = s->D[i * stride + j];
-            s->A[j * stride + i] = s->A[i * stride + j];
-            s->Q[j * stride + i] = s->Q[i * stride + j];
-        }
-    for (int k = 0; k < n * stride; k++) s->A[k] += s->Q[k];
-}
-
-/* what one rigid coordinate adds to D and A */
-GK_INLINE void add_coordinate(gk_system *s, const double *row, double moves, double yields, const int quads)
-{
+    int moving[RIGID], count = 0;
+    for (int d = 0; d < RIGID; d++)
+        if (setup->inverse_mass[d] > 0.0) moving[count++] = d;
     for (int i = 0; i < s->n; i++) {
-        if (row[i] == 0.0) continue;
-        gk_axpy(moves * row[i], row, s->D + i * 4 * quads, 0, quads);
-        gk_axpy(yields * row[i], row, s->A + i * 4 * quads, 0, quads);
+        gk_quad sum[MAX_STRIDE / 4], *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
+        for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
+        for (int m = 0; m < count; m++) {
+            const double *coordinate = s->rigid[moving[m]], w = setup->inverse_mass[moving[m]] * coordinate[i];
+            const gk_quad *row = (const gk_quad *)coordinate;
+            if (w != 0.0)
+                for (int q = 0; q < quads; q++) sum[q] += w * row[q];
+        }
+        for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] -= k->rigid_kappa * sum[q];
     }
 }
 
 /* a clutch is a row of speeds, without κ */
 static void add_rigid(const gk_setup *setup, const gk_coefficients *k, gk_system *s)
 {
-    for (int d = 0; d < RIGID; d++) {
-        const double moves = k->rigid_mobility * setup->inverse_mass[d], yields = -k->rigid_kappa * setup->inverse_mass[d];
-        if (setup->inverse_mass[d] > 0.0) GK_SIZED(s->stride / 4, add_coordinate, s, s->rigid[d], moves, yields)
-    }
+    GK_SIZED(s->stride / 4, add_rows, setup, k, s)
     for (int i = s->contacts; i < s->n; i++)
         if (s->kind[i] == ROW_CLUTCH)
             for (int j = 0; j < s->n; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
@@ -227,20 +223,18 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
     s->Q = s->A + size;
     s->J = s->Q + size;
     s->L = s->J + size;
+    s->B = s->L + size;
     memset(s->D, 0, 3 * size * sizeof(double));
-    for (int g = 0; g < 2; g++) {
+    for (int g = 0; g < 2; g++) gather(setup, work, g, work->y[g], work->read[g]);
+    if (GK_ON(setup, elastic)) {
         double *const all[KINDS] = {s->D, s->A, s->Q}, *const residual[KINDS] = {s->Q};
-        gather(setup, work, g, work->y[g], work->read[g]);
-        if (!GK_ON(setup, elastic)) continue; /* rigid gears */
-        if (tables) {
-            gk_table_add(model, setup, g, &work->table[g], all);
-            continue;
-        }
-        gram(setup, work, g, k, s->D, s->A);
-        if (GK_ON(setup, residual)) gk_table_add(model, setup, g, &setup->modal[g].residual, residual);
+        const gk_table *const of_step[2] = {&work->table[0], &work->table[1]}, *const at_rest[2] = {&setup->modal[0].residual, &setup->modal[1].residual};
+        if (tables) gk_table_put(model, setup, of_step, all);
+        else if (GK_ON(setup, residual)) gk_table_put(model, setup, at_rest, residual);
+        for (int g = 0; g < 2 && !tables; g++) gram(setup, work, g, k, s->D, s->A);
     }
     gaps(model, setup, k->h, work);
-    mirror(s);
+    for (int i = 0; i < s->n * s->stride; i++) s->A[i] += s->Q[i];
     add_rigid(setup, k, s);
     if (GK_ON(setup, residual) && GK_ON(setup, contact_damping)) take_paths(model, setup, work);
     else memset(s->path, 0, (size_t)work->places * sizeof *s->path); /* no dashpot asks for it */

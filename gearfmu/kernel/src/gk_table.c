@@ -161,80 +161,86 @@ void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coeffic
 /* ---- reading ------------------------------------------------------------------------------------------------------------------------------------------- */
 enum { HALVES = (KINDS * MAX_SLICES * MAX_SLICES + 7) / 8 };
 
-/* Σ w_i w_j cell_ij over the 4 × 4 grid rolls around two places */
-GK_INLINE void interpolate(const gk_place *p, const gk_place *q, int g, const gk_real *cells, int rolls, gk_half *out, const int halves)
+/* Σ w_i w_j cell_ij over the 4 × 4 grid rolls around two places, added to sum */
+GK_INLINE void interpolate(const gk_place *p, const gk_place *q, int g, const gk_real *cells, int rolls, gk_half *total, const int halves)
 {
     gk_half sum[HALVES];
-    for (int k = 0; k < halves; k++) sum[k] = (gk_half){0};
+    for (int k = 0; k < halves; k++) sum[k] = total[k];
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++) {
             const gk_real w = (gk_real)(p->weight[g][i] * q->weight[g][j]);
             const gk_half *t = (const gk_half *)cells + (size_t)(((p->index[g] + i) * rolls + q->index[g] + j) * halves);
             for (int k = 0; k < halves; k++) sum[k] += w * t[k];
         }
-    memcpy(out, sum, (size_t)halves * sizeof *sum);
+    memcpy(total, sum, (size_t)halves * sizeof *sum);
 }
 
-GK_INLINE void add_blocks(const gk_real *value, int kinds, double *const out[2], int stride, const int strips)
+/* a block at (row, column) and its mirror image */
+GK_INLINE void put_blocks(const gk_real *value, int kinds, double *const out[KINDS], int stride, int row, int column, const int strips)
 {
-    for (int kind = 0; kind < kinds; kind++)
+    for (int kind = 0; kind < kinds; kind++, value += strips * strips) {
+        double *here = out[kind] + row * stride + column, *mirrored = out[kind] + column * stride + row;
         for (int a = 0; a < strips; a++)
-            for (int b = 0; b < strips; b++) out[kind][a * stride + b] += *value++;
+            for (int b = 0; b < strips; b++) here[a * stride + b] = value[a * strips + b];
+        if (row != column)
+            for (int a = 0; a < strips; a++)
+                for (int b = 0; b < strips; b++) mirrored[b * stride + a] = value[a * strips + b];
+    }
 }
 
-/* between the strips of two places, added to the matrices of the table's kinds */
-static void flank_pair(const gk_gear *gear, int g, const gk_table *table, const gk_place *p, const gk_place *q, int strips, double **out, int stride)
+/* between the strips of places p and q, through both gears */
+static void flank_pair(const gk_model *model, const gk_work *work, const gk_table *const table[2], int p, int q, int strips, double *const out[KINDS])
 {
-    const int offset = q->number[g] - p->number[g];
+    const gk_place *from = &work->place[p], *to = &work->place[q];
+    const int halves = table[0]->block / 8;
     gk_half sum[HALVES];
-    if (offset < -3 || offset > 3) return;
-    const gk_real *cells = table->ff + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + 3) * (size_t)(gear->rolls * gear->rolls * table->block);
-    GK_SIZED(table->block / 8, interpolate, p, q, g, cells, gear->rolls, sum)
-    GK_STRIPPED(strips, add_blocks, (const gk_real *)sum, table->kinds, out, stride)
+    for (int k = 0; k < halves; k++) sum[k] = (gk_half){0};
+    for (int g = 0; g < 2; g++) {
+        const int offset = to->number[g] - from->number[g], rolls = model->gear[g].rolls;
+        if (offset < -3 || offset > 3) continue;
+        const gk_real *cells = table[g]->ff + (size_t)((from->flank * 2 + to->flank) * OFFSETS + offset + 3) * (size_t)(rolls * rolls * table[g]->block);
+        GK_SIZED(halves, interpolate, from, to, g, cells, rolls, sum)
+    }
+    GK_STRIPPED(strips, put_blocks, (const gk_real *)sum, table[0]->kinds, out, work->system.stride, p * strips, q * strips)
 }
 
-/* strips of a place to the bore, turned from the tooth's axes into inertial ones */
-static void place_bore(const gk_system *s, const gk_gear *gear, int g, const gk_table *table, const gk_place *place, int first, double attitude, double *const out[KINDS])
+/* strips of a place to the bore of gear g, turned from the tooth's axes into inertial ones */
+static void place_bore(const gk_model *model, const gk_work *work, int g, const gk_table *table, int p, int strips, double *const out[KINDS])
 {
+    const gk_gear *gear = &model->gear[g];
+    const gk_place *place = &work->place[p];
+    const int stride = work->system.stride, kinds = table->kinds, *bore = work->system.bore[g];
     double sine, cosine;
-    gk_sincos(attitude + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
-    const int strips = GK_STRIPS(s), kinds = table->kinds, *row = s->bore[g];
+    gk_sincos(work->attitude[g] + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
     for (int a = 0; a < strips; a++) {
+        const int row = p * strips + a;
         gk_quad c[KINDS] = {{0}, {0}, {0}};
         const gk_quad *t = (const gk_quad *)table->fb + (size_t)((place->flank * gear->rolls + place->index[g]) * strips + a) * (size_t)kinds;
         for (int i = 0; i < 4; i++, t += strips * kinds)
             for (int kind = 0; kind < kinds; kind++) c[kind] += place->weight[g][i] * t[kind];
         for (int kind = 0; kind < kinds; kind++) {
-            double *line = out[kind] + (first + a) * s->stride;
-            if (row[BORE_X] >= 0) line[row[BORE_X]] -= c[kind][0] * cosine - c[kind][1] * sine;
-            if (row[BORE_Y] >= 0) line[row[BORE_Y]] -= c[kind][0] * sine + c[kind][1] * cosine;
-            if (row[BORE_RZ] >= 0) line[row[BORE_RZ]] -= c[kind][2];
+            const double pulls[BORE_ROWS] = {c[kind][0] * cosine - c[kind][1] * sine, c[kind][0] * sine + c[kind][1] * cosine, c[kind][2]};
+            for (int i = 0; i < BORE_ROWS; i++)
+                if (bore[i] >= 0) out[kind][row * stride + bore[i]] = out[kind][bore[i] * stride + row] = -pulls[i];
         }
     }
 }
 
-/* flank–flank, flank–bore and bore–bore compliance of gear g into the upper triangles of out[kind] */
-void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[KINDS])
+/* flank–flank, flank–bore and bore–bore compliance of both gears into out[kind] (stride, stride), symmetric; entries between different gears' bores stay */
+void gk_table_put(const gk_model *model, const gk_setup *setup, const gk_table *const table[2], double *const out[KINDS])
 {
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
-    const gk_gear *gear = &model->gear[g];
-    const int strips = GK_STRIPS(setup), stride = s->stride, *row = s->bore[g];
-    const double attitude = work->attitude[g];
-    for (int p = 0; p < work->places; p++) {
-        const gk_place *place = &work->place[p];
-        for (int q = p; q < work->places; q++) {
-            const int at = (p * stride + q) * strips;
-            double *block[KINDS];
-            for (int kind = 0; kind < table->kinds; kind++) block[kind] = out[kind] + at;
-            flank_pair(gear, g, table, place, &work->place[q], strips, block, stride);
-        }
-        place_bore(s, gear, g, table, place, p * strips, attitude, out);
+    const int strips = GK_STRIPS(setup);
+    for (int p = 0; p < work->places; p++)
+        for (int q = p; q < work->places; q++) flank_pair(model, work, table, p, q, strips, out);
+    for (int g = 0; g < 2; g++) {
+        const int *bore = s->bore[g];
+        for (int p = 0; p < work->places; p++) place_bore(model, work, g, table[g], p, strips, out);
+        for (int i = 0; i < BORE_ROWS; i++)
+            for (int k = i; k < BORE_ROWS && bore[i] >= 0; k++)
+                for (int kind = 0; kind < table[g]->kinds && bore[k] >= 0; kind++) out[kind][bore[i] * s->stride + bore[k]] = out[kind][bore[k] * s->stride + bore[i]] = table[g]->bb[kind][3 * i + k];
     }
-    for (int i = 0; i < BORE_ROWS; i++)
-        for (int k = i; k < BORE_ROWS; k++)
-            if (row[i] >= 0 && row[k] >= 0)
-                for (int kind = 0; kind < table->kinds; kind++) out[kind][row[i] * stride + row[k]] += table->bb[kind][3 * i + k];
 }
 
 /* P of a place: both teeth */

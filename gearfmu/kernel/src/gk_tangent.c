@@ -2,23 +2,31 @@
  * limit ±(λ0 + λ1) is ±B instead. By columns of whole quads; an inactive row is an empty one. Close to symmetric positive definite: no pivoting. */
 #include "gk_core.h"
 
+/* column j of B: what the dashpot of row j does to all rows */
+GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
+{
+    const double later = s->beta[j] - 0.5;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *Q = (const gk_quad *)s->Q + j * quads;
+    gk_quad *B = (gk_quad *)s->B + j * quads;
+    for (int q = 0; q < quads; q++) B[q] = D[q] + 0.5 * A[q] + later * Q[q];
+}
+
 /* column j: what λ_j does to all rows */
 GK_INLINE void form_column(const gk_system *s, int j, const double *mask, double *column, const int quads)
 {
     const int strips = GK_STRIPS(s), contact = j < s->contacts;
     const int place = contact ? s->place_of[j] : 0, first = contact ? place * strips : j, count = contact ? strips : 1;
-    const double limit = s->clip[j] == 2 ? 0.0 : s->clip[j];
-    const gk_quad *D = (const gk_quad *)s->D, *A = (const gk_quad *)s->A, *Q = (const gk_quad *)s->Q, *on = (const gk_quad *)mask;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B, *on = (const gk_quad *)mask;
     gk_quad c[MAX_STRIDE / 4];
     double own[MAX_SLICES];
-    for (int q = 0; q < quads; q++) c[q] = D[j * quads + q] + A[j * quads + q];
-    if (limit != 0.0)
-        for (int q = 0; q < quads; q++) c[q] += limit * (D[j * quads + q] + 0.5 * A[j * quads + q] + (s->beta[j] - 0.5) * Q[j * quads + q]);
+    for (int q = 0; q < quads; q++) c[q] = D[q] + A[q];
+    if (s->clip[j] == 1 || s->clip[j] == -1)
+        for (int q = 0; q < quads; q++) c[q] += s->clip[j] * B[j * quads + q];
     for (int e = first; e < first + count; e++) {
         own[e - first] = !s->active[e] ? 0.0 : contact ? s->path[place][(e - first) * strips + j - first] + (e == j ? s->slope[j] : 0.0) : s->spring[j];
-        const double moves = s->clip[e] == 0 ? s->damping[e] * own[e - first] : 0.0, mean = 0.5 * moves, later = (s->beta[e] - 0.5) * moves;
+        const double moves = s->clip[e] == 0 ? s->damping[e] * own[e - first] : 0.0;
         if (moves == 0.0) continue;
-        for (int q = 0; q < quads; q++) c[q] += moves * D[e * quads + q] + mean * A[e * quads + q] + later * Q[e * quads + q];
+        for (int q = 0; q < quads; q++) c[q] += moves * B[e * quads + q];
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
     for (int e = 0; e < count; e++) column[first + e] += own[e];
@@ -29,6 +37,8 @@ GK_INLINE void factorise(gk_system *s, const int quads)
     const int n = s->n, stride = 4 * quads;
     double mask[MAX_STRIDE];
     for (int i = 0; i < stride; i++) mask[i] = i < n && s->active[i];
+    for (int j = 0; j < n; j++)
+        if (s->active[j] && s->clip[j] != 2) form_dashpot(s, j, quads);
     for (int j = 0; j < n; j++)
         if (s->active[j]) form_column(s, j, mask, s->J + j * stride, quads);
     for (int k = 0; k < n; k++) {

@@ -22,7 +22,7 @@
 #define gk_rows_form gk_rows_form_avx2
 #define gk_table_residual gk_table_residual_avx2
 #define gk_table_for gk_table_for_avx2
-#define gk_table_add gk_table_add_avx2
+#define gk_table_put gk_table_put_avx2
 #define gk_table_path gk_table_path_avx2
 #define gk_system_form gk_system_form_avx2
 #define gk_system_rates gk_system_rates_avx2

@@ -18,7 +18,7 @@ typedef struct gk_approach { double delta, slope, energy; } gk_approach; /* δ(�
 /* Unknown forces of one step: contacts, then links. Closed contact, bilateral row, sticking clutch:
  *     g + D z + Aλ + lag + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction
  * D: what a force in the step does to the gaps; P + δ: the path that the row's own dashpot is parallel to; A = Q − K: everything else that has no mass, Q, less the κ part.
- * lag = Q f_d − ½K η_d: what the dashpots' force at the end of the step, f_d = ½η_d + (β − ½)(η_d − η_d0), deflects; the κ part of its mean. */
+ * lag = Q f_d − ½K η_d: what the dashpots' force at the end of the step, f_d = β η_d + tail, deflects; the κ part of its mean. */
 typedef struct gk_system {
     int contacts, n, stride, strips;
     gk_row_kind kind[MAX_ROWS];
@@ -33,14 +33,14 @@ typedef struct gk_system {
     gk_local local[MAX_PAIRS];        /* law of a place, per metre */
     double rigid[RIGID][MAX_STRIDE];  /* derivative of the rows by each rigid coordinate */
     double *D, *A, *Q;                /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
-    double *J, *L;                    /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor */
+    double *J, *L, *B;                /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor; what a dashpot's force does, D + ½A + (β − ½)Q */
     double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_ROWS]; /* P: strips of a place, (strips, strips); links: 1/k */
 
     double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE], z[MAX_STRIDE]; /* λ, η_d, η = η_d + α·direction, z = λ + η */
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
     double direction[MAX_STRIDE], alpha;
-    double beta[MAX_STRIDE], end[MAX_STRIDE];               /* β: ¾ where the last step had a dashpot force too, else ½; f_d */
+    double beta[MAX_STRIDE], tail[MAX_STRIDE], end[MAX_STRIDE]; /* f_d = β η_d + what the last step leaves of it */
     double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE]; /* D z, Aλ, Q f_d − ½K η_d */
     double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     gk_approach law[MAX_CONTACTS];    /* at the present λ */
@@ -71,7 +71,7 @@ struct gk_work {
     double read[2][MAX_BASIS], read_rate[2][MAX_BASIS];
     gk_system system;
     uint64_t cycles[PHASES], mark;            /* phase profile, filled by a build with GK_PROFILE */
-    double matrix[5 * MAX_STRIDE * MAX_STRIDE];   /* D, A, Q, J, L */
+    double matrix[6 * MAX_STRIDE * MAX_STRIDE];   /* D, A, Q, J, L, B */
     gk_table table[2];                            /* of each gear: D, −K and Q of one step */
     double table_h, table_gamma;                  /* which step; 0: none yet */
     double run_h, run_gamma;                      /* γ of the internal step of the run */
@@ -104,7 +104,7 @@ void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const 
 /* gk_table.c */
 void gk_table_residual(const gk_model *model, gk_setup *setup);
 void gk_table_for(const gk_model *model, const gk_setup *setup, const gk_coefficients *k);
-void gk_table_add(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, double *const out[KINDS]);
+void gk_table_put(const gk_model *model, const gk_setup *setup, const gk_table *const table[2], double *const out[KINDS]);
 void gk_table_path(const gk_model *model, const gk_setup *setup, const gk_place *place, double *out);
 /* gk_law.c */
 void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);
