@@ -187,7 +187,7 @@ void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double
     }
 }
 
-/* modal state to the end of the step; returns what modal damping took, where it is on: work of the mean force minus change of energy, mode by mode */
+/* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of energy, mode by mode */
 GK_INLINE double correct_modes(const gk_setup *setup, const gk_coefficients *k, int g, gk_real *q, const int damped)
 {
     const gk_work *work = setup->work;
@@ -195,6 +195,7 @@ GK_INLINE double correct_modes(const gk_setup *setup, const gk_coefficients *k, 
     gk_real *v = q + n, lane[LANES] = {0};
     const gk_real *f = v + n, half = (gk_real)0.5;
     const gk_flow *w = &k->flow[g];
+    double sum = 0.0;
     for (int i = 0; i < n; i += LANES)
         for (int l = 0; l < LANES; l++) {
             const int j = i + l;
@@ -202,11 +203,13 @@ GK_INLINE double correct_modes(const gk_setup *setup, const gk_coefficients *k, 
             if (damped) {
                 const gk_real energy = half * w->inverse_s2[j] * ((v1 - v[j]) * (v1 + v[j]) + setup->modal[g].omega2[j] * ((q1 - q[j]) * (q1 + q[j])));
                 lane[l] += half * (f[j] + z) * (q1 - q[j]) - energy;
+            } else { /* nothing but rounding, so it takes more digits to see */
+                const double dq = (double)q1 - q[j], dv = (double)v1 - v[j], omega = setup->modal[g].omega[j];
+                sum += 0.5 * (((double)f[j] + z) * dq - w->inverse_s2[j] * (dv * ((double)v1 + v[j]) + omega * omega * dq * ((double)q1 + q[j])));
             }
             q[j] = q1;
             v[j] = v1;
         }
-    double sum = 0.0;
     for (int l = 0; l < LANES; l++) sum += lane[l];
     return sum;
 }
@@ -222,7 +225,7 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
             gk_real *next = work->reading[g];
             gk_step_scatter(setup, g, s->z, s->force, work->force[g], next);
             if (GK_ON(setup, modal_damping)) data->ledger.dissipated += correct_modes(setup, k, g, q, 1);
-            else correct_modes(setup, k, g, q, 0);
+            else work->system.owed -= correct_modes(setup, k, g, q, 0); /* what rounding gave or took */
             memcpy(q + 2 * n, next, (size_t)n * sizeof *next);
         }
         q += 3 * n;
