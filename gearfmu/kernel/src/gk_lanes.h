@@ -24,6 +24,18 @@ typedef double gk_quad __attribute__((vector_size(4 * sizeof(double)), may_alias
     default: f(__VA_ARGS__, quads);        \
     }
 
+/* f(…, quads, block) for every block of a quad of rows, blocks as constants too where quads is one */
+#define GK_BLOCKS(quads, f, ...)                                          \
+    f(__VA_ARGS__, quads, 0);                                             \
+    if (quads > 1) f(__VA_ARGS__, quads, 1);                              \
+    if (quads > 2) f(__VA_ARGS__, quads, 2);                              \
+    for (int block = 3; block < quads; block++) f(__VA_ARGS__, quads, block);
+#define GK_BLOCKS_BACK(quads, f, ...)                                     \
+    for (int block = quads - 1; block > 2; block--) f(__VA_ARGS__, quads, block); \
+    if (quads > 2) f(__VA_ARGS__, quads, 2);                              \
+    if (quads > 1) f(__VA_ARGS__, quads, 1);                              \
+    f(__VA_ARGS__, quads, 0);
+
 /* the same for the strips of a place: those of 1, 5 and 10 slices */
 #define GK_STRIPPED(strips, f, ...)           \
     switch (strips) {                         \

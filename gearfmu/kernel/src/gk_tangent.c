@@ -12,45 +12,82 @@ GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 }
 
 /* column j: what λ_j does to all rows */
-GK_INLINE void form_column(const gk_system *s, int j, const double *mask, double *column, const int quads)
+GK_INLINE void contact_column(const gk_system *s, int j, const double *mask, double *column, const int quads, const int strips)
 {
-    const int strips = GK_STRIPS(s), contact = j < s->contacts;
-    const int place = contact ? s->place_of[j] : 0, first = contact ? place * strips : j, count = contact ? strips : 1;
+    const int place = s->place_of[j], first = place * strips;
     const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B, *on = (const gk_quad *)mask;
+    const double *path = s->path[place] + j - first;
     gk_quad c[MAX_STRIDE / 4];
     double own[MAX_SLICES];
     for (int q = 0; q < quads; q++) c[q] = D[q] + A[q];
     if (s->clip[j] == 1 || s->clip[j] == -1)
         for (int q = 0; q < quads; q++) c[q] += s->clip[j] * B[j * quads + q];
-    for (int e = first; e < first + count; e++) {
-        own[e - first] = !s->active[e] ? 0.0 : contact ? s->path[place][(e - first) * strips + j - first] + (e == j ? s->slope[j] : 0.0) : s->spring[j];
-        const double moves = s->clip[e] == 0 ? s->damping[e] * own[e - first] : 0.0;
+    for (int e = 0; e < strips; e++) {
+        own[e] = s->active[first + e] ? path[e * strips] + (first + e == j ? s->slope[j] : 0.0) : 0.0;
+        const double moves = s->clip[first + e] == 0 ? s->damping[first + e] * own[e] : 0.0;
         if (moves == 0.0) continue;
-        for (int q = 0; q < quads; q++) c[q] += moves * B[e * quads + q];
+        for (int q = 0; q < quads; q++) c[q] += moves * B[(first + e) * quads + q];
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
-    for (int e = 0; e < count; e++) column[first + e] += own[e];
+    for (int e = 0; e < strips; e++) column[first + e] += own[e];
 }
 
-GK_INLINE void factorise(gk_system *s, const int quads)
+GK_INLINE void link_column(const gk_system *s, int j, const double *mask, double *column, const int quads)
 {
-    const int n = s->n, stride = 4 * quads;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B + j * quads, *on = (const gk_quad *)mask;
+    const double moves = s->clip[j] == 0 ? s->damping[j] * s->spring[j] : 0.0;
+    for (int q = 0; q < quads; q++) {
+        gk_quad c = D[q] + A[q];
+        if (moves != 0.0) c += moves * B[q];
+        ((gk_quad *)column)[q] = c * on[q];
+    }
+    column[j] += s->spring[j];
+}
+
+GK_INLINE void columns(gk_system *s, const int quads)
+{
+    const int n = s->n, stride = 4 * quads, strips = GK_STRIPS(s);
     double mask[MAX_STRIDE];
     for (int i = 0; i < stride; i++) mask[i] = i < n && s->active[i];
     for (int j = 0; j < n; j++)
         if (s->active[j] && s->clip[j] != 2) form_dashpot(s, j, quads);
-    for (int j = 0; j < n; j++)
-        if (s->active[j]) form_column(s, j, mask, s->J + j * stride, quads);
-    for (int k = 0; k < n; k++) {
-        if (!s->active[k]) continue;
-        double *pivot = s->J + k * stride, *lower = s->L + k * stride;
-        const double inverse = 1.0 / pivot[k];
-        for (int q = k / 4; q < quads; q++) ((gk_quad *)lower)[q] = inverse * ((gk_quad *)pivot)[q];
-        for (int i = k / 4 * 4; i <= k; i++) lower[i] = 0.0;
-        for (int i = k + 1; i < (k / 4 + 1) * 4; i++) pivot[i] = 0.0;
-        for (int j = k + 1; j < n; j++)
-            if (s->active[j]) gk_axpy(-s->J[j * stride + k], lower, s->J + j * stride, k / 4, quads);
+    for (int j = 0; j < n; j++) {
+        double *column = s->J + j * stride;
+        if (!s->active[j]) {
+            memset(column, 0, (size_t)stride * sizeof *column);
+            column[j] = 1.0;
+        } else if (j < s->contacts) {
+            GK_STRIPPED(strips, contact_column, s, j, mask, column, quads)
+        } else {
+            link_column(s, j, mask, column, quads);
+        }
     }
+}
+
+/* pivots 4·block … of the factors: the columns right of them lose what the pivots explain */
+GK_INLINE void eliminate(gk_system *s, const int quads, const int block)
+{
+    const int n = s->n, stride = 4 * quads, end = 4 * block + 4 < n ? 4 * block + 4 : n;
+    for (int k = 4 * block; k < end; k++) {
+        double *pivot = s->J + k * stride, *lower = s->L + k * stride;
+        gk_quad l[MAX_STRIDE / 4];
+        s->inverse[k] = 1.0 / pivot[k];
+        for (int q = block; q < quads; q++) l[q] = s->inverse[k] * ((gk_quad *)pivot)[q];
+        for (int i = 0; i <= k - 4 * block; i++) l[block][i] = 0.0;
+        for (int q = block; q < quads; q++) ((gk_quad *)lower)[q] = l[q];
+        for (int i = k; i < 4 * block + 4; i++) pivot[i] = 0.0;
+        for (int j = k + 1; j < n; j++) {
+            gk_quad *column = (gk_quad *)s->J + j * quads;
+            const double f = -((double *)column)[k];
+            for (int q = block; q < quads; q++) column[q] += f * l[q];
+        }
+    }
+}
+
+GK_INLINE void factorise(gk_system *s, const int quads)
+{
+    columns(s, quads);
+    GK_BLOCKS(quads, eliminate, s)
 }
 
 void gk_tangent_factorise(gk_system *s)
@@ -60,17 +97,31 @@ void gk_tangent_factorise(gk_system *s)
     s->rounds++;
 }
 
-GK_INLINE void solve(const gk_system *s, double *x, const int quads)
+GK_INLINE void forward(const gk_system *s, double *x, const int quads, const int block)
 {
-    const int n = s->n, stride = 4 * quads;
-    for (int k = 0; k < n; k++)
-        if (s->active[k]) gk_axpy(-x[k], s->L + k * stride, x, k / 4, quads);
-    for (int k = n - 1; k >= 0; k--) {
-        if (!s->active[k]) continue;
-        const double *column = s->J + k * stride, f = x[k] / column[k];
-        gk_axpy(-f, column, x, 0, k / 4 + 1);
+    const int stride = 4 * quads, end = 4 * block + 4 < s->n ? 4 * block + 4 : s->n;
+    for (int k = 4 * block; k < end; k++) {
+        const gk_quad *lower = (const gk_quad *)(s->L + k * stride);
+        const double f = -x[k];
+        for (int q = block; q < quads; q++) ((gk_quad *)x)[q] += f * lower[q];
+    }
+}
+
+GK_INLINE void backward(const gk_system *s, double *x, const int quads, const int block)
+{
+    const int stride = 4 * quads, end = 4 * block + 4 < s->n ? 4 * block + 4 : s->n;
+    for (int k = end - 1; k >= 4 * block; k--) {
+        const gk_quad *column = (const gk_quad *)(s->J + k * stride);
+        const double f = x[k] * s->inverse[k];
+        for (int q = 0; q <= block; q++) ((gk_quad *)x)[q] -= f * column[q];
         x[k] = f;
     }
+}
+
+GK_INLINE void solve(const gk_system *s, double *x, const int quads)
+{
+    GK_BLOCKS(quads, forward, s, x)
+    GK_BLOCKS_BACK(quads, backward, s, x)
 }
 
 /* x ← J⁻¹ x; x (stride) is 0 where a row is not active */

@@ -34,6 +34,7 @@ typedef struct gk_system {
     double rigid[RIGID][MAX_STRIDE];  /* derivative of the rows by each rigid coordinate */
     double *D, *A, *Q;                /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
     double *J, *L, *B;                /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor; what a dashpot's force does, D + ½A + (β − ½)Q */
+    double inverse[MAX_STRIDE];       /* of the pivots */
     double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_ROWS]; /* P: strips of a place, (strips, strips); links: 1/k */
 
     double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE], z[MAX_STRIDE]; /* λ, η_d, η = η_d + α·direction, z = λ + η */
