@@ -31,7 +31,7 @@ static balance defect(const gk_system *s)
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
-            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + (s->kind[i] == ROW_CONTACT ? s->law[i].energy : 0.0);
+            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + s->potential[i];
             b.defect += energy;
             b.scale += fabs(energy);
         }
@@ -45,22 +45,20 @@ static balance defect(const gk_system *s)
 /* p = dλ/dα and w_d = dη_d/dα */
 static void sensitivity(const gk_system *s, double *p, double *dash)
 {
-    double moved[MAX_STRIDE], path[MAX_ROWS];
+    double moved[MAX_STRIDE], path[MAX_STRIDE];
     gk_solve_times(s, s->D, s->direction, moved);
     for (int i = 0; i < s->stride; i++) p[i] = i < s->n && s->active[i] ? -moved[i] : 0.0;
     gk_tangent_solve(s, p);
     gk_solve_path(s, p, path);
     for (int i = 0; i < s->n; i++) {
-        dash[i] = 0.0;
-        if (!s->active[i] || s->clip[i] == 2) continue;
-        dash[i] = s->clip[i] ? s->clip[i] * p[i] : s->damping[i] * (path[i] + (s->kind[i] == ROW_CONTACT ? s->slope[i] * p[i] : 0.0));
+        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
     }
 }
 
 /* expansion of Δ in α along the solved direction */
 static void expand(const gk_system *s, const double *p, const double *dash, balance *b)
 {
-    double yields[MAX_STRIDE], path[MAX_ROWS], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
+    double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++) w[i] = p[i] + s->direction[i] + dash[i], late[i] = s->beta[i] * dash[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
@@ -69,7 +67,7 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
     for (int i = 0; i < s->n; i++) {
         const double direct = p[i] + s->direction[i];
         if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;
-        const double massless = yields[i] + path[i] + (s->kind[i] == ROW_CONTACT ? s->slope[i] * p[i] : 0.0);
+        const double massless = yields[i] + path[i] + s->slope[i] * p[i];
         const double gap = s->active[i] || s->kind[i] == ROW_TORQUE ? -massless : moved[i] + lag[i];
         b->c1 += s->force[i] * massless + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
         b->c2 += 0.5 * p[i] * massless + 0.5 * direct * gap;
@@ -110,8 +108,8 @@ static int find_alpha(gk_system *s, balance b)
         if (!(fabs(divisor) > 0.0)) return 0;
         const double a = -2.0 * b.defect / divisor;
         s->alpha += a;
-        for (int i = 0; i < s->n; i++)
-            if (p[i] != 0.0) gk_solve_set(s, i, s->force[i] + a * p[i]);
+        for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
+        gk_law_apply(s);
         gk_solve_settle(s);
         gk_solve_contacts(s);
         b = defect(s);

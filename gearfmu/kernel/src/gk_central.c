@@ -123,7 +123,7 @@ static int closed(const gk_model *model, const gk_setup *setup, double position)
     gk_system_form(model, setup, &empty, &work->explicit_rows, work);
     for (int i = 0; i < s->n; i++) {
         s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
-        if (i < s->contacts) s->slope[i] = gk_law_at(&s->local[s->place_of[i]], s->width[i], full * s->width[i]).slope;
+        s->slope[i] = i < s->contacts ? gk_law_at(&s->local[s->place_of[i]], s->width[i], full * s->width[i]).slope : 0.0;
     }
     gk_limit_compliance(s, full, 0, s->J);
     return gk_limit_cholesky(s->J, s->n);

@@ -46,8 +46,6 @@ static inline double nearest(double x) {
     return (x + shift) - shift;
 }
 
-static const double LN2_HIGH = 0x1.62e42fefp-1, LN2_LOW = 0x1.473de6af278edp-34; /* 32 bits, so n·LN2_HIGH is exact */
-
 /* exp r = 1 + r + r² EXP(r) on |r| ≤ ln 2 / 2; 2.6e-18 */
 static const double EXP[] = {0x1.0000000000000p-1,  0x1.5555555555557p-3,  0x1.5555555555556p-5,  0x1.11111111100dfp-7,
                              0x1.6c16c16c162d6p-10, 0x1.a01a01abe6323p-13, 0x1.a01a01a6d7831p-16, 0x1.71de0237484cdp-19,
@@ -58,7 +56,7 @@ double gk_exp(double x) {
     if (x > 709.79) return HUGE_VAL;
     if (x < -745.14) return 0.0;
     double n = nearest(x * 0x1.71547652b82fep+0);
-    double high = x - n * LN2_HIGH, low = n * LN2_LOW;
+    double high = x - n * GK_LN2_HIGH, low = n * GK_LN2_LOW;
     double r = high - low;
     double tail = (high - r) - low;
     double y = 1.0 + (r + (tail + r * r * HORNER(EXP, r)));
@@ -66,10 +64,6 @@ double gk_exp(double x) {
     int half = (int)n / 2;
     return y * power_of_two(half) * power_of_two((int)n - half);
 }
-
-/* log((1 + s)/(1 − s)) = 2 s + s z LOG(z), z = s², |s| ≤ (√2 − 1)/(√2 + 1); 3.2e-16 */
-static const double LOG[] = {0x1.5555555555558p-1, 0x1.99999999952e2p-2, 0x1.2492492df14bcp-2, 0x1.c71c62e57c3c4p-3,
-                             0x1.7462b4ac441afp-3, 0x1.39fe604146b74p-3, 0x1.2b584c6b42d60p-3};
 
 double gk_log(double x) {
     if (x == 0.0) return -HUGE_VAL;
@@ -87,8 +81,8 @@ double gk_log(double x) {
     /* log(1 + f) = f − f²/2 + s (f²/2 + R) keeps the leading terms exact */
     double f = m - 1.0, n = exponent;
     double s = f / (2.0 + f), z = s * s, half_square = 0.5 * f * f;
-    double r = z * HORNER(LOG, z);
-    return n * LN2_HIGH - ((half_square - (s * (half_square + r) + n * LN2_LOW)) - f);
+    double r = z * HORNER(GK_LOG, z);
+    return n * GK_LN2_HIGH - ((half_square - (s * (half_square + r) + n * GK_LN2_LOW)) - f);
 }
 
 /* sin r = r + r z SIN(z), cos r = 1 − z/2 + z² COS(z), z = r², |r| ≤ π/4; 3.2e-17, 2.3e-18 */

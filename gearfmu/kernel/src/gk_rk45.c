@@ -17,13 +17,13 @@ static const double ERROR[STAGES] = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920
 /* y ← S c S y on the active rows: what dashpots c on the paths S = P + δ′ make of the rate of λ */
 void gk_rk45_resist(const gk_setup *setup, const gk_system *s, double *y)
 {
-    double path[MAX_ROWS];
+    double path[MAX_STRIDE];
     for (int pass = 0; pass < 2; pass++) {
         gk_solve_path(s, y, path);
         for (int i = 0; i < s->n; i++) {
             const int contact = s->kind[i] == ROW_CONTACT;
             const double c = !s->active[i] ? 0.0 : contact ? (GK_ON(setup, contact_damping) ? setup->damping * setup->strip_width[i % s->strips] : 0.0) : setup->link_d[s->link_of[i]];
-            y[i] = (path[i] + (contact ? s->slope[i] * y[i] : 0.0)) * (pass ? s->active[i] : c);
+            y[i] = (path[i] + s->slope[i] * y[i]) * (pass ? s->active[i] : c);
         }
     }
 }
@@ -68,6 +68,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, const gk_data
     gk_step_recall(setup, data, s);
     for (int r = 0; r < s->n; r++)
         if (s->kind[r] == ROW_SPRING) s->clip[r] = 2;
+    gk_solve_status(s);
     gk_solve_plain(s);
     gk_system_rates(setup, work, speed, work->speed, rate);
     add_dashpots(setup, s, rate);

@@ -23,8 +23,7 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
     for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
     for (int j = 0; j < s->n; j++) {
         const gk_quad *row = (const gk_quad *)(matrix + j * 4 * quads);
-        if (x[j] != 0.0)
-            for (int q = 0; q < quads; q++) sum[q] += x[j] * row[q];
+        for (int q = 0; q < quads; q++) sum[q] += x[j] * row[q];
     }
     memcpy(y, sum, (size_t)quads * sizeof *sum);
 }
@@ -32,18 +31,26 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
 /* y = matrix x; the matrix is symmetric, so its rows are its columns */
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y) { GK_SIZED(s->stride / 4, times, s, matrix, x, y) }
 
-/* what the dashpots' force deflects outside their paths: Q·end − ½K·dash, K = Q − A */
-void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag)
+GK_INLINE void lagging(const gk_system *s, const double *end, const double *dash, double *lag, const int quads)
 {
-    double later[MAX_STRIDE], mean[MAX_STRIDE], part[MAX_STRIDE];
-    for (int i = 0; i < s->n; i++) mean[i] = 0.5 * dash[i], later[i] = end[i] - mean[i];
-    gk_solve_times(s, s->Q, later, lag);
-    gk_solve_times(s, s->A, mean, part);
-    for (int i = 0; i < s->n; i++) lag[i] += part[i];
+    gk_quad sum[MAX_STRIDE / 4];
+    for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
+    for (int j = 0; j < s->n; j++) {
+        const gk_quad *Q = (const gk_quad *)s->Q + j * quads, *A = (const gk_quad *)s->A + j * quads;
+        const double mean = 0.5 * dash[j], later = end[j] - mean;
+        for (int q = 0; q < quads; q++) sum[q] += later * Q[q] + mean * A[q];
+    }
+    memcpy(lag, sum, (size_t)quads * sizeof *sum);
 }
 
+/* what the dashpots' force deflects outside their paths: Q·end − ½K·dash, K = Q − A */
+void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag) { GK_SIZED(s->stride / 4, lagging, s, end, dash, lag) }
+
+/* P x; x and y of whole quads */
 GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const int strips)
 {
+    const gk_quad *spring = (const gk_quad *)s->spring, *from = (const gk_quad *)x;
+    for (int q = s->contacts / 4; q < s->stride / 4; q++) ((gk_quad *)y)[q] = spring[q] * from[q];
     for (int first = 0, p = 0; first < s->contacts; first += strips, p++)
         for (int a = 0; a < strips; a++) {
             double sum = 0.0;
@@ -52,84 +59,92 @@ GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const
         }
 }
 
-/* P x */
-void gk_solve_path(const gk_system *s, const double *x, double *y)
-{
-    GK_STRIPPED(GK_STRIPS(s), along_paths, s, x, y)
-    for (int i = s->contacts; i < s->n; i++) y[i] = s->spring[i] * x[i];
-}
+void gk_solve_path(const gk_system *s, const double *x, double *y) { GK_STRIPPED(GK_STRIPS(s), along_paths, s, x, y) }
 
 /* a contact that let go in this step: its path springs back, against the dashpot, as far as that does not pull */
 static int opened(const gk_system *s, int i) { return is_contact(s, i) && !s->active[i] && s->force0[i] > 0.0; }
 
-void gk_solve_set(gk_system *s, int i, double force)
+/* rows and dashpots as numbers, after their status has changed */
+void gk_solve_status(gk_system *s)
 {
-    s->force[i] = force;
-    if (is_contact(s, i)) s->law[i] = gk_law_at(&s->local[s->place_of[i]], s->width[i], force);
+    s->dashpots = 0;
+    for (int i = s->n; i < s->stride; i++) s->on[i] = s->gain[i] = s->pull[i] = s->fixed[i] = s->late[i] = s->rest[i] = 0.0;
+    for (int i = 0; i < s->n; i++) {
+        const int acts = s->clip[i] != 2, linear = s->active[i] && s->clip[i] == 0, limited = s->active[i] && acts && !linear;
+        s->on[i] = s->active[i];
+        s->gain[i] = linear ? s->damping[i] : 0.0;
+        s->pull[i] = limited ? s->clip[i] : 0.0;
+        s->fixed[i] = opened(s, i) ? gk_max(-s->damping[i] * s->squeeze0[i], -s->force0[i]) : 0.0;
+        s->late[i] = acts ? s->beta[i] : 0.0;
+        s->rest[i] = acts ? s->tail[i] : 0.0;
+        s->dashpots |= s->gain[i] != 0.0 || limited || s->fixed[i] != 0.0 || s->rest[i] != 0.0;
+    }
 }
 
-/* everything that follows from λ, α and the status of rows and dashpots */
+GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
+{
+#define OF(array) ((gk_quad *)s->array)
+    for (int q = 0; q < quads; q++) {
+        OF(squeeze)[q] = OF(linear)[q] + OF(delta)[q];
+        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]) + OF(fixed)[q];
+        OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q];
+        OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
+        OF(z)[q] = OF(force)[q] + OF(eta)[q];
+    }
+#undef OF
+    for (int i = s->n - s->clutches; i < s->n; i++) s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
+    times(s, s->D, s->z, s->Dz, quads);
+    times(s, s->A, s->force, s->Al, quads);
+    if (s->dashpots) lagging(s, s->end, s->dash, s->lag, quads);
+    else memset(s->lag, 0, (size_t)quads * sizeof(gk_quad));
+}
+
+/* everything that follows from λ, α and the status of rows and dashpots; the law has been applied */
 void gk_solve_settle(gk_system *s)
 {
-    int dashpots = 0;
     gk_solve_path(s, s->force, s->linear);
-    for (int i = 0; i < s->n; i++) {
-        s->squeeze[i] = s->linear[i] + (is_contact(s, i) ? s->law[i].delta : 0.0);
-        s->dash[i] = opened(s, i) ? gk_max(-s->damping[i] * s->squeeze0[i], -s->force0[i]) : 0.0;
-        if (s->active[i] && s->clip[i] != 2) s->dash[i] = s->clip[i] ? s->clip[i] * (s->force0[i] + s->force[i]) : s->damping[i] * (s->squeeze[i] - s->squeeze0[i]);
-        s->end[i] = s->clip[i] == 2 ? 0.0 : s->beta[i] * s->dash[i] + s->tail[i];
-        dashpots |= s->end[i] != 0.0 || s->dash[i] != 0.0;
-        s->eta[i] = s->alpha * s->direction[i] + s->dash[i];
-        if (!is_clutch(s, i)) s->z[i] = s->force[i] + s->eta[i];
-        else if (s->active[i]) s->z[i] = s->force[i];
-    }
-    gk_solve_times(s, s->D, s->z, s->Dz);
-    gk_solve_times(s, s->A, s->force, s->Al);
-    if (dashpots) gk_solve_lag(s, s->end, s->dash, s->lag);
-    else memset(s->lag, 0, (size_t)s->n * sizeof *s->lag);
+    GK_SIZED(s->stride / 4, dashpots_and_sums, s)
 }
 
 static void residual(const gk_system *s, double *r)
 {
-    for (int i = 0; i < s->stride; i++) r[i] = i < s->n && s->active[i] ? -(gk_solve_end_gap(s, i) + gk_solve_massless(s, i)) : 0.0;
+    const gk_quad *g = (const gk_quad *)s->g, *Dz = (const gk_quad *)s->Dz, *lag = (const gk_quad *)s->lag, *Al = (const gk_quad *)s->Al, *squeeze = (const gk_quad *)s->squeeze, *on = (const gk_quad *)s->on;
+    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + squeeze[q]) * on[q];
 }
 
 /* moves the active λ by x; e: what the local law bends away from its tangent. Returns whether the change still matters. */
 static int move(gk_system *s, const double *x, double *e, double *change)
 {
-    double size = 0.0;
-    *change = 0.0;
-    for (int i = 0; i < s->n; i++) {
-        if (!s->active[i]) continue;
-        if (is_contact(s, i)) {
-            const double before = s->law[i].delta;
-            gk_solve_set(s, i, s->force[i] + x[i]);
-            e[i] = s->law[i].delta - before - s->slope[i] * x[i];
-        } else {
-            s->force[i] += x[i];
-        }
-        *change = gk_max(*change, fabs(x[i]));
-        size = gk_max(size, fabs(s->force[i]));
+    const int quads = s->stride / 4;
+    const gk_quad *by = (const gk_quad *)x, *on = (const gk_quad *)s->on, *slope = (const gk_quad *)s->slope, *delta = (const gk_quad *)s->delta;
+    gk_quad most = {0}, size = {0}, *force = (gk_quad *)s->force, *bent = (gk_quad *)e;
+    for (int q = 0; q < quads; q++) {
+        force[q] += by[q];
+        bent[q] = -delta[q] - slope[q] * by[q];
+        most = gk_larger(most, gk_magnitude(by[q]));
+        size = gk_larger(size, gk_magnitude(force[q] * on[q]));
     }
-    return GK_HAS(hertz) && s->curved && *change > SOLVED * size;
+    gk_law_apply(s);
+    for (int q = 0; q < quads; q++) bent[q] += delta[q];
+    *change = gk_largest(most);
+    return GK_HAS(hertz) && s->curved && *change > SOLVED * gk_largest(size);
 }
 
 /* what the law's bend e leaves in the equations: −(e + B Γ e) */
 static void bend(const gk_system *s, const double *e, double *r)
 {
     const int quads = s->stride / 4;
-    memset(r, 0, (size_t)s->stride * sizeof *r);
-    for (int j = 0; j < s->contacts; j++) {
-        if (!s->active[j] || s->clip[j] != 0 || s->damping[j] == 0.0) continue;
-        gk_axpy(-s->damping[j] * e[j], s->B + j * s->stride, r, 0, quads);
-    }
-    for (int i = 0; i < s->n; i++) r[i] = !s->active[i] ? 0.0 : i < s->contacts ? r[i] - e[i] : r[i];
+    const gk_quad *bent = (const gk_quad *)e, *on = (const gk_quad *)s->on;
+    for (int q = 0; q < quads; q++) ((gk_quad *)r)[q] = -bent[q];
+    for (int j = 0; j < s->contacts; j++)
+        if (s->gain[j] != 0.0) gk_axpy(-s->gain[j] * e[j], s->B + j * s->stride, r, 0, quads);
+    for (int q = 0; q < quads; q++) ((gk_quad *)r)[q] *= on[q];
 }
 
 /* λ of the active rows for the present set. Only the local law and its dashpots are not linear, so that after the first residual only their bend is left. */
 static void newton(gk_system *s)
 {
-    double x[MAX_STRIDE], e[MAX_CONTACTS], change, last = INFINITY;
+    double x[MAX_STRIDE], e[MAX_STRIDE], change, last = INFINITY;
     gk_tangent_factorise(s);
     residual(s, x);
     for (int round = 0; round < CHORD_LIMIT; round++) {
@@ -160,11 +175,11 @@ static void flip(gk_system *s, int i)
 {
     s->active[i] = !s->active[i];
     if (is_clutch(s, i)) {
-        if (!s->active[i]) s->z[i] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
+        if (!s->active[i]) s->slip[i - s->n + s->clutches] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
         s->force[i] = 0.0;
-    } else {
-        if (!s->active[i]) s->clip[i] = 2; /* linear dashpots belong to closed contacts */
-        gk_solve_set(s, i, s->active[i] ? s->force[i] : 0.0);
+    } else if (!s->active[i]) {
+        s->clip[i] = 2; /* linear dashpots belong to closed contacts */
+        s->force[i] = 0.0;
     }
 }
 
@@ -203,9 +218,11 @@ void gk_solve_contacts(gk_system *s)
             else
                 for (int i = 0; i < s->n; i++)
                     if (wrong[i]) flip(s, i);
+            gk_law_apply(s);
         } else if (dashpot_rounds-- <= 0 || !limit_dashpots(s)) {
             return;
         }
+        gk_solve_status(s);
         gk_solve_settle(s);
     }
     s->limit_reached = 1;
@@ -226,6 +243,6 @@ double gk_solve_stored(const gk_system *s)
 {
     double sum = 0.0;
     for (int i = 0; i < s->n; i++)
-        if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + (is_contact(s, i) ? s->law[i].energy : 0.0);
+        if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + s->potential[i];
     return sum;
 }

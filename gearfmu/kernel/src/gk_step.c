@@ -93,58 +93,65 @@ int gk_step_remembered(const gk_data *data, gk_key key)
     return -1;
 }
 
+/* λ0 without dashpots, settled: massless deflection and energy at the start */
+static void recall_forces(const gk_data *data, gk_system *s)
+{
+    const size_t size = (size_t)s->stride * sizeof(double);
+    s->limit_reached = s->rounds = s->dashpots = 0;
+    s->alpha = 0.0;
+    double *const nothing[] = {s->direction, s->squeeze0, s->gain, s->pull, s->fixed, s->late, s->rest};
+    for (size_t a = 0; a < sizeof nothing / sizeof *nothing; a++) memset(nothing[a], 0, size);
+    memset(s->delta + s->contacts, 0, size - (size_t)s->contacts * sizeof(double)); /* links know no local law */
+    memset(s->yield + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
+    memset(s->potential + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
+    memcpy(s->force, s->force0, size);
+    for (int i = s->n - s->clutches; i < s->n; i++) {
+        s->active[i] = (unsigned char)data->locked[s->link_of[i] - CLUTCH_0];
+        s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
+    }
+    gk_law_apply(s);
+    gk_solve_settle(s);
+    s->stored0 = gk_solve_stored(s);
+    gk_solve_lag(s, s->end0, s->dash0, s->lag0);
+    s->held0 = 0.0;
+    for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
+}
+
 /* The start of the step as this step's compliance sees it: massless deflection and energy under λ0, gaps g0 = s0 − C′λ0 − δ(λ0); then the first guess of status and forces */
 void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
 {
     const gk_work *work = setup->work;
-    int given = 0, goes_on = 0; /* forces that act already: given ones, dashpots' */
-    s->limit_reached = s->rounds = 0;
-    s->alpha = 0.0;
-    memset(s->direction, 0, (size_t)s->stride * sizeof *s->direction);
-    for (int i = s->n; i < s->stride; i++) s->force[i] = s->z[i] = s->dash[i] = s->eta[i] = 0.0;
-    memset(s->squeeze0, 0, (size_t)s->n * sizeof *s->squeeze0);
+    int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
+    recall_forces(data, s);
+    memcpy(s->squeeze0, s->squeeze, (size_t)s->stride * sizeof *s->squeeze);
     for (int i = 0; i < s->n; i++) {
-        s->clip[i] = 2;
-        const int acted = s->dash0[i] != 0.0 && (s->kind[i] != ROW_CONTACT || s->force0[i] > 0.0);
+        const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
         s->beta[i] = acted ? 0.25 * (3.0 + MEMORY) : 0.5;
         s->tail[i] = acted ? -0.25 * (1.0 - MEMORY) * s->dash0[i] - MEMORY * s->end0[i] : 0.0;
-        s->active[i] = s->kind[i] == ROW_CLUTCH ? (unsigned char)data->locked[s->link_of[i] - CLUTCH_0] : 1;
-        s->z[i] = 0.0;
-        if (s->kind[i] == ROW_CLUTCH && !s->active[i]) s->z[i] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
-        gk_solve_set(s, i, s->force0[i]);
+        s->g0[i] = -gk_solve_massless(s, i);
     }
-    gk_solve_settle(s);
-    s->stored0 = gk_solve_stored(s);
-    s->held0 = 0.0;
-    gk_solve_lag(s, s->end0, s->dash0, s->lag0);
-    for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
-    for (int i = 0; i < s->n; i++) {
-        const double deflection = gk_solve_massless(s, i);
-        s->squeeze0[i] = s->squeeze[i];
-        s->g0[i] = -deflection;
-        switch (s->kind[i]) {
-        case ROW_CONTACT: {
-            const gk_place *p = &work->place[s->place_of[i]];
-            if (p->memory < 0) s->g0[i] = s->g[i];
-            else s->g0[i] += data->memory[p->memory].gap[i % GK_STRIPS(s)];
-            s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
-            if (s->force0[i] > 0.0 && s->damping[i] > 0.0) s->clip[i] = 0;
-            break;
-        }
-        case ROW_SPRING: s->clip[i] = 0; break;
-        case ROW_TORQUE:
-            s->active[i] = 0;
-            s->force[i] = work->torque[s->link_of[i] - PORT_0];
-            given |= s->force[i] != s->force0[i];
-            break;
-        case ROW_CLUTCH: s->g0[i] = s->g[i];
-        }
-        s->end[i] = s->clip[i] == 2 ? 0.0 : s->tail[i];
-        goes_on |= s->end[i] != 0.0;
+    for (int i = 0; i < s->contacts; i++) {
+        const int memory = work->place[s->place_of[i]].memory;
+        s->g0[i] = memory < 0 ? s->g[i] : s->g0[i] + data->memory[memory].gap[i % GK_STRIPS(s)];
+        s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
+        s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }
+    for (int i = s->contacts; i < s->n; i++) {
+        s->clip[i] = s->kind[i] == ROW_SPRING ? 0 : 2;
+        if (s->kind[i] == ROW_SPRING) s->active[i] = 1;
+        if (s->kind[i] == ROW_CLUTCH) s->g0[i] = s->g[i];
+        if (s->kind[i] != ROW_TORQUE) continue;
+        s->active[i] = 0;
+        s->force[i] = work->torque[s->link_of[i] - PORT_0];
+        given |= s->force[i] != s->force0[i];
+    }
+    gk_solve_status(s);
     if (given) gk_solve_settle(s);
-    else if (goes_on) gk_solve_lag(s, s->end, s->dash, s->lag);
+    else if (s->dashpots) {
+        memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
+        gk_solve_lag(s, s->end, s->dash, s->lag);
+    }
     s->owed = data->ledger.owed;
     s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }

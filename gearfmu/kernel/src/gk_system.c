@@ -56,6 +56,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->dash0[s->n] = place->memory < 0 ? 0.0 : data->memory[place->memory].dash[i];
             s->weight[s->n] = setup->strip_width[i] * setup->slices / setup->width;
             s->width[s->n] = setup->strip_width[i];
+            s->per_width[s->n] = 1.0 / setup->strip_width[i];
             if (i == 0) gk_law_set(model, setup, place->curvature, &s->local[p]);
         }
     s->contacts = s->n;
@@ -65,7 +66,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
 {
     gk_system *s = &work->system;
     s->strips = setup->strips;
-    s->n = 0;
+    s->n = s->clutches = 0;
     list_contacts(model, setup, data, h, work);
     for (int g = 0; g < 2; g++)
         for (int k = 0; k < BORE_ROWS; k++) s->bore[g][k] = -1;
@@ -83,8 +84,12 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
         s->spring[s->n] = setup->link_c[link];
         s->damping[s->n] = 2.0 * setup->link_d[link] / h;
         s->bound[s->n] = link >= CLUTCH_0 ? 2.0 * data->value[GK_OF_SHAFT(CAPACITY, link - CLUTCH_0)] : 0.0;
+        s->width[s->n] = s->per_width[s->n] = 0.0;
+        s->clutches += link >= CLUTCH_0;
         s->n++;
     }
+    s->stride = (s->n + 3) / 4 * 4;
+    for (int i = s->n; i < s->n + 4; i++) s->g[i] = s->force0[i] = s->dash0[i] = s->end0[i] = s->spring[i] = s->width[i] = s->per_width[i] = 0.0;
 }
 
 /* elastic part of every row from what the basis rows read, in the row's own sense */
@@ -215,7 +220,6 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
 {
     gk_system *s = &work->system;
     list_rows(model, setup, data, k->h, work);
-    s->stride = (s->n + 3) / 4 * 4;
     const size_t size = (size_t)(s->stride * s->stride);
     const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma;
     s->D = work->matrix;

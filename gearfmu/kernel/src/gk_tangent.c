@@ -12,19 +12,19 @@ GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 }
 
 /* column j: what λ_j does to all rows */
-GK_INLINE void contact_column(const gk_system *s, int j, const double *mask, double *column, const int quads, const int strips)
+GK_INLINE void contact_column(const gk_system *s, int j, double *column, const int quads, const int strips)
 {
     const int place = s->place_of[j], first = place * strips;
-    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B, *on = (const gk_quad *)mask;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B, *on = (const gk_quad *)s->on;
     const double *path = s->path[place] + j - first;
     gk_quad c[MAX_STRIDE / 4];
     double own[MAX_SLICES];
     for (int q = 0; q < quads; q++) c[q] = D[q] + A[q];
-    if (s->clip[j] == 1 || s->clip[j] == -1)
-        for (int q = 0; q < quads; q++) c[q] += s->clip[j] * B[j * quads + q];
+    if (s->pull[j] != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
     for (int e = 0; e < strips; e++) {
-        own[e] = s->active[first + e] ? path[e * strips] + (first + e == j ? s->slope[j] : 0.0) : 0.0;
-        const double moves = s->clip[first + e] == 0 ? s->damping[first + e] * own[e] : 0.0;
+        own[e] = s->on[first + e] * (path[e * strips] + (first + e == j ? s->slope[j] : 0.0));
+        const double moves = s->gain[first + e] * own[e];
         if (moves == 0.0) continue;
         for (int q = 0; q < quads; q++) c[q] += moves * B[(first + e) * quads + q];
     }
@@ -32,10 +32,10 @@ GK_INLINE void contact_column(const gk_system *s, int j, const double *mask, dou
     for (int e = 0; e < strips; e++) column[first + e] += own[e];
 }
 
-GK_INLINE void link_column(const gk_system *s, int j, const double *mask, double *column, const int quads)
+GK_INLINE void link_column(const gk_system *s, int j, double *column, const int quads)
 {
-    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B + j * quads, *on = (const gk_quad *)mask;
-    const double moves = s->clip[j] == 0 ? s->damping[j] * s->spring[j] : 0.0;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *B = (const gk_quad *)s->B + j * quads, *on = (const gk_quad *)s->on;
+    const double moves = s->gain[j] * s->spring[j];
     for (int q = 0; q < quads; q++) {
         gk_quad c = D[q] + A[q];
         if (moves != 0.0) c += moves * B[q];
@@ -47,8 +47,6 @@ GK_INLINE void link_column(const gk_system *s, int j, const double *mask, double
 GK_INLINE void columns(gk_system *s, const int quads)
 {
     const int n = s->n, stride = 4 * quads, strips = GK_STRIPS(s);
-    double mask[MAX_STRIDE];
-    for (int i = 0; i < stride; i++) mask[i] = i < n && s->active[i];
     for (int j = 0; j < n; j++)
         if (s->active[j] && s->clip[j] != 2) form_dashpot(s, j, quads);
     for (int j = 0; j < n; j++) {
@@ -57,9 +55,9 @@ GK_INLINE void columns(gk_system *s, const int quads)
             memset(column, 0, (size_t)stride * sizeof *column);
             column[j] = 1.0;
         } else if (j < s->contacts) {
-            GK_STRIPPED(strips, contact_column, s, j, mask, column, quads)
+            GK_STRIPPED(strips, contact_column, s, j, column, quads)
         } else {
-            link_column(s, j, mask, column, quads);
+            link_column(s, j, column, quads);
         }
     }
 }
@@ -92,7 +90,7 @@ GK_INLINE void factorise(gk_system *s, const int quads)
 
 void gk_tangent_factorise(gk_system *s)
 {
-    for (int i = 0; i < s->contacts; i++) s->slope[i] = s->active[i] ? s->law[i].slope : 0.0;
+    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)s->slope)[q] = ((gk_quad *)s->yield)[q] * ((gk_quad *)s->on)[q];
     GK_SIZED(s->stride / 4, factorise, s)
     s->rounds++;
 }

@@ -32,7 +32,8 @@
 #define gk_solve_contacts gk_solve_contacts_avx2
 #define gk_solve_plain gk_solve_plain_avx2
 #define gk_solve_settle gk_solve_settle_avx2
-#define gk_solve_set gk_solve_set_avx2
+#define gk_solve_status gk_solve_status_avx2
+#define gk_law_apply gk_law_apply_avx2
 #define gk_solve_times gk_solve_times_avx2
 #define gk_solve_path gk_solve_path_avx2
 #define gk_solve_lag gk_solve_lag_avx2

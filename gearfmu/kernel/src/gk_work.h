@@ -20,32 +20,36 @@ typedef struct gk_approach { double delta, slope, energy; } gk_approach; /* δ(�
  * D: what a force in the step does to the gaps; P + δ: the path that the row's own dashpot is parallel to; A = Q − K: everything else that has no mass, Q, less the κ part.
  * lag = Q f_d − ½K η_d: what the dashpots' force at the end of the step, f_d = β η_d + tail, deflects; the κ part of its mean. */
 typedef struct gk_system {
-    int contacts, n, stride, strips;
+    int contacts, n, stride, strips, clutches; /* clutches are the last rows */
     gk_row_kind kind[MAX_ROWS];
     int link_of[MAX_ROWS];            /* −1 for contacts */
     int place_of[MAX_CONTACTS];
     int bore[2][BORE_ROWS];           /* rows that pull at the bores, −1: none */
-    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_ROWS], dash0[MAX_ROWS], end0[MAX_STRIDE], lag0[MAX_STRIDE];
-    double damping[MAX_ROWS];         /* 2c/h of the row's dashpot */
-    double bound[MAX_ROWS];           /* clutch: |z| ≤ bound */
+    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_STRIDE], dash0[MAX_STRIDE], end0[MAX_STRIDE], lag0[MAX_STRIDE];
+    double damping[MAX_STRIDE];        /* 2c/h of the row's dashpot */
+    double bound[MAX_ROWS], slip[2];  /* clutch: |z| ≤ bound; z of a slipping one, by clutch */
     double weight[MAX_ROWS];          /* slices that a row stands for: η is shared out per slice */
-    double width[MAX_CONTACTS];
+    double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in links */
     gk_local local[MAX_PAIRS];        /* law of a place, per metre */
     double rigid[RIGID][MAX_STRIDE];  /* derivative of the rows by each rigid coordinate */
     double *D, *A, *Q;                /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
     double *J, *L, *B;                /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor; what a dashpot's force does, D + ½A + (β − ½)Q */
     double inverse[MAX_STRIDE];       /* of the pivots */
-    double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_ROWS]; /* P: strips of a place, (strips, strips); links: 1/k */
+    double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_STRIDE]; /* P: strips of a place, (strips, strips); links: 1/k */
 
     double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE], z[MAX_STRIDE]; /* λ, η_d, η = η_d + α·direction, z = λ + η */
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
+    double beta[MAX_STRIDE], tail[MAX_STRIDE]; /* of a dashpot that acts: f_d = β η_d + what the last step leaves of it */
+    double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], fixed[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE]; /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
+                                         η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1) + fixed, f_d = late·η_d + rest */
+    int dashpots;                     /* any of them */
     double direction[MAX_STRIDE], alpha;
-    double beta[MAX_STRIDE], tail[MAX_STRIDE], end[MAX_STRIDE]; /* f_d = β η_d + what the last step leaves of it */
+    double end[MAX_STRIDE];           /* f_d */
     double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE]; /* D z, Aλ, Q f_d − ½K η_d */
     double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
-    gk_approach law[MAX_CONTACTS];    /* at the present λ */
-    double slope[MAX_CONTACTS];       /* δ′ in the tangent */
+    double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at the present λ: δ, δ′, ∫ λ dδ; 0 in links */
+    double slope[MAX_STRIDE];         /* δ′ in the tangent */
     double stored0;                   /* energy of the massless part at the start of the step */
     double held0;                     /* energy that the dashpots' force holds in Q at the start */
     double owed, due;                 /* defect of energy that the steps before left; what of it this step should make good */
@@ -111,11 +115,12 @@ void gk_table_path(const gk_model *model, const gk_setup *setup, const gk_place 
 void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law);
 void gk_law_bounds(const gk_model *model, gk_setup *setup);
 gk_approach gk_law_at(const gk_local *law, double width, double force);
+void gk_law_apply(gk_system *s);
 /* gk_solve.c */
 void gk_solve_contacts(gk_system *s);
 void gk_solve_plain(gk_system *s);
 void gk_solve_settle(gk_system *s);
-void gk_solve_set(gk_system *s, int row, double force);
+void gk_solve_status(gk_system *s);
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
 void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag);
 void gk_solve_path(const gk_system *s, const double *x, double *y);
