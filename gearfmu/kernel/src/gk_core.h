@@ -106,6 +106,7 @@ typedef struct gk_modal { /* dynamic modes of one gear: n lanes, [first parts | 
     gk_real *rows;        /* (2 flanks, rolls, strips, n) tooth 0 */
     gk_real *bore;        /* (3, n) */
     gk_real *cosine, *sine; /* (z, pairs) */
+    double *turn;           /* (z, 2) cosine and sine of the angle from tooth 0 to a tooth */
     gk_table residual;    /* static compliance of everything that is not dynamic */
     double *path;         /* (2 flanks, rolls, strips² padded to 4): residual of a tooth's strips beyond all stored modes, what the contact's dashpot is parallel to */
 } gk_modal;

@@ -21,14 +21,12 @@ static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const 
 }
 
 /* x and y stay away where no bearing reads them */
-static void bore_rows(const gk_modal *modal, int radial, double attitude, gk_real *out)
+static void bore_rows(const gk_modal *modal, int radial, const double *axes, gk_real *out)
 {
-    double sine, cosine;
     const int n = 2 * modal->n / LANES;
     memcpy(out + BORE_RZ * modal->n, modal->bore + BORE_RZ * modal->n, (size_t)modal->n * sizeof *out);
     if (!radial) return;
-    gk_sincos(attitude, &sine, &cosine);
-    const gk_real c = (gk_real)cosine, s = (gk_real)sine;
+    const gk_real c = (gk_real)axes[0], s = (gk_real)axes[1];
     const gk_half *x = (const gk_half *)modal->bore, *y = x + n;
     gk_half *to = (gk_half *)out;
     for (int k = 0; k < n; k++) {
@@ -43,9 +41,10 @@ void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *fr
     for (int g = 0; g < 2; g++) {
         const gk_modal *modal = &setup->modal[g];
         work->attitude[g] = frame[g ? PHIB : PHIA] + model->gear[g].phase;
+        gk_sincos(work->attitude[g], &work->axes[g][1], &work->axes[g][0]);
         if (!GK_LANES(setup, g)) continue;
         size_t row = (size_t)GK_STRIPS(setup) * modal->n;
         for (int p = 0; p < work->places; p++) place_rows(setup, &model->gear[g], g, &work->place[p], work->basis[g] + p * row);
-        bore_rows(modal, GK_HAS(bearings) && setup->link[BEARING_0X + 2 * g], work->attitude[g], work->basis[g] + work->places * row);
+        bore_rows(modal, GK_HAS(bearings) && setup->link[BEARING_0X + 2 * g], work->axes[g], work->basis[g] + work->places * row);
     }
 }

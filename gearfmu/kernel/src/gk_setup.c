@@ -45,6 +45,7 @@ static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g,
     m->bore = take(b, BORE_ROWS * n * sizeof(gk_real));
     m->cosine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
     m->sine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
+    m->turn = take(b, 2 * (size_t)gear->z * sizeof(double));
     m->path = take(b, 2 * R * ((A * A + 3) / 4 * 4) * sizeof(double));
     lay_out_table(b, setup, gear, 1, &m->residual);
 }
@@ -167,6 +168,7 @@ static void fill_modes(const gk_gear *gear, gk_modal *m, int strips, gk_strip_we
     memset(m->bore, 0, (size_t)BORE_ROWS * n * sizeof(gk_real));
     memset(m->cosine, 0, (size_t)gear->z * P * sizeof(gk_real));
     memset(m->sine, 0, (size_t)gear->z * P * sizeof(gk_real));
+    for (int j = 0; j < gear->z; j++) gk_sincos(2.0 * GK_PI * j / gear->z, &m->turn[2 * j + 1], &m->turn[2 * j]);
     int lane = -1;
     for (int k = 0; k < m->count; k++) {
         if (gear->part[k] != 2) lane++;

@@ -171,9 +171,10 @@ static int flank_ended(const gk_data *data, const gk_work *work, int strips)
 
 static int all_finite(const gk_system *s)
 {
-    for (int i = 0; i < s->n; i++)
-        if (!(fabs(s->force[i]) < HUGE_FORCE && fabs(s->z[i]) < HUGE_FORCE && fabs(s->g[i]) < HUGE_FORCE)) return 0;
-    return 1;
+    const gk_quad *force = (const gk_quad *)s->force, *z = (const gk_quad *)s->z, *g = (const gk_quad *)s->g;
+    gk_bits fine = ~(gk_bits){0};
+    for (int q = 0; q < s->stride / 4; q++) fine &= (gk_magnitude(force[q]) < HUGE_FORCE) & (gk_magnitude(z[q]) < HUGE_FORCE) & (gk_magnitude(g[q]) < HUGE_FORCE);
+    return (fine[0] & fine[1] & fine[2] & fine[3]) != 0;
 }
 
 /* Σ rows·x and Σ rows·y into lanes: modal forces of the row forces x and y on gear g */
@@ -181,16 +182,27 @@ void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double
 {
     const gk_work *work = setup->work;
     const gk_system *s = &work->system;
-    const int n = GK_LANES(setup, g);
-    memset(out_x, 0, (size_t)n * sizeof *out_x);
-    memset(out_y, 0, (size_t)n * sizeof *out_y);
+    const int halves = 2 * GK_LANES(setup, g) / LANES;
+    const gk_half *rows[MAX_BASIS];
+    gk_half of_x[MAX_BASIS], of_y[MAX_BASIS];
+    int count = 0;
     for (int r = 0; r < s->contacts + BORE_ROWS; r++) {
         const int row = r < s->contacts ? r : s->bore[g][r - s->contacts];
         if (row < 0 || (x[row] == 0.0 && y[row] == 0.0)) continue;
-        const gk_real sign = r < s->contacts ? -1 : 1, w = sign * (gk_real)x[row], u = sign * (gk_real)y[row];
-        const gk_half *b = (const gk_half *)(work->basis[g] + (size_t)r * n);
-        gk_half *to_x = (gk_half *)out_x, *to_y = (gk_half *)out_y;
-        for (int i = 0; i < 2 * n / LANES; i++) to_x[i] += w * b[i], to_y[i] += u * b[i];
+        const gk_real sign = r < s->contacts ? -1 : 1;
+        of_x[count] = (gk_half){0} + sign * (gk_real)x[row];
+        of_y[count] = (gk_half){0} + sign * (gk_real)y[row];
+        rows[count++] = (const gk_half *)work->basis[g] + (size_t)r * halves;
+    }
+    for (int i = 0; i < halves; i++) {
+        gk_half sum_x = {0}, sum_y = {0};
+        for (int r = 0; r < count; r++) {
+            const gk_half b = rows[r][i];
+            sum_x += of_x[r] * b;
+            sum_y += of_y[r] * b;
+        }
+        ((gk_half *)out_x)[i] = sum_x;
+        ((gk_half *)out_y)[i] = sum_y;
     }
 }
 
@@ -240,8 +252,7 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     for (int d = 0; d < RIGID; d++) {
         const double z = gk_dot_quads(s->rigid[d], s->z, s->stride / 4);
         double force = gk_dot_quads(s->rigid[d], s->force, s->stride / 4);
-        for (int i = s->contacts; i < s->n; i++)
-            if (s->kind[i] == ROW_CLUTCH) force -= s->rigid[d][i] * s->force[i];
+        for (int i = s->n - s->clutches; i < s->n; i++) force -= s->rigid[d][i] * s->force[i];
         const double before = data->x[d];
         data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
         data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_mass[d] * z;

@@ -159,22 +159,28 @@ void gk_system_rates(const gk_setup *setup, gk_work *work, const gk_real *const 
     }
 }
 
-/* R = Σ rowᵀrow/m over the rigid coordinates: D takes mobility·R, A gives κ·R */
+/* row i of R = Σ rowᵀrow/m over the rigid coordinates that move */
+GK_INLINE void rigid_row(const gk_setup *setup, const gk_system *s, const int *moving, int count, int i, gk_quad *sum, const int quads)
+{
+    for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
+    for (int m = 0; m < count; m++) {
+        const double *coordinate = s->rigid[moving[m]], w = setup->inverse_mass[moving[m]] * coordinate[i];
+        if (w != 0.0)
+            for (int q = 0; q < quads; q++) sum[q] += w * ((const gk_quad *)coordinate)[q];
+    }
+}
+
+/* A ← A + Q; D takes mobility·R, A gives κ·R; strips of a place share one row of R */
 GK_INLINE void add_rows(const gk_setup *setup, const gk_coefficients *k, gk_system *s, const int quads)
 {
     int moving[RIGID], count = 0;
+    gk_quad sum[MAX_STRIDE / 4], *D = (gk_quad *)s->D, *A = (gk_quad *)s->A;
+    const gk_quad *Q = (const gk_quad *)s->Q;
     for (int d = 0; d < RIGID; d++)
         if (setup->inverse_mass[d] > 0.0) moving[count++] = d;
-    for (int i = 0; i < s->n; i++) {
-        gk_quad sum[MAX_STRIDE / 4], *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
-        for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
-        for (int m = 0; m < count; m++) {
-            const double *coordinate = s->rigid[moving[m]], w = setup->inverse_mass[moving[m]] * coordinate[i];
-            const gk_quad *row = (const gk_quad *)coordinate;
-            if (w != 0.0)
-                for (int q = 0; q < quads; q++) sum[q] += w * row[q];
-        }
-        for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] -= k->rigid_kappa * sum[q];
+    for (int i = 0; i < s->n; i++, D += quads, A += quads, Q += quads) {
+        if (i >= s->contacts || i == 0 || s->place_of[i] != s->place_of[i - 1]) rigid_row(setup, s, moving, count, i, sum, quads);
+        for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] += Q[q] - k->rigid_kappa * sum[q];
     }
 }
 
@@ -238,7 +244,6 @@ void gk_system_form(const gk_model *model, const gk_setup *setup, const gk_data 
         for (int g = 0; g < 2 && !tables; g++) gram(setup, work, g, k, s->D, s->A);
     }
     gaps(model, setup, k->h, work);
-    for (int i = 0; i < s->n * s->stride; i++) s->A[i] += s->Q[i];
     add_rigid(setup, k, s);
     if (GK_ON(setup, residual) && GK_ON(setup, contact_damping)) take_paths(model, setup, work);
     else memset(s->path, 0, (size_t)work->places * sizeof *s->path); /* no dashpot asks for it */

@@ -164,15 +164,12 @@ enum { HALVES = (KINDS * MAX_SLICES * MAX_SLICES + 7) / 8 };
 /* Σ w_i w_j cell_ij over the 4 × 4 grid rolls around two places, added to sum */
 GK_INLINE void interpolate(const gk_place *p, const gk_place *q, int g, const gk_real *cells, int rolls, gk_half *total, const int halves)
 {
-    gk_half sum[HALVES];
-    for (int k = 0; k < halves; k++) sum[k] = total[k];
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const gk_real w = (gk_real)(p->weight[g][i] * q->weight[g][j]);
-            const gk_half *t = (const gk_half *)cells + (size_t)(((p->index[g] + i) * rolls + q->index[g] + j) * halves);
-            for (int k = 0; k < halves; k++) sum[k] += w * t[k];
-        }
-    memcpy(total, sum, (size_t)halves * sizeof *sum);
+    const gk_half *t = (const gk_half *)cells + (size_t)((p->index[g] * rolls + q->index[g]) * halves);
+    const gk_real w0 = (gk_real)q->weight[g][0], w1 = (gk_real)q->weight[g][1], w2 = (gk_real)q->weight[g][2], w3 = (gk_real)q->weight[g][3];
+    for (int i = 0; i < 4; i++, t += rolls * halves) {
+        const gk_real w = (gk_real)p->weight[g][i];
+        for (int k = 0; k < halves; k++) total[k] += w * ((w0 * t[k] + w1 * t[halves + k]) + (w2 * t[2 * halves + k] + w3 * t[3 * halves + k]));
+    }
 }
 
 /* a block at (row, column) and its mirror image */
@@ -204,42 +201,57 @@ static void flank_pair(const gk_model *model, const gk_work *work, const gk_tabl
     GK_STRIPPED(strips, put_blocks, (const gk_real *)sum, table[0]->kinds, out, work->system.stride, p * strips, q * strips)
 }
 
-/* strips of a place to the bore of gear g, turned from the tooth's axes into inertial ones */
-static void place_bore(const gk_model *model, const gk_work *work, int g, const gk_table *table, int p, int strips, double *const out[KINDS])
+typedef struct bores { int count, of[BORE_ROWS], row[BORE_ROWS]; } bores; /* rows that pull at a gear's bore: which of x, y, rz, and where they stand */
+
+static bores live_bores(const gk_system *s, int g)
 {
-    const gk_gear *gear = &model->gear[g];
+    bores b = {0};
+    for (int i = 0; i < BORE_ROWS; i++)
+        if (s->bore[g][i] >= 0) b.of[b.count] = i, b.row[b.count++] = s->bore[g][i];
+    return b;
+}
+
+/* strips of a place to the bore of gear g, turned from the tooth's axes into inertial ones */
+GK_INLINE void place_bore(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, int p, const bores *b, double *const out[KINDS], const int kinds, const int count)
+{
+    const gk_work *work = setup->work;
     const gk_place *place = &work->place[p];
-    const int stride = work->system.stride, kinds = table->kinds, *bore = work->system.bore[g];
-    double sine, cosine;
-    gk_sincos(work->attitude[g] + 2.0 * GK_PI * place->tooth[g] / gear->teeth, &sine, &cosine);
-    for (int a = 0; a < strips; a++) {
-        const int row = p * strips + a;
-        gk_quad c[KINDS] = {{0}, {0}, {0}};
-        const gk_quad *t = (const gk_quad *)table->fb + (size_t)((place->flank * gear->rolls + place->index[g]) * strips + a) * (size_t)kinds;
-        for (int i = 0; i < 4; i++, t += strips * kinds)
-            for (int kind = 0; kind < kinds; kind++) c[kind] += place->weight[g][i] * t[kind];
-        for (int kind = 0; kind < kinds; kind++) {
-            const double pulls[BORE_ROWS] = {c[kind][0] * cosine - c[kind][1] * sine, c[kind][0] * sine + c[kind][1] * cosine, c[kind][2]};
-            for (int i = 0; i < BORE_ROWS; i++)
-                if (bore[i] >= 0) out[kind][row * stride + bore[i]] = out[kind][bore[i] * stride + row] = -pulls[i];
+    const int strips = GK_STRIPS(setup), stride = work->system.stride;
+    const double *turn = setup->modal[g].turn + 2 * place->tooth[g], *axes = work->axes[g], *w = place->weight[g];
+    const double cosine = axes[0] * turn[0] - axes[1] * turn[1], sine = axes[1] * turn[0] + axes[0] * turn[1];
+    const gk_quad *t = (const gk_quad *)table->fb + (size_t)((place->flank * model->gear[g].rolls + place->index[g]) * strips * kinds);
+    for (int a = 0; a < strips; a++)
+        for (int kind = 0; kind < kinds; kind++, t++) {
+            const gk_quad c = (w[0] * t[0] + w[1] * t[strips * kinds]) + (w[2] * t[2 * strips * kinds] + w[3] * t[3 * strips * kinds]);
+            const double pulls[BORE_ROWS] = {c[1] * sine - c[0] * cosine, -c[0] * sine - c[1] * cosine, -c[2]};
+            double *matrix = out[kind], *column = matrix + (p * strips + a), *row = matrix + (p * strips + a) * stride;
+            for (int i = 0; i < count; i++) column[b->row[i] * stride] = row[b->row[i]] = pulls[count == BORE_ROWS ? i : b->of[i]];
         }
-    }
+}
+
+/* everything of gear g that its bore takes part in */
+GK_INLINE void bore_blocks(const gk_model *model, const gk_setup *setup, int g, const gk_table *table, const bores *b, double *const out[KINDS], const int kinds, const int count)
+{
+    const gk_work *work = setup->work;
+    for (int p = 0; p < work->places; p++) place_bore(model, setup, g, table, p, b, out, kinds, count);
+    for (int kind = 0; kind < kinds; kind++)
+        for (int i = 0; i < count; i++) {
+            double *row = out[kind] + b->row[i] * work->system.stride;
+            const double *bb = table->bb[kind] + 3 * (count == BORE_ROWS ? i : b->of[i]);
+            for (int k = 0; k < count; k++) row[b->row[k]] = bb[count == BORE_ROWS ? k : b->of[k]];
+        }
 }
 
 /* flank–flank, flank–bore and bore–bore compliance of both gears into out[kind] (stride, stride), symmetric; entries between different gears' bores stay */
 void gk_table_put(const gk_model *model, const gk_setup *setup, const gk_table *const table[2], double *const out[KINDS])
 {
     const gk_work *work = setup->work;
-    const gk_system *s = &work->system;
-    const int strips = GK_STRIPS(setup);
     for (int p = 0; p < work->places; p++)
-        for (int q = p; q < work->places; q++) flank_pair(model, work, table, p, q, strips, out);
+        for (int q = p; q < work->places; q++) flank_pair(model, work, table, p, q, GK_STRIPS(setup), out);
     for (int g = 0; g < 2; g++) {
-        const int *bore = s->bore[g];
-        for (int p = 0; p < work->places; p++) place_bore(model, work, g, table[g], p, strips, out);
-        for (int i = 0; i < BORE_ROWS; i++)
-            for (int k = i; k < BORE_ROWS && bore[i] >= 0; k++)
-                for (int kind = 0; kind < table[g]->kinds && bore[k] >= 0; kind++) out[kind][bore[i] * s->stride + bore[k]] = out[kind][bore[k] * s->stride + bore[i]] = table[g]->bb[kind][3 * i + k];
+        const bores b = live_bores(&work->system, g);
+        if (table[g]->kinds == KINDS && b.count == BORE_ROWS) bore_blocks(model, setup, g, table[g], &b, out, KINDS, BORE_ROWS);
+        else bore_blocks(model, setup, g, table[g], &b, out, table[g]->kinds, b.count);
     }
 }
 

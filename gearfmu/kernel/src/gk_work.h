@@ -69,7 +69,7 @@ struct gk_work {
     double stage_rigid[7][2 * RIGID], trial_rigid[2 * RIGID];
     gk_real *basis[2];                        /* (MAX_BASIS, n): rows of the contacts, then bore rows in inertial axes */
     double frame[RIGID], speed[RIGID];        /* predicted */
-    double attitude[2];                       /* of the gears whose rows the system is formed with */
+    double attitude[2], axes[2][2];           /* of the gears whose rows the system is formed with, and its cosine and sine */
     double moved[RIGID];
     int another;                              /* this step is of another h or γ than the last */
     double outer[2], outer_before[2], outer_speed[2], torque[2]; /* outer ends of the ports at both ends of the step, torque at its end */
