@@ -16,16 +16,12 @@ static inline int gk_finite(double x) { return x - x == 0.0; }
 typedef double gk_quad __attribute__((vector_size(4 * sizeof(double)), may_alias, aligned(sizeof(double))));
 typedef int64_t gk_bits __attribute__((vector_size(4 * sizeof(int64_t)), may_alias, aligned(sizeof(double))));
 #define GK_INLINE static inline __attribute__((always_inline))
-#pragma GCC diagnostic ignored "-Wpsabi" /* how vectors would be passed does not matter: everything that takes one is inlined */
-GK_INLINE gk_quad gk_all(double x) { return (gk_quad){x, x, x, x}; }
-GK_INLINE gk_quad gk_choose(gk_bits where, gk_quad x, gk_quad y) { return (gk_quad)((where & (gk_bits)x) | (~where & (gk_bits)y)); }
-GK_INLINE gk_quad gk_larger(gk_quad x, gk_quad y) { return gk_choose(x > y, x, y); }
-GK_INLINE gk_quad gk_magnitude(gk_quad x) { return (gk_quad)((gk_bits)x & INT64_MAX); }
-static inline double gk_largest(gk_quad x)
-{
-    const double low = gk_max(x[0], x[2]), high = gk_max(x[1], x[3]);
-    return gk_max(low, high);
-}
+/* macros, because compilers differ in how they pass vectors and say so */
+#define GK_ALL(x) ((gk_quad){(x), (x), (x), (x)})
+#define GK_CHOOSE(where, x, y) ((gk_quad)(((where) & (gk_bits)(x)) | (~(where) & (gk_bits)(y))))
+#define GK_LARGER(x, y) GK_CHOOSE((x) > (y), x, y)
+#define GK_MAGNITUDE(x) ((gk_quad)((gk_bits)(x) & INT64_MAX))
+static inline double gk_largest(const gk_quad *x) { return gk_max(gk_max((*x)[0], (*x)[2]), gk_max((*x)[1], (*x)[3])); }
 /* calls f(…, quads) with the usual sizes as constants, so that the compiler keeps short rows in registers */
 #define GK_SIZED(quads, f, ...)            \
     switch (quads) {                       \

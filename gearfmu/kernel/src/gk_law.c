@@ -43,51 +43,49 @@ void gk_law_bounds(const gk_model *model, gk_setup *setup)
 }
 
 /* ln x of four normal numbers, as gk_log */
-GK_INLINE gk_quad log_quad(gk_quad x)
+GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
 {
-    const gk_bits b = (gk_bits)x + ((int64_t)0x95f62 << 32), biased = (b >> 52) | 0x4330000000000000;
+    const gk_bits b = (gk_bits)*x + ((int64_t)0x95f62 << 32), biased = (b >> 52) | 0x4330000000000000;
     const gk_quad m = (gk_quad)((b & (INT64_MAX >> 11)) + ((int64_t)0x3fe6a09e << 32)), n = (gk_quad)biased - (0x1p52 + 1023.0);
     const gk_quad f = m - 1.0, s = f / (2.0 + f), z = s * s, half_square = 0.5 * f * f;
-    gk_quad r = gk_all(GK_LOG[6]);
+    gk_quad r = GK_ALL(GK_LOG[6]);
     for (int i = 5; i >= 0; i--) r = r * z + GK_LOG[i];
-    return n * GK_LN2_HIGH - ((half_square - (s * (half_square + z * r) + n * GK_LN2_LOW)) - f);
+    *out = n * GK_LN2_HIGH - ((half_square - (s * (half_square + z * r) + n * GK_LN2_LOW)) - f);
 }
 
-typedef struct law_quads { gk_quad delta, slope, energy; } law_quads;
-
-/* δ, δ′ and ∫ λ dδ of strips of length `width` (per_width: its inverse, 0 where there is no strip); λ ≤ 0 follows the straight line through the origin, for iterates only */
-GK_INLINE law_quads law_quad(const gk_local *law, gk_quad force, gk_quad width, gk_quad per_width)
+/* δ, δ′ and ∫ λ dδ of four strips of lengths `width` (per_width: their inverse, 0 where there is no strip); λ ≤ 0 follows the straight line through the origin, for iterates only */
+GK_INLINE void law_of_four(const gk_local *law, const double *force, const double *width, const double *per_width, double *delta, double *yield, double *potential)
 {
-    const gk_quad f = force * per_width;
-    law_quads at = {law->delta_high + law->slope_high * (f - law->high), gk_all(law->slope_high), law->phi_high + 0.5 * law->slope_high * f * f};
+    const gk_quad per = *(const gk_quad *)per_width, f = *(const gk_quad *)force * per;
+    gk_quad d = law->delta_high + law->slope_high * (f - law->high), slope = GK_ALL(law->slope_high), energy = law->phi_high + 0.5 * law->slope_high * f * f;
     if (GK_HAS(hertz) && law->a != 0.0) {
         const gk_bits low = f <= law->low, high = f >= law->high;
-        const gk_quad q = gk_choose(f > 0.0, gk_all(law->q_low), gk_all(0.0));
-        const gk_quad secant = law->c - 0.5 * law->a * log_quad(law->beta * gk_choose(low, gk_all(law->low), f));
-        at.delta = gk_choose(low, f * (law->c_low + q * f), gk_choose(high, at.delta, f * secant));
-        at.slope = gk_choose(low, law->c_low + 2.0 * q * f, gk_choose(high, at.slope, secant - 0.5 * law->a));
-        at.energy = gk_choose(low, f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f), gk_choose(high, at.energy, f * f * (0.5 * secant - 0.125 * law->a) + law->phi_log));
+        const gk_quad q = GK_CHOOSE(f > 0.0, GK_ALL(law->q_low), GK_ALL(0.0));
+        gk_quad square = law->beta * GK_CHOOSE(low, GK_ALL(law->low), f); /* b² */
+        log_of_four(&square, &square);
+        const gk_quad secant = law->c - 0.5 * law->a * square;
+        d = GK_CHOOSE(low, f * (law->c_low + q * f), GK_CHOOSE(high, d, f * secant));
+        slope = GK_CHOOSE(low, law->c_low + 2.0 * q * f, GK_CHOOSE(high, slope, secant - 0.5 * law->a));
+        energy = GK_CHOOSE(low, f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f), GK_CHOOSE(high, energy, f * f * (0.5 * secant - 0.125 * law->a) + law->phi_log));
     }
-    at.slope *= per_width;
-    at.energy *= width;
-    return at;
+    *(gk_quad *)delta = d;
+    *(gk_quad *)yield = slope * per;
+    *(gk_quad *)potential = energy * *(const gk_quad *)width;
 }
 
 gk_approach gk_law_at(const gk_local *law, double width, double force)
 {
-    const law_quads at = law_quad(law, gk_all(force), gk_all(width), gk_all(1.0 / width));
-    return (gk_approach){at.delta[0], at.slope[0], at.energy[0]};
+    const double four[3][4] = {{force, force, force, force}, {width, width, width, width}, {1.0 / width, 1.0 / width, 1.0 / width, 1.0 / width}};
+    double delta[4], yield[4], potential[4];
+    law_of_four(law, four[0], four[1], four[2], delta, yield, potential);
+    return (gk_approach){delta[0], yield[0], potential[0]};
 }
 
 GK_INLINE void apply(gk_system *s, const int strips)
 {
     for (int p = 0, first = 0; first < s->contacts; p++, first += strips)
-        for (int i = first; i < first + strips; i += 4) { /* what a quad writes beyond its place the next one writes again; links have no width */
-            const law_quads at = law_quad(&s->local[p], *(const gk_quad *)(s->force + i), *(const gk_quad *)(s->width + i), *(const gk_quad *)(s->per_width + i));
-            *(gk_quad *)(s->delta + i) = at.delta;
-            *(gk_quad *)(s->yield + i) = at.slope;
-            *(gk_quad *)(s->potential + i) = at.energy;
-        }
+        for (int i = first; i < first + strips; i += 4) /* what a quad writes beyond its place the next one writes again; links have no width */
+            law_of_four(&s->local[p], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i, s->potential + i);
 }
 
 /* the law of every contact at its present λ */

@@ -121,13 +121,14 @@ static int move(gk_system *s, const double *x, double *e, double *change)
     for (int q = 0; q < quads; q++) {
         force[q] += by[q];
         bent[q] = -delta[q] - slope[q] * by[q];
-        most = gk_larger(most, gk_magnitude(by[q]));
-        size = gk_larger(size, gk_magnitude(force[q] * on[q]));
+        const gk_quad moved = GK_MAGNITUDE(by[q]), now = GK_MAGNITUDE(force[q] * on[q]);
+        most = GK_LARGER(most, moved);
+        size = GK_LARGER(size, now);
     }
     gk_law_apply(s);
     for (int q = 0; q < quads; q++) bent[q] += delta[q];
-    *change = gk_largest(most);
-    return GK_HAS(hertz) && s->curved && *change > SOLVED * gk_largest(size);
+    *change = gk_largest(&most);
+    return GK_HAS(hertz) && s->curved && *change > SOLVED * gk_largest(&size);
 }
 
 /* what the law's bend e leaves in the equations: −(e + B Γ e) */

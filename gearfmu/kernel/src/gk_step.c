@@ -173,7 +173,7 @@ static int all_finite(const gk_system *s)
 {
     const gk_quad *force = (const gk_quad *)s->force, *z = (const gk_quad *)s->z, *g = (const gk_quad *)s->g;
     gk_bits fine = ~(gk_bits){0};
-    for (int q = 0; q < s->stride / 4; q++) fine &= (gk_magnitude(force[q]) < HUGE_FORCE) & (gk_magnitude(z[q]) < HUGE_FORCE) & (gk_magnitude(g[q]) < HUGE_FORCE);
+    for (int q = 0; q < s->stride / 4; q++) fine &= (GK_MAGNITUDE(force[q]) < HUGE_FORCE) & (GK_MAGNITUDE(z[q]) < HUGE_FORCE) & (GK_MAGNITUDE(g[q]) < HUGE_FORCE);
     return (fine[0] & fine[1] & fine[2] & fine[3]) != 0;
 }
 

@@ -178,9 +178,11 @@ GK_INLINE void add_rows(const gk_setup *setup, const gk_coefficients *k, gk_syst
     const gk_quad *Q = (const gk_quad *)s->Q;
     for (int d = 0; d < RIGID; d++)
         if (setup->inverse_mass[d] > 0.0) moving[count++] = d;
-    for (int i = 0; i < s->n; i++, D += quads, A += quads, Q += quads) {
-        if (i >= s->contacts || i == 0 || s->place_of[i] != s->place_of[i - 1]) rigid_row(setup, s, moving, count, i, sum, quads);
-        for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] += Q[q] - k->rigid_kappa * sum[q];
+    for (int first = 0, next; first < s->n; first = next) {
+        next = first + (first < s->contacts ? GK_STRIPS(s) : 1);
+        rigid_row(setup, s, moving, count, first, sum, quads);
+        for (int i = first; i < next; i++, D += quads, A += quads, Q += quads)
+            for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] += Q[q] - k->rigid_kappa * sum[q];
     }
 }
 
