@@ -4,7 +4,8 @@
 
 static const double MOBILITY = 1e-4; /* s²: divided by the mass of a coordinate, m/N */
 static const double SEE = 3e-3;      /* m: look this far for flanks */
-static const double AT_REST = 1e-11; /* m: movement at MOBILITY that counts as none: some 1e-8 N are left */
+static const double AT_REST = 1e-11; /* m: movement at MOBILITY that counts as none: some 1e-8 N are left … */
+static const double ROUNDING = 2e-7; /* … and what single precision of the rows leaves undecided of the deepest deflection */
 enum { REST_ROUNDS = 150 };
 
 static int grounded(const gk_boundary *b) { return b->kind != PORT_TORQUE; }
@@ -106,6 +107,14 @@ static double relax(const gk_model *model, const gk_setup *rest, gk_data *data, 
     return s->limit_reached ? gk_max(moved, 1.0) : moved;
 }
 
+/* movement at MOBILITY below which the solution cannot be told from rest */
+static double rest_limit(const gk_work *work)
+{
+    double deepest = 0.0;
+    for (int p = 0; p < work->places; p++) deepest = gk_max(deepest, -work->place[p].gap);
+    return AT_REST + ROUNDING * deepest;
+}
+
 /* modes take the static share of the forces that hold the equilibrium */
 static void spread(const gk_setup *setup, gk_data *data)
 {
@@ -164,7 +173,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_data
             moved = unroll(model, &rest, b, before, data->x, relax(model, &rest, data, given));
             balance_rotation(model, &rest, b, given);
         }
-        if (moved * (MOBILITY / mobility) <= AT_REST) {
+        if (moved * (MOBILITY / mobility) <= rest_limit(work)) {
             spread(&rest, data);
             memcpy(data->still, data->x, sizeof data->still);
             return GK_OK;

@@ -249,7 +249,8 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
         }
         q += 3 * n;
     }
-    for (int d = 0; d < RIGID; d++) {
+    const int coordinates = setup->link[SHAFT_0] || setup->link[SHAFT_1] ? RIGID : INERTIA_0;
+    for (int d = 0; d < coordinates; d++) {
         const double z = gk_dot_quads(s->rigid[d], s->z, s->stride / 4);
         double force = gk_dot_quads(s->rigid[d], s->force, s->stride / 4);
         for (int i = s->n - s->clutches; i < s->n; i++) force -= s->rigid[d][i] * s->force[i];
