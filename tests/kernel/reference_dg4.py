@@ -220,7 +220,7 @@ class Reference:
             for _ in range(ROUNDS):  # what η opens or closes changes the dashpots
                 step = Step(self._shifted(gap, state, dashpots), before, state.force, self.d + self._late(dashpots) @ dashpots.lag)
                 force, eta, active = self._conserve(step, force, active, was)
-                if np.array_equal(was & ~active, dashpots.opened):
+                if not p.dashpot.any() or np.array_equal(was & ~active, dashpots.opened):
                     break
                 dashpots = self._dashpots(state, dashpots.rate, was & ~active)
         elif not changed and s.epsilon:
