@@ -118,27 +118,32 @@ def _last(flags: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Step:
-    """What one step starts from: gap (m,) at the predicted state, gap before (m,), force0 (m,), lagged (m, m): what the
-    end forces do to the gaps within the step, through the dashpots too."""
+class Dashpots:
+    """Where each dashpot stands, (m,) int: acts 0 or 1 · clip: η_d linear 0, at its limit ±(λ₀ + λ₁) ±1 · hold: f_d
+    linear 0, at its limit ±λ₁ ±1. And what follows: η_d = by λ₁ + fixed, f_d = late_by λ₁ + late_fixed."""
 
-    gap: np.ndarray
-    before: np.ndarray
-    force0: np.ndarray
-    lagged: np.ndarray
+    acts: np.ndarray
+    clip: np.ndarray
+    hold: np.ndarray
+    by: np.ndarray
+    fixed: np.ndarray
+    late_by: np.ndarray
+    late_fixed: np.ndarray
+
+    def stand_as(self, other: Dashpots) -> bool:
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in ("acts", "clip", "hold"))
 
 
 @dataclass(frozen=True)
-class Dashpots:
-    """η_d = lag (λ₁ − λ₀) + fixed, f_d = beta η_d + tail: lag (m, m), the others (m,). lag: rate times the rows' paths;
-    opened: contacts that let go."""
+class Solved:
+    """λ₁ and closed contacts (m,), the dashpots, gap (m,) at λ₁ = 0, lagged (m, m): what λ₁ does to it, through the
+    dashpots too."""
 
-    rate: np.ndarray
-    opened: np.ndarray
-    lag: np.ndarray
-    fixed: np.ndarray
-    beta: np.ndarray
-    tail: np.ndarray
+    force: np.ndarray
+    active: np.ndarray
+    dashpots: Dashpots
+    gap: np.ndarray
+    lagged: np.ndarray
 
 
 class Reference:
@@ -208,91 +213,93 @@ class Reference:
         dissipation where none did."""
         p, s = self.problem, self.scheme
         was = (state.force > 0) | p.bilateral
-        before = state.gap - self.c @ state.force
         none = np.zeros_like(gap)
         if not was.any() and np.all(gap >= 0):
             return none, none, none, none
-        force, active, dashpots = self._with_dashpot(gap, state, was)
-        changed = bool(np.any(active != was))
+        solved, eta = self._solve(gap, state, was), none
+        changed = bool(np.any(solved.active != was))
         self.changes += changed
-        eta = none
         if changed and s.energy:
-            for _ in range(ROUNDS):  # what η opens or closes changes the dashpots
-                step = Step(self._shifted(gap, state, dashpots), before, state.force, self.d + self._late(dashpots) @ dashpots.lag)
-                force, eta, active = self._conserve(step, force, active, was)
-                if not p.dashpot.any() or np.array_equal(was & ~active, dashpots.opened):
-                    break
-                dashpots = self._dashpots(state, dashpots.rate, was & ~active)
+            solved, eta = self._conserve(gap, state, solved, was)
         elif not changed and s.epsilon:
-            force, active = self._closed(gap, state, dashpots, was, 2 * s.epsilon)
-            eta = 2 * s.epsilon * (force - state.force)
-        dash = dashpots.lag @ (force - state.force) + dashpots.fixed
-        return force, eta + dash, dash, dashpots.beta * dash + dashpots.tail
+            solved = self._solve(gap, state, was, 2 * s.epsilon)
+            eta = 2 * s.epsilon * (solved.force - state.force)
+        force, dashpots = solved.force, solved.dashpots
+        dash = dashpots.by @ force + dashpots.fixed
+        return force, eta + dash, dash, dashpots.late_by @ force + dashpots.late_fixed
 
     def _lag(self, dash: np.ndarray, late: np.ndarray) -> np.ndarray:
         """What the dashpots' force deflects outside their paths: Q late − ½K dash, K = Q − A."""
         return self.q @ (late - 0.5 * dash) + self.a @ (0.5 * dash)
 
-    def _late(self, dashpots: Dashpots) -> np.ndarray:
-        """(m, m): what η_d does to the gaps."""
-        return self.d + 0.5 * self.a + self.q * (dashpots.beta - 0.5)
+    def _solve(self, gap: np.ndarray, state: State, start: np.ndarray, slow: float = 0.0) -> Solved:
+        """The complementarity problem with η = η_d + slow (λ₁ − λ₀). Where a dashpot stands follows from λ₁ and is
+        sought; for each stand η_d and f_d are linear in λ₁ whether a contact is open or closed, and nothing jumps
+        between them."""
+        was = (state.force > 0) | self.problem.bilateral
+        nowhere = np.zeros(len(gap), int)
+        dashpots = self._dashpots(state, was.astype(int), nowhere, nowhere)
+        mean = self.d + 0.5 * (self.a - self.q)  # what η_d does to the gaps; f_d does Q
+        for i in range(200):
+            lagged = (1 + slow) * self.d + mean @ dashpots.by + self.q @ dashpots.late_by
+            shifted = gap + mean @ dashpots.fixed + self.q @ dashpots.late_fixed - slow * self.d @ state.force
+            force, active = solve_lcp(lagged + self.c, shifted, self.problem.bilateral, start)
+            found = self._stand(state, force, was | active)
+            if found.stand_as(dashpots):
+                return Solved(force, active, dashpots, shifted, lagged)
+            dashpots, start = self._towards(state, dashpots, found, last=i > ROUNDS), active
+        raise AssertionError("where the dashpots stand was not found")
 
-    def _shifted(self, gap: np.ndarray, state: State, dashpots: Dashpots) -> np.ndarray:
-        """(m,): the gaps with all of the dashpots' force that does not depend on λ₁."""
-        return gap + self._late(dashpots) @ (dashpots.fixed - dashpots.lag @ state.force) + self.q @ dashpots.tail
+    def _stand(self, state: State, force: np.ndarray, closed: np.ndarray) -> Dashpots:
+        """The dashpots as λ₁ and `closed` (m,), contacts closed at either end, place them. η_d at most doubles or
+        cancels λ₀ + λ₁, f_d at most doubles or cancels λ₁: a contact lets go without force."""
+        acts = (closed & (self.problem.dashpot > 0)).astype(int)
+        linear = self._dashpots(state, acts, 0 * acts, 0 * acts)
+        clip = self._beyond(linear.by @ force + linear.fixed, state.force + force)
+        clipped = self._dashpots(state, acts, clip, 0 * acts)
+        return self._dashpots(state, acts, clip, self._beyond(clipped.late_by @ force + clipped.late_fixed, force))
 
-    def _closed(self, gap: np.ndarray, state: State, dashpots: Dashpots,
-                start: np.ndarray, slow: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """λ₁ and active set for η = η_d + slow (λ₁ − λ₀)."""
-        lagged = self._late(dashpots) @ dashpots.lag + slow * self.d
-        shifted = self._shifted(gap, state, dashpots) - slow * self.d @ state.force
-        return solve_lcp(self.d + lagged + self.c, shifted, self.problem.bilateral, start)
+    def _towards(self, state: State, old: Dashpots, new: Dashpots, last: bool) -> Dashpots:
+        """From one limit to the other by way of what lies between; where `last`, only the last that moves."""
+        moved = (old.acts != new.acts) | (old.clip != new.clip) | (old.hold != new.hold)
+        moved = _last(moved) if last else moved
+        pairs = ((old.acts, new.acts), (old.clip, new.clip), (old.hold, new.hold))
+        nearer = [(here, np.where(here * there == -1, 0, there)) for here, there in pairs]
+        return self._dashpots(state, *(np.where(moved, there, here) for here, there in nearer))
 
-    def _with_dashpot(self, gap: np.ndarray, state: State, was: np.ndarray) -> tuple:
-        """λ₁, active set and the dashpots, η_d = (2c/h) P (λ₁ − λ₀) of closed contacts.
+    def _beyond(self, wished: np.ndarray, limit: np.ndarray) -> np.ndarray:
+        """(m,): the sign of what is beyond ± limit, else 0. Bilateral rows have no limit."""
+        return np.where((np.abs(wished) > limit) & ~self.problem.bilateral, np.sign(wished), 0).astype(int)
 
-        A dashpot at most doubles or cancels the elastic force λ₀ + λ₁; that of a contact which lets go holds back what
-        λ₀ pushes. Its force at the end of the step has a memory where the last step had one too (theory, 10a)."""
-        p, force0 = self.problem, state.force
-        damping = 2 * p.dashpot / self.scheme.h
-        rate, opened = damping, np.zeros_like(was)
-        for _ in range(200):
-            dashpots = self._dashpots(state, rate, opened)
-            force, active = self._closed(gap, state, dashpots, was)
-            wished = np.abs(dashpots.lag @ (force - force0))
-            limit = np.where(active, np.where(p.bilateral, np.inf, force0 + force), 0.0)
-            over, let_go = wished > limit * (1 + 1e-13), was & ~active
-            if not over.any() and np.array_equal(let_go, opened):
-                return force, active, dashpots
-            lowered = np.where(over, rate * np.divide(limit, wished, out=np.ones_like(rate), where=over), rate)
-            rate, opened = np.where(opened & active, damping, lowered), let_go
-        raise AssertionError("the limit of the dashpots was not found")
-
-    def _dashpots(self, state: State, rate: np.ndarray, opened: np.ndarray) -> Dashpots:
-        """Those of closed contacts with η_d per change of their path, and of the ones that let go."""
-        p = self.problem
+    def _dashpots(self, state: State, acts: np.ndarray, clip: np.ndarray, hold: np.ndarray) -> Dashpots:
+        """η_d = (2c/h) Δ(path λ) and f_d with a memory where the last step had one too (10a), or their limits."""
+        p, one = self.problem, np.eye(len(acts))
+        rate = (2 * acts * p.dashpot / self.scheme.h)[:, None] * p.path
+        by = np.where(clip[:, None] == 0, rate, clip[:, None] * one)
+        fixed = np.where(clip == 0, -rate @ state.force, clip * state.force)
         acted = (state.dash != 0.0) & ((state.force > 0) | p.bilateral)
-        springs_back = -np.minimum(2 * p.dashpot / self.scheme.h * (p.path @ state.force), state.force)
-        rate = np.where(opened, 0.0, rate)
-        beta = np.where(opened, 0.0, np.where(acted, 0.25 * (3 + MEMORY), 0.5))
-        tail = np.where((rate > 0) & acted, -0.25 * (1 - MEMORY) * state.dash - MEMORY * state.late, 0.0)
-        return Dashpots(rate, opened, rate[:, None] * p.path, np.where(opened, springs_back, 0.0), beta, tail)
+        beta = np.where(acted, 0.25 * (3 + MEMORY), 0.5)
+        tail = np.where(acted, -0.25 * (1 - MEMORY) * state.dash - MEMORY * state.late, 0.0)
+        late_by = np.where(hold[:, None] == 0, beta[:, None] * by, hold[:, None] * one)
+        late_fixed = np.where((hold == 0) & (acts > 0), beta * fixed + tail, 0.0)
+        return Dashpots(acts, clip, hold, by, fixed, late_by, late_fixed)
 
-    def _conserve(self, step: Step, force: np.ndarray, active: np.ndarray,
-                  was: np.ndarray) -> tuple[np.ndarray, ...]:
-        """λ₁, η = α·Δg and the active set with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
-        c, d, bilateral, before, force0 = self.c, self.d, self.problem.bilateral, step.before, step.force0
-        lagged, g = step.lagged, step.gap
+    def _conserve(self, gap: np.ndarray, state: State, solved: Solved, was: np.ndarray) -> tuple[Solved, np.ndarray]:
+        """The solution and η = α·Δg with which the step's work, without the dashpots', equals the change of ½λᵀC′λ."""
+        c, d, force0 = self.c, self.d, state.force
+        before = state.gap - c @ force0
         stored = 0.5 * force0 @ c @ force0
-        direction = np.where(active | was, self.problem.weight * (g + lagged @ force - before), 0.0)
+        reached = solved.gap + solved.lagged @ solved.force
+        direction = np.where(solved.active | was, self.problem.weight * (reached - before), 0.0)
         alpha = 0.0
         for _ in range(ROUNDS):
+            force, active, lagged = solved.force, solved.active, solved.lagged
             z = force + alpha * direction
-            moved = g + lagged @ force + alpha * (d @ direction) - before
+            moved = solved.gap + lagged @ force - before
             defect = 0.5 * force @ c @ force - stored + 0.5 * (force0 + z) @ moved
             rounding = 4e-16 * (np.abs(force0) + np.abs(force)) @ np.abs(moved)  # decides where flanks just graze
             if abs(defect) <= self.scheme.tolerance * (stored + 0.5 * np.diag(c) @ force**2) + rounding:
-                return force, alpha * direction, active
+                return solved, alpha * direction
             self.rounds += 1
             p = np.zeros_like(force)
             if active.any():
@@ -300,13 +307,10 @@ class Reference:
             w, shift = p + direction, lagged @ p + d @ direction
             c1 = force @ c @ p + 0.5 * w @ moved + 0.5 * (force0 + z) @ shift
             c2 = 0.5 * p @ c @ p + 0.5 * w @ shift
-            a = -2 * defect / (c1 + np.copysign(np.sqrt(max(0.0, c1**2 - 4 * defect * c2)), c1))
-            alpha, force = alpha + a, force + a * p
-            shifted = g + alpha * (d @ direction)
-            if np.any(active & ~bilateral & (force <= 0)) or np.any(~active & (shifted + (lagged + c) @ force < 0)):
-                force, active = solve_lcp(lagged + c, shifted, bilateral, active)
+            alpha -= 2 * defect / (c1 + np.copysign(np.sqrt(max(0.0, c1**2 - 4 * defect * c2)), c1))
+            solved = self._solve(gap + alpha * (d @ direction), state, active)
         self.failures += 1
-        return force, alpha * direction, active
+        return solved, alpha * direction
 
 
 def _corrections(omega: np.ndarray, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:

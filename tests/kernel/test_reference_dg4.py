@@ -126,6 +126,7 @@ def test_dashpot_neither_pulls_nor_more_than_doubles_the_force() -> None:
     limited = 0
     for _ in range(800):
         before, state = state.force, reference.step(state, external)
+        assert np.all(np.abs(state.late) <= state.force * (1 + 1e-12))  # at the end of the step too
         elastic, mean = before + state.force, before + state.force + state.eta
         if np.any((before > 0) != (state.force > 0)):
             continue  # η then also holds the energy together
