@@ -16,7 +16,9 @@ TORQUE = 15.0  # N·m: so little that tip relief excites far more than the stiff
 RESONANCE = (11000.0, 14000.0)  # rpm: mesh frequency 2.9 … 3.7 kHz about a mode of mesh and bearings
 BINS = 60
 LOST = 0.05  # contact-loss share of a bin in which the resonance has jumped
-EXPECTED = {"open_share_up": Expected(0.0585, 0.003), "open_share_down": Expected(0.1005, 0.007)}  # as in loads.py
+# where h goes to 0: at 0.9 µs, with dashpots that act at changes of contact and without. Their error there is of first
+# order in h: 0.6 % of the time on the way down at the default step
+EXPECTED = {"open_share_up": Expected(0.057, 0.003), "open_share_down": Expected(0.0955, 0.007)}
 
 
 def run_up_and_down(case: Case) -> Finding:
