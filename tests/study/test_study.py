@@ -19,6 +19,7 @@ from gearfmu.study.bench import Point, Replay, measure, models_for, paired_price
 from gearfmu.study.cuts import cut_rows
 from gearfmu.study.ladder import SLICES, STEPS, fitting, points
 from gearfmu.study.limits import limit_rows
+from gearfmu.study.norm import errors as errors_of
 from gearfmu.study.notes import notes
 from gearfmu.study.refined import BodyRow, body_rows, cheap
 from gearfmu.study.table import read_rows, tidy, write_rows
@@ -41,18 +42,32 @@ def made(scene: SceneSpec, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pa
     return out, study(Job(scene, out, defaults=True)).rows
 
 
-def test_every_level_once_and_finer_is_better(made: tuple[Path, tuple[Row, ...]]) -> None:
+def test_every_level_once_and_modes_pay(made: tuple[Path, tuple[Row, ...]]) -> None:
+    """At the default step what is left is the error of time, the same for every level that has the mesh's modes."""
     out, rows = made
     by_level = {row.level: row for row in rows}
     assert sorted(by_level) == ["fast", "full", "rigid", "standard"] and len(rows) == 4
-    errors = [by_level[level].te_error for level in ("rigid", "fast", "full")]
-    assert errors[0] > 3 * errors[1] > 3 * errors[2] > 0
+    errors = {level: by_level[level].te_error for level in by_level}
+    assert errors["rigid"] > 3 * errors["fast"] > 0, "measured: 27 times"
+    assert [errors[level] / errors["full"] for level in ("fast", "standard")] == pytest.approx([1.0, 1.0], abs=0.1)
     assert by_level["rigid"].n_dyn == 0 < by_level["fast"].n_dyn < by_level["full"].n_dyn
     assert all(0 < row.realtime_factor < 100 and row.slices == 5 for row in rows)
     assert 1.1 < by_level["full"].cpu_ratio / by_level["rigid"].cpu_ratio < 3.0, "sums over modes are tabulated"
     assert (out / "study.csv").read_text().splitlines()[0] == COLUMNS
     reference = read_rows(out / "references.csv", ReferenceRow)[0]
     assert reference.h_s < min(row.h_s for row in rows) / 3 and reference.n_dyn == by_level["full"].n_dyn
+
+
+def test_finer_is_better(scene: SceneSpec) -> None:
+    """Steps of 2.5 and 1.25 µs: at level full the error of time is left, of 2nd order in a turning mesh; at fast that of
+    the modes left out, which no step makes smaller."""
+    model = models_for(scene)
+    reference = measure(scene, model, Point("full", h=0.5e-6)).signals
+    te = {(level, h): errors_of(measure(scene, model, Point(level, h=h)).signals, reference).te
+          for level in ("fast", "standard", "full") for h in (2.5e-6, 1.25e-6)}
+    assert te["fast", 1.25e-6] > 3 * te["full", 1.25e-6], "measured: 4.7 times"
+    assert te["fast", 1.25e-6] > te["standard", 1.25e-6] > te["full", 1.25e-6]
+    assert np.log2(te["full", 2.5e-6] / te["full", 1.25e-6]) == pytest.approx(2.0, abs=0.3)  # measured: 2.1
 
 
 def test_a_study_goes_on_where_it_stopped(made: tuple[Path, tuple[Row, ...]], scene: SceneSpec) -> None:
