@@ -28,7 +28,7 @@ def finding(
     depth = overlap(record, pair)
     found = lost(record)
     found |= {"trouble": float(record["solver.trouble"][-1]), "status": float(record["solver.status"][-1])}
-    said = [*common(record, depth, energy), *complaints]
+    said = [*common(record, depth, energy), *at_most("number of steps left unsolved", found["trouble"], 0), *complaints]
     outcome = record.outcome
     if outcome != COMPLETED:
         outcome = f"{outcome}@{record.time[-1]:.6g}"
