@@ -59,7 +59,7 @@ static void sensitivity(const gk_system *s, double *p, double *dash)
 static void expand(const gk_system *s, const double *p, const double *dash, balance *b)
 {
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
-    for (int i = 0; i < s->n; i++) w[i] = p[i] + s->direction[i] + dash[i], late[i] = s->beta[i] * dash[i];
+    for (int i = 0; i < s->n; i++) w[i] = p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);

@@ -45,8 +45,8 @@ void gk_law_bounds(const gk_model *model, gk_setup *setup)
 /* ln x of four normal numbers, as gk_log */
 GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
 {
-    const gk_bits b = (gk_bits)*x + ((int64_t)0x95f62 << 32), biased = (b >> 52) | 0x4330000000000000;
-    const gk_quad m = (gk_quad)((b & (INT64_MAX >> 11)) + ((int64_t)0x3fe6a09e << 32)), n = (gk_quad)biased - (0x1p52 + 1023.0);
+    const gk_unsigned b = (gk_unsigned)*x + ((uint64_t)0x95f62 << 32), biased = (b >> 52) | 0x4330000000000000;
+    const gk_quad m = (gk_quad)((b & (UINT64_MAX >> 12)) + ((uint64_t)0x3fe6a09e << 32)), n = (gk_quad)biased - (0x1p52 + 1023.0);
     const gk_quad f = m - 1.0, s = f / (2.0 + f), z = s * s, half_square = 0.5 * f * f;
     gk_quad r = GK_ALL(GK_LOG[6]);
     for (int i = 5; i >= 0; i--) r = r * z + GK_LOG[i];

@@ -2,12 +2,12 @@
  *
  *   closed contact, bilateral row, sticking clutch:  gap + deflection = 0;   open contact: λ = 0 and gap + deflection ≥ 0;   slipping clutch: z = ±bound
  *   gap = g + D z + lag,   deflection = Aλ + Pλ + δ(λ),   z = λ + η,   η = α·direction + η_d
- *   dashpot of a row: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to |λ0 + λ1| (no pull); its path is straight while a contact is open
+ *   dashpot of a row closed at either end: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to |λ0 + λ1| (no pull)
  *
  * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last one (block principal pivoting, Júdice & Pires 1994). */
 #include "gk_core.h"
 
-enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12 };
+enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, DASHPOT_ROUNDS = 8 };
 #ifdef GK_DOUBLE_MODES
 static const double SOLVED = 1e-11;
 #else
@@ -61,23 +61,20 @@ GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const
 
 void gk_solve_path(const gk_system *s, const double *x, double *y) { GK_STRIPPED(GK_STRIPS(s), along_paths, s, x, y) }
 
-/* a contact that let go in this step: its path springs back, against the dashpot, as far as that does not pull */
-static int opened(const gk_system *s, int i) { return is_contact(s, i) && !s->active[i] && s->force0[i] > 0.0; }
-
 /* rows and dashpots as numbers, after their status has changed */
 void gk_solve_status(gk_system *s)
 {
     s->dashpots = 0;
-    for (int i = s->n; i < s->stride; i++) s->on[i] = s->gain[i] = s->pull[i] = s->fixed[i] = s->late[i] = s->rest[i] = 0.0;
+    for (int i = s->n; i < s->stride; i++) s->on[i] = s->gain[i] = s->pull[i] = s->late[i] = s->rest[i] = s->held[i] = 0.0;
     for (int i = 0; i < s->n; i++) {
-        const int acts = s->clip[i] != 2, linear = s->active[i] && s->clip[i] == 0, limited = s->active[i] && acts && !linear;
+        const int clip = s->clip[i], lasts = clip != 2 && s->hold[i] == 0;
         s->on[i] = s->active[i];
-        s->gain[i] = linear ? s->damping[i] : 0.0;
-        s->pull[i] = limited ? s->clip[i] : 0.0;
-        s->fixed[i] = opened(s, i) ? gk_max(-s->damping[i] * s->squeeze0[i], -s->force0[i]) : 0.0;
-        s->late[i] = acts ? s->beta[i] : 0.0;
-        s->rest[i] = acts ? s->tail[i] : 0.0;
-        s->dashpots |= s->gain[i] != 0.0 || limited || s->fixed[i] != 0.0 || s->rest[i] != 0.0;
+        s->gain[i] = clip == 0 ? s->damping[i] : 0.0;
+        s->pull[i] = clip == 2 ? 0.0 : clip;
+        s->late[i] = lasts ? s->beta[i] : 0.0;
+        s->rest[i] = lasts ? s->tail[i] : 0.0;
+        s->held[i] = s->hold[i];
+        s->dashpots |= s->gain[i] != 0.0 || s->pull[i] != 0.0 || s->rest[i] != 0.0;
     }
 }
 
@@ -86,8 +83,8 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
 #define OF(array) ((gk_quad *)s->array)
     for (int q = 0; q < quads; q++) {
         OF(squeeze)[q] = OF(linear)[q] + OF(delta)[q];
-        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]) + OF(fixed)[q];
-        OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q];
+        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
+        OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
         OF(z)[q] = OF(force)[q] + OF(eta)[q];
     }
@@ -179,23 +176,31 @@ static void flip(gk_system *s, int i)
         if (!s->active[i]) s->slip[i - s->n + s->clutches] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
         s->force[i] = 0.0;
     } else if (!s->active[i]) {
-        s->clip[i] = 2; /* linear dashpots belong to closed contacts */
+        if (!(s->force0[i] > 0.0)) s->clip[i] = 2; /* closed at neither end */
+        s->hold[i] = s->clip[i] != 2;
         s->force[i] = 0.0;
     }
 }
 
-/* dashpots of closed contacts: limited so that they never pull */
+static int beyond(double x, double limit) { return x > limit ? 1 : x < -limit ? -1 : 0; }
+
+/* from one limit to the other by way of what lies between */
+static signed char towards(int old, int new) { return (signed char)(old * new == -1 ? 0 : new); }
+
+/* Where the dashpots of contacts that are closed at either end stand: they never pull, so η_d is limited by ±(λ0 + λ1) and f_d by ±λ1; a contact lets go without force */
 static int limit_dashpots(gk_system *s)
 {
     int changed = 0;
     for (int i = 0; i < s->contacts; i++) {
-        signed char clip = 2;
-        if (s->active[i] && s->damping[i] > 0.0) {
+        signed char clip = 2, hold = 0;
+        if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
             const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i];
-            clip = free > limit ? 1 : free < -limit ? -1 : 0;
+            clip = towards(s->clip[i], beyond(free, limit));
+            hold = s->active[i] ? towards(s->hold[i], beyond(s->beta[i] * gk_clamp(free, -limit, limit) + s->tail[i], s->force[i])) : 1;
         }
-        changed |= clip != s->clip[i];
+        changed |= clip != s->clip[i] || hold != s->hold[i];
         s->clip[i] = clip;
+        s->hold[i] = hold;
     }
     return changed;
 }
@@ -203,7 +208,7 @@ static int limit_dashpots(gk_system *s)
 /* λ and z for the present α; starts from the present active set, settled */
 void gk_solve_contacts(gk_system *s)
 {
-    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = 3;
+    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = DASHPOT_ROUNDS;
     for (int round = 0; round < ROUND_LIMIT; round++) {
         newton(s);
         unsigned char wrong[MAX_ROWS];

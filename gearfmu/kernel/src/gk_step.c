@@ -99,7 +99,7 @@ static void recall_forces(const gk_data *data, gk_system *s)
     const size_t size = (size_t)s->stride * sizeof(double);
     s->limit_reached = s->rounds = s->dashpots = 0;
     s->alpha = 0.0;
-    double *const nothing[] = {s->direction, s->squeeze0, s->gain, s->pull, s->fixed, s->late, s->rest};
+    double *const nothing[] = {s->direction, s->squeeze0, s->gain, s->pull, s->late, s->rest, s->held};
     for (size_t a = 0; a < sizeof nothing / sizeof *nothing; a++) memset(nothing[a], 0, size);
     memset(s->delta + s->contacts, 0, size - (size_t)s->contacts * sizeof(double)); /* links know no local law */
     memset(s->yield + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
@@ -130,6 +130,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         s->beta[i] = acted ? 0.25 * (3.0 + MEMORY) : 0.5;
         s->tail[i] = acted ? -0.25 * (1.0 - MEMORY) * s->dash0[i] - MEMORY * s->end0[i] : 0.0;
         s->g0[i] = -gk_solve_massless(s, i);
+        s->hold[i] = 0;
     }
     for (int i = 0; i < s->contacts; i++) {
         const int memory = work->place[s->place_of[i]].memory;

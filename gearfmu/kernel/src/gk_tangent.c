@@ -1,11 +1,11 @@
-/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + ½A + (β − ½)Q,  S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its
- * limit ±(λ0 + λ1) is ±B instead. By columns of whole quads; an inactive row is an empty one. Close to symmetric positive definite: no pivoting. */
+/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + ½A + (late − ½)Q,  S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its
+ * limit ±(λ0 + λ1) is ±B instead, an end force at its limit ±λ1 is ±Q with late = 0. By columns of whole quads; an inactive row is an empty one. Close to symmetric positive definite: no pivoting. */
 #include "gk_core.h"
 
 /* column j of B: what the dashpot of row j does to all rows */
 GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 {
-    const double later = s->beta[j] - 0.5;
+    const double later = s->late[j] - 0.5;
     const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads, *Q = (const gk_quad *)s->Q + j * quads;
     gk_quad *B = (gk_quad *)s->B + j * quads;
     for (int q = 0; q < quads; q++) B[q] = D[q] + 0.5 * A[q] + later * Q[q];
@@ -22,14 +22,16 @@ GK_INLINE void contact_column(const gk_system *s, int j, double *column, const i
     for (int q = 0; q < quads; q++) c[q] = D[q] + A[q];
     if (s->pull[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
+    if (s->held[j] != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += s->held[j] * ((const gk_quad *)s->Q)[j * quads + q];
     for (int e = 0; e < strips; e++) {
-        own[e] = s->on[first + e] * (path[e * strips] + (first + e == j ? s->slope[j] : 0.0));
+        own[e] = path[e * strips] + (first + e == j ? s->slope[j] : 0.0);
         const double moves = s->gain[first + e] * own[e];
         if (moves == 0.0) continue;
         for (int q = 0; q < quads; q++) c[q] += moves * B[(first + e) * quads + q];
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
-    for (int e = 0; e < strips; e++) column[first + e] += own[e];
+    for (int e = 0; e < strips; e++) column[first + e] += s->on[first + e] * own[e];
 }
 
 GK_INLINE void link_column(const gk_system *s, int j, double *column, const int quads)
@@ -48,7 +50,7 @@ GK_INLINE void columns(gk_system *s, const int quads)
 {
     const int n = s->n, stride = 4 * quads, strips = GK_STRIPS(s);
     for (int j = 0; j < n; j++)
-        if (s->active[j] && s->clip[j] != 2) form_dashpot(s, j, quads);
+        if (s->gain[j] != 0.0 || s->pull[j] != 0.0) form_dashpot(s, j, quads);
     for (int j = 0; j < n; j++) {
         double *column = s->J + j * stride;
         if (!s->active[j]) {

@@ -33,16 +33,16 @@ typedef struct gk_system {
     gk_local local[MAX_PAIRS];        /* law of a place, per metre */
     double rigid[RIGID][MAX_STRIDE];  /* derivative of the rows by each rigid coordinate */
     double *D, *A, *Q;                /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
-    double *J, *L, *B;                /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor; what a dashpot's force does, D + ½A + (β − ½)Q */
+    double *J, *L, *B;                /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower factor; what a dashpot's force does, D + ½A + (late − ½)Q */
     double inverse[MAX_STRIDE];       /* of the pivots */
     double path[MAX_PAIRS][MAX_SLICES * MAX_SLICES + 3], spring[MAX_STRIDE]; /* P: strips of a place, (strips, strips); links: 1/k */
 
     double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE], z[MAX_STRIDE]; /* λ, η_d, η = η_d + α·direction, z = λ + η */
     unsigned char active[MAX_ROWS];   /* in the equations: closed contact, bilateral row, sticking clutch */
-    signed char clip[MAX_ROWS];       /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting */
+    signed char clip[MAX_ROWS], hold[MAX_ROWS]; /* dashpot: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting; its force at the end: 0 linear, ±1 at its limit ±λ1 */
     double beta[MAX_STRIDE], tail[MAX_STRIDE]; /* of a dashpot that acts: f_d = β η_d + what the last step leaves of it */
-    double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], fixed[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE]; /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
-                                         η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1) + fixed, f_d = late·η_d + rest */
+    double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE], held[MAX_STRIDE]; /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
+                                         η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), f_d = late·η_d + rest + held·λ1 */
     int dashpots;                     /* any of them */
     double direction[MAX_STRIDE], alpha;
     double end[MAX_STRIDE];           /* f_d */
