@@ -251,7 +251,7 @@ static void count_step(const gk_setup *setup, gk_data *data, double h, tally *t)
     double side[2] = {0, 0};
     int touches = 0;
     for (int i = 0; i < s->n; i++) {
-        const double mean = 0.5 * (s->force0[i] + s->z[i]);
+        const double mean = gk_solve_mean(s, i);
         if (i < s->contacts) {
             side[work->place[s->place_of[i]].flank] += mean;
             touches |= s->force[i] > 0.0;

@@ -86,7 +86,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
         OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
         OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
-        OF(z)[q] = OF(force)[q] + OF(eta)[q];
+        OF(z)[q] = OF(force)[q] + OF(eta)[q] - OF(begin)[q];
     }
 #undef OF
     for (int i = s->n - s->clutches; i < s->n; i++) s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];

@@ -93,8 +93,8 @@ int gk_step_remembered(const gk_data *data, gk_key key)
     return -1;
 }
 
-/* λ0 without dashpots, settled: massless deflection and energy at the start */
-static void recall_forces(const gk_data *data, gk_system *s)
+/* λ0 without dashpots, settled: massless deflection and energy at the start; linear: forces of the step are (mix4) */
+static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
     const size_t size = (size_t)s->stride * sizeof(double);
     s->limit_reached = s->rounds = s->dashpots = 0;
@@ -105,6 +105,8 @@ static void recall_forces(const gk_data *data, gk_system *s)
     memset(s->yield + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
     memset(s->potential + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
     memcpy(s->force, s->force0, size);
+    if (linear) memcpy(s->begin, s->end0, size);
+    else memset(s->begin, 0, size);
     for (int i = s->n - s->clutches; i < s->n; i++) {
         s->active[i] = (unsigned char)data->locked[s->link_of[i] - CLUTCH_0];
         s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
@@ -123,7 +125,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
     const gk_work *work = setup->work;
     int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
-    recall_forces(data, s);
+    recall_forces(data, s, setup->integrator == MIX4);
     memcpy(s->squeeze0, s->squeeze, (size_t)s->stride * sizeof *s->squeeze);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
@@ -239,11 +241,17 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     gk_work *work = setup->work;
     const gk_system *s = &work->system;
     gk_real *q = data->modal;
+    double with_dashpots[MAX_STRIDE];
+    const double *last = s->force; /* forces at the end that the next prediction is made with */
+    if (setup->integrator == MIX4) {
+        for (int q4 = 0; q4 < s->stride / 4; q4++) ((gk_quad *)with_dashpots)[q4] = ((const gk_quad *)s->force)[q4] + ((const gk_quad *)s->end)[q4];
+        last = with_dashpots;
+    }
     for (int g = 0; g < 2; g++) {
         const int n = GK_LANES(setup, g);
         if (n) {
             gk_real *next = work->reading[g];
-            gk_step_scatter(setup, g, s->z, s->force, work->force[g], next);
+            gk_step_scatter(setup, g, s->z, last, work->force[g], next);
             if (GK_ON(setup, modal_damping)) data->ledger.dissipated += correct_modes(setup, k, g, q, 1);
             else work->system.owed -= correct_modes(setup, k, g, q, 0); /* what rounding gave or took */
             memcpy(q + 2 * n, next, (size_t)n * sizeof *next);
@@ -253,7 +261,7 @@ static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients 
     const int coordinates = setup->link[SHAFT_0] || setup->link[SHAFT_1] ? RIGID : INERTIA_0;
     for (int d = 0; d < coordinates; d++) {
         const double z = gk_dot_quads(s->rigid[d], s->z, s->stride / 4);
-        double force = gk_dot_quads(s->rigid[d], s->force, s->stride / 4);
+        double force = gk_dot_quads(s->rigid[d], last, s->stride / 4);
         for (int i = s->n - s->clutches; i < s->n; i++) force -= s->rigid[d][i] * s->force[i];
         const double before = data->x[d];
         data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
@@ -272,7 +280,7 @@ static void account(const gk_setup *setup, gk_data *data)
     double held = 0.0, taken = 0.0;
     for (int i = 0; i < s->n; i++) {
         const int link = s->link_of[i], port = link - PORT_0, clutch = link - CLUTCH_0;
-        const double mean = 0.5 * (s->force0[i] + s->z[i]);
+        const double mean = gk_solve_mean(s, i);
         if (s->kind[i] == ROW_CLUTCH) {
             taken -= mean * (work->moved[INERTIA_0 + clutch] - work->moved[DISC_0 + clutch]);
             data->locked[clutch] = s->active[i];

@@ -45,7 +45,7 @@ typedef struct gk_system {
                                          η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), f_d = late·η_d + rest + held·λ1 */
     int dashpots;                     /* any of them */
     double direction[MAX_STRIDE], alpha;
-    double end[MAX_STRIDE];           /* f_d */
+    double end[MAX_STRIDE], begin[MAX_STRIDE]; /* f_d; mix4, whose forces are linear in the step: f_d at its start, which the prediction contains; else 0 */
     double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE]; /* D z, Aλ, Q f_d − ½K η_d */
     double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at the present λ: δ, δ′, ∫ λ dδ; 0 in links */
@@ -127,6 +127,7 @@ void gk_solve_path(const gk_system *s, const double *x, double *y);
 double gk_solve_stored(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the massless part under it: their sum is the distance that is left */
 static inline double gk_solve_end_gap(const gk_system *s, int i) { return s->g[i] + s->Dz[i] + s->lag[i]; }
+static inline double gk_solve_mean(const gk_system *s, int i) { return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]); } /* force of a row in the step */
 static inline double gk_solve_massless(const gk_system *s, int i) { return s->Al[i] + s->squeeze[i]; }
 /* gk_tangent.c */
 void gk_tangent_factorise(gk_system *s);
