@@ -10,52 +10,17 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from numpy.polynomial.legendre import Legendre
 from scipy.linalg import eig
 from scipy.optimize import brentq
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import load_stage_bodies
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble, loaded_te
+from gearfmu.stage.dashpot import own_path
 
 RATIO = 0.03
-PATH_SHARE = 0.95  # of the residual beyond all stored modes: what a contact's dashpot is parallel to (gk_system.c)
 CLOSING = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion's axis, r_b φ; wheel's axis, r_b φ
-
-
-def strip_weights(slices: int, functions: int) -> np.ndarray:
-    """(slices, functions): load of each slice on the width functions."""
-    edges = np.linspace(-1, 1, slices + 1)
-    integral = [Legendre.basis(a).integ() for a in range(functions)]
-    return np.array(
-        [
-            [(2 * a + 1) * (p(high) - p(low)) / (high - low) for a, p in enumerate(integral)]
-            for low, high in zip(edges[:-1], edges[1:], strict=True)
-        ]
-    )
-
-
-def residual_path(body: ReducedBody, slices: int) -> float:
-    """Path of a contact's dashpot in one tooth: its share of the deflection beyond all stored modes under 1 N shared evenly
-    by the slices, mean over the roll, m/N."""
-    weights = strip_weights(slices, body.flank_rows.shape[2]).mean(axis=0)
-    omega2 = (2 * np.pi * body.frequency) ** 2
-    rows = body.flank_rows[0]
-    beyond = body.static_ff[0, 0, 0].diagonal(axis1=0, axis2=1).transpose(2, 0, 1)  # (rolls, functions, functions)
-    beyond = beyond - np.einsum("ian,ibn->iab", rows / omega2, rows)
-    return PATH_SHARE * float(np.einsum("a,iab,b->i", weights, beyond, weights).mean())
-
-
-def local_path(spec: StageSpec, force: float) -> float:
-    """Tangent of the local law (theory, eq. 7) for one tooth pair that carries `force`, both bodies, m/N."""
-    pair = PairGeometry.of(spec)
-    rolls = [np.sqrt(gear.r**2 - gear.r_b**2) for gear in pair.gears]
-    width = min(gear.face_width for gear in spec.gears)
-    local = [2 * (1 - g.material.poisson_ratio**2) / (np.pi * g.material.youngs_modulus) for g in spec.gears]
-    half_width = np.sqrt(2 * sum(local) * force / width / sum(1 / roll for roll in rolls))
-    terms = [c * (np.log(4 * g.body.strip_half_width / half_width) - 1.5) for c, g in zip(local, spec.gears, strict=True)]
-    return sum(terms) / width
 
 
 def mesh_mode(stage: str, torque: float) -> dict[str, float]:
@@ -65,8 +30,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     result = loaded_te(assemble(spec, bodies), [torque], positions=64, rigid_bearings=True)
     stiffness, pairs = result.stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
     gears = PairGeometry.of(spec).gears
-    path = sum(residual_path(body, spec.contact.slices) for body in bodies)
-    path += local_path(spec, torque / gears[0].r_b / pairs)
+    path = own_path(spec, bodies, torque / gears[0].r_b / pairs)
     mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])
     width = min(gear.face_width for gear in spec.gears)
 

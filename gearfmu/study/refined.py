@@ -14,6 +14,7 @@ from gearfmu.body import load_stage_bodies
 from gearfmu.body.reduce import reduce_gear
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage.dashpot import same_loss
 from gearfmu.stage.tables import ROLLS
 from gearfmu.study.bench import Point, Run, measure, models_for
 from gearfmu.study.norm import errors
@@ -45,7 +46,8 @@ class BodyRow:
 
 @dataclass(frozen=True)
 class Variant:
-    """A refinement: what to call it, gears as they are to be reduced (None: the shipped bodies), slices, rolls."""
+    """A refinement: what to call it, gears as they are to be reduced (None: the shipped bodies), slices, rolls. Reduced
+    anew, the contact's dashpots take the constant with which they lose the same (`gearfmu.stage.dashpot`)."""
 
     name: str
     gears: tuple[Any, ...] | None
@@ -104,7 +106,11 @@ def body_rows(
 
 
 def _run(scene: SceneSpec, bodies: Sequence[Any], variant: Variant, h: float) -> Run:
-    changes = {"gears": variant.gears} if variant.gears else {}
+    changes: dict[str, Any] = {}
+    if variant.gears:
+        spec = load_stage(scene.stage.name)
+        contact = spec.contact.model_copy(update={"damping": same_loss(spec, load_stage_bodies(spec), bodies)})
+        changes = {"gears": variant.gears, "contact": contact}
     model = models_for(scene, bodies, variant.rolls, **changes)
     return measure(scene, model, Point("full", h=h, slices=variant.slices))
 
