@@ -37,6 +37,7 @@ SLICES = (1, 5, 10)
 LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
 DG4, MIX4, EM = 0, 1, 2
 DOUBLE, FLOAT, CURVED = 1e-8, 1e-5, 1e-6  # limits of the drift: double, as shipped, double with the load-dependent law
+GROWTH = 2e-5  # in one damped step: what dashpots hold outside their path balances to second order (theory, 12a)
 DAMPED = {"effect.contact_damping": 1.0, "effect.modal_damping": 1.0}
 COLUMNS = ("test", "case", "build", "law", "slices", "h_s", "starts", "duration_s", "drift", "limit", "growth", "changes", "trouble")
 
@@ -132,7 +133,7 @@ def keeps(case: Case, line: Mapping) -> bool:
     """Whether a line is as it should be: within its limit, or a control that is seen to fail; damped runs never grow."""
     if case.at_least:
         return line["drift"] > case.at_least
-    return line["drift"] <= line["limit"] and not line["trouble"] and (case.test != "T9" or line["growth"] <= line["limit"])
+    return line["drift"] <= line["limit"] and not line["trouble"] and (case.test != "T9" or line["growth"] <= GROWTH)
 
 
 def kept(file: Path, anew: list[str]) -> list[dict[str, object]]:
