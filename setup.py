@@ -2,6 +2,7 @@
 
 A source install builds the host's kernel only. GEARFMU_PLATFORMS="linux64 win64" (make wheel, with ziglang) puts
 several into one wheel."""
+
 import importlib.util
 import os
 import shutil
@@ -58,5 +59,8 @@ class BinaryDistribution(Distribution):
         return True
 
 
-setup(distclass=BinaryDistribution, cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel},
-      setup_requires=["ziglang==0.16.0"] if chosen_platforms() else [])
+setup(
+    distclass=BinaryDistribution,
+    cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel},
+    setup_requires=["ziglang==0.16.0"] if chosen_platforms() else [],
+)

@@ -36,8 +36,19 @@ STEP, SETTLE, LOAD, SPEED = 60e-6, 0.01, 302.0, 2000 * math.pi / 30
 DIVIDED = {"dg4": (8, 12, 16, 24, 32), "central": (20, 24, 32, 48, 64, 96, 144)}  # of STEP
 FINE = 256
 UNSTABLE = 0.5  # force error of a run that its dashpots have made unstable; stable ones stay below a tenth
-COLUMNS = ("level", "scheme", "h_s", "drift", "te_error", "force_error", "time_per_second", "stable_predicted_s", "stable_measured_s",
-           "stable_loaded_predicted_s", "stable_loaded_s")
+COLUMNS = (
+    "level",
+    "scheme",
+    "h_s",
+    "drift",
+    "te_error",
+    "force_error",
+    "time_per_second",
+    "stable_predicted_s",
+    "stable_measured_s",
+    "stable_loaded_predicted_s",
+    "stable_loaded_s",
+)
 
 
 def predicted_limit(kernel: Kernel) -> float:
@@ -63,7 +74,9 @@ def measured_limit(free: StageModel, level: int, predicted: float) -> float:
     for factor in (0.7, 0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.2, 1.3, 1.4):
         h = factor * predicted
         try:
-            kernel = started(free, Rattle(play=-60e-6, speed=0.05), {"level": level, "integrator": SCHEMES["central"], "h": h})
+            kernel = started(
+                free, Rattle(play=-60e-6, speed=0.05), {"level": level, "integrator": SCHEMES["central"], "h": h}
+            )
             found = energies(kernel, h, 0.005)
         except (ModelError, SimulationError):
             break
@@ -109,7 +122,7 @@ def loaded(model: StageModel, level: int, scheme: str, divided: int, duration: f
             break
         spent += (time.process_time() - before) * (i * STEP >= SETTLE)
         samples.append((kernel.get("mesh.te"), kernel.get("mesh.force")))
-    return np.array(samples[round(SETTLE / STEP):]), spent / (duration - SETTLE)
+    return np.array(samples[round(SETTLE / STEP) :]), spent / (duration - SETTLE)
 
 
 def error(run: np.ndarray, reference: np.ndarray, column: int) -> float:
@@ -137,26 +150,43 @@ def rows(models: tuple[StageModel, StageModel], level: str, starts: int, duratio
     apart = [error(*references.values(), column) for column in (0, 1)]
     print(f"{level}: the converged schemes differ by {apart[0]:.2%} in TE and {apart[1]:.2%} in force")
     predicted = predicted_limit(started(free, Rattle(), {"level": number, "integrator": SCHEMES["central"]}))
-    limits = {"dg4": (math.inf,) * 3, "central": (predicted, measured_limit(free, number, predicted), predicted_loaded(model, number))}
+    limits = {
+        "dg4": (math.inf,) * 3,
+        "central": (predicted, measured_limit(free, number, predicted), predicted_loaded(model, number)),
+    }
     found, times = [], {}
-    points = [(scheme, n) for scheme, list_of in DIVIDED.items() for n in list_of if STEP / n <= 0.95 * limits[scheme][0]]
+    points = [
+        (scheme, n) for scheme, list_of in DIVIDED.items() for n in list_of if STEP / n <= 0.95 * limits[scheme][0]
+    ]
     runs = {point: loaded(model, number, *point, duration) for point in points}
     for _ in range(2):
         times = {p: min(times.get(p, math.inf), runs[p][1], loaded(model, number, *p, duration)[1]) for p in points}
     stable = {scheme: stable_loaded(runs, scheme, references[scheme]) for scheme in SCHEMES}
     for scheme, n in points:
         trace = runs[scheme, n][0]
-        found.append({
-            "level": level, "scheme": scheme, "h_s": STEP / n, "drift": drift(free, number, scheme, STEP / n, starts),
-            "te_error": error(trace, references[scheme], 0), "force_error": error(trace, references[scheme], 1),
-            "time_per_second": times[scheme, n], "stable_predicted_s": limits[scheme][0], "stable_measured_s": limits[scheme][1],
-            "stable_loaded_predicted_s": limits[scheme][2], "stable_loaded_s": stable[scheme],
-        })
+        found.append(
+            {
+                "level": level,
+                "scheme": scheme,
+                "h_s": STEP / n,
+                "drift": drift(free, number, scheme, STEP / n, starts),
+                "te_error": error(trace, references[scheme], 0),
+                "force_error": error(trace, references[scheme], 1),
+                "time_per_second": times[scheme, n],
+                "stable_predicted_s": limits[scheme][0],
+                "stable_measured_s": limits[scheme][1],
+                "stable_loaded_predicted_s": limits[scheme][2],
+                "stable_loaded_s": stable[scheme],
+            }
+        )
         line = found[-1]
-        print(f"{level:9} {scheme:8} {1e6 * line['h_s']:6.3f} µs  drift {line['drift']:.1e}  TE {line['te_error']:.2%}  force "
-              f"{line['force_error']:.2%}  {line['time_per_second']:.3f} s/s  stable to {1e6 * line['stable_predicted_s']:.2f} µs "
-              f"predicted, {1e6 * line['stable_measured_s']:.2f} µs measured, loaded {1e6 * line['stable_loaded_predicted_s']:.2f} µs predicted, {1e6 * line['stable_loaded_s']:.2f} µs "
-              f"the largest here", flush=True)
+        print(
+            f"{level:9} {scheme:8} {1e6 * line['h_s']:6.3f} µs  drift {line['drift']:.1e}  TE {line['te_error']:.2%}  force "
+            f"{line['force_error']:.2%}  {line['time_per_second']:.3f} s/s  stable to {1e6 * line['stable_predicted_s']:.2f} µs "
+            f"predicted, {1e6 * line['stable_measured_s']:.2f} µs measured, loaded {1e6 * line['stable_loaded_predicted_s']:.2f} µs predicted, {1e6 * line['stable_loaded_s']:.2f} µs "
+            f"the largest here",
+            flush=True,
+        )
     return found
 
 

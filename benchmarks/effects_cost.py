@@ -51,7 +51,10 @@ class Bench:
         self.folder = folder
         self.host = folder / "host"
         program = ROOT / "benchmarks" / "effects_host.c"
-        subprocess.run(["cc", "-std=gnu99", "-O2", f"-I{ROOT / 'gearfmu' / 'kernel' / 'src'}", "-o", self.host, program, "-ldl"], check=True)
+        subprocess.run(
+            ["cc", "-std=gnu99", "-O2", f"-I{ROOT / 'gearfmu' / 'kernel' / 'src'}", "-o", self.host, program, "-ldl"],
+            check=True,
+        )
         spec = load_stage(STAGE)
         bodies = load_stage_bodies(spec)
         pinion = spec.gears[0].model_copy(update={"index_deviation": MISPLACED})
@@ -115,8 +118,11 @@ def main(names: list[str]) -> None:
                 continue
             row, same = bench.measure(effect)
             rows[effect.name] = row
-            print(f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a step: "
-                  f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}, same bits: {same}", flush=True)
+            print(
+                f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a step: "
+                f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}, same bits: {same}",
+                flush=True,
+            )
     write_text(TABLE, table(rows))
 
 

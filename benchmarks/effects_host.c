@@ -1,6 +1,7 @@
 /* Runs a stage model through gk_ for benchmarks/effects_cost.py, which counts the instructions of `measured`:
- *   effects_host LIBRARY BLOB WARM STEPS H WHAT=BASE+SLOPE …     WHAT: p<reference> parameter, i<reference> input, which follows BASE + SLOPE·time
- * Prints the internal steps of the measured part and the bits of the watched outputs (w<reference>) at its end. */
+ *   effects_host LIBRARY BLOB WARM STEPS H WHAT=BASE+SLOPE …     WHAT: p<reference> parameter, i<reference> input,
+ * which follows BASE + SLOPE·time Prints the internal steps of the measured part and the bits of the watched outputs
+ * (w<reference>) at its end. */
 #define _POSIX_C_SOURCE 200809L
 #include "gk.h"
 #include <dlfcn.h>
@@ -10,7 +11,11 @@
 #include <valgrind/callgrind.h>
 
 enum { MOST = 64 };
-typedef struct entry { char kind; uint32_t reference; double base, slope; } entry;
+typedef struct entry {
+    char kind;
+    uint32_t reference;
+    double base, slope;
+} entry;
 typedef struct run {
     gk_model *model;
     gk_setup *setup;
@@ -22,8 +27,10 @@ typedef struct run {
 
 static size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *);
 static gk_outcome (*model_open)(gk_model *, const void *, size_t, char *), (*defaults)(const gk_model *, gk_data *);
-static gk_outcome (*set)(const gk_model *, gk_data *, uint32_t, double), (*get)(const gk_model *, const gk_data *, uint32_t, double *);
-static gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, char *), (*initialize)(const gk_model *, const gk_setup *, gk_data *, double);
+static gk_outcome (*set)(const gk_model *, gk_data *, uint32_t, double),
+    (*get)(const gk_model *, const gk_data *, uint32_t, double *);
+static gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, char *),
+    (*initialize)(const gk_model *, const gk_setup *, gk_data *, double);
 static gk_outcome (*step)(const gk_model *, const gk_setup *, gk_data *, double, double);
 static int (*variable_count)(const gk_model *);
 static gk_outcome (*variable)(const gk_model *, int, gk_variable_info *);
@@ -39,9 +46,21 @@ static void bind(const char *path)
 {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     must(library != NULL, "the library does not load");
-    const struct { void *to; const char *name; } table[] = {
-        {&model_size, "gk_model_size"}, {&setup_size, "gk_setup_size"}, {&data_size, "gk_data_size"}, {&model_open, "gk_model_open"}, {&defaults, "gk_defaults"}, {&set, "gk_set"},
-        {&get, "gk_get"}, {&prepare, "gk_prepare"}, {&initialize, "gk_initialize"}, {&step, "gk_step"}, {&variable_count, "gk_variable_count"}, {&variable, "gk_variable"}};
+    const struct {
+        void *to;
+        const char *name;
+    } table[] = {{&model_size, "gk_model_size"},
+                 {&setup_size, "gk_setup_size"},
+                 {&data_size, "gk_data_size"},
+                 {&model_open, "gk_model_open"},
+                 {&defaults, "gk_defaults"},
+                 {&set, "gk_set"},
+                 {&get, "gk_get"},
+                 {&prepare, "gk_prepare"},
+                 {&initialize, "gk_initialize"},
+                 {&step, "gk_step"},
+                 {&variable_count, "gk_variable_count"},
+                 {&variable, "gk_variable"}};
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         void *found = dlsym(library, table[i].name);
         must(found != NULL, table[i].name);
@@ -72,7 +91,9 @@ static void *whole_file(const char *path, size_t *size)
 static void put(run *r, char kind, double time)
 {
     for (int i = 0; i < r->entries; i++)
-        if (r->entry[i].kind == kind) must(set(r->model, r->data, r->entry[i].reference, r->entry[i].base + r->entry[i].slope * time) == GK_OK, "a value is refused");
+        if (r->entry[i].kind == kind)
+            must(set(r->model, r->data, r->entry[i].reference, r->entry[i].base + r->entry[i].slope * time) == GK_OK,
+                 "a value is refused");
 }
 
 static void advance(run *r, int from, int to)
@@ -91,7 +112,8 @@ static double steps_done(const run *r)
     gk_variable_info info;
     double value = 0.0;
     for (int i = 0; i < variable_count(r->model); i++)
-        if (variable(r->model, i, &info) == GK_OK && !strcmp(info.name, "solver.steps")) get(r->model, r->data, info.reference, &value);
+        if (variable(r->model, i, &info) == GK_OK && !strcmp(info.name, "solver.steps"))
+            get(r->model, r->data, info.reference, &value);
     return value;
 }
 

@@ -39,7 +39,21 @@ DG4, MIX4, EM = 0, 1, 2
 DOUBLE, FLOAT, CURVED = 1e-8, 1e-5, 1e-6  # limits of the drift: double, as shipped, double with the load-dependent law
 GROWTH = 2e-5  # in one damped step: what dashpots hold outside their path balances to second order (theory, 12a)
 DAMPED = {"effect.contact_damping": 1.0, "effect.modal_damping": 1.0}
-COLUMNS = ("test", "case", "build", "law", "slices", "h_s", "starts", "duration_s", "drift", "limit", "growth", "changes", "trouble")
+COLUMNS = (
+    "test",
+    "case",
+    "build",
+    "law",
+    "slices",
+    "h_s",
+    "starts",
+    "duration_s",
+    "drift",
+    "limit",
+    "growth",
+    "changes",
+    "trouble",
+)
 
 
 @dataclass(frozen=True)
@@ -104,7 +118,9 @@ def random_start(base: Rattle, seed: int) -> Rattle:
     return replace(base, position=position, offset=place * max(base.play, 0.0), speed=speed)
 
 
-def row(model: StageModel, name: str, case: Case, chosen: tuple[str, int, int, float], run: Mapping) -> dict[str, object]:
+def row(
+    model: StageModel, name: str, case: Case, chosen: tuple[str, int, int, float], run: Mapping
+) -> dict[str, object]:
     """One line of the table. chosen: build, law, slices, step; run: libraries, starts, duration, level."""
     build, law, slices, h = chosen
     parameters = {"level": LEVELS[run["level"]], "h": h, "slices": slices, "effect.hertz": law, **case.parameters}
@@ -120,8 +136,18 @@ def row(model: StageModel, name: str, case: Case, chosen: tuple[str, int, int, f
         worst["changes"] += found.changes
         worst["trouble"] += found.trouble
     limit = case.limit if case.limit is not None else FLOAT if build == "shipped" else CURVED if law else DOUBLE
-    return {"test": case.test, "case": name, "build": build, "law": ("linear", "hertz")[law], "slices": slices, "h_s": h,
-            "starts": run["starts"], "duration_s": run["duration"], "limit": limit if not case.at_least else case.at_least, **worst}
+    return {
+        "test": case.test,
+        "case": name,
+        "build": build,
+        "law": ("linear", "hertz")[law],
+        "slices": slices,
+        "h_s": h,
+        "starts": run["starts"],
+        "duration_s": run["duration"],
+        "limit": limit if not case.at_least else case.at_least,
+        **worst,
+    }
 
 
 def combinations(case: Case) -> Iterator[tuple[str, int, int, float]]:
@@ -162,7 +188,12 @@ def main() -> int:
     model, bad = free_pair(spec, load_stage_bodies(spec)), 0
     lines = kept(chosen.out, chosen.cases) if chosen.cases else []
     with tempfile.TemporaryDirectory() as folder:
-        run = {"libraries": kernels(Path(folder)), "starts": chosen.starts, "duration": chosen.duration, "level": chosen.level}
+        run = {
+            "libraries": kernels(Path(folder)),
+            "starts": chosen.starts,
+            "duration": chosen.duration,
+            "level": chosen.level,
+        }
         for name in chosen.cases or [*CASES, *CONTROLS]:
             case = {**CASES, **CONTROLS}[name]
             for combination in combinations(case):
@@ -175,9 +206,12 @@ def main() -> int:
 def shown(case: Case, line: Mapping) -> bool:
     """Print a line; returns whether it is as it should be."""
     good = keeps(case, line)
-    print(f"{line['test']:9} {line['case']:31} {line['build']:8} {line['law']:7} {line['slices']:3d} {1e6 * line['h_s']:5.1f} µs  "
-          f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth {line['growth']:.1e}  "
-          f"{line['changes']:6d} changes {line['trouble']:3d} trouble{'' if good else '   ← NOT KEPT'}", flush=True)
+    print(
+        f"{line['test']:9} {line['case']:31} {line['build']:8} {line['law']:7} {line['slices']:3d} {1e6 * line['h_s']:5.1f} µs  "
+        f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth {line['growth']:.1e}  "
+        f"{line['changes']:6d} changes {line['trouble']:3d} trouble{'' if good else '   ← NOT KEPT'}",
+        flush=True,
+    )
     return good
 
 

@@ -32,12 +32,26 @@ from gearfmu.stage import StageModel, Steady, assemble  # noqa: E402
 from gearfmu.stage.trace import write_columns  # noqa: E402
 
 STEP, SETTLE, LOAD, SPEED, FAST = 60e-6, 0.01, 302.0, 2000 * math.pi / 30, 1
-ROWS_STILL = {r"grid\(&model->gear\[i\], p->roll\[i\]": "grid(&model->gear[i], 0.5 * (model->gear[i].s_form + model->gear[i].s_tip)"}
+ROWS_STILL = {
+    r"grid\(&model->gear\[i\], p->roll\[i\]": "grid(&model->gear[i], 0.5 * (model->gear[i].s_form + model->gear[i].s_tip)"
+}
 CURVATURE_STILL = {r"gk_law_set\(model, setup, place->curvature": "gk_law_set(model, setup, 1.0 / 0.007 + 1.0 / 0.009"}
-COLUMNS = ("stage", "piece", "h_s", "through_J", "work_J", "dissipated_J", "left_J", "left_of_through", "left_of_dissipated")
+COLUMNS = (
+    "stage",
+    "piece",
+    "h_s",
+    "through_J",
+    "work_J",
+    "dissipated_J",
+    "left_J",
+    "left_of_through",
+    "left_of_dissipated",
+)
 
 
-def balance(model: StageModel, library: Path | None, parameters: Mapping[str, float], duration: float) -> dict[str, float]:
+def balance(
+    model: StageModel, library: Path | None, parameters: Mapping[str, float], duration: float
+) -> dict[str, float]:
     """Energies between SETTLE and `duration` (s), J."""
     inputs, kernel = Steady(model, SPEED, LOAD), Kernel(model.blob, {"level": FAST, **parameters}, library)
     for name, value in inputs(0.0).items():
@@ -52,8 +66,15 @@ def balance(model: StageModel, library: Path | None, parameters: Mapping[str, fl
             first, through = np.array([kernel.get(name) for name in names]), 0.0
         through += abs(kernel.get("pinion.tau_mean")) * SPEED * STEP
     work, lost, left = np.array([kernel.get(name) for name in names]) - first
-    return {"h_s": kernel.get("solver.h"), "through_J": through, "work_J": work, "dissipated_J": lost, "left_J": left,
-            "left_of_through": left / through, "left_of_dissipated": left / lost}
+    return {
+        "h_s": kernel.get("solver.h"),
+        "through_J": through,
+        "work_J": work,
+        "dissipated_J": lost,
+        "left_J": left,
+        "left_of_through": left / through,
+        "left_of_dissipated": left / lost,
+    }
 
 
 def changes_of_h(free: StageModel, library: Path | None, steps: tuple[float, float]) -> float:
@@ -86,22 +107,32 @@ def main() -> None:
         rows, curvature = (variant(folder, *v) for v in (("rows", ROWS_STILL), ("curvature", CURVATURE_STILL)))
         both = variant(folder, "both", {**ROWS_STILL, **CURVATURE_STILL})
         cases = [(relieved, "all as it is", double, {"h": STEP / n}) for n in (8, 16, 32)]
-        cases += [(relieved, "rows and residual still", rows, {}), (relieved, "curvature still", curvature, {}),
-                  (relieved, "rows, residual, curvature still", both, {}), (relieved, "law linear", double, {"effect.hertz": 0.0}),
-                  (relieved, "bearings off", double, {"effect.bearings": 0.0}),
-                  (relieved, "all still, bearings off", both, {"effect.bearings": 0.0}),
-                  (bare, "tip corners", double, {}), (bare, "tip corners, all still", both, {}),
-                  (bare, "tip corners off", double, {"effect.tip_contact": 0.0})]
+        cases += [
+            (relieved, "rows and residual still", rows, {}),
+            (relieved, "curvature still", curvature, {}),
+            (relieved, "rows, residual, curvature still", both, {}),
+            (relieved, "law linear", double, {"effect.hertz": 0.0}),
+            (relieved, "bearings off", double, {"effect.bearings": 0.0}),
+            (relieved, "all still, bearings off", both, {"effect.bearings": 0.0}),
+            (bare, "tip corners", double, {}),
+            (bare, "tip corners, all still", both, {}),
+            (bare, "tip corners off", double, {"effect.tip_contact": 0.0}),
+        ]
         for model, piece, library, parameters in cases:
             line = {"stage": model.name, "piece": piece, **balance(model, library, parameters, chosen.duration)}
             lines.append(line)
-            print(f"{line['stage']:13} {piece:32} h {1e6 * line['h_s']:.2f} µs  through {line['through_J']:.0f} J  work {line['work_J']:.4f} J  "
-                  f"dissipated {line['dissipated_J']:.4f} J  left {line['left_J']:+.1e} J = {line['left_of_through']:+.1e} of through, "
-                  f"{line['left_of_dissipated']:+.1%} of the losses", flush=True)
+            print(
+                f"{line['stage']:13} {piece:32} h {1e6 * line['h_s']:.2f} µs  through {line['through_J']:.0f} J  work {line['work_J']:.4f} J  "
+                f"dissipated {line['dissipated_J']:.4f} J  left {line['left_J']:+.1e} J = {line['left_of_through']:+.1e} of through, "
+                f"{line['left_of_dissipated']:+.1%} of the losses",
+                flush=True,
+            )
         free = free_pair(spec, bodies)
         for steps in ((5e-6, 5e-6), (5e-6, 7.5e-6), (50e-6, 60e-6)):
             changed = changes_of_h(free, double, steps)
-            print(f"communication steps {1e6 * steps[0]:.0f} and {1e6 * steps[1]:.1f} µs in turn: energy within {changed:.1e}")
+            print(
+                f"communication steps {1e6 * steps[0]:.0f} and {1e6 * steps[1]:.1f} µs in turn: energy within {changed:.1e}"
+            )
     write_columns(chosen.out, {column: np.array([line[column] for line in lines]) for column in COLUMNS})
 
 

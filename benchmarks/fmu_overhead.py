@@ -6,6 +6,7 @@ The two roads take turns step by step in one process (tests/fmu/host.c) and give
 of the paired differences. Prints a table and writes benchmarks/fmu_overhead.csv.
 Aim (issue 2 and the design): at most 0.2 µs a step.
 """
+
 from __future__ import annotations
 
 import csv
@@ -37,14 +38,29 @@ def measure(work: Path) -> list[dict[str, object]]:
     names = {v.name: str(v.valueReference) for v in read_model_description(str(work)).modelVariables}
     host = compile_program(ROOT / "tests" / "fmu" / "host.c", work / "host")
     library = next((work / "binaries").rglob("*.so"))
-    command = [host, library, (work / "resources").as_uri(), model.hash, "bench", str(STEPS),
-               names["pinion.phi"], names["mesh.force"]]
+    command = [
+        host,
+        library,
+        (work / "resources").as_uri(),
+        model.hash,
+        "bench",
+        str(STEPS),
+        names["pinion.phi"],
+        names["mesh.force"],
+    ]
     rows = []
     for _ in range(REPEATS):
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         fmi, direct, overhead = map(float, done.stdout.split())
-        rows.append({"stage": STAGE, "machine": platform.processor() or platform.machine(),
-                     "fmi_ns": fmi, "gk_ns": direct, "overhead_ns": overhead})
+        rows.append(
+            {
+                "stage": STAGE,
+                "machine": platform.processor() or platform.machine(),
+                "fmi_ns": fmi,
+                "gk_ns": direct,
+                "overhead_ns": overhead,
+            }
+        )
     return rows
 
 

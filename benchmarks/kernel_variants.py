@@ -30,7 +30,7 @@ def variant(folder: Path, name: str, edits: Mapping[str, str]) -> Path:
     shutil.copytree(HERE / "src", sources, dirs_exist_ok=True)
     for pattern, replacement in edits.items():
         changed = 0
-        for path in sorted(sources.glob("*.c")):
+        for path in sorted(sources.rglob("*.c")):
             before = path.read_text(encoding="utf-8")
             after = re.sub(pattern, replacement, before)
             path.write_text(after, encoding="utf-8")
@@ -38,7 +38,18 @@ def variant(folder: Path, name: str, edits: Mapping[str, str]) -> Path:
         if not changed:
             raise ValueError(f"{pattern!r} changes no kernel source: adapt benchmarks/kernel_variants.py")
     out = folder / f"{name}.so"
-    files = [str(p) for p in sorted(sources.glob("*.c"))]
-    command = ["cc", *FLAGS, "-DGK_DOUBLE_MODES", "-fPIC", "-shared", "-Wl,-Bsymbolic", f"-I{fmi_headers()}", "-o", str(out)]
+    files = [str(p) for p in sorted(sources.rglob("*.c"))]
+    command = [
+        "cc",
+        *FLAGS,
+        "-DGK_DOUBLE_MODES",
+        "-fPIC",
+        "-shared",
+        "-Wl,-Bsymbolic",
+        f"-I{fmi_headers()}",
+        f"-I{sources}",
+        "-o",
+        str(out),
+    ]
     subprocess.run([*command, *files, "-lm"], check=True)
     return out

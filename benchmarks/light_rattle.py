@@ -39,7 +39,10 @@ def start(scene: LightRattle, number: int) -> LightRattle:
 
 def errors(found: dict[str, float], wanted: dict[str, float]) -> dict[str, float]:
     """Of every limited number: the open share's as a difference, the others' relative."""
-    return {f"{name}_error": (found[name] - wanted[name]) / (1.0 if name == "open_share" else wanted[name]) for name in LIMITS}
+    return {
+        f"{name}_error": (found[name] - wanted[name]) / (1.0 if name == "open_share" else wanted[name])
+        for name in LIMITS
+    }
 
 
 def table(model: StageModel, duration: float, level: int, starts: int = STARTS) -> list[dict[str, object]]:
@@ -59,10 +62,13 @@ def table(model: StageModel, duration: float, level: int, starts: int = STARTS) 
 def line(scene: str, number: int, h: float, found: dict[str, float], wanted: dict[str, float]) -> dict[str, object]:
     """One line of the table, printed."""
     made = {"scene": scene, "start": number, "h_s": h, **found, **errors(found, wanted)}
-    print(f"{scene:12} {'mean' if number < 0 else number:>5} h {1e6 * h:5.2f} µs  open {100 * found['open_share']:5.2f} %  coast "
-          f"{100 * found['coast_share']:4.1f} %  {found['impacts']:6.0f} impacts/s   errors: open "
-          f"{100 * made['open_share_error']:+.2f} points, force {made['force_rms_error']:+.3%}, TE {made['te_std_error']:+.3%}, "
-          f"impulse {made['impulse_error']:+.3%}", flush=True)
+    print(
+        f"{scene:12} {'mean' if number < 0 else number:>5} h {1e6 * h:5.2f} µs  open {100 * found['open_share']:5.2f} %  coast "
+        f"{100 * found['coast_share']:4.1f} %  {found['impacts']:6.0f} impacts/s   errors: open "
+        f"{100 * made['open_share_error']:+.2f} points, force {made['force_rms_error']:+.3%}, TE {made['te_std_error']:+.3%}, "
+        f"impulse {made['impulse_error']:+.3%}",
+        flush=True,
+    )
     return made
 
 

@@ -5,6 +5,7 @@
 Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. Beside the cycles the arithmetic that the phase cannot do without and
 the bytes that it reads and writes, counted from the sizes of the model (`work`). Prints a table and writes benchmarks/phases.csv.
 """
+
 from __future__ import annotations
 
 import csv
@@ -29,7 +30,10 @@ PAIRS = 2  # tooth pairs within reach, nearly always
 def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
     """Cycles a step of each phase: median over the blocks, of (steps, cycles) counted from the start, but for the first,
     in which the tables of the step are made; so neither that nor what else ran on the machine counts."""
-    found = [{phase: (after[phase] - before[phase]) / (n - m) for phase in after} for (m, before), (n, after) in pairwise(blocks[1:])]
+    found = [
+        {phase: (after[phase] - before[phase]) / (n - m) for phase in after}
+        for (m, before), (n, after) in pairwise(blocks[1:])
+    ]
     return {phase: statistics.median(block[phase] for block in found) for phase in found[0]}
 
 
@@ -53,7 +57,10 @@ def work(n: int, pairs: float, strips: int) -> dict[str, tuple[float, float]]:
         "predict": (12 * n, 4 * n * (8 + 3 + 2)),
         "rows": (10 * rows * n, 4 * n * 5 * rows),
         "system": (2 * (m + 2) * n + 2 * cells + 24 * m * m, 4 * n * (m + 2) + 4 * cells + 8 * 5 * m * m),
-        "solve": (2 * m * m * (1 + 3 * strips) + 2 / 3 * m**3 + 2 * 2 * m * m + 4 * 2 * m * m, 8 * m * m * (3 + 2 + 2 + 4)),
+        "solve": (
+            2 * m * m * (1 + 3 * strips) + 2 / 3 * m**3 + 2 * 2 * m * m + 4 * 2 * m * m,
+            8 * m * m * (3 + 2 + 2 + 4),
+        ),
         "correct": (4 * (rows + 4) * n + 16 * n, 4 * n * (rows + 4 + 12)),
     }
 
@@ -79,10 +86,20 @@ def profile(library: Path) -> list[dict[str, object]]:
         cycles, steps = quiet(blocks), kernel.get("solver.steps")
         cut = {"rigid": 0.0, "fast": spec.levels.fast_cut, "standard": spec.levels.standard_cut, "full": math.inf}[name]
         counted = work(lanes(model, cut), PAIRS, (spec.contact.slices + 1) // 2)
-        rows += [{"level": name, "phase": phase, "cycles_per_step": round(value), "share": round(value / sum(cycles.values()), 4),
-                  "n_dyn": int(kernel.get("solver.n_dyn")), "h_s": kernel.get("solver.h"), "rounds": round(kernel.get("solver.rounds") / steps, 3),
-                  "flops": round(counted.get(phase, (0, 0))[0]), "bytes": round(counted.get(phase, (0, 0))[1])}
-                 for phase, value in cycles.items()]
+        rows += [
+            {
+                "level": name,
+                "phase": phase,
+                "cycles_per_step": round(value),
+                "share": round(value / sum(cycles.values()), 4),
+                "n_dyn": int(kernel.get("solver.n_dyn")),
+                "h_s": kernel.get("solver.h"),
+                "rounds": round(kernel.get("solver.rounds") / steps, 3),
+                "flops": round(counted.get(phase, (0, 0))[0]),
+                "bytes": round(counted.get(phase, (0, 0))[1]),
+            }
+            for phase, value in cycles.items()
+        ]
     return rows
 
 
@@ -94,4 +111,6 @@ if __name__ == "__main__":
         writer.writeheader()
         writer.writerows(table)
     for row in table:
-        print(f"{row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:7d} cycles a step  {row['share']:6.1%}  {row['flops']:7d} flop {row['bytes']:7d} B   h {1e6 * row['h_s']:.2f} µs, {row['n_dyn']} modes")
+        print(
+            f"{row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:7d} cycles a step  {row['share']:6.1%}  {row['flops']:7d} flop {row['bytes']:7d} B   h {1e6 * row['h_s']:.2f} µs, {row['n_dyn']} modes"
+        )

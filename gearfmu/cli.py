@@ -22,7 +22,10 @@ VERBS = {
         "gearfmu.commands.stages:reduce",
         "Reduce the gears of a stage to .h5 bodies (skipped when up to date).",
     ),
-    "import": ("gearfmu.commands.imports:import_", "Check finite elements made elsewhere, fit the involutes; writes nothing."),
+    "import": (
+        "gearfmu.commands.imports:import_",
+        "Check finite elements made elsewhere, fit the involutes; writes nothing.",
+    ),
     "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
     "frf": ("gearfmu.commands.frf:frf", "Reduction methods judged by the transfer matrix of a body."),

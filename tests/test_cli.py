@@ -167,7 +167,7 @@ def test_variables_page_in_docs_is_the_kernels_table(capsys: pytest.CaptureFixtu
 
 
 def test_every_row_of_the_table_is_read() -> None:
-    source = (ROOT / "gearfmu" / "kernel" / "src" / "gk_variables.inc").read_text(encoding="utf-8")
+    source = (ROOT / "gearfmu" / "kernel" / "src" / "model" / "gk_variables.inc").read_text(encoding="utf-8")
     found = variables.rows()
     assert len(found) == source.count("GK_REAL, GK_") + source.count("GK_INTEGER, GK_") + source.count(
         "GK_BOOLEAN, GK_"

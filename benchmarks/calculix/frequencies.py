@@ -99,7 +99,11 @@ def write_deck(mesh: FeMesh, material: Material, path: Path) -> None:
     for k, row in enumerate(mesh.elements + 1, start=1):
         text = [str(node) for node in row]
         lines += [f"{k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
-    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}"]
+    lines += [
+        "*MATERIAL, NAME=STEEL",
+        "*ELASTIC",
+        f"{1e-6 * material.youngs_modulus:.12g}, {material.poisson_ratio:.12g}",
+    ]
     lines += ["*DENSITY", f"{1e-12 * material.density:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL"]
     symmetry, choice = _symmetry(mesh) if mesh.teeth > 1 else ([], [])
     lines += [*symmetry, "*STEP", "*FREQUENCY", f"{COUNT + RIGID}", *choice, "*END STEP"]
@@ -119,7 +123,9 @@ def _symmetry(sector: FeMesh) -> tuple[list[str], list[str]]:
 def frequencies(path: Path) -> np.ndarray:
     """Elastic frequencies (Hz) of a .dat file: the table of eigenvalues without the six rigid modes."""
     text = path.read_text(encoding="ascii")
-    rows = re.findall(r"^\s+(\d+)\s+(\S+)\s+(\S+)\s+(\S+)\s+(\S+)\s*$", text.split("E I G E N V A L U E")[1], re.MULTILINE)
+    rows = re.findall(
+        r"^\s+(\d+)\s+(\S+)\s+(\S+)\s+(\S+)\s+(\S+)\s*$", text.split("E I G E N V A L U E")[1], re.MULTILINE
+    )
     values = np.array([float(row[1]) for row in rows[: COUNT + RIGID]])
     assert len(values) == COUNT + RIGID and np.all(np.abs(values[:RIGID]) < 1e-4 * values[RIGID])
     return np.sqrt(values[RIGID:]) / (2 * np.pi)
@@ -151,11 +157,13 @@ def solved(case: Case, work: Path) -> list[dict[str, Any]]:
     result = deck.with_suffix(".dat")
     found = sector_frequencies(result, sector.teeth) if case.by_sector else frequencies(result)
     digest = hashlib.sha256(deck.read_bytes()).hexdigest()[:32]
-    size = {"nodes": len(mesh.nodes), "elements": len(mesh.elements), "seconds": f"{seconds:.0f}", "deck_sha256": digest}
-    return [
-        {"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size}
-        for k, f in enumerate(found, start=1)
-    ]
+    size = {
+        "nodes": len(mesh.nodes),
+        "elements": len(mesh.elements),
+        "seconds": f"{seconds:.0f}",
+        "deck_sha256": digest,
+    }
+    return [{"case": case.name, "mode": k, "frequency_Hz": f"{f:.4f}", **size} for k, f in enumerate(found, start=1)]
 
 
 def write(path: Path, rows: list[dict[str, Any]]) -> None:

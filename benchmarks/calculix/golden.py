@@ -1,6 +1,6 @@
 """Collect the tables of this folder into tests/reference/calculix_fzg_c.json, which the tests read.
 
-    python benchmarks/calculix/golden.py
+python benchmarks/calculix/golden.py
 """
 
 from __future__ import annotations

@@ -30,9 +30,7 @@ STIFF, INNER = 1e5, 0.7  # Young's modulus of the sleeve, parts of the gear's; i
 def rigid_bore_bodies(spec: StageSpec) -> list[ReducedBody]:
     """The stored bodies of a pair with the static tables of gears whose bores are rigid. Their modes stay as they were:
     of use at level rigid only."""
-    return [
-        _rigid(spec, index, body) for index, body in enumerate(load_stage_bodies(spec))
-    ]
+    return [_rigid(spec, index, body) for index, body in enumerate(load_stage_bodies(spec))]
 
 
 def _rigid(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:
@@ -41,9 +39,7 @@ def _rigid(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:
     flank, points = tooth_flank(geometry, gear, False)
     body = SleevedBody(sleeved(gear_sector(geometry, gear.face_width, gear.body.mesh)), gear, flank, points)
     tables = static_tables(body, [], lambda what, share: None)
-    return replace(
-        stored, static_ff=tables.static_ff, static_fb=tables.static_fb, static_bb=tables.static_bb
-    )
+    return replace(stored, static_ff=tables.static_ff, static_fb=tables.static_fb, static_bb=tables.static_bb)
 
 
 @dataclass(frozen=True)

@@ -185,4 +185,3 @@ def _problems(body: InterfaceBody) -> list[str]:
     if not problems and not (np.all(np.diff(body.frequency) >= 0) and body.frequency.min(initial=1.0) > 0):
         problems.append("modes/frequency must be above 0 and ascending")
     return problems
-

@@ -131,12 +131,8 @@ def _display_entries() -> tuple[Entry, ...]:
 def _rim_entries() -> tuple[Entry, ...]:
     return (
         Entry("rim/patch_point", "rim.patch_point", (3,), "m", "middle of the rim's patch of sector 0"),
-        Entry(
-            "rim/patch_rows", "rim.patch_rows", (3, "n"), "kg-1/2", "mean displacement x, y, z of that patch"
-        ),
-        Entry(
-            "rim/flank_rigid", "rim.flank_rigid", (2, "R", "A", 6), ", m", "flank rows of rigid motion, space 0"
-        ),
+        Entry("rim/patch_rows", "rim.patch_rows", (3, "n"), "kg-1/2", "mean displacement x, y, z of that patch"),
+        Entry("rim/flank_rigid", "rim.flank_rigid", (2, "R", "A", 6), ", m", "flank rows of rigid motion, space 0"),
         Entry(
             "rim/c_fp",
             "rim.static_fp",

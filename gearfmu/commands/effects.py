@@ -98,7 +98,7 @@ def _numbers(stage: str) -> dict[str, str]:
         "coast_flank": f"{1e6 * pair.normal_backlash:.1f} µm of backlash along the normal",
         "contact_damping": f"{spec.contact.damping:g} N·s/m per metre of face width",
         "tip_relief": " and ".join(f"{amount:g} µm" for amount in reliefs) + _idle(not any(reliefs)),
-        "tip_contact": " and ".join(f"{1e3 * g.tip_edge_radius:g} mm" for g in spec.gears) 
+        "tip_contact": " and ".join(f"{1e3 * g.tip_edge_radius:g} mm" for g in spec.gears)
         + f" edge radius; flanks carry alone up to {alone:.3g} N·m",
         "bearings": " and ".join(f"{g.bearing.stiffness:g} N/m" for g in spec.gears),
         "modal_damping": " and ".join(f"{g.modal_damping:g}" for g in spec.gears) + " of critical",

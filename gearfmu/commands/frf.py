@@ -34,7 +34,9 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
 @click.option(
     "--band", nargs=2, type=Quantity("Hz"), default=(50.0, 10e3), show_default="50 Hz to 10 kHz", help="From, to."
 )
-@click.option("--damping", type=click.FloatRange(0), default=0.01, show_default=True, help="Damping ratio of both models.")
+@click.option(
+    "--damping", type=click.FloatRange(0), default=0.01, show_default=True, help="Damping ratio of both models."
+)
 @click.option("--lines", type=click.IntRange(2), default=400, show_default=True, help="Logarithmically spaced lines.")
 @click.option("--free/--held", default=False, help="Reduce the free body (as the kernel takes it) or, as the paper, "
               "with its ground held; judged with the ground held either way.  [default: held]")  # fmt: skip

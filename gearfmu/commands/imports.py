@@ -18,7 +18,11 @@ from gearfmu.commands.shared import Quantity, echo_pairs
 @click.option(
     "--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file."
 )
-@click.option("--bore", default="", help="Node set of the bore (of a ring: of its rim); without it the nodes on the stage's diameter.")
+@click.option(
+    "--bore",
+    default="",
+    help="Node set of the bore (of a ring: of its rim); without it the nodes on the stage's diameter.",
+)
 @click.option("--bolt", "bolts", multiple=True, help="Of a carrier: node set of a bolt's seat, in order from +x.")
 @click.option("--ignore", multiple=True, help="Node set of reference nodes that belong to no element.")
 def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> None:

@@ -13,7 +13,7 @@ from gearfmu.stability.case import LEVELS, STEPS
 
 
 class StepSize(Quantity):
-    """"default", "half" or "quarter" of the kernel's own step, or a step with a unit."""
+    """ "default", "half" or "quarter" of the kernel's own step, or a step with a unit."""
 
     name = '"default|half|quarter|<number> s"'
 

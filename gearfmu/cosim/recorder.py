@@ -31,9 +31,7 @@ class Recorder:
         if unfit:
             raise CouplingError(f"nothing to record for {', '.join(unfit)}; there are {', '.join(everything)}")
         units = {"": stage, DRIVE: drive}
-        self._logs = {
-            prefix: units[prefix].log(list(names), points) for prefix, names in self._names.items() if names
-        }
+        self._logs = {prefix: units[prefix].log(list(names), points) for prefix, names in self._names.items() if names}
         self._take = [log.take for log in self._logs.values()]
         self._time: list[float] = []
 

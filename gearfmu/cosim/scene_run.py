@@ -78,9 +78,7 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))
 
 
-def run_once(
-    scene: SceneSpec, source: Source, progress: Progress | None = None, wiring: Wiring = WHOLE
-) -> Result:
+def run_once(scene: SceneSpec, source: Source, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected."""
     shafts, choice = shafts_of(source.model.spec), scene.stage
     parameters = {

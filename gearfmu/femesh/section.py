@@ -99,8 +99,7 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
 
 
 def rim_parameters(height: float, depth: float, mesh: MeshSpec) -> np.ndarray:
-    """Grading through a rim of this height; its first element continues the last one of the root block, `depth` high.
-    """
+    """Grading through a rim of this height; its first element continues the last one of the root block, `depth` high."""
     across = graded(mesh.thickness, mesh.thickness_grading)
     first = depth * (across[-1] - across[-3])
     wanted = math.log1p(height / first * (mesh.rim_grading - 1)) / math.log(mesh.rim_grading)

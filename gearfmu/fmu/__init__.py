@@ -1,4 +1,5 @@
 """FMUs of gear stages: model description, native and pythonfmu FMU, validation."""
+
 from gearfmu.fmu.package import export
 from gearfmu.fmu.validate import validate
 

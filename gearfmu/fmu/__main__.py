@@ -1,4 +1,5 @@
 """The probes of gearfmu.fmu.validate as a program: python -m gearfmu.fmu FOLDER [CHECK …]."""
+
 import sys
 
 from gearfmu.fmu.probes import main

@@ -1,4 +1,5 @@
 """Does modelDescription.xml agree with the binary beside it? The binary's own table of variables is the truth."""
+
 from __future__ import annotations
 
 from collections.abc import Iterator

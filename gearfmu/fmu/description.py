@@ -1,4 +1,5 @@
 """modelDescription.xml of FMI 2.0, generated from the kernel's own table of variables."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -36,18 +37,29 @@ class Identity:
 
 def model_description(identity: Identity, variables: Sequence[Variable]) -> bytes:
     """The XML document (UTF-8) for these variables, in their order; raises FmuError for a unit without definition."""
-    root = ET.Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": identity.name, "guid": identity.guid, "description": identity.description,
-        "version": identity.version, "license": "BSD-3-Clause", "generationTool": f"gearfmu {identity.version}",
-        "variableNamingConvention": "structured", "numberOfEventIndicators": "0"})
+    root = ET.Element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0",
+            "modelName": identity.name,
+            "guid": identity.guid,
+            "description": identity.description,
+            "version": identity.version,
+            "license": "BSD-3-Clause",
+            "generationTool": f"gearfmu {identity.version}",
+            "variableNamingConvention": "structured",
+            "numberOfEventIndicators": "0",
+        },
+    )
     ET.SubElement(root, "CoSimulation", _capabilities(identity))
     _add_units(root, variables)
     _add_enumerations(root, variables)
     categories = ET.SubElement(root, "LogCategories")
     for name, text in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", {"name": name, "description": text})
-    ET.SubElement(root, "DefaultExperiment",
-                  {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)})
+    ET.SubElement(
+        root, "DefaultExperiment", {"startTime": "0", "stopTime": repr(DEFAULT_STOP), "stepSize": repr(DEFAULT_STEP)}
+    )
     listed = ET.SubElement(root, "ModelVariables")
     for variable in variables:
         _add_variable(listed, variable)
@@ -63,12 +75,22 @@ def enumeration_type(variable: Variable) -> str:
 
 def _capabilities(identity: Identity) -> dict[str, str]:
     """Only what is real: input interpolation, output derivatives and directional derivatives are not offered."""
-    able = {"canHandleVariableCommunicationStepSize": True, "canGetAndSetFMUstate": True, "canSerializeFMUstate": True,
-            "needsExecutionTool": not identity.native, "canNotUseMemoryManagementFunctions": not identity.native,
-            "canBeInstantiatedOnlyOncePerProcess": False, "canInterpolateInputs": False,
-            "canRunAsynchronuously": False, "providesDirectionalDerivative": False}
-    return {"modelIdentifier": identity.identifier, **{name: str(value).lower() for name, value in able.items()},
-            "maxOutputDerivativeOrder": "0"}
+    able = {
+        "canHandleVariableCommunicationStepSize": True,
+        "canGetAndSetFMUstate": True,
+        "canSerializeFMUstate": True,
+        "needsExecutionTool": not identity.native,
+        "canNotUseMemoryManagementFunctions": not identity.native,
+        "canBeInstantiatedOnlyOncePerProcess": False,
+        "canInterpolateInputs": False,
+        "canRunAsynchronuously": False,
+        "providesDirectionalDerivative": False,
+    }
+    return {
+        "modelIdentifier": identity.identifier,
+        **{name: str(value).lower() for name, value in able.items()},
+        "maxOutputDerivativeOrder": "0",
+    }
 
 
 def _add_units(root: ET.Element, variables: Sequence[Variable]) -> None:
@@ -94,9 +116,13 @@ def _add_enumerations(root: ET.Element, variables: Sequence[Variable]) -> None:
 
 def _add_variable(listed: ET.Element, variable: Variable) -> None:
     output = variable.causality == "output"
-    attributes = {"name": variable.name, "valueReference": str(variable.reference),
-                  "description": variable.description, "causality": variable.causality,
-                  "variability": _variability(variable)}
+    attributes = {
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": _variability(variable),
+    }
     if variable.causality != "input":
         attributes["initial"] = "calculated" if output else "exact"
     node = ET.SubElement(listed, "ScalarVariable", attributes)

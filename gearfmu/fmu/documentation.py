@@ -1,4 +1,5 @@
 """Documentation inside the FMU: one page with all variables, and the licences of what the FMU contains."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -33,8 +34,10 @@ connect all three where the other side has them.</li>
 </ul>
 """
 
-STYLE = ("body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
-         "td,th{padding:.1em .8em;text-align:left}")
+STYLE = (
+    "body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
+    "td,th{padding:.1em .8em;text-align:left}"
+)
 
 
 def page(identity: Identity, variables: Sequence[Variable]) -> str:
@@ -42,10 +45,12 @@ def page(identity: Identity, variables: Sequence[Variable]) -> str:
     head = ("name", "causality", "type", "unit", "start", "description")
     rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _row(v)) + "</tr>\n" for v in variables)
     title = escape(identity.name)
-    return (f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-            f"<style>{STYLE}</style></head>\n<body><h1>{title}</h1>\n<p>{escape(identity.description)}</p>{NOTES}"
-            f"<table><tr>{''.join(f'<th>{name}</th>' for name in head)}</tr>\n{rows}</table>\n"
-            f"<p>Model {identity.guid}, gearfmu {escape(identity.version)}.</p></body></html>\n")
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+        f"<style>{STYLE}</style></head>\n<body><h1>{title}</h1>\n<p>{escape(identity.description)}</p>{NOTES}"
+        f"<table><tr>{''.join(f'<th>{name}</th>' for name in head)}</tr>\n{rows}</table>\n"
+        f"<p>Model {identity.guid}, gearfmu {escape(identity.version)}.</p></body></html>\n"
+    )
 
 
 def licences(native: bool) -> dict[str, str]:

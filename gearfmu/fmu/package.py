@@ -1,4 +1,5 @@
 """An FMU file from a stage model: XML from the kernel's table, the model blob, a byte copy of the kernel library."""
+
 from __future__ import annotations
 
 import hashlib
@@ -104,13 +105,21 @@ def _python_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, byte
 
 def _common_files(model: Model, identifier: str, native: bool) -> dict[str, bytes]:
     variables = list(Kernel(model.blob).variables.values())
-    identity = Identity(model.name, identifier, model.hash, metadata.version("gearfmu"),
-                        getattr(getattr(model, "spec", None), "description", ""), native)
-    return {"modelDescription.xml": model_description(identity, variables),
-            "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(variables),
-            "documentation/index.html": page(identity, variables).encode(),
-            **{f"documentation/licenses/{name}": text.encode() for name, text in licences(native).items()},
-            MODEL_FILE: model.blob}
+    identity = Identity(
+        model.name,
+        identifier,
+        model.hash,
+        metadata.version("gearfmu"),
+        getattr(getattr(model, "spec", None), "description", ""),
+        native,
+    )
+    return {
+        "modelDescription.xml": model_description(identity, variables),
+        "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(variables),
+        "documentation/index.html": page(identity, variables).encode(),
+        **{f"documentation/licenses/{name}": text.encode() for name, text in licences(native).items()},
+        MODEL_FILE: model.blob,
+    }
 
 
 def _pythonfmu_folder() -> Path:

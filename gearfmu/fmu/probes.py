@@ -1,6 +1,7 @@
 """Calls that an FMU must answer well, run in a process of their own by gearfmu.fmu.validate: a crash is then a finding.
 
-    python -m gearfmu.fmu FOLDER [CHECK …]       FOLDER: an unpacked FMU; writes one JSON object a line"""
+python -m gearfmu.fmu FOLDER [CHECK …]       FOLDER: an unpacked FMU; writes one JSON object a line"""
+
 from __future__ import annotations
 
 import json
@@ -36,8 +37,12 @@ class Subject:
         self.variables = self.description.modelVariables
         self.native = not self.description.coSimulation.needsExecutionTool
         self.step_size = float(getattr(self.description.defaultExperiment, "stepSize", None) or 1e-4)
-        self.fmu = FMU2Slave(guid=guid or self.description.guid, unzipDirectory=folder, instanceName="probe",
-                             modelIdentifier=self.description.coSimulation.modelIdentifier)
+        self.fmu = FMU2Slave(
+            guid=guid or self.description.guid,
+            unzipDirectory=folder,
+            instanceName="probe",
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+        )
         self.time = 0
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.logger = fmi2CallbackLoggerTYPE(lambda *_: None)
@@ -108,8 +113,9 @@ def wrong_order(folder: str) -> Findings:
     outputs, inputs = subject.references("output", "Real")[:1], subject.references("input", "Real")[:1]
     step = {"doStep": (0.0, subject.step_size)}
     setup = {"setupExperiment": (), "enterInitializationMode": ()}
-    yield from _refused(subject, "instantiated mode",
-                        {"exitInitializationMode": (), **step, "getReal": (outputs,), "terminate": ()})
+    yield from _refused(
+        subject, "instantiated mode", {"exitInitializationMode": (), **step, "getReal": (outputs,), "terminate": ()}
+    )
     subject.fmu.setupExperiment(startTime=0.0)
     subject.fmu.enterInitializationMode()
     yield from _refused(subject, "initialization mode", {**setup, **step, "terminate": ()})
@@ -139,8 +145,11 @@ def bad_values(folder: str) -> Findings:
     if not subject.native:
         return
     truth = subject.references("parameter", "Boolean")[:1]
-    yield from _refused(subject, "step mode, of an unknown reference",
-                        {"getReal": ([UNKNOWN],), "getInteger": ([UNKNOWN],), "setBoolean": ([UNKNOWN], [True])})
+    yield from _refused(
+        subject,
+        "step mode, of an unknown reference",
+        {"getReal": ([UNKNOWN],), "getInteger": ([UNKNOWN],), "setBoolean": ([UNKNOWN], [True])},
+    )
     yield from _refused(subject, "step mode, of a Boolean", {"getReal": (truth,)} if truth else {})
     if subject.run() != expected:
         yield "refused values", "the outputs differ afterwards", "a refused call must change nothing"
@@ -166,8 +175,12 @@ def start_values(folder: str) -> Findings:
     subject = Subject(folder)
     subject.fmu.setupExperiment(startTime=0.0)
     subject.fmu.enterInitializationMode()
-    getters = {"Real": subject.fmu.getReal, "Integer": subject.fmu.getInteger, "Enumeration": subject.fmu.getInteger,
-               "Boolean": subject.fmu.getBoolean}
+    getters = {
+        "Real": subject.fmu.getReal,
+        "Integer": subject.fmu.getInteger,
+        "Enumeration": subject.fmu.getInteger,
+        "Boolean": subject.fmu.getBoolean,
+    }
     for v in subject.variables:
         if v.causality in ("input", "parameter") and v.type in getters:
             value = getters[v.type]([v.valueReference])[0]
@@ -200,7 +213,7 @@ def saved_state(folder: str) -> Findings:
 def _serialized(folder: str, image: bytes, time: int, expected: bytes, native: bool) -> Findings:
     other = Subject(folder)
     if native:
-        flipped = [image[:k] + bytes([image[k] ^ 1]) + image[k + 1:] for k in (0, len(image) // 2, len(image) - 1)]
+        flipped = [image[:k] + bytes([image[k] ^ 1]) + image[k + 1 :] for k in (0, len(image) // 2, len(image) - 1)]
         for damaged in (b"", image[:-1], image + b"\0", *flipped):
             yield from _refused(other, "instantiated mode, of damaged bytes", {"deSerializeFMUstate": (damaged,)})
     else:
@@ -262,6 +275,7 @@ def wrong_guid(folder: str) -> Findings:
 def kernel_table(folder: str) -> Findings:
     """modelDescription.xml says what the binary's own table of variables says."""
     from gearfmu.fmu.agreement import compare
+
     yield from compare(Path(folder))
 
 
@@ -272,8 +286,20 @@ def _plain_run(folder: str, steps: int = STEPS) -> bytes:
     return bits
 
 
-CHECKS: dict[str, Callable[[str], Findings]] = {check.__name__: check for check in (
-    wrong_guid, kernel_table, start_values, wrong_order, bad_values, bad_steps, saved_state, instances, clocks)}
+CHECKS: dict[str, Callable[[str], Findings]] = {
+    check.__name__: check
+    for check in (
+        wrong_guid,
+        kernel_table,
+        start_values,
+        wrong_order,
+        bad_values,
+        bad_steps,
+        saved_state,
+        instances,
+        clocks,
+    )
+}
 
 
 def main(folder: str, names: list[str]) -> None:

@@ -1,6 +1,7 @@
 """Slave of a `--runtime python` FMU. It stands in the FMU's resources beside the kernel library and the model, needs
 nothing but Python's standard library, and hands every call to the library's own FMI 2 face: one set of rules, the same
 bits as the native FMU. MODEL_HASH and LIBRARY are filled in at export."""
+
 import ctypes
 import os
 import pathlib
@@ -18,8 +19,13 @@ LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, 
 class Callbacks(ctypes.Structure):
     """fmi2CallbackFunctions; without memory functions the library takes its own."""
 
-    _fields_ = [("logger", LOGGER), ("allocate", ctypes.c_void_p), ("free", ctypes.c_void_p),
-                ("step_finished", ctypes.c_void_p), ("environment", ctypes.c_void_p)]
+    _fields_ = [
+        ("logger", LOGGER),
+        ("allocate", ctypes.c_void_p),
+        ("free", ctypes.c_void_p),
+        ("step_finished", ctypes.c_void_p),
+        ("environment", ctypes.c_void_p),
+    ]
 
 
 def load_library(resources):
@@ -40,8 +46,9 @@ class GearStage(Fmi2Slave):
         self.library = load_library(self.resources)
         self.callbacks = Callbacks(logger=LOGGER(self._take_message))
         location = pathlib.Path(self.resources).resolve().as_uri()
-        self.instance = self.library.fmi2Instantiate(self.instance_name.encode(), 1, MODEL_HASH.encode(),
-                                                     location.encode(), ctypes.byref(self.callbacks), 0, 0)
+        self.instance = self.library.fmi2Instantiate(
+            self.instance_name.encode(), 1, MODEL_HASH.encode(), location.encode(), ctypes.byref(self.callbacks), 0, 0
+        )
         if not self.instance:
             raise RuntimeError("the kernel refused to make an instance: " + self._messages())
 
@@ -51,8 +58,9 @@ class GearStage(Fmi2Slave):
 
     def setup_experiment(self, start_time, stop_time=None, tolerance=None):
         stop = ctypes.c_double(stop_time or 0.0)
-        self._demand("fmi2SetupExperiment", 0, ctypes.c_double(0), ctypes.c_double(start_time),
-                     int(stop_time is not None), stop)
+        self._demand(
+            "fmi2SetupExperiment", 0, ctypes.c_double(0), ctypes.c_double(start_time), int(stop_time is not None), stop
+        )
 
     def enter_initialization_mode(self):
         self._demand("fmi2EnterInitializationMode")
@@ -134,8 +142,9 @@ class GearStage(Fmi2Slave):
         self.refused = self._call(function, *arguments) != OK or self.refused
 
     def _take_message(self, environment, name, status, category, message):
-        self.log(message.decode("utf-8", "replace").replace("%%", "%"), Fmi2Status(status),
-                 (category or b"logAll").decode())
+        self.log(
+            message.decode("utf-8", "replace").replace("%%", "%"), Fmi2Status(status), (category or b"logAll").decode()
+        )
 
     def _messages(self):
         return "; ".join(message.msg for message in self.log_queue)

@@ -2,6 +2,7 @@
 
 Nothing is loaded, so that a Windows binary can be checked on Linux.
 Sources: System V ABI (gABI), chapters 4 and 5; Microsoft PE Format."""
+
 from __future__ import annotations
 
 import struct
@@ -27,7 +28,7 @@ def exported_symbols(path: str | Path) -> set[str]:
 
 
 def _text(data: bytes, start: int) -> str:
-    return data[start:data.index(b"\0", start)].decode("ascii", "replace")
+    return data[start : data.index(b"\0", start)].decode("ascii", "replace")
 
 
 def _elf_symbols(data: bytes) -> set[str]:
@@ -47,11 +48,11 @@ def _elf_symbols(data: bytes) -> set[str]:
 
 def _pe_symbols(data: bytes) -> set[str]:
     header = struct.unpack_from("<I", data, 60)[0]
-    if data[header:header + 4] != b"PE\0\0":
+    if data[header : header + 4] != b"PE\0\0":
         raise ValueError("no PE header")
     sections, optional = struct.unpack_from("<H", data, header + 6)[0], struct.unpack_from("<H", data, header + 20)[0]
     start = header + 24
-    directory = struct.unpack_from("<I", data, start + (112 if data[start:start + 2] == b"\x0b\x02" else 96))[0]
+    directory = struct.unpack_from("<I", data, start + (112 if data[start : start + 2] == b"\x0b\x02" else 96))[0]
     rows = [struct.unpack_from("<IIII", data, start + optional + 40 * k + 8) for k in range(sections)]
 
     def place(address: int) -> int:

@@ -2,6 +2,7 @@
 
 The members carry the names of a rotational flange: `phi` and `tau` as in Modelica.Mechanics.Rotational.Interfaces, plus
 the speed, the acceleration and the mean torque that a good coupling uses. Which are inputs follows from the port."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -25,11 +26,21 @@ def terminals_and_icons(variables: Sequence[Variable]) -> bytes:
     root = ET.Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     terminals = ET.SubElement(root, "Terminals")
     for shaft, names in shafts(variables).items():
-        terminal = ET.SubElement(terminals, "Terminal", {
-            "name": shaft, "matchingRule": "bus", "terminalKind": KIND,
-            "description": f"rotational flange of shaft {shaft}; all angles about +z"})
+        terminal = ET.SubElement(
+            terminals,
+            "Terminal",
+            {
+                "name": shaft,
+                "matchingRule": "bus",
+                "terminalKind": KIND,
+                "description": f"rotational flange of shaft {shaft}; all angles about +z",
+            },
+        )
         for name in names:
-            ET.SubElement(terminal, "TerminalMemberVariable", {
-                "variableName": name, "memberName": name.split(".")[1], "variableKind": "signal"})
+            ET.SubElement(
+                terminal,
+                "TerminalMemberVariable",
+                {"variableName": name, "memberName": name.split(".")[1], "variableKind": "signal"},
+            )
     ET.indent(root)
     return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"

@@ -1,4 +1,5 @@
 """Units of the kernel's variables as FMI 2 units: exponents of the SI base units, and the usual display units."""
+
 from __future__ import annotations
 
 import math

@@ -1,4 +1,5 @@
 """All that can be found wrong with an FMU: what fmpy checks, and what only shows when it is opened and called."""
+
 from __future__ import annotations
 
 import json
@@ -116,7 +117,7 @@ def fmi_functions() -> set[str]:
     exchange, simulation = "Functions for FMI2 for Model Exchange", "Functions for FMI2 for Co-Simulation"
     declared = text.rindex("Common Functions")
     names = set()
-    for part in (text[declared:text.rindex(exchange)], text[text.rindex(simulation):]):
+    for part in (text[declared : text.rindex(exchange)], text[text.rindex(simulation) :]):
         names |= {line.split()[2].rstrip(";") for line in part.splitlines() if line.strip().startswith("FMI2_Export")}
     return names
 

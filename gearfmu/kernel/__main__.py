@@ -1,4 +1,5 @@
 """Builds the kernel library: python -m gearfmu.kernel [--platform win64] [--sanitize]."""
+
 import sys
 
 from gearfmu.kernel.build import main

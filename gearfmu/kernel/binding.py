@@ -1,4 +1,5 @@
 """ctypes declarations of gk.h and the one loaded library."""
+
 from __future__ import annotations
 
 import ctypes
@@ -11,8 +12,19 @@ from gearfmu.kernel.build import library_path
 
 ABI = 1
 MESSAGE = 512
-OUTCOMES = ("ok", "bad_blob", "bad_variable", "bad_value", "bad_call", "bad_step", "step_too_large", "no_equilibrium",
-            "diverged", "penetration", "energy")
+OUTCOMES = (
+    "ok",
+    "bad_blob",
+    "bad_variable",
+    "bad_value",
+    "bad_call",
+    "bad_step",
+    "step_too_large",
+    "no_equilibrium",
+    "diverged",
+    "penetration",
+    "energy",
+)
 TYPES = ("Real", "Integer", "Boolean", "Enumeration")
 CAUSALITIES = ("input", "output", "parameter")
 
@@ -20,8 +32,18 @@ CAUSALITIES = ("input", "output", "parameter")
 class VariableInfo(ctypes.Structure):
     """gk_variable_info."""
 
-    _fields_ = [("reference", c_uint32), ("type", c_int), ("causality", c_int), ("name", c_char * 64), ("unit", c_char * 24), ("items", c_char * 64),
-                ("description", c_char * 160), ("start", c_double), ("minimum", c_double), ("maximum", c_double)]
+    _fields_ = [
+        ("reference", c_uint32),
+        ("type", c_int),
+        ("causality", c_int),
+        ("name", c_char * 64),
+        ("unit", c_char * 24),
+        ("items", c_char * 64),
+        ("description", c_char * 160),
+        ("start", c_double),
+        ("minimum", c_double),
+        ("maximum", c_double),
+    ]
 
 
 _SIGNATURES = {
@@ -59,7 +81,9 @@ def load(path: Path | None = None) -> ctypes.CDLL:
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
     if library.gk_abi() != ABI:
-        raise ModelError(f"{path or library_path()} speaks version {library.gk_abi()} of the kernel interface, this Python {ABI}: reinstall gearfmu")
+        raise ModelError(
+            f"{path or library_path()} speaks version {library.gk_abi()} of the kernel interface, this Python {ABI}: reinstall gearfmu"
+        )
     return library
 
 

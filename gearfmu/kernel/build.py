@@ -1,4 +1,4 @@
-"""Builds the one shared library of the project from gearfmu/kernel/src/*.c: the gk_ API and the FMI 2 entry points.
+"""Builds the one shared library of the project from the C files below gearfmu/kernel/src: the gk_ API and the FMI 2 entry points.
 
 One source list, one set of flags (docs/architecture.md, Kernel): contraction of products and sums is off and there is
 no fast-math, so that gcc, clang and zig, Linux and Windows give the same bits. `-Bsymbolic` and hidden visibility keep
@@ -8,6 +8,7 @@ a second FMU in the same process from running the first one's kernel.
 
 This file is also loaded by setup.py before anything is installed: it imports the standard library and gearfmu.errors.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -28,8 +29,16 @@ HERE = Path(__file__).resolve().parent
 STEM = "gearfmu_kernel"
 SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
 ZIG_TARGET = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
-FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden",
-         "-Wall", "-Wextra", "-Werror")
+FLAGS = (
+    "-std=c99",
+    "-O3",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fvisibility=hidden",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+)
 REBUILD = "python -m gearfmu.kernel"
 CROSS = 'pip install "gearfmu[cross]"'
 
@@ -44,14 +53,16 @@ def host_platform() -> str:
     Raises BuildError on a 32-bit or unknown system."""
     name = {"Linux": "linux64", "Windows": "win64", "Darwin": "darwin64"}.get(_platform.system())
     if name is None or sys.maxsize <= 2**32:
-        raise BuildError(f"no kernel for this system ({_platform.system()} {_platform.machine()}): "
-                         f"gearfmu runs on 64-bit {', '.join(SUFFIX)}")
+        raise BuildError(
+            f"no kernel for this system ({_platform.system()} {_platform.machine()}): "
+            f"gearfmu runs on 64-bit {', '.join(SUFFIX)}"
+        )
     return name
 
 
 def sources(folder: Path = HERE) -> list[Path]:
     """C sources, headers and tables below `folder`/src in a fixed order; empty when there are none."""
-    found = (p for p in (folder / "src").glob("*") if p.suffix in (".c", ".h", ".inc"))
+    found = (p for p in (folder / "src").rglob("*") if p.suffix in (".c", ".h", ".inc"))
     return sorted(found, key=lambda p: p.name)
 
 
@@ -76,17 +87,27 @@ def library_path(platform: str = "host") -> Path:
     library = next((p for p in found if p.is_file()), None)
     if library is None:
         needs = "" if name == host_platform() else f" (it needs the cross compiler: {CROSS})"
-        raise BuildError(f"no kernel library for {name} (looked for {', '.join(map(str, found))}): "
-                         f"build it with `{REBUILD}{option}`{needs}")
+        raise BuildError(
+            f"no kernel library for {name} (looked for {', '.join(map(str, found))}): "
+            f"build it with `{REBUILD}{option}`{needs}"
+        )
     files = next((s for s in map(sources, folders) if s), [])
     if files and _built_from(library) != source_hash(files):
-        raise BuildError(f"{library} was built from other sources than those in {files[0].parent}: "
-                         f"rebuild it with `{REBUILD}{option}`")
+        raise BuildError(
+            f"{library} was built from other sources than those in {files[0].parent}: "
+            f"rebuild it with `{REBUILD}{option}`"
+        )
     return library
 
 
-def build_library(platform: str = "host", sanitize: bool = False, pattern: bool = False, real: str = "float",
-                  out: str | Path | None = None, compiler: Sequence[str] | None = None) -> Path:
+def build_library(
+    platform: str = "host",
+    sanitize: bool = False,
+    pattern: bool = False,
+    real: str = "float",
+    out: str | Path | None = None,
+    compiler: Sequence[str] | None = None,
+) -> Path:
     """Compile and link the library; returns its path.
 
     platform: "host", or "linux64" / "win64" cross-compiled with ziglang.
@@ -109,8 +130,21 @@ def build_library(platform: str = "host", sanitize: bool = False, pattern: bool 
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=".build-") as work:
         made = Path(work) / target.name
-        _run([*command, *FLAGS, *_variant_flags(sanitize, pattern, real), *_link_flags(name, sanitize),
-              f"-I{fmi_headers()}", *own_flags, "-o", str(made), *[str(p) for p in files if p.suffix == ".c"], *_libraries(name)])
+        _run(
+            [
+                *command,
+                *FLAGS,
+                *_variant_flags(sanitize, pattern, real),
+                *_link_flags(name, sanitize),
+                f"-I{fmi_headers()}",
+                f"-I{HERE / 'src'}",
+                *own_flags,
+                "-o",
+                str(made),
+                *[str(p) for p in files if p.suffix == ".c"],
+                *_libraries(name),
+            ]
+        )
         digest = Path(work) / "digest"
         digest.write_text(source_hash(files) + "\n")
         os.replace(made, target)
@@ -123,8 +157,19 @@ def compile_program(source: Path, out: Path, platform: str = "host", sanitize: b
 
     Raises BuildError with the compiler's messages."""
     name = _platform_name(platform)
-    _run([*_compiler(name, sanitize), *FLAGS, *_variant_flags(sanitize, pattern=False, real="float"),
-          f"-I{fmi_headers()}", f"-I{HERE / 'src'}", "-o", str(out), str(source), *_libraries(name)])
+    _run(
+        [
+            *_compiler(name, sanitize),
+            *FLAGS,
+            *_variant_flags(sanitize, pattern=False, real="float"),
+            f"-I{fmi_headers()}",
+            f"-I{HERE / 'src'}",
+            "-o",
+            str(out),
+            str(source),
+            *_libraries(name),
+        ]
+    )
     return out
 
 

@@ -1,4 +1,5 @@
 """One running instance of a stage model in this process."""
+
 from __future__ import annotations
 
 import ctypes
@@ -81,8 +82,20 @@ class Kernel:
             info = VariableInfo()
             self._lib.gk_variable(self._model, i, ctypes.byref(info))
             items = tuple(info.items.decode().split("|")) if info.items else ()
-            found.append(Variable(info.reference, info.name.decode(), TYPES[info.type], CAUSALITIES[info.causality], info.unit.decode(), items,
-                                  info.description.decode(), info.start, info.minimum, info.maximum))
+            found.append(
+                Variable(
+                    info.reference,
+                    info.name.decode(),
+                    TYPES[info.type],
+                    CAUSALITIES[info.causality],
+                    info.unit.decode(),
+                    items,
+                    info.description.decode(),
+                    info.start,
+                    info.minimum,
+                    info.maximum,
+                )
+            )
         return found
 
     def _reference(self, name: str) -> int:
@@ -96,7 +109,9 @@ class Kernel:
         outcome = self._lib.gk_set(self._model, self._data, self._reference(name), value)
         if outcome:
             variable = self.variables[name]
-            raise ModelError(f"{name} = {value!r}: {self._text(outcome)} (between {variable.minimum:g} and {variable.maximum:g} {variable.unit})")
+            raise ModelError(
+                f"{name} = {value!r}: {self._text(outcome)} (between {variable.minimum:g} and {variable.maximum:g} {variable.unit})"
+            )
 
     def get(self, name: str) -> float:
         """Value of any variable, SI."""
@@ -150,16 +165,22 @@ class Kernel:
     def restore(self, state: bytes) -> None:
         """Take a state of this model and setup back. ModelError when the bytes cannot be one."""
         if self._lib.gk_state_check(self._model, self._setup, state, len(state)):
-            raise ModelError("these bytes are not a state of this model at this level: save and restore with the same model and parameters")
+            raise ModelError(
+                "these bytes are not a state of this model at this level: save and restore with the same model and parameters"
+            )
         ctypes.memmove(self._data, state, len(state))
 
     def transmission(self, phi_wheel: float, torque: float, keep: bool = False) -> TeState:
         """Quasi-static equilibrium with the wheel's bore held at phi_wheel (rad) and `torque` (N·m) on the pinion's bore; after `prepare`."""
         out = (ctypes.c_double * (1 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
-        self._check(self._lib.gk_te(self._model, self._setup, self._data, phi_wheel, torque, int(keep), out, ctypes.byref(count)))
+        self._check(
+            self._lib.gk_te(
+                self._model, self._setup, self._data, phi_wheel, torque, int(keep), out, ctypes.byref(count)
+            )
+        )
         slices = int(self.get("slices"))
-        rows = [out[1 + i * (2 + slices): 1 + (i + 1) * (2 + slices)] for i in range(count.value)]
+        rows = [out[1 + i * (2 + slices) : 1 + (i + 1) * (2 + slices)] for i in range(count.value)]
         return TeState(out[0], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
 
     def profile(self) -> dict[str, int]:
@@ -174,4 +195,6 @@ class Kernel:
 
     def _check(self, outcome: int) -> None:
         if outcome:
-            raise SimulationError(f"{self.name}: {self._text(outcome)} (last good time {self.time:.9g} s)", OUTCOMES[outcome], self.time)
+            raise SimulationError(
+                f"{self.name}: {self._text(outcome)} (last good time {self.time:.9g} s)", OUTCOMES[outcome], self.time
+            )

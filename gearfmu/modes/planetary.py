@@ -22,9 +22,7 @@ from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
 BODIES = ("sun", "planet", "ring", "carrier")
 
 
-def set_body_modes(
-    spec: Any, name: str, count: int, progress: Progress | None = None, scale: float = 1.0
-) -> BodyModes:
+def set_body_modes(spec: Any, name: str, count: int, progress: Progress | None = None, scale: float = 1.0) -> BodyModes:
     """The `count` lowest elastic modes of a free body of a PlanetarySpec, with its modal damping: sun, planet and ring
     by one sector; the carrier with its bolts and bore coupled as the file says. The ring's mounts are left out.
 
@@ -38,9 +36,7 @@ def set_body_modes(
     return _damped(found, gear.modal_damping)
 
 
-def mounted_ring_modes(
-    spec: Any, count: int, progress: Progress | None = None, scale: float = RING_SCALE
-) -> BodyModes:
+def mounted_ring_modes(spec: Any, count: int, progress: Progress | None = None, scale: float = RING_SCALE) -> BodyModes:
     """The lowest modes of the ring on its mounts, with all its teeth.
 
     scale : factor on all element counts; at 1 a whole ring is too much. BodyError for a ring without mounts.

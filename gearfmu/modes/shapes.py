@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 DRAWN = 0.05  # of the body's diameter: the largest displacement as it is drawn
 
+
 @dataclass(frozen=True)
 class Mode:
     """One frequency of a body: a single mode, or the pair of a cyclic body.

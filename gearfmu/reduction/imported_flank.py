@@ -99,7 +99,10 @@ def _all_between(
     low, high = wanted.radii()
     radius = np.hypot(centre[:, 0], centre[:, 1])
     chosen = (
-        (np.abs(normal[:, 2]) < _STEEP) & (np.abs(moment) > _INWARD * wanted.flank.r_b) & (radius > low) & (radius < high)
+        (np.abs(normal[:, 2]) < _STEEP)
+        & (np.abs(moment) > _INWARD * wanted.flank.r_b)
+        & (radius > low)
+        & (radius < high)
     )
     side = np.where(chosen, np.sign(moment), 0).astype(int)
     base = np.arctan2(centre[:, 1], centre[:, 0]) + side * (

@@ -94,8 +94,9 @@ def placed(model: StageModel, start: Rattle) -> bytes:
     return write_blob(sections)
 
 
-def started(model: StageModel, start: Rattle, parameters: Mapping[str, float] | None = None,
-            library: Path | None = None) -> Kernel:
+def started(
+    model: StageModel, start: Rattle, parameters: Mapping[str, float] | None = None, library: Path | None = None
+) -> Kernel:
     """A kernel of the pair at its start; `parameters` go over CONSERVING. Momenta along the mesh cancel: the pair
     stays where it is."""
     geometry = PairGeometry.of(model.spec)
@@ -124,5 +125,12 @@ def energies(kernel: Kernel, h: float, duration: float) -> Energies:
         kernel.get_many(references, first + i * samples.strides[0])
     stored, work, dissipated, pairs, contact = samples.T
     changes = int(np.count_nonzero((np.diff(pairs) != 0) | (np.diff(contact) != 0)))
-    return Energies(stored - work, dissipated, kinetic, changes, int(kernel.get("solver.trouble")),
-                    bool(int(kernel.get("solver.status")) & 8), stored)
+    return Energies(
+        stored - work,
+        dissipated,
+        kinetic,
+        changes,
+        int(kernel.get("solver.trouble")),
+        bool(int(kernel.get("solver.status")) & 8),
+        stored,
+    )

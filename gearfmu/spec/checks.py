@@ -47,7 +47,8 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
         found += _reliefs(gears, geometry)
         found += _strips(gears, geometry, torque_max)
     return [
-        Problem(file, field, value if isinstance(value, str) else millimetres(value), remedy) for field, value, remedy in found
+        Problem(file, field, value if isinstance(value, str) else millimetres(value), remedy)
+        for field, value, remedy in found
     ]
 
 

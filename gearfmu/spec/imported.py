@@ -20,8 +20,7 @@ Files = TypeVar("Files", bound="FilesSpec")
 
 
 class FilesSpec(Spec):
-    """Mesh of a body, its units, and, where they are ready-made, its matrices; paths relative to the file that says so.
-    """
+    """Mesh of a body, its units, and, where they are ready-made, its matrices; paths relative to the file that says so."""
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
     length: Annotated[float, Quantity("m", above=0)] = Field(

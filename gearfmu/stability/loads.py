@@ -49,9 +49,7 @@ def torque_reversal(case: Case) -> Finding:
     """±torque_max within 5 ms through the backlash and back, at 2000 rpm. Impacts on either side, and the torque
     carried to 2 % by the coast flanks, then by the drive flanks."""
     pair, ends = geometry(RELIEVED), (winding(RELIEVED, LARGEST), winding(RELIEVED, -LARGEST))
-    turn = Turning(
-        RELIEVED, Constant(2000 * RPM), (Step(0.02, 0.025, *ends), Step(0.065, 0.07, ends[1], ends[0]))
-    )
+    turn = Turning(RELIEVED, Constant(2000 * RPM), (Step(0.02, 0.025, *ends), Step(0.065, 0.07, ends[1], ends[0])))
     made = run(kernel(model(RELIEVED), case), turn, 0.12, H)
     middle = (made.time > 0.045) & (made.time < 0.065)
     coast = pair.gears[0].r_b * made["mesh.force_mean"][middle].mean()

@@ -31,6 +31,7 @@ SCENES: dict[str, Callable[[Case], Finding]] = {
     )
 }
 
+
 def what(name: str) -> str:
     """What happens in a scene and what must be seen there: its docstring on one line."""
     return " ".join((SCENES[name].__doc__ or "").split())

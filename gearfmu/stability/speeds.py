@@ -33,7 +33,9 @@ def run_up_and_down(case: Case) -> Finding:
     for name, lost in (("up", up), ("down", down)):
         facts[f"open_share_{name}"] = float(lost.mean())
         facts[f"jump_{name}_rpm"] = _onset(lost)
-        said += at_least(f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 4 * LOST)
+        said += at_least(
+            f"largest contact-loss share in {1.0 / BINS:.3f} of the run {name}", float(lost.max()), 4 * LOST
+        )
     said += statistics(facts, EXPECTED)
     apart = facts["jump_up_rpm"] - facts["jump_down_rpm"]
     said += at_least("distance of the jumps up and down (rpm)", apart, 2.0 * (HIGH - LOW) / BINS)

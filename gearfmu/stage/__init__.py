@@ -1,4 +1,5 @@
 """The stage as the kernel runs it: model, quasi-static transmission error, standalone simulation, traces."""
+
 from __future__ import annotations
 
 from gearfmu.stage.model import StageModel, assemble

@@ -1,8 +1,9 @@
 """The model blob: named constant arrays in one checked block of bytes, read in place by the kernel (layout:
 docs/file-formats.md, "Model blob").
 
-The same rules are checked here and in gearfmu/kernel/src/gk_blob.c; one content has exactly one sequence of bytes.
+The same rules are checked here and in gearfmu/kernel/src/base/gk_blob.c; one content has exactly one sequence of bytes.
 """
+
 from __future__ import annotations
 
 import hashlib
@@ -139,11 +140,13 @@ def _check_header(blob: bytes) -> int:
     if magic != MAGIC:
         raise ModelError("model blob: does not begin with GFMB, this is not a gearfmu model")
     if version != FORMAT:
-        raise ModelError(f"model blob: format version {version}, this package reads version {FORMAT}: "
-                         "assemble the stage again")
+        raise ModelError(
+            f"model blob: format version {version}, this package reads version {FORMAT}: assemble the stage again"
+        )
     if size != len(blob):
-        raise ModelError(f"model blob: header says {size} bytes, there are {len(blob)}: "
-                         "the blob is cut short or padded")
+        raise ModelError(
+            f"model blob: header says {size} bytes, there are {len(blob)}: the blob is cut short or padded"
+        )
     if count > MOST_SECTIONS or HEADER.size + count * ENTRY.size > size:
         raise ModelError(f"model blob: {count} sections do not fit")
     if any(blob[52 : HEADER.size]):

@@ -44,7 +44,9 @@ def local_path(spec: StageSpec, force: float) -> float:
     width = min(gear.face_width for gear in spec.gears)
     local = [2 * (1 - g.material.poisson_ratio**2) / (np.pi * g.material.youngs_modulus) for g in spec.gears]
     half_width = np.sqrt(2 * sum(local) * force / width / sum(1 / roll for roll in rolls))
-    terms = [c * (np.log(4 * g.body.strip_half_width / half_width) - 1.5) for c, g in zip(local, spec.gears, strict=True)]
+    terms = [
+        c * (np.log(4 * g.body.strip_half_width / half_width) - 1.5) for c, g in zip(local, spec.gears, strict=True)
+    ]
     return sum(terms) / width
 
 

@@ -1,4 +1,5 @@
 """Reduced body → the tables of one gear in the model blob: rows and compliances on an even grid of rolls, for the width functions that the stage can excite."""
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -59,7 +60,7 @@ def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
 
 
 def body_sections(index: int, body: Any, to_grid: np.ndarray, degrees: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/gk_model.c); to_grid: of `resampling`."""
+    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/model/gk_model.c); to_grid: of `resampling`."""
     modes = excited_modes(body, degrees)
     rows = blend(to_grid, body.flank_rows[:, :, degrees][..., modes], 1)
     static = body.static_ff[..., degrees, :][..., degrees]

@@ -119,9 +119,7 @@ class _KeptSource:
         return self.unit_made
 
 
-def models_for(
-    scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int = ROLLS, **changes: Any
-) -> StageModel:
+def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int = ROLLS, **changes: Any) -> StageModel:
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
     along a flank; changes: of the StageSpec."""
     spec = load_stage(scene.stage.name).model_copy(update=changes)

@@ -47,7 +47,7 @@ class FlatPair:
 
 
 def flat_blob(pair: FlatPair) -> bytes:
-    """The model blob (sections: gearfmu/kernel/src/gk_model.c)."""
+    """The model blob (sections: gearfmu/kernel/src/model/gk_model.c)."""
     sections: dict = {
         "model": np.array([1, FLAT, pair.slices, 0], np.int32),
         "name": "flat_pair",

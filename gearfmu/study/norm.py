@@ -77,9 +77,7 @@ class Errors:
 
     def below(self, share: float, other: Errors) -> bool:
         """Whether every alternating part's error is at most `share` of the other's."""
-        return all(
-            getattr(self, f.name) <= share * getattr(other, f.name) for f in fields(self) if f.name != "te_mean"
-        )
+        return all(getattr(self, f.name) <= share * getattr(other, f.name) for f in fields(self) if f.name != "te_mean")
 
 
 STOPPED = Errors(float("nan"), float("nan"), float("nan"), float("nan"))

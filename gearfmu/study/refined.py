@@ -115,9 +115,7 @@ def _run(scene: SceneSpec, bodies: Sequence[Any], variant: Variant, h: float) ->
     return measure(scene, model, Point("full", h=h, slices=variant.slices))
 
 
-def _row(
-    scene: SceneSpec, variant: Variant, own: Run, bodies: Sequence[Any], cost: tuple[float, float]
-) -> BodyRow:
+def _row(scene: SceneSpec, variant: Variant, own: Run, bodies: Sequence[Any], cost: tuple[float, float]) -> BodyRow:
     run = _run(scene, bodies, variant, cost[0])
     e, dof = errors(own.signals, run.signals), "/".join(str(body.mesh["dof_sector"]) for body in bodies)
     head = (scene.name, variant.name, dof, run.n_dyn, variant.slices, variant.rolls)

@@ -67,7 +67,9 @@ def test_reference_does_not_depend_on_the_cut():
     cuts, one torque to 1e-5 of its standard deviation (0.3e-5 as measured), and one lock-up."""
     inside, outside = (run("gs_mean", H, chain=chain).trace for chain in (True, False))
     assert rms(inside[torque(True)] + outside[torque(False)]) < 1e-5 * np.std(inside[torque(True)])
-    seen = [trace.time[np.argmax(trace[name] > 0)] for trace, name in ((inside, LOCKED[True]), (outside, LOCKED[False]))]
+    seen = [
+        trace.time[np.argmax(trace[name] > 0)] for trace, name in ((inside, LOCKED[True]), (outside, LOCKED[False]))
+    ]
     assert abs(seen[0] - seen[1]) <= 1.01 * H
 
 

@@ -1,4 +1,5 @@
 """FMUs that all tests of this room share, made once per session from a small stage, and a helper to unpack them."""
+
 from __future__ import annotations
 
 from pathlib import Path

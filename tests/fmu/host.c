@@ -1,7 +1,8 @@
-/* A small importer in C: loads the binary of an FMU and drives it. Compiled natively and, for Windows, with the cross compiler.
- *   host LIBRARY RESOURCES GUID run STEPS H REFERENCE,… [REFERENCE=BASE+SLOPE …]   hex of the outputs after every step; inputs follow BASE + k·SLOPE
- *   host LIBRARY RESOURCES GUID fuzz SEED CALLS REFERENCES                         random calls, wrong ones too; exit code 1 when an answer is wrong
- *   host LIBRARY RESOURCES GUID bench STEPS REFERENCE REFERENCE                    ns per step through the FMI face, through gk_ (set, step, get), and the difference */
+/* A small importer in C: loads the binary of an FMU and drives it. Compiled natively and, for Windows, with the cross
+ * compiler. host LIBRARY RESOURCES GUID run STEPS H REFERENCE,… [REFERENCE=BASE+SLOPE …]   hex of the outputs after
+ * every step; inputs follow BASE + k·SLOPE host LIBRARY RESOURCES GUID fuzz SEED CALLS REFERENCES random calls, wrong
+ * ones too; exit code 1 when an answer is wrong host LIBRARY RESOURCES GUID bench STEPS REFERENCE REFERENCE ns per step
+ * through the FMI face, through gk_ (set, step, get), and the difference */
 #if !defined(_WIN32)
 #define _POSIX_C_SOURCE 200809L
 #endif
@@ -14,9 +15,13 @@
 #if defined(_WIN32)
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-static void *symbol(void *library, const char *name) { return (void *)(uintptr_t)GetProcAddress((HMODULE)library, name); }
+static void *symbol(void *library, const char *name)
+{
+    return (void *)(uintptr_t)GetProcAddress((HMODULE)library, name);
+}
 static void *load(const char *path) { return (void *)LoadLibraryA(path); }
-static double now(void) {
+static double now(void)
+{
     LARGE_INTEGER count, frequency;
     QueryPerformanceCounter(&count);
     QueryPerformanceFrequency(&frequency);
@@ -27,22 +32,26 @@ static double now(void) {
 #include <time.h>
 static void *symbol(void *library, const char *name) { return dlsym(library, name); }
 static void *load(const char *path) { return dlopen(path, RTLD_NOW | RTLD_LOCAL); }
-static double now(void) {
+static double now(void)
+{
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 #endif
 
-#define FUNCTIONS(X)                                                                                                                        \
-    X(SetDebugLogging) X(Instantiate) X(FreeInstance) X(SetupExperiment) X(EnterInitializationMode) X(ExitInitializationMode) X(Terminate)  \
-    X(Reset) X(GetReal) X(GetInteger) X(GetBoolean) X(SetReal) X(SetInteger) X(SetBoolean) X(GetFMUstate) X(SetFMUstate) X(FreeFMUstate)     \
-    X(SerializedFMUstateSize) X(SerializeFMUstate) X(DeSerializeFMUstate) X(DoStep) X(CancelStep) X(GetStatus) X(GetRealStatus)
+#define FUNCTIONS(X)                                                                                                   \
+    X(SetDebugLogging)                                                                                                 \
+    X(Instantiate) X(FreeInstance) X(SetupExperiment) X(EnterInitializationMode) X(ExitInitializationMode)             \
+        X(Terminate) X(Reset) X(GetReal) X(GetInteger) X(GetBoolean) X(SetReal) X(SetInteger) X(SetBoolean)            \
+            X(GetFMUstate) X(SetFMUstate) X(FreeFMUstate) X(SerializedFMUstateSize) X(SerializeFMUstate)               \
+                X(DeSerializeFMUstate) X(DoStep) X(CancelStep) X(GetStatus) X(GetRealStatus)
 #define X(name) static fmi2##name##TYPE *name;
 FUNCTIONS(X)
 #undef X
 
-static void *lookup(void *library, const char *name) {
+static void *lookup(void *library, const char *name)
+{
     void *found = symbol(library, name);
     if (!found) {
         fprintf(stderr, "no function %s in the library\n", name);
@@ -51,35 +60,43 @@ static void *lookup(void *library, const char *name) {
     return found;
 }
 
-static void find_functions(void *library) {
+static void find_functions(void *library)
+{
 #define X(name) *(void **)&name = lookup(library, "fmi2" #name);
     FUNCTIONS(X)
 #undef X
 }
 
 static long blocks; /* given out and not yet taken back */
-static void *allocate(size_t count, size_t size) {
+static void *allocate(size_t count, size_t size)
+{
     blocks++;
     return calloc(count, size);
 }
-static void release(void *block) {
+static void release(void *block)
+{
     blocks -= block != NULL;
     free(block);
 }
 static int loud;
-static void say(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String message, ...) {
+static void say(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String message,
+                ...)
+{
     (void)e;
     if (loud) fprintf(stderr, "%s %d %s: %s\n", name, status, category, message);
 }
 static const fmi2CallbackFunctions environment = {say, allocate, release, NULL, NULL};
 
-static void need(int condition, const char *what) {
+static void need(int condition, const char *what)
+{
     if (condition) return;
     fprintf(stderr, "failed: %s\n", what);
     exit(1);
 }
 
-/* ---- run ------------------------------------------------------------------------------------------------------------------------------------ */
+/* ---- run
+ * ------------------------------------------------------------------------------------------------------------------------------------
+ */
 #define MOST 256
 typedef struct inputs {
     int count;
@@ -87,13 +104,16 @@ typedef struct inputs {
     double base[MOST], slope[MOST], value[MOST];
 } inputs;
 
-static int read_references(const char *text, fmi2ValueReference references[]) {
+static int read_references(const char *text, fmi2ValueReference references[])
+{
     int n = 0;
-    for (char *end; n < MOST && *text; text = *end ? end + 1 : end) references[n++] = (fmi2ValueReference)strtoul(text, &end, 10);
+    for (char *end; n < MOST && *text; text = *end ? end + 1 : end)
+        references[n++] = (fmi2ValueReference)strtoul(text, &end, 10);
     return n;
 }
 
-static void read_inputs(inputs *in, int count, char **text) {
+static void read_inputs(inputs *in, int count, char **text)
+{
     in->count = count;
     for (int i = 0; i < count; i++) {
         char *end;
@@ -103,12 +123,14 @@ static void read_inputs(inputs *in, int count, char **text) {
     }
 }
 
-static void set_inputs(fmi2Component c, inputs *in, long k) {
+static void set_inputs(fmi2Component c, inputs *in, long k)
+{
     for (int i = 0; i < in->count; i++) in->value[i] = in->base[i] + (double)k * in->slope[i];
     need(SetReal(c, in->reference, (size_t)in->count, in->value) == fmi2OK, "fmi2SetReal");
 }
 
-static void start(fmi2Component c, inputs *in) {
+static void start(fmi2Component c, inputs *in)
+{
     need(c != NULL, "fmi2Instantiate");
     need(SetupExperiment(c, 0, 0, 0, 0, 0) == fmi2OK, "fmi2SetupExperiment");
     need(EnterInitializationMode(c) == fmi2OK, "fmi2EnterInitializationMode");
@@ -116,7 +138,8 @@ static void start(fmi2Component c, inputs *in) {
     need(ExitInitializationMode(c) == fmi2OK, "fmi2ExitInitializationMode");
 }
 
-static int run(fmi2Component c, int count, char **arguments) {
+static int run(fmi2Component c, int count, char **arguments)
+{
     static inputs in;
     fmi2ValueReference outputs[MOST];
     double values[MOST], H = strtod(arguments[1], NULL);
@@ -131,7 +154,8 @@ static int run(fmi2Component c, int count, char **arguments) {
         for (int i = 0; i < n; i++) {
             uint64_t bits;
             memcpy(&bits, &values[i], sizeof bits);
-            printf("%08lx%08lx%c", (unsigned long)(bits >> 32), (unsigned long)(bits & 0xffffffffu), i + 1 < n ? ' ' : '\n');
+            printf("%08lx%08lx%c", (unsigned long)(bits >> 32), (unsigned long)(bits & 0xffffffffu),
+                   i + 1 < n ? ' ' : '\n');
         }
     }
     FreeInstance(c);
@@ -139,13 +163,17 @@ static int run(fmi2Component c, int count, char **arguments) {
     return 0;
 }
 
-/* ---- fuzz ----------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- fuzz
+ * -----------------------------------------------------------------------------------------------------------------------------------
+ */
 static uint64_t seed;
-static unsigned dice(unsigned sides) {
+static unsigned dice(unsigned sides)
+{
     seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17; /* xorshift64, Marsaglia */
     return (unsigned)((seed >> 33) % sides);
 }
-static double odd_number(void) {
+static double odd_number(void)
+{
     static const double odd[] = {0, 1, -1, 1e-3, 1e-4, -1e-4, 1e300, -1e300, 5e-324, 2, 4};
     unsigned k = dice(14);
     return k < 11 ? odd[k] : k == 11 ? NAN : k == 12 ? INFINITY : -INFINITY;
@@ -165,24 +193,29 @@ typedef struct fuzz {
     long answers[7], forged; /* forged: states accepted although one of their bits was changed */
 } fuzz;
 
-static fmi2Component component(subject *s) {
+static fmi2Component component(subject *s)
+{
     unsigned k = dice(200);
     return k == 0 ? NULL : k == 1 ? (fmi2Component)(uintptr_t)(12345u * dice(99999)) : k < 10 ? s->freed : s->c;
 }
 
-static void renew(fuzz *f, subject *s) {
+static void renew(fuzz *f, subject *s)
+{
     if (s->c) s->freed = s->c, FreeInstance(s->c);
-    s->c = Instantiate("fuzz", dice(20) ? fmi2CoSimulation : fmi2ModelExchange, dice(20) ? f->guid : "?", dice(20) ? f->resources : "file:///%zz", &environment, 0, 1);
+    s->c = Instantiate("fuzz", dice(20) ? fmi2CoSimulation : fmi2ModelExchange, dice(20) ? f->guid : "?",
+                       dice(20) ? f->resources : "file:///%zz", &environment, 0, 1);
     memset(s->states, 0, sizeof s->states);
     s->time = 0;
 }
 
-static fmi2Status fuzz_values(fuzz *f, fmi2Component c) {
+static fmi2Status fuzz_values(fuzz *f, fmi2Component c)
+{
     fmi2ValueReference references[4];
     double reals[4];
     int whole[4];
     size_t n = dice(5);
-    for (size_t i = 0; i < 4; i++) references[i] = dice(f->references + 3), reals[i] = odd_number(), whole[i] = (int)dice(7) - 2;
+    for (size_t i = 0; i < 4; i++)
+        references[i] = dice(f->references + 3), reals[i] = odd_number(), whole[i] = (int)dice(7) - 2;
     switch (dice(6)) {
     case 0: return SetReal(c, references, n, reals);
     case 1: return SetInteger(c, references, n, whole);
@@ -197,13 +230,15 @@ static fmi2Status fuzz_values(fuzz *f, fmi2Component c) {
 }
 
 /* give damaged bytes a right checksum (docs/file-formats.md), so that the deeper checks are reached */
-static void forge(char *image, size_t size) {
+static void forge(char *image, size_t size)
+{
     uint64_t check = 14695981039346656037u;
     for (size_t i = 24; i < size; i++) check = (check ^ (unsigned char)image[i]) * 1099511628211u;
     if (size > 24) memcpy(image + 16, &check, sizeof check);
 }
 
-static fmi2Status fuzz_state(fuzz *f, subject *s, fmi2Component c) {
+static fmi2Status fuzz_state(fuzz *f, subject *s, fmi2Component c)
+{
     fmi2FMUstate *state = &s->states[dice(3)], odd = dice(20) ? *state : (fmi2FMUstate)(uintptr_t)dice(5000);
     fmi2Status status;
     switch (dice(5)) {
@@ -229,7 +264,8 @@ static fmi2Status fuzz_state(fuzz *f, subject *s, fmi2Component c) {
     }
 }
 
-static fmi2Status fuzz_step(subject *s, fmi2Component c) {
+static fmi2Status fuzz_step(subject *s, fmi2Component c)
+{
     double H = dice(4) ? 1e-4 : odd_number(), time = dice(10) ? s->time : odd_number();
     if (H > 1e-3 && H < 1e6) H = 1e-3; /* long steps are allowed, but we have no time for them */
     fmi2Status status = DoStep(c, time, H, fmi2True);
@@ -237,26 +273,36 @@ static fmi2Status fuzz_step(subject *s, fmi2Component c) {
     return status;
 }
 
-static fmi2Status fuzz_call(fuzz *f) {
+static fmi2Status fuzz_call(fuzz *f)
+{
     subject *s = &f->subjects[dice(3)];
     fmi2Component c = component(s);
     double reached;
     switch (dice(24)) {
     case 0: return dice(4) ? fmi2OK : (renew(f, s), fmi2OK);
     case 1: return SetupExperiment(c, 0, 0, odd_number(), dice(2) != 0, odd_number());
-    case 2: case 3: return EnterInitializationMode(c);
-    case 4: case 5: return ExitInitializationMode(c);
+    case 2:
+    case 3: return EnterInitializationMode(c);
+    case 4:
+    case 5: return ExitInitializationMode(c);
     case 6: return dice(5) ? fmi2OK : Terminate(c);
     case 7: s->time = 0; return dice(3) ? fmi2OK : Reset(c);
     case 8: return GetRealStatus(c, (fmi2StatusKind)dice(5), dice(9) ? &reached : NULL);
     case 9: return dice(2) ? CancelStep(c) : SetDebugLogging(c, dice(2) != 0, dice(2), NULL);
-    case 10: case 11: case 12: return fuzz_state(f, s, c);
-    case 13: case 14: case 15: case 16: case 17: return fuzz_values(f, c);
+    case 10:
+    case 11:
+    case 12: return fuzz_state(f, s, c);
+    case 13:
+    case 14:
+    case 15:
+    case 16:
+    case 17: return fuzz_values(f, c);
     default: return fuzz_step(s, c);
     }
 }
 
-static int run_fuzz(const char *guid, const char *resources, char **arguments) {
+static int run_fuzz(const char *guid, const char *resources, char **arguments)
+{
     static fuzz f;
     f.guid = guid, f.resources = resources;
     f.references = (unsigned)strtoul(arguments[2], NULL, 10);
@@ -266,11 +312,14 @@ static int run_fuzz(const char *guid, const char *resources, char **arguments) {
     for (int k = 0; k < 3; k++) FreeInstance(f.subjects[k].c);
     free(f.image);
     need(blocks == 0, "all memory given back");
-    printf("ok %ld warning %ld discard %ld error %ld forged %ld\n", f.answers[0], f.answers[1], f.answers[2], f.answers[3], f.forged);
+    printf("ok %ld warning %ld discard %ld error %ld forged %ld\n", f.answers[0], f.answers[1], f.answers[2],
+           f.answers[3], f.forged);
     return 0;
 }
 
-/* ---- bench ---------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- bench
+ * ----------------------------------------------------------------------------------------------------------------------------------
+ */
 typedef struct direct {
     gk_outcome (*set)(const gk_model *, gk_data *, uint32_t, double);
     gk_outcome (*get)(const gk_model *, const gk_data *, uint32_t, double *);
@@ -280,12 +329,14 @@ typedef struct direct {
     gk_data *data;
 } direct;
 
-static void *block(size_t size) {
+static void *block(size_t size)
+{
     void *memory = malloc(size + 64);
     return memset((void *)(((uintptr_t)memory + 63) / 64 * 64), 0, size);
 }
 
-static char *read_file(const char *resources, long *size) {
+static char *read_file(const char *resources, long *size)
+{
     char path[4096];
     snprintf(path, sizeof path, "%s/model.gkb", resources + (strncmp(resources, "file://", 7) ? 0 : 7));
     FILE *file = fopen(path, "rb");
@@ -299,13 +350,15 @@ static char *read_file(const char *resources, long *size) {
     return bytes;
 }
 
-static void open_direct(direct *d, void *library, const char *resources) {
+static void open_direct(direct *d, void *library, const char *resources)
+{
     char message[GK_MESSAGE];
     long size;
     char *bytes = read_file(resources, &size);
     size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *);
     gk_outcome (*open)(gk_model *, const void *, size_t, char *), (*defaults)(const gk_model *, gk_data *);
-    gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, char *), (*initialize)(const gk_model *, const gk_setup *, gk_data *, double);
+    gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, char *),
+        (*initialize)(const gk_model *, const gk_setup *, gk_data *, double);
     *(void **)&model_size = lookup(library, "gk_model_size"), *(void **)&setup_size = lookup(library, "gk_setup_size");
     *(void **)&data_size = lookup(library, "gk_data_size"), *(void **)&open = lookup(library, "gk_model_open");
     *(void **)&defaults = lookup(library, "gk_defaults"), *(void **)&prepare = lookup(library, "gk_prepare");
@@ -318,15 +371,22 @@ static void open_direct(direct *d, void *library, const char *resources) {
     need(initialize(d->model, d->setup, d->data, 0) == GK_OK, "gk_initialize");
 }
 
-static int by_size(const void *a, const void *b) { return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b); }
+static int by_size(const void *a, const void *b)
+{
+    return (*(const double *)a > *(const double *)b) - (*(const double *)a < *(const double *)b);
+}
 
-/* The same step on both roads in turn, each timed alone: the clock's own time cancels in the median of the paired differences. */
-static int bench(void *library, const char *resources, fmi2Component c, char **arguments) {
+/* The same step on both roads in turn, each timed alone: the clock's own time cancels in the median of the paired
+ * differences. */
+static int bench(void *library, const char *resources, fmi2Component c, char **arguments)
+{
     static inputs none;
     static direct d;
-    fmi2ValueReference in = (fmi2ValueReference)strtoul(arguments[1], NULL, 10), out = (fmi2ValueReference)strtoul(arguments[2], NULL, 10);
+    fmi2ValueReference in = (fmi2ValueReference)strtoul(arguments[1], NULL, 10),
+                       out = (fmi2ValueReference)strtoul(arguments[2], NULL, 10);
     long steps = strtol(arguments[0], NULL, 10);
-    double *samples = malloc(3 * (size_t)steps * sizeof *samples), *fmi = samples, *gk = fmi + steps, *extra = gk + steps;
+    double *samples = malloc(3 * (size_t)steps * sizeof *samples), *fmi = samples, *gk = fmi + steps,
+           *extra = gk + steps;
     double H = 5e-6, input = 0, first = 0, second = 0;
     start(c, &none);
     open_direct(&d, library, resources);
@@ -340,17 +400,20 @@ static int bench(void *library, const char *resources, fmi2Component c, char **a
         gk_outcome outcome = d.step(d.model, d.setup, d.data, (double)k * H, H);
         d.get(d.model, d.data, out, &second);
         double t2 = now();
-        need(status == fmi2OK && outcome == GK_OK && memcmp(&first, &second, sizeof first) == 0, "both roads give the same bits");
+        need(status == fmi2OK && outcome == GK_OK && memcmp(&first, &second, sizeof first) == 0,
+             "both roads give the same bits");
         fmi[k] = t1 - t0, gk[k] = t2 - t1, extra[k] = fmi[k] - gk[k];
     }
-    qsort(fmi, (size_t)steps, sizeof *fmi, by_size), qsort(gk, (size_t)steps, sizeof *gk, by_size), qsort(extra, (size_t)steps, sizeof *extra, by_size);
+    qsort(fmi, (size_t)steps, sizeof *fmi, by_size), qsort(gk, (size_t)steps, sizeof *gk, by_size),
+        qsort(extra, (size_t)steps, sizeof *extra, by_size);
     printf("%.1f %.1f %.1f\n", fmi[steps / 2] * 1e9, gk[steps / 2] * 1e9, extra[steps / 2] * 1e9);
     free(samples);
     FreeInstance(c);
     return 0;
 }
 
-int main(int count, char **arguments) {
+int main(int count, char **arguments)
+{
     if (count < 7) return 2;
     const char *resources = arguments[2], *guid = arguments[3];
     void *library = load(arguments[1]);
@@ -360,5 +423,6 @@ int main(int count, char **arguments) {
     if (!loud) return run_fuzz(guid, resources, arguments + 5);
     fmi2Component c = Instantiate("host", fmi2CoSimulation, guid, resources, &environment, 0, 0);
     need(c != NULL, "fmi2Instantiate");
-    return strcmp(arguments[4], "bench") ? run(c, count - 5, arguments + 5) : bench(library, resources, c, arguments + 5);
+    return strcmp(arguments[4], "bench") ? run(c, count - 5, arguments + 5)
+                                         : bench(library, resources, c, arguments + 5);
 }

@@ -2,6 +2,7 @@
 
 The numbers are of the right size (tooth stiffness, frequencies), the tables consistent (static compliance = modes and a
 local part, positive semidefinite), the blob small and quickly made: for tests of the FMU, not of the physics."""
+
 from __future__ import annotations
 
 import zipfile
@@ -51,11 +52,25 @@ def body(gear, shape) -> SimpleNamespace:
     rows[0, :, 0] = shape_of_roll[:, None] * (amplitude * (part < 2))
     rows[1] = -rows[0]
     return SimpleNamespace(
-        name=gear.name, input_hash=f"{z:064x}", teeth=z, r_b=shape.r_b, face_width=gear.face_width,
-        strip_half_width=gear.body.strip_half_width, **_inertia(gear), frequency=frequency,
-        damping_ratio=np.full(n, gear.modal_damping), nodal_diameter=diameters, part=part, parity=np.ones(n, int),
-        roll=roll, flank_rows=rows, bore_rows=np.zeros((6, n)), static_ff=_static(rows, frequency, diameters, z),
-        static_fb=np.zeros((2, ROLLS, FUNCTIONS, 6)), static_bb=1e-11 * np.eye(6))
+        name=gear.name,
+        input_hash=f"{z:064x}",
+        teeth=z,
+        r_b=shape.r_b,
+        face_width=gear.face_width,
+        strip_half_width=gear.body.strip_half_width,
+        **_inertia(gear),
+        frequency=frequency,
+        damping_ratio=np.full(n, gear.modal_damping),
+        nodal_diameter=diameters,
+        part=part,
+        parity=np.ones(n, int),
+        roll=roll,
+        flank_rows=rows,
+        bore_rows=np.zeros((6, n)),
+        static_ff=_static(rows, frequency, diameters, z),
+        static_fb=np.zeros((2, ROLLS, FUNCTIONS, 6)),
+        static_bb=1e-11 * np.eye(6),
+    )
 
 
 def _inertia(gear) -> dict:

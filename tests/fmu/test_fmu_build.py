@@ -1,4 +1,5 @@
 """Building the kernel library: a stale one is noticed, bad wishes are named, only the agreed symbols are exported."""
+
 from __future__ import annotations
 
 import shutil
@@ -44,7 +45,7 @@ def test_library_of_these_sources_is_found(package):
 @pytest.mark.parametrize("change", ["edit", "add", "remove"])
 def test_any_change_of_the_sources_makes_it_stale(package, change):
     place_library(package)
-    some = package / "src" / "gk_math.c"
+    some = package / "src" / "base" / "gk_math.c"
     if change == "edit":
         some.write_text(some.read_text() + "/* edited */\n")
     elif change == "add":
@@ -57,7 +58,7 @@ def test_any_change_of_the_sources_makes_it_stale(package, change):
 
 def test_touching_or_changing_line_ends_does_not(package):
     place_library(package)
-    some = package / "src" / "gk_math.c"
+    some = package / "src" / "base" / "gk_math.c"
     some.write_bytes(some.read_bytes().replace(b"\n", b"\r\n"))
     assert library_path().is_file()
 
@@ -97,6 +98,6 @@ def test_exported_symbols_are_the_two_interfaces():
 
 def test_host_library_needs_no_new_glibc():
     """With ziglang it is built against glibc 2.17, which every supported Linux has."""
-    pytest.importorskip("ziglang", reason="needs ziglang: pip install \"gearfmu[cross]\"")
+    pytest.importorskip("ziglang", reason='needs ziglang: pip install "gearfmu[cross]"')
     versions = {word.decode() for word in library_path().read_bytes().split(b"\0") if word.startswith(b"GLIBC_2.")}
     assert versions and max(tuple(map(int, v.removeprefix("GLIBC_").split("."))) for v in versions) <= (2, 17)

@@ -1,4 +1,5 @@
 """Who may call what when: the native FMU's answers to every call in every mode, and to what importers get wrong."""
+
 from __future__ import annotations
 
 import ctypes
@@ -58,11 +59,19 @@ def in_mode(folder: str, mode: str) -> Subject:
 def arguments(subject: Subject, call: str) -> tuple:
     real, level, truth = (reference(subject, name) for name in ("pinion.phi", "level", "effect.hertz"))
     time, c = ctypes.c_double(), subject.fmu.component
-    return {"doStep": (0.0, 1e-4), "getReal": ([real],), "getInteger": ([level],), "getBoolean": ([truth],),
-            "setReal": ([real], [0.0]), "setInteger": ([level], [1]), "setDebugLogging": (True, ["logAll"]),
-            "fmi2GetRealStatus": (c, 2, ctypes.byref(time)), "fmi2CancelStep": (c,),
-            "fmi2SetRealInputDerivatives": (c, None, 0, None, None),
-            "fmi2GetDirectionalDerivative": (c, None, 0, None, 0, None, None)}.get(call, ())
+    return {
+        "doStep": (0.0, 1e-4),
+        "getReal": ([real],),
+        "getInteger": ([level],),
+        "getBoolean": ([truth],),
+        "setReal": ([real], [0.0]),
+        "setInteger": ([level], [1]),
+        "setDebugLogging": (True, ["logAll"]),
+        "fmi2GetRealStatus": (c, 2, ctypes.byref(time)),
+        "fmi2CancelStep": (c,),
+        "fmi2SetRealInputDerivatives": (c, None, 0, None, None),
+        "fmi2GetDirectionalDerivative": (c, None, 0, None, 0, None, None),
+    }.get(call, ())
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -139,7 +148,8 @@ def test_refusals_say_why(unpacked):
     subject = Subject(unpacked)
     subject.close()
     subject.callbacks.logger = fmi2CallbackLoggerTYPE(
-        lambda _, name, status, category, text: messages.append((status, category.decode(), text.decode())))
+        lambda _, name, status, category, text: messages.append((status, category.decode(), text.decode()))
+    )
     subject.fmu.instantiate(callbacks=subject.callbacks, loggingOn=False)
     subject.status("setReal", [reference(subject, "level")], [1.0])
     subject.status("doStep", 0.0, 1e-4)
@@ -163,8 +173,9 @@ def test_resource_locations(unpacked, spelling):
     location = spelling.format(uri=uri, path=uri.removeprefix("file://"), plain=resources)
     assert "%" in uri, "the folder's name needs escapes"
     subject = Subject(unpacked)
-    component = subject.fmu.fmi2Instantiate(b"x", 1, subject.description.guid.encode(), location.encode(),
-                                            ctypes.byref(subject.callbacks), 0, 0)
+    component = subject.fmu.fmi2Instantiate(
+        b"x", 1, subject.description.guid.encode(), location.encode(), ctypes.byref(subject.callbacks), 0, 0
+    )
     assert component
     subject.fmu.fmi2FreeInstance(component)
     subject.close()
@@ -173,13 +184,15 @@ def test_resource_locations(unpacked, spelling):
 @pytest.mark.parametrize("location", [b"", b"file:///%zz", b"file:///%00", b"file:///no/such/place", b"x" * 9000, None])
 def test_bad_resource_locations(unpacked, location):
     subject = Subject(unpacked)
-    assert not subject.fmu.fmi2Instantiate(b"x", 1, subject.description.guid.encode(), location,
-                                           ctypes.byref(subject.callbacks), 0, 0)
+    assert not subject.fmu.fmi2Instantiate(
+        b"x", 1, subject.description.guid.encode(), location, ctypes.byref(subject.callbacks), 0, 0
+    )
     subject.close()
 
 
-@pytest.mark.parametrize("name, kind, guid", [
-    (b"", 1, None), (None, 1, None), (b"x", 0, None), (b"x", 1, b"?"), (b"x", 1, b"")])
+@pytest.mark.parametrize(
+    "name, kind, guid", [(b"", 1, None), (None, 1, None), (b"x", 0, None), (b"x", 1, b"?"), (b"x", 1, b"")]
+)
 def test_bad_instantiation(unpacked, name, kind, guid):
     subject = Subject(unpacked)
     location = (Path(unpacked) / "resources").as_uri().encode()

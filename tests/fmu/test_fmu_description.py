@@ -1,4 +1,5 @@
 """What lies in the FMU: XML from the kernel's table, units, terminals, library, licences; the same bytes every time."""
+
 from __future__ import annotations
 
 import ast
@@ -20,9 +21,17 @@ from gearfmu.fmu.units import ATOMS, base_exponents
 from gearfmu.kernel import library_path
 
 
-@pytest.mark.parametrize("unit, expected", [
-    ("rad/s2", {"s": -2, "rad": 1}), ("N.s/m2", {"kg": 1, "m": -1, "s": -1}), ("N.m", {"kg": 1, "m": 2, "s": -2}),
-    ("J/N.m", {}), ("kg.m2", {"kg": 1, "m": 2}), ("m-1", {"m": -1})])
+@pytest.mark.parametrize(
+    "unit, expected",
+    [
+        ("rad/s2", {"s": -2, "rad": 1}),
+        ("N.s/m2", {"kg": 1, "m": -1, "s": -1}),
+        ("N.m", {"kg": 1, "m": 2, "s": -2}),
+        ("J/N.m", {}),
+        ("kg.m2", {"kg": 1, "m": 2}),
+        ("m-1", {"m": -1}),
+    ],
+)
 def test_units_are_reduced_to_base_units(unit, expected):
     assert base_exponents(unit) == expected
 
@@ -55,7 +64,11 @@ def test_description_is_the_kernels_table(model, native):
     assert [v.name for v in listed] == [v.name for v in model.kernel_variables()]
     for ours, theirs in zip(model.kernel_variables(), listed):
         assert (ours.reference, ours.type, ours.causality, ours.unit or None) == (
-            theirs.valueReference, theirs.type, theirs.causality, theirs.unit)
+            theirs.valueReference,
+            theirs.type,
+            theirs.causality,
+            theirs.unit,
+        )
         assert theirs.description == ours.description
         if ours.causality != "output" and ours.type != "Boolean":
             assert float(theirs.start) == ours.start
@@ -75,8 +88,10 @@ def test_ports_decide_terminals_and_causality(unpacked, unpacked_other):
     def causalities(folder):
         terminals = ET.parse(os.path.join(folder, "terminalsAndIcons", "terminalsAndIcons.xml"))
         by_name = {v.name: v.causality for v in read_model_description(folder).modelVariables}
-        return {terminal.get("name"): {m.get("memberName"): by_name[m.get("variableName")] for m in terminal}
-                for terminal in terminals.iter("Terminal")}
+        return {
+            terminal.get("name"): {m.get("memberName"): by_name[m.get("variableName")] for m in terminal}
+            for terminal in terminals.iter("Terminal")
+        }
 
     spring = {"phi": "input", "w": "input", "a": "input", "tau": "output", "tau_mean": "output"}
     torque = {"tau": "input", "phi": "output", "w": "output", "a": "output"}
@@ -113,8 +128,12 @@ def test_python_slave_needs_no_numpy_and_its_module_carries_its_content(model, p
             return name, archive.read(f"resources/{name}.py").decode()
 
     name, text = slave(python)
-    imported = {node.module if isinstance(node, ast.ImportFrom) else alias.name for node in ast.walk(ast.parse(text))
-                if isinstance(node, (ast.Import, ast.ImportFrom)) for alias in node.names}
+    imported = {
+        node.module if isinstance(node, ast.ImportFrom) else alias.name
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for alias in node.names
+    }
     assert {module.split(".")[0] for module in imported} <= {"__future__", "pythonfmu", *sys.stdlib_module_names}
     renamed = slave(export(small_model(), tmp_path / "same.fmu", runtime="python"))[0]
     other = slave(export(small_model("fzg_c"), tmp_path / "other.fmu", runtime="python"))[0]
@@ -145,8 +164,10 @@ def test_failed_export_leaves_the_old_file(model, tmp_path):
     assert target.read_bytes() == b"old" and list(tmp_path.iterdir()) == [target]
 
 
-@pytest.mark.parametrize("options, word", [({"runtime": "java"}, "runtime"), ({"platforms": ()}, "platforms"),
-                                           ({"platforms": ("amiga",)}, "amiga")])
+@pytest.mark.parametrize(
+    "options, word",
+    [({"runtime": "java"}, "runtime"), ({"platforms": ()}, "platforms"), ({"platforms": ("amiga",)}, "amiga")],
+)
 def test_unknown_options_are_named(model, tmp_path, options, word):
     with pytest.raises(Exception, match=word):
         export(model, tmp_path / "x.fmu", **options)

@@ -1,4 +1,5 @@
 """Two roads, one answer: FMU and kernel, native and pythonfmu, one stage beside another, fmpy and other importers."""
+
 from __future__ import annotations
 
 import json
@@ -16,8 +17,12 @@ from gearfmu.fmu.probes import Subject
 
 STEPS, H = 200, 1e-4
 TURN, RATIO = 2e-2, 16 / 24  # rad per step; the wheel turns the other way
-INPUTS = {"pinion.phi": (1e-3, TURN), "pinion.w": (TURN / H, 0.0),
-          "wheel.phi": (0.0, -TURN * RATIO), "wheel.w": (-TURN / H * RATIO, 0.0)}
+INPUTS = {
+    "pinion.phi": (1e-3, TURN),
+    "pinion.w": (TURN / H, 0.0),
+    "wheel.phi": (0.0, -TURN * RATIO),
+    "wheel.w": (-TURN / H * RATIO, 0.0),
+}
 
 SIDE_BY_SIDE = """
 import ctypes, json, sys
@@ -84,8 +89,10 @@ def test_fmu_is_the_kernel_bit_for_bit(model, unpacked, unpacked_python, outputs
 
 def test_two_runtimes_agree_under_fmpys_own_master(native, python):
     starts = {"pinion.phi": 2e-3, "pinion.w": 1.0}
-    runs = [fmpy.simulate_fmu(str(fmu), stop_time=0.02, step_size=H, output_interval=H, start_values=starts)
-            for fmu in (native, python)]
+    runs = [
+        fmpy.simulate_fmu(str(fmu), stop_time=0.02, step_size=H, output_interval=H, start_values=starts)
+        for fmu in (native, python)
+    ]
     assert runs[0].dtype == runs[1].dtype and runs[0].tobytes() == runs[1].tobytes()
 
 
@@ -100,8 +107,13 @@ def test_two_stages_in_one_process(unpacked, unpacked_other, mode):
     assert alone[0] != alone[1]
     for order in ((0, 1), (1, 0)):
         folders = [(unpacked, unpacked_other)[k] for k in order]
-        done = subprocess.run([sys.executable, "-c", SIDE_BY_SIDE, mode, *folders], capture_output=True, text=True,
-                              check=True, env={**os.environ, "LD_DEBUG": "bindings"})
+        done = subprocess.run(
+            [sys.executable, "-c", SIDE_BY_SIDE, mode, *folders],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, "LD_DEBUG": "bindings"},
+        )
         assert json.loads(done.stdout.splitlines()[-1]) == [alone[k] for k in order]
         assert not crossing(done.stderr, folders), "the dynamic linker tied one FMU to the other"
 

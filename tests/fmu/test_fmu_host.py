@@ -1,4 +1,5 @@
 """The FMU in a host written in C: random calls under ASan and UBSan, and the Windows FMU under wine."""
+
 from __future__ import annotations
 
 import os
@@ -26,8 +27,9 @@ class Host:
     program: Path
     library: Path
 
-    def run(self, folder: str, *arguments: str, before: tuple[str, ...] = (), uri: str | None = None,
-            **environment: str) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, folder: str, *arguments: str, before: tuple[str, ...] = (), uri: str | None = None, **environment: str
+    ) -> subprocess.CompletedProcess[str]:
         """Run with resources and GUID of the FMU in `folder`; returns the finished process."""
         resources, guid = uri or (Path(folder) / "resources").as_uri(), read_model_description(folder).guid
         command = [*before, str(self.program), str(self.library), resources, guid, *arguments]
@@ -101,7 +103,8 @@ def test_windows_fmu_gives_the_bits_of_linux(model, plain, tmp_path, monkeypatch
     program = compile_program(SOURCE, tmp_path / "host.exe", "win64")
     uri = "file:///Z:" + (Path(folder) / "resources").as_uri().removeprefix("file://")
     under_wine = Host(program, Path(shutil.copy(dll, tmp_path / "stage.dll"))).run(
-        folder, *loaded_run(folder), before=("wine",), uri=uri, WINEPREFIX=str(tmp_path / "wine"), WINEDEBUG="-all")
+        folder, *loaded_run(folder), before=("wine",), uri=uri, WINEPREFIX=str(tmp_path / "wine"), WINEDEBUG="-all"
+    )
     assert under_wine.returncode == 0, under_wine.stderr[-3000:]
     here = plain.run(folder, *loaded_run(folder))
     assert under_wine.stdout.split() == here.stdout.split()

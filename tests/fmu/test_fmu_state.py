@@ -1,4 +1,5 @@
 """Saved states: bitwise over a thousand rollbacks, in a fresh process, with other parameters; not from damage."""
+
 from __future__ import annotations
 
 import json
@@ -43,8 +44,13 @@ def driven(subject: Subject, steps: int = 1) -> bytes:
     for _ in range(steps):
         t = subject.time * subject.step_size
         swing = 0.01 * math.sin(2 * math.pi * 450 * t)
-        inputs = {"pinion.phi": 300 * t + swing, "pinion.w": 300.0, "wheel.phi": -200 * t, "wheel.w": -200.0,
-                  "pinion.clutch.capacity": 150.0 if math.sin(2 * math.pi * 300 * t) > 0 else 1.0}
+        inputs = {
+            "pinion.phi": 300 * t + swing,
+            "pinion.w": 300.0,
+            "wheel.phi": -200 * t,
+            "wheel.w": -200.0,
+            "pinion.clutch.capacity": 150.0 if math.sin(2 * math.pi * 300 * t) > 0 else 1.0,
+        }
         for variable in subject.variables:
             if variable.name in inputs:
                 subject.fmu.setReal([variable.valueReference], [inputs[variable.name]])
@@ -132,8 +138,13 @@ def with_parameters(folder: str, **values: int) -> Subject:
 
 def fresh_process(folder: str, image: bytes, time: int, steps: int) -> list[str]:
     """Output bits (hex) of `steps` steps in a new process that only knows the bytes of the state."""
-    done = subprocess.run([sys.executable, "-c", FRESH, folder, str(time), str(steps)], input=image.hex() + "\n",
-                          capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", FRESH, folder, str(time), str(steps)],
+        input=image.hex() + "\n",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -174,7 +185,7 @@ def test_damaged_bytes_are_refused_and_change_nothing(unpacked, history):
     for _ in range(300):
         damaged = bytearray(image)
         damaged[dice.randrange(len(image))] ^= 1 << dice.randrange(8)
-        cut = bytes(damaged[:dice.randrange(len(image))]) if dice.random() < 0.2 else bytes(damaged)
+        cut = bytes(damaged[: dice.randrange(len(image))]) if dice.random() < 0.2 else bytes(damaged)
         assert subject.status("deSerializeFMUstate", cut) == ERROR
     assert subject.run(5) == b"".join(history[3:8])
     subject.close()

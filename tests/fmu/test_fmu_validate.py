@@ -1,4 +1,5 @@
 """validate finds what is wrong, and only that: each damage to a good FMU gives the finding that names it."""
+
 from __future__ import annotations
 
 import struct
@@ -50,15 +51,18 @@ def test_shipped_stage_has_no_problems(tmp_path):
     assert validate(export(assemble(spec, bodies), tmp_path / "shipped.fmu")) == []
 
 
-@pytest.mark.parametrize("old, new, expected", [
-    ('name="mesh.te"', 'name="mesh.tee"', "mesh.te = only in the binary"),
-    ('unit="N.m"', 'unit="N"', "unit = N: the binary says N.m"),
-    ('start="0.0"', 'start="0.5"', "modelDescription.xml declares start=0.5"),
-    ('<BaseUnit kg="1" m="1" s="-2" />', "", "declare a unit with its SI base units"),
-    ('guid="', 'guid="0', "Failed to instantiate model"),
-    ('<Unknown index="', '<Unknown index="9', "modelDescription.xml"),
-    ('causality="output"', 'causality="local"', "causality = local: the binary says output"),
-])
+@pytest.mark.parametrize(
+    "old, new, expected",
+    [
+        ('name="mesh.te"', 'name="mesh.tee"', "mesh.te = only in the binary"),
+        ('unit="N.m"', 'unit="N"', "unit = N: the binary says N.m"),
+        ('start="0.0"', 'start="0.5"', "modelDescription.xml declares start=0.5"),
+        ('<BaseUnit kg="1" m="1" s="-2" />', "", "declare a unit with its SI base units"),
+        ('guid="', 'guid="0', "Failed to instantiate model"),
+        ('<Unknown index="', '<Unknown index="9', "modelDescription.xml"),
+        ('causality="output"', 'causality="local"', "causality = local: the binary says output"),
+    ],
+)
 def test_changes_of_the_description(members, tmp_path, old, new, expected):
     problems = findings(members, edited(members, old, new), tmp_path)
     assert any(expected in str(problem) for problem in problems), "\n".join(map(str, problems))
@@ -102,7 +106,7 @@ def test_a_crash_is_a_finding(members, tmp_path):
     address = int(next(line.split()[0] for line in listed.splitlines() if line.endswith(" fmi2DoStep")), 16)
     data = bytearray(library.read_bytes())
     place = file_offset(data, address)
-    data[place:place + 2] = b"\x0f\x0b"
+    data[place : place + 2] = b"\x0f\x0b"
     problems = findings(members, {binary_of(members): bytes(data)}, tmp_path)
     crashed = {problem.field for problem in problems}
     assert {"bad_steps", "saved_state", "instances", "clocks"} <= crashed and "start_values" not in crashed

@@ -134,7 +134,9 @@ def ring_deck(folder: Path, mesh: FeMesh, angle: float = 0.0) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("whole", "rim"), [(False, ""), pytest.param(True, 'rim = "RIM"\n', marks=pytest.mark.full)], ids=["sector", "whole"]
+    ("whole", "rim"),
+    [(False, ""), pytest.param(True, 'rim = "RIM"\n', marks=pytest.mark.full)],
+    ids=["sector", "whole"],
 )
 def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> None:
     """One sector, or the whole ring turned by an angle; rows, tables and what the mounts need."""

@@ -1,5 +1,6 @@
 """Shared by the kernel's tests: the folder's helper modules can be imported by name,
 and libraries are compiled once."""
+
 from __future__ import annotations
 
 import sys

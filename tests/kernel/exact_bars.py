@@ -7,6 +7,7 @@ velocity of the touching ends, and they part when the force would become tension
 Graff, Wave Motion in
 Elastic Solids, 1975, §2.4). All lengths here are whole numbers of cells, so the solution is exact on the grid.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass

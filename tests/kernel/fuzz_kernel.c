@@ -1,8 +1,10 @@
-/* Reads cases from standard input, each a u64 seed, a u64 size and the bytes of a blob; opens, prepares and initialises it and runs 20 communication steps with random
- * parameters and inputs, saves, damages and restores the state on the way. One line a case: its number, the last call and its outcome, or what it should not have done: an output
- * that is not finite after GK_OK, a refusal without a message. A finding of a sanitizer ends the process, and so does a case that takes longer than CASE_SECONDS. */
+/* Reads cases from standard input, each a u64 seed, a u64 size and the bytes of a blob; opens, prepares and initialises
+ * it and runs 20 communication steps with random parameters and inputs, saves, damages and restores the state on the
+ * way. One line a case: its number, the last call and its outcome, or what it should not have done: an output that is
+ * not finite after GK_OK, a refusal without a message. A finding of a sanitizer ends the process, and so does a case
+ * that takes longer than CASE_SECONDS. */
 #define _POSIX_C_SOURCE 200112L
-#include "gk_core.h"
+#include "model/gk_core.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -10,18 +12,21 @@
 enum { STEPS = 20, CASE_SECONDS = 120 };
 static uint64_t state;
 
-static double uniform(void) { /* xorshift64* (Vigna 2016) */
+static double uniform(void)
+{ /* xorshift64* (Vigna 2016) */
     state ^= state >> 12, state ^= state << 25, state ^= state >> 27;
     return (double)((state * 0x2545f4914f6cdd1dULL) >> 11) * 0x1p-53;
 }
 
-static void *memory(size_t size) { /* exact size, so that a sanitizer sees every byte beyond */
+static void *memory(size_t size)
+{ /* exact size, so that a sanitizer sees every byte beyond */
     void *p = NULL;
     if (posix_memalign(&p, 64, size ? size : 1)) abort();
     return p;
 }
 
-static double plausible(const gk_variable_info *v) {
+static double plausible(const gk_variable_info *v)
+{
     double top = v->maximum < 1e3 ? v->maximum : v->unit[0] == 'r' && v->unit[3] == 0 ? 0.02 : 300.0;
     double low = v->minimum > -top ? v->minimum : -top;
     if (v->maximum > 0 && !strcmp(v->name, "h")) return 1e-7 * gk_exp(uniform() * 9.2);
@@ -30,7 +35,8 @@ static double plausible(const gk_variable_info *v) {
 }
 
 /* some variables of one causality, to values they should take, or to ones they must refuse */
-static void set_some(const gk_model *model, gk_data *data, gk_causality causality, double share) {
+static void set_some(const gk_model *model, gk_data *data, gk_causality causality, double share)
+{
     gk_variable_info v;
     for (int i = 0; gk_variable(model, i, &v) == GK_OK; i++) {
         if (v.causality != causality || uniform() > share) continue;
@@ -39,7 +45,8 @@ static void set_some(const gk_model *model, gk_data *data, gk_causality causalit
 }
 
 /* name of a variable that is not finite, "" when all are */
-static const char *not_finite(const gk_model *model, const gk_data *data) {
+static const char *not_finite(const gk_model *model, const gk_data *data)
+{
     static gk_variable_info v;
     for (int i = 0; gk_variable(model, i, &v) == GK_OK; i++) {
         double value = NAN;
@@ -49,15 +56,18 @@ static const char *not_finite(const gk_model *model, const gk_data *data) {
 }
 
 /* a damaged state is refused, or steps on without harm; what it then says is as good as the state was */
-static void step_from_damage(const gk_model *model, const gk_setup *setup, const void *saved, size_t size) {
+static void step_from_damage(const gk_model *model, const gk_setup *setup, const void *saved, size_t size)
+{
     gk_data *data = memory(gk_data_size(model));
     unsigned char *bytes = (unsigned char *)data;
     memset(data, 0, gk_data_size(model));
     memcpy(data, saved, size);
     for (int k = 0; k < 3; k++) {
         size_t at = (size_t)(uniform() * (double)size) & ~(size_t)3;
-        if (uniform() < 0.5) bytes[at + (size_t)(uniform() * 4.0)] ^= (unsigned char)(1 << (int)(uniform() * 8.0));
-        else memset(bytes + at, uniform() < 0.5 ? 0xff : 0x7f, at + 8 <= size ? 8 : size - at);
+        if (uniform() < 0.5)
+            bytes[at + (size_t)(uniform() * 4.0)] ^= (unsigned char)(1 << (int)(uniform() * 8.0));
+        else
+            memset(bytes + at, uniform() < 0.5 ? 0xff : 0x7f, at + 8 <= size ? 8 : size - at);
     }
     if (gk_state_check(model, setup, data, size) == GK_OK)
         for (int k = 0; k < 2; k++) (void)gk_step(model, setup, data, gk_time(data), setup->h);
@@ -65,7 +75,8 @@ static void step_from_damage(const gk_model *model, const gk_setup *setup, const
 }
 
 /* what went wrong, or "" */
-static const char *run_steps(const gk_model *model, const gk_setup *setup, gk_data *data, gk_outcome *outcome) {
+static const char *run_steps(const gk_model *model, const gk_setup *setup, gk_data *data, gk_outcome *outcome)
+{
     size_t size = gk_state_size(setup);
     void *saved = memory(size);
     const char *wrong = not_finite(model, data);
@@ -81,7 +92,8 @@ static const char *run_steps(const gk_model *model, const gk_setup *setup, gk_da
     return wrong;
 }
 
-static void run_case(unsigned long number, const void *blob, size_t size) {
+static void run_case(unsigned long number, const void *blob, size_t size)
+{
     char message[GK_MESSAGE] = "";
     gk_model *model = memory(gk_model_size());
     const char *call = "open", *wrong = "";
@@ -106,7 +118,8 @@ static void run_case(unsigned long number, const void *blob, size_t size) {
     fflush(stdout);
 }
 
-int main(void) {
+int main(void)
+{
     uint64_t head[2];
     for (unsigned long number = 0; fread(head, sizeof head, 1, stdin) == 1; number++) {
         void *blob = memory(head[1]);

@@ -1,4 +1,5 @@
 """The kernel compiled together with inner_probe.c: places of contact, local law and step limit of a prepared model."""
+
 from __future__ import annotations
 
 import ctypes
@@ -29,7 +30,7 @@ class Place:
 
 def compile_inner(out: Path) -> Path:
     """Kernel and inner_probe.c in one library."""
-    files = [str(p) for p in sorted(source_folder().glob("*.c"))] + [str(HERE / "inner_probe.c")]
+    files = [str(p) for p in sorted(source_folder().rglob("*.c"))] + [str(HERE / "inner_probe.c")]
     line = ["cc", *FLAGS, "-fPIC", "-shared", f"-I{source_folder()}", f"-I{fmi_headers()}", "-o", str(out), *files]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -52,7 +53,7 @@ class Inner:
         """All places at frame (xA, yA, φA, xB, yB, φB) whose undeformed gap is below `reach`."""
         full, out = (ctypes.c_double * RIGID)(*frame), (ctypes.c_double * (8 * 12))()
         count = self._lib.probe_places(*self._handles(), full, ctypes.c_double(reach), out)
-        rows = [out[12 * i: 12 * i + 12] for i in range(count)]
+        rows = [out[12 * i : 12 * i + 12] for i in range(count)]
         return [Place(int(r[0]), int(r[1]), r[2], np.array(r[3:9]), (r[9], r[10]), r[11]) for r in rows]
 
     def law(self, force: float, curvature: float) -> tuple[float, float, float]:

@@ -1,5 +1,6 @@
-/* Opens inner functions of the kernel to tests: places of contact with gap and gradient, the local law. Compiled together with gearfmu/kernel/src. */
-#include "gk_core.h"
+/* Opens inner functions of the kernel to tests: places of contact with gap and gradient, the local law. Compiled
+ * together with gearfmu/kernel/src. */
+#include "model/gk_core.h"
 
 /* out: per place {flank, tooth, gap, gradient[6], roll A, roll B, curvature} */
 GK_API int probe_places(const gk_model *model, const gk_setup *setup, const double *frame, double reach, double *out)
@@ -29,7 +30,10 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
     out[2] = at.energy;
 }
 
-GK_API double probe_mu(const gk_model *model, const gk_setup *setup, double h, double gamma) { return gk_limit_mu(model, setup, h, gamma); }
+GK_API double probe_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
+{
+    return gk_limit_mu(model, setup, h, gamma);
+}
 
 /* a prepared setup keeps this γ, whatever its limit is */
 GK_API void probe_set_gamma(gk_setup *setup, double gamma)

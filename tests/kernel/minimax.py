@@ -1,4 +1,4 @@
-"""Polynomial coefficients of gearfmu/kernel/src/gk_math.c, made from scratch:
+"""Polynomial coefficients of gearfmu/kernel/src/base/gk_math.c, made from scratch:
 `python tests/kernel/minimax.py` prints the C arrays.
 
 Each kernel polynomial p(z) interpolates its function at the Chebyshev points of the argument range with 60 digits
@@ -7,6 +7,7 @@ about two of the true minimax polynomial: Powell, Computer J.
 9, 1967) and its coefficients are then rounded to double. `test_math.py`
 checks that the arrays in the C source are these numbers.
 """
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -80,12 +81,23 @@ _zero = mp.mpf(0)
 KERNELS = (
     Kernel("EXP", _series_safe(_exp_tail, _power_series(lambda k: 1 / mp.factorial(k + 2))), -_half_ln2, _half_ln2, 11),
     Kernel("LOG", _series_safe(_log_tail, _power_series(lambda k: mp.mpf(2) / (2 * k + 3))), mp.mpf(0), _s_max, 7),
-    Kernel("SIN", _series_safe(_sin_tail, _power_series(lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3))),
-           _zero, _quarter, 6),
-    Kernel("COS", _series_safe(_cos_tail, _power_series(lambda k: (-1) ** k / mp.factorial(2 * k + 4))),
-           _zero, _quarter, 6),
-    Kernel("ATAN", _series_safe(_atan_tail, _power_series(lambda k: mp.mpf((-1) ** (k + 1)) / (2 * k + 3))),
-           _zero, _octant, 11),
+    Kernel(
+        "SIN",
+        _series_safe(_sin_tail, _power_series(lambda k: (-1) ** (k + 1) / mp.factorial(2 * k + 3))),
+        _zero,
+        _quarter,
+        6,
+    ),
+    Kernel(
+        "COS", _series_safe(_cos_tail, _power_series(lambda k: (-1) ** k / mp.factorial(2 * k + 4))), _zero, _quarter, 6
+    ),
+    Kernel(
+        "ATAN",
+        _series_safe(_atan_tail, _power_series(lambda k: mp.mpf((-1) ** (k + 1)) / (2 * k + 3))),
+        _zero,
+        _octant,
+        11,
+    ),
     Kernel("ASIN", _series_safe(_asin_tail, _power_series(_asin_coefficient)), mp.mpf(0), mp.mpf(1) / 4, 13),
 )
 
@@ -122,8 +134,14 @@ def main() -> None:
         print(f"/* largest error {largest_error(kernel):.1e} */")
         print(f"static const double {kernel.name}[] = {{" + ", ".join(c.hex() for c in coefficients(kernel)) + "};")
     print("static const double PIO2[] = {" + ", ".join(p.hex() for p in pio2_parts()) + "};")
-    constants = {"PI/4": mp.pi / 4, "PI/2": mp.pi / 2, "3PI/4": 3 * mp.pi / 4, "PI": mp.pi,
-                 "1/LN2": 1 / mp.log(2), "2/PI": 2 / mp.pi}
+    constants = {
+        "PI/4": mp.pi / 4,
+        "PI/2": mp.pi / 2,
+        "3PI/4": 3 * mp.pi / 4,
+        "PI": mp.pi,
+        "1/LN2": 1 / mp.log(2),
+        "2/PI": 2 / mp.pi,
+    }
     for name, value in constants.items():
         print(f"{name}: {float(value).hex()} + {float(value - float(value)).hex()}")
     ln2_high = mp.floor(mp.log(2) * 2**33) / 2**33

@@ -1,5 +1,6 @@
 """Random damage to a blob that reaches the checks behind the hash:
 the SHA-256 is computed anew after nearly every change."""
+
 from __future__ import annotations
 
 import struct
@@ -9,8 +10,28 @@ import numpy as np
 
 from gearfmu.stage.blob import ENTRY, HEADER, seal
 
-EDGES = [0, 1, 2, 3, 7, 63, 64, 65, 255, 2**15, 2**31 - 1, 2**31, 2**32 - 1, 2**32,
-         2**53, 2**61, 2**63 - 1, 2**63, 2**64 - 64, 2**64 - 1]
+EDGES = [
+    0,
+    1,
+    2,
+    3,
+    7,
+    63,
+    64,
+    65,
+    255,
+    2**15,
+    2**31 - 1,
+    2**31,
+    2**32 - 1,
+    2**32,
+    2**53,
+    2**61,
+    2**63 - 1,
+    2**63,
+    2**64 - 64,
+    2**64 - 1,
+]
 REALS = [0.0, -0.0, 1.0, -1.0, 5e-324, -1e-300, 1e-12, 1e12, 1e300, -1e300, np.inf, -np.inf, np.nan]
 
 
@@ -95,4 +116,15 @@ def _stretch(data: bytearray, rng: np.random.Generator) -> None:
 
 
 MUTATIONS: list[Callable[[bytearray, np.random.Generator], None]] = [
-    _flip_bit, _set_byte, _table_field, _table_field, _element, _element, _element, _element, _cut, _extend, _stretch]
+    _flip_bit,
+    _set_byte,
+    _table_field,
+    _table_field,
+    _element,
+    _element,
+    _element,
+    _element,
+    _cut,
+    _extend,
+    _stretch,
+]

@@ -1,8 +1,10 @@
-/* Face of gk_blob.h for the tests: open a blob, copy its hash, look every name up under every type and add up all it holds. */
-#include "gk_blob.h"
+/* Face of gk_blob.h for the tests: open a blob, copy its hash, look every name up under every type and add up all it
+ * holds. */
+#include "base/gk_blob.h"
 #include <string.h>
 
-int probe_blob_open(const void *bytes, size_t size, char *message, char *hash, uint32_t *sections) {
+int probe_blob_open(const void *bytes, size_t size, char *message, char *hash, uint32_t *sections)
+{
     gk_blob blob;
     gk_outcome outcome = gk_blob_open(&blob, bytes, size, message);
     memcpy(hash, blob.hash, sizeof blob.hash);
@@ -11,7 +13,8 @@ int probe_blob_open(const void *bytes, size_t size, char *message, char *hash, u
 }
 
 /* sum of the elements of section `name` under type 1, 2, 3; *count = UINT64_MAX when absent */
-int probe_blob_sum(const void *bytes, size_t size, const char *name, int type, double *sum, uint64_t *count) {
+int probe_blob_sum(const void *bytes, size_t size, const char *name, int type, double *sum, uint64_t *count)
+{
     char message[GK_MESSAGE];
     gk_blob blob;
     gk_outcome outcome = gk_blob_open(&blob, bytes, size, message);

@@ -1,5 +1,6 @@
 """Builds of the kernel for tests: its parts behind the array functions of probe_*.c,
 and the whole with any compiler."""
+
 from __future__ import annotations
 
 import ctypes
@@ -16,7 +17,7 @@ import numpy as np
 from gearfmu.kernel.build import FLAGS, build_library
 
 HERE = Path(__file__).parent
-SOURCES = ("gk_math.c", "gk_blob.c", "gk_sha256.c")
+SOURCES = ("base/gk_math.c", "base/gk_blob.c", "base/gk_sha256.c")
 MESSAGE = 512
 _vector = np.ctypeslib.ndpointer(np.float64, flags="C")
 
@@ -94,7 +95,8 @@ class Probes:
         message, digest = ctypes.create_string_buffer(MESSAGE), ctypes.create_string_buffer(65)
         sections = ctypes.c_uint32()
         outcome = self._library.probe_blob_open(
-            ctypes.c_void_p(address), ctypes.c_size_t(len(blob)), message, digest, ctypes.byref(sections))
+            ctypes.c_void_p(address), ctypes.c_size_t(len(blob)), message, digest, ctypes.byref(sections)
+        )
         assert memory is not None
         return outcome, message.value.decode(), digest.value.decode(), sections.value
 
@@ -103,8 +105,13 @@ class Probes:
         memory, address = _placed(blob, 0)
         total, count = ctypes.c_double(), ctypes.c_uint64()
         outcome = self._library.probe_blob_sum(
-            ctypes.c_void_p(address), ctypes.c_size_t(len(blob)), name.encode(), kind,
-            ctypes.byref(total), ctypes.byref(count))
+            ctypes.c_void_p(address),
+            ctypes.c_size_t(len(blob)),
+            name.encode(),
+            kind,
+            ctypes.byref(total),
+            ctypes.byref(count),
+        )
         assert memory is not None and outcome == 0
         return None if count.value == 2**64 - 1 else (total.value, count.value)
 

@@ -5,6 +5,7 @@ Orders of magnitude are those of a steel spur pair (1 kg a gear, 7e8 N/m of mass
 modes from 4 to 60 kHz). Gaps of drive flanks grow with
 x_B − x_A, gaps of coast flanks shrink with it.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -60,8 +61,10 @@ def _body(layout: Layout, mass: float, rng: np.random.Generator) -> tuple[np.nda
     """ω (n,) and the displacement of every slice per mode (pairs·slices, n) of one body, rigid motion first."""
     omega = np.concatenate([[0.0], 2 * np.pi * np.sort(rng.uniform(4e3, 60e3, layout.modes))])
     z = np.linspace(-1, 1, layout.slices) if layout.slices > 1 else np.zeros(1)
-    pairs = [rng.uniform(-1, 1, layout.modes) + np.outer(z, 0.3 * rng.uniform(-1, 1, layout.modes))
-             for _ in range(layout.pairs)]
+    pairs = [
+        rng.uniform(-1, 1, layout.modes) + np.outer(z, 0.3 * rng.uniform(-1, 1, layout.modes))
+        for _ in range(layout.pairs)
+    ]
     elastic = np.vstack(pairs) / np.sqrt(mass)
     return omega, np.hstack([np.full((len(elastic), 1), 1 / np.sqrt(mass)), elastic])
 

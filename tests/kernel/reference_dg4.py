@@ -15,6 +15,7 @@ and of one scalar, makes the work of a step in which a contact opens or closes e
 discrete
 gradient after Gonzalez, J. Nonlinear Sci. 6, 1996).
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -48,8 +49,12 @@ class Problem:
 
     def __post_init__(self) -> None:
         m = len(self.offset)
-        for name, default in (("bilateral", np.zeros(m, bool)), ("dashpot", np.zeros(m)), ("path", self.compliance),
-                              ("weight", np.ones(m))):
+        for name, default in (
+            ("bilateral", np.zeros(m, bool)),
+            ("dashpot", np.zeros(m)),
+            ("path", self.compliance),
+            ("weight", np.ones(m)),
+        ):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default)
 
@@ -86,8 +91,9 @@ class State:
         return self.force + 0.5 * self.eta
 
 
-def solve_lcp(matrix: np.ndarray, gap: np.ndarray, bilateral: np.ndarray,
-              start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def solve_lcp(
+    matrix: np.ndarray, gap: np.ndarray, bilateral: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Forces and active set of 0 ≤ λ ⊥ gap + matrix λ ≥ 0 (bilateral rows: = 0, λ of any sign); matrix is a P-matrix.
 
     Block principal pivoting: flip everything that is violated; after four rounds without progress only the last one
@@ -174,7 +180,9 @@ class Reference:
         y = q / self.scale + self.kappa * f
         at_gap = self._gap(y, external)
         closed = (force > 0) | p.bilateral
-        return State(y, v / self.scale, f, force, np.where(closed, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force))))
+        return State(
+            y, v / self.scale, f, force, np.where(closed, 0.0, at_gap + self.c @ force), *np.zeros((3, len(force)))
+        )
 
     def step(self, state: State, external: np.ndarray) -> State:
         """The state h later; `external` (n,): unscaled external modal forces at the end of the step."""

@@ -1,8 +1,9 @@
 """Small model blobs made without finite elements: a spur pair of FZG C size with a few invented modes,
 and two coaxial bars.
 
-Shapes and meaning of the sections are those of gearfmu/stage (model.py, tables.py) and gearfmu/kernel/src/gk_model.c.
+Shapes and meaning of the sections are those of gearfmu/stage (model.py, tables.py) and gearfmu/kernel/src/model/gk_model.c.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -31,7 +32,9 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     """A spur pair of 16/24 teeth with 5 modes (two of them pairs) a gear, 3 slices, ports of the kinds named."""
     rng = np.random.default_rng(seed)
     sections: dict = {
-        "model": np.array([1, PAIR, 3, _coast_shift()], np.int32), "name": "small_pair", "shafts": "pinion|wheel",
+        "model": np.array([1, PAIR, 3, _coast_shift()], np.int32),
+        "name": "small_pair",
+        "shafts": "pinion|wheel",
         "degrees": np.array(DEGREES, np.int32),
         "pair": np.array([DISTANCE, 1e-4, 2e4, 600.0, 628.0, 20e3, 60e3, 7.5e-6, 0.0]),
     }
@@ -47,7 +50,8 @@ def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: 
     strip of 1 m, 1/Pa (as good as rigid when left out)."""
     bodies = tuple(
         FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.static_compliance()]]))
-        for b, n in zip(bars, modes, strict=True))
+        for b, n in zip(bars, modes, strict=True)
+    )
     return flat_blob(bodies, Block(gap=gap, local=local))
 
 
@@ -79,7 +83,9 @@ def flat_blob(bodies: tuple[FlatBody, FlatBody], block: Block) -> bytes:
     """Two bodies that meet in a flat contact: gap = x_B − x_A − outward displacements, in every slice."""
     functions = len(block.degrees)
     sections: dict = {
-        "model": np.array([1, FLAT, block.slices, 0], np.int32), "name": "bars", "shafts": "left|right",
+        "model": np.array([1, FLAT, block.slices, 0], np.int32),
+        "name": "bars",
+        "shafts": "left|right",
         "degrees": np.array(block.degrees, np.int32),
         "pair": np.array([block.gap, 0.0, block.damping, 1.0, 1.0, 1e9, 1e9, 1e-3, 0.0]),
     }
@@ -89,29 +95,57 @@ def flat_blob(bodies: tuple[FlatBody, FlatBody], block: Block) -> bytes:
         static[0, 0, 3] = body.static
         numbers = [1, 0.01, 0, 0.01, 0, 0, body.mass, body.mass, 1.0, block.local, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
         sections |= {
-            f"gear{g}": np.array(numbers, float), f"port{g}": np.array([TORQUE, 0, 1, 0, 1, 1, 1, 0], float),
-            f"size{g}": np.array([n, 4, functions], np.int32), f"omega{g}": body.omega, f"zeta{g}": body.zeta,
-            f"diameter{g}": np.zeros(n, np.int32), f"part{g}": np.zeros(n, np.int32),
-            f"rows{g}": np.broadcast_to(body.rows, (2, 4, functions, n)), f"bore{g}": np.zeros((3, n)),
-            f"c_ff{g}": static, f"c_fb{g}": np.zeros((2, 4, functions, 3)), f"c_bb{g}": np.zeros((3, 3)),
+            f"gear{g}": np.array(numbers, float),
+            f"port{g}": np.array([TORQUE, 0, 1, 0, 1, 1, 1, 0], float),
+            f"size{g}": np.array([n, 4, functions], np.int32),
+            f"omega{g}": body.omega,
+            f"zeta{g}": body.zeta,
+            f"diameter{g}": np.zeros(n, np.int32),
+            f"part{g}": np.zeros(n, np.int32),
+            f"rows{g}": np.broadcast_to(body.rows, (2, 4, functions, n)),
+            f"bore{g}": np.zeros((3, n)),
+            f"c_ff{g}": static,
+            f"c_fb{g}": np.zeros((2, 4, functions, 3)),
+            f"c_bb{g}": np.zeros((3, 3)),
         }
     return write_blob(sections)
 
 
 def _coast_shift() -> int:
     """The wheel's tooth whose coast flank is nearest to that of the pinion's tooth 0."""
+
     def gap(shift: int) -> float:
         turned = PHASE[1] + shift * 2 * np.pi / TEETH[1] - np.pi
         return abs(LENGTH - BASE[0] * (PSI[0] + WORKING) - BASE[1] * (PSI[1] + WORKING - turned))
+
     return min((-1, 0, 1), key=gap)
 
 
 def _gear(g: int) -> np.ndarray:
     edge, inner = 2e-4, TIP[g] - 2e-4
     local = 2 * (1 - 0.3**2) / (np.pi * 206e9)
-    return np.array([TEETH[g], BASE[g], FORM[g], TIP[g], PSI[g], PHASE[g], MASS[g], INERTIA[g], 14e-3, local, 1e-3,
-                     15e-6 / (0.2 * TIP[g]) ** 2, 0.8 * TIP[g], edge, np.hypot(BASE[g], inner),
-                     TIP[g] / BASE[g] - np.arctan2(inner, BASE[g]), 3e8, 600.0])
+    return np.array(
+        [
+            TEETH[g],
+            BASE[g],
+            FORM[g],
+            TIP[g],
+            PSI[g],
+            PHASE[g],
+            MASS[g],
+            INERTIA[g],
+            14e-3,
+            local,
+            1e-3,
+            15e-6 / (0.2 * TIP[g]) ** 2,
+            0.8 * TIP[g],
+            edge,
+            np.hypot(BASE[g], inner),
+            TIP[g] / BASE[g] - np.arctan2(inner, BASE[g]),
+            3e8,
+            600.0,
+        ]
+    )
 
 
 def _tables(g: int, rng: np.random.Generator) -> dict:
@@ -130,8 +164,14 @@ def _tables(g: int, rng: np.random.Generator) -> dict:
     for f in (0, 1):
         static[f, f, 3] += own
     return {
-        f"size{g}": np.array([5, ROLLS, 2], np.int32), f"omega{g}": omega, f"zeta{g}": np.full(5, 0.01),
-        f"diameter{g}": diameter, f"part{g}": part, f"rows{g}": rows, f"bore{g}": bore, f"c_ff{g}": static,
+        f"size{g}": np.array([5, ROLLS, 2], np.int32),
+        f"omega{g}": omega,
+        f"zeta{g}": np.full(5, 0.01),
+        f"diameter{g}": diameter,
+        f"part{g}": part,
+        f"rows{g}": rows,
+        f"bore{g}": bore,
+        f"c_ff{g}": static,
         f"c_fb{g}": np.einsum("fiak,ck->fiac", rows / omega**2, bore),
         f"c_bb{g}": np.einsum("ck,dk->cd", bore / omega**2, bore) + np.diag([3e-10, 3e-10, 3e-8]),
     }

@@ -1,5 +1,6 @@
 """Impact of coaxial bars: the exact wave solution against tabulated facts, closed-form modal data,
 and the reference time step against both."""
+
 from __future__ import annotations
 
 import json
@@ -48,8 +49,13 @@ def collide(bar1: Bar, bar2: Bar, n: int) -> Outcome:
     edges = zip(np.flatnonzero(change == 1), np.flatnonzero(change == -1), strict=True)
     intervals = [(float(a) / unit, float(b + 1) / unit) for a, b in edges]
     final = reference.velocity(state)
-    return Outcome(intervals, final[0] / np.sqrt(bar1.mass), final[n1 + 1] / np.sqrt(bar2.mass),
-                   (reference.energy(state) - first) / first, reference.mu())
+    return Outcome(
+        intervals,
+        final[0] / np.sqrt(bar1.mass),
+        final[n1 + 1] / np.sqrt(bar2.mass),
+        (reference.energy(state) - first) / first,
+        reference.mu(),
+    )
 
 
 def lengths(case: str) -> tuple[int, int]:

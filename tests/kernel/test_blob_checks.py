@@ -1,5 +1,6 @@
 """The kernel's checks of a blob: SHA-256 against hashlib, each rule broken once,
 and the same verdict as the Python reader on random damage."""
+
 from __future__ import annotations
 
 import hashlib
@@ -16,8 +17,13 @@ from gearfmu.errors import ModelError
 from gearfmu.stage.blob import ENTRY, HEADER, F64, I32, TEXT, blob_hash, read_blob, seal, write_blob
 
 BAD_BLOB = 1
-SAMPLE = {"name": "fzg_c µ", "roll": np.arange(1.0, 20.0), "teeth": np.array([16, -24]), "none": np.zeros(0),
-          "more": np.full(8, -2.5)}
+SAMPLE = {
+    "name": "fzg_c µ",
+    "roll": np.arange(1.0, 20.0),
+    "teeth": np.array([16, -24]),
+    "none": np.zeros(0),
+    "more": np.full(8, -2.5),
+}
 BLOB = write_blob(SAMPLE)
 TYPE, COUNT, OFFSET = 24, 32, 40  # places in a table entry
 
@@ -53,36 +59,39 @@ def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
     assert (outcome, message) == (0, "") and digest == hashlib.sha256(blob[40:]).hexdigest()
 
 
-@pytest.mark.parametrize(("damage", "words"), [
-    (BLOB[:10], "10 bytes are too few"),
-    (b"GFMC" + BLOB[4:], "does not begin with GFMB"),
-    (patched(4, b"\x02"), "format version 2, this kernel reads version 1"),
-    (BLOB[:-64], "cut short"),
-    (patched(40, struct.pack("<Q", len(BLOB) + 1)), "cut short"),
-    (patched(48, struct.pack("<I", 2**32 - 1)), "sections do not fit"),
-    (patched(48, struct.pack("<I", 1000)), "sections do not fit"),
-    (patched(48, struct.pack("<I", 4)), "does not begin where"),
-    (patched(63, b"\1"), "reserved bytes"),
-    (BLOB[:-100] + b"\1" + BLOB[-99:], "do not match their SHA-256"),
-    (patched(entry(1), b" "), "name of section 1"),
-    (patched(entry(1), b"\0"), "name of section 1"),
-    (patched(entry(1) + 20, b"x"), "name of section 1"),
-    (patched(entry(0), b"y" * 24), "name of section 0"),
-    (patched(entry(2), b"name\0"), "'name' is there twice"),
-    (patched(entry(1) + TYPE, b"\4"), "'roll' is of unknown type 4"),
-    (patched(entry(1) + TYPE + 4, b"\1"), "'roll' is of unknown type"),
-    (patched(entry(2) + COUNT, struct.pack("<Q", 2**62)), "'teeth' reaches beyond the end"),
-    (patched(entry(2) + COUNT, struct.pack("<Q", 2**64 - 1)), "'teeth' reaches beyond the end"),
-    (patched(entry(1) + COUNT, struct.pack("<Q", 8)), "'teeth' does not begin where"),
-    (patched(entry(1) + OFFSET, struct.pack("<Q", 2**64 - 64)), "'roll' does not begin where"),
-    (patched(entry(4) + COUNT, struct.pack("<Q", 9)), "'more' reaches beyond the end"),
-    (patched(entry(4) + COUNT, struct.pack("<Q", 0)), "sections end at"),
-    (patched(len(BLOB) - 8, struct.pack("<d", np.inf)), "'more' holds a value that is not finite"),
-    (patched(len(BLOB) - 8, struct.pack("<d", np.nan)), "'more' holds a value that is not finite"),
-    (patched(entry(0) + COUNT, b"\7"), "'name' is not UTF-8 text that ends with NUL"),
-    (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\xff"), "'name' is not UTF-8"),
-    (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\0"), "'name' is not UTF-8"),
-])
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (BLOB[:10], "10 bytes are too few"),
+        (b"GFMC" + BLOB[4:], "does not begin with GFMB"),
+        (patched(4, b"\x02"), "format version 2, this kernel reads version 1"),
+        (BLOB[:-64], "cut short"),
+        (patched(40, struct.pack("<Q", len(BLOB) + 1)), "cut short"),
+        (patched(48, struct.pack("<I", 2**32 - 1)), "sections do not fit"),
+        (patched(48, struct.pack("<I", 1000)), "sections do not fit"),
+        (patched(48, struct.pack("<I", 4)), "does not begin where"),
+        (patched(63, b"\1"), "reserved bytes"),
+        (BLOB[:-100] + b"\1" + BLOB[-99:], "do not match their SHA-256"),
+        (patched(entry(1), b" "), "name of section 1"),
+        (patched(entry(1), b"\0"), "name of section 1"),
+        (patched(entry(1) + 20, b"x"), "name of section 1"),
+        (patched(entry(0), b"y" * 24), "name of section 0"),
+        (patched(entry(2), b"name\0"), "'name' is there twice"),
+        (patched(entry(1) + TYPE, b"\4"), "'roll' is of unknown type 4"),
+        (patched(entry(1) + TYPE + 4, b"\1"), "'roll' is of unknown type"),
+        (patched(entry(2) + COUNT, struct.pack("<Q", 2**62)), "'teeth' reaches beyond the end"),
+        (patched(entry(2) + COUNT, struct.pack("<Q", 2**64 - 1)), "'teeth' reaches beyond the end"),
+        (patched(entry(1) + COUNT, struct.pack("<Q", 8)), "'teeth' does not begin where"),
+        (patched(entry(1) + OFFSET, struct.pack("<Q", 2**64 - 64)), "'roll' does not begin where"),
+        (patched(entry(4) + COUNT, struct.pack("<Q", 9)), "'more' reaches beyond the end"),
+        (patched(entry(4) + COUNT, struct.pack("<Q", 0)), "sections end at"),
+        (patched(len(BLOB) - 8, struct.pack("<d", np.inf)), "'more' holds a value that is not finite"),
+        (patched(len(BLOB) - 8, struct.pack("<d", np.nan)), "'more' holds a value that is not finite"),
+        (patched(entry(0) + COUNT, b"\7"), "'name' is not UTF-8 text that ends with NUL"),
+        (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\xff"), "'name' is not UTF-8"),
+        (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\0"), "'name' is not UTF-8"),
+    ],
+)
 def test_each_rule(probes: Probes, damage: bytes, words: str) -> None:
     outcome, message, _, sections = probes.blob_open(damage)
     assert outcome == BAD_BLOB and words in message and sections == 0

@@ -1,4 +1,5 @@
 """One source, the same bits: whatever the compiler, the optimisation and the contents of uninitialised memory."""
+
 from __future__ import annotations
 
 import hashlib
@@ -14,8 +15,9 @@ from gearfmu.kernel import Kernel
 
 FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": (), "native": ("-march=native",)}
 QUICK = {("gcc", "O0"), ("clang", "O3")}
-VARIANTS = [pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full])
-            for c in compilers() for f in FLAG_SETS]
+VARIANTS = [
+    pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full]) for c in compilers() for f in FLAG_SETS
+]
 WATCHED = ("mesh.force", "mesh.te", "energy.stored", "energy.residual", "bearing.pinion.fx", "wheel.gear.phi")
 
 

@@ -1,4 +1,5 @@
 """Line contact: gaps are zero where involutes touch, gradients are derivatives of the gaps, flanks go over into tip corners without a jump, the local law is Hertz's."""
+
 from __future__ import annotations
 
 import json
@@ -34,7 +35,7 @@ def plain(library: Path) -> Inner:
 def misplaced(library: Path) -> Inner:
     """Every tooth of both gears out of its place by up to 1.4 mrad (50 µm), either flank by an amount of its own."""
     angles = np.random.default_rng(3).uniform(-1.4e-3, 1.4e-3, (2, sum(TEETH)))
-    index = {"index0": angles[:, :TEETH[0]], "index1": angles[:, TEETH[0]:]}
+    index = {"index0": angles[:, : TEETH[0]], "index1": angles[:, TEETH[0] :]}
     return Inner(library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 1})
 
 
@@ -53,7 +54,11 @@ def test_unmodified_drive_flanks_touch_at_every_angle_and_the_coast_gap_is_the_b
         on_line = [p for p in places if p.flank == DRIVE and p.roll[0] < TIP[0] and p.roll[1] < TIP[1]]
         assert on_line and max(abs(p.gap) for p in on_line) < 1e-14
         coast = [p.gap for p in places if p.flank == COAST and p.roll[0] < TIP[0] and p.roll[1] < TIP[1]]
-        nominal = 2 * np.pi * BASE[0] / TEETH[0] - 2 * BASE[0] * (PSI[0] - np.tan(WORKING) + WORKING) - 2 * BASE[1] * (PSI[1] - np.tan(WORKING) + WORKING)
+        nominal = (
+            2 * np.pi * BASE[0] / TEETH[0]
+            - 2 * BASE[0] * (PSI[0] - np.tan(WORKING) + WORKING)
+            - 2 * BASE[1] * (PSI[1] - np.tan(WORKING) + WORKING)
+        )
         assert coast and np.allclose(coast, nominal + 1e-4 * np.cos(WORKING), atol=1e-12)
 
 
@@ -78,15 +83,20 @@ def test_a_tooth_out_of_its_place_closes_its_own_gap_by_base_radius_times_angle(
 
 
 def test_number_of_pairs_in_contact_is_the_contact_ratio_on_average(plain: Inner):
-    count = [sum(p.flank == DRIVE and abs(p.gap) < 1e-12 for p in plain.places(turned(phi))) for phi in np.linspace(0, 2 * np.pi / TEETH[0], 400, endpoint=False)]
-    length = (sum(BASE) * np.tan(WORKING))
+    count = [
+        sum(p.flank == DRIVE and abs(p.gap) < 1e-12 for p in plain.places(turned(phi)))
+        for phi in np.linspace(0, 2 * np.pi / TEETH[0], 400, endpoint=False)
+    ]
+    length = sum(BASE) * np.tan(WORKING)
     ratio = (TIP[0] + TIP[1] - length) / (2 * np.pi * BASE[0] / TEETH[0])
     assert np.mean(count) == pytest.approx(ratio, abs=5e-3)
 
 
 @pytest.mark.parametrize("gears", ["relieved", "misplaced"])
 @pytest.mark.parametrize("dx, dy, lead", [(0, 0, 0), (3e-5, -2e-5, 1e-5), (-1e-4, 5e-5, -2e-5)])
-def test_gradients_are_derivatives_of_the_gaps(gears: str, dx: float, dy: float, lead: float, request: pytest.FixtureRequest):
+def test_gradients_are_derivatives_of_the_gaps(
+    gears: str, dx: float, dy: float, lead: float, request: pytest.FixtureRequest
+):
     relieved: Inner = request.getfixturevalue(gears)
     step, kinds = np.array([1e-7, 1e-7, 1e-6, 1e-7, 1e-7, 1e-6]), set()
     for phi in np.linspace(0, 2 * np.pi / TEETH[0], 57, endpoint=False):
@@ -110,7 +120,9 @@ def test_gradients_are_derivatives_of_the_gaps(gears: str, dx: float, dy: float,
 @pytest.mark.parametrize("gears", ["relieved", "misplaced"])
 @pytest.mark.parametrize("tooth_end", [0, 1])
 @pytest.mark.parametrize("flank", [DRIVE, COAST])
-def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(gears: str, flank: int, tooth_end: int, request: pytest.FixtureRequest):
+def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(
+    gears: str, flank: int, tooth_end: int, request: pytest.FixtureRequest
+):
     relieved: Inner = request.getfixturevalue(gears)
 
     def at(phi: float) -> tuple[Place | None, Place | None]:
@@ -129,7 +141,10 @@ def test_gap_and_gradient_go_over_from_flank_to_tip_corner_without_a_jump(gears:
             place = one(relieved.places(turned(phi - sign * middle, 2e-5, 1e-5), 2e-3), flank, corner.tooth)
             still = place is not None and place.roll[tooth_end] >= TIP[tooth_end]
             low, high = (middle, high) if still else (low, middle)
-        before, after = (one(relieved.places(turned(phi - sign * (high + d), 2e-5, 1e-5), 2e-3), flank, corner.tooth) for d in (1e-9, -1e-9))
+        before, after = (
+            one(relieved.places(turned(phi - sign * (high + d), 2e-5, 1e-5), 2e-3), flank, corner.tooth)
+            for d in (1e-9, -1e-9)
+        )
         assert after is not None and before is not None
         assert before.gap == pytest.approx(after.gap, abs=1e-10)
         assert np.allclose(before.gradient, after.gradient, atol=1e-5)
@@ -158,7 +173,7 @@ def test_local_law_is_continuous_with_its_slope_and_its_energy_is_the_integral(p
     assert np.allclose(np.diff(approach) / np.diff(force), middle, rtol=2e-3)
     work = np.diff(approach) * 0.5 * (force[1:] + force[:-1])
     assert np.allclose(np.diff(energy), work, rtol=3e-5)
-    assert plain.law(0.0, 150.0) [0] == 0.0 and plain.law(0.0, 150.0)[2] == 0.0
+    assert plain.law(0.0, 150.0)[0] == 0.0 and plain.law(0.0, 150.0)[2] == 0.0
 
 
 def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(library: Path):

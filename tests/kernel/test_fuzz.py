@@ -1,5 +1,6 @@
 """Damaged model blobs and states under AddressSanitizer and UBSan:
 refused with a message or run with a named outcome, never a crash or garbage."""
+
 from __future__ import annotations
 
 import functools
@@ -27,8 +28,12 @@ REFUSED = ("open", "1")
 
 @functools.lru_cache
 def originals() -> tuple[bytes, ...]:
-    return (pair_blob(("chain", "spring")), pair_blob(("torque", "fixed")), pair_blob(("spring", "torque")),
-            bars_blob((Bar(0.1), Bar(0.2)), (5, 10), 1e-6))
+    return (
+        pair_blob(("chain", "spring")),
+        pair_blob(("torque", "fixed")),
+        pair_blob(("spring", "torque")),
+        bars_blob((Bar(0.1), Bar(0.2)), (5, 10), 1e-6),
+    )
 
 
 def sound(number: int) -> bytes:
@@ -46,7 +51,7 @@ def fuzzer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = next((compilers()[name] for name in ("gcc", "clang") if name in compilers()), None)
     if command is None:
         pytest.skip("no gcc or clang with sanitizers: install gcc (Debian: apt-get install gcc)")
-    files = [Path(__file__).with_name("fuzz_kernel.c"), *sorted(source_folder().glob("gk_*.c"))]
+    files = [Path(__file__).with_name("fuzz_kernel.c"), *sorted(source_folder().rglob("gk_*.c"))]
     return compile_c([*command, *FLAGS, *SANITIZE], files, tmp_path_factory.mktemp("fuzz") / "fuzz")
 
 

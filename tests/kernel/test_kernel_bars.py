@@ -1,5 +1,6 @@
 """The kernel's flat engagement on coaxial bars: step by step as the independent reference,
 and the exact impact (double and product build)."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -59,8 +60,13 @@ COMPARED = [Case(100, 100, 8, local=2.8e-12), Case(100, 300, 5, gap=2e-6, local=
 
 def kernel_forces(case: Case, library: Path, integrator: str) -> np.ndarray:
     """Contact force at the end of every internal step; bar 1 starts with 1 m/s."""
-    parameters = {"left.w_start": 1.0, "h": case.h, "integrator": INTEGRATORS[integrator], "level": 3,
-                  "effect.hertz": 0}
+    parameters = {
+        "left.w_start": 1.0,
+        "h": case.h,
+        "integrator": INTEGRATORS[integrator],
+        "level": 3,
+        "effect.hertz": 0,
+    }
     kernel = Kernel(bars_blob(case.bars, case.modes, case.gap, case.local), parameters, library)
     kernel.initialize()
     forces = np.empty(case.steps)

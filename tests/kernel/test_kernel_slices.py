@@ -1,5 +1,6 @@
 """The kernel's step against the independent reference where slices are strongly coupled, open and close one by one,
 with and without damping."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -52,14 +53,27 @@ def reference_problem(two: tuple[FlatBody, FlatBody], block: Block) -> Problem:
     half_width = np.sqrt(4 * share * REFERENCE_LOAD / block.slices)
     local = 2 * share * (np.log(4e-3 / half_width) - 1) * np.eye(block.slices)
     offset, dashpot = np.full(block.slices, block.gap), np.full(block.slices, block.damping / block.slices)
-    return Problem(np.concatenate(omega), np.concatenate(zeta), np.hstack(rows), compliance + local, offset,
-                   dashpot=dashpot, path=PATH_SHARE * compliance + local)
+    return Problem(
+        np.concatenate(omega),
+        np.concatenate(zeta),
+        np.hstack(rows),
+        compliance + local,
+        offset,
+        dashpot=dashpot,
+        path=PATH_SHARE * compliance + local,
+    )
 
 
 def kernel_run(two: tuple[FlatBody, FlatBody], block: Block, integrator: int, library: Path) -> np.ndarray:
     """(STEPS, 3): mesh force, stored energy and dissipated energy after every step."""
-    parameters = {"left.w_start": SPEED, "h": H, "integrator": integrator, "level": 3, "slices": block.slices,
-                  "effect.hertz": 0}
+    parameters = {
+        "left.w_start": SPEED,
+        "h": H,
+        "integrator": integrator,
+        "level": 3,
+        "slices": block.slices,
+        "effect.hertz": 0,
+    }
     kernel = Kernel(flat_blob(two, block), parameters, library)
     kernel.initialize()
     record = np.empty((STEPS, 3))
@@ -88,11 +102,23 @@ def mirrored(problem: Problem) -> Problem:
     m = len(problem.offset)
     keep = np.arange((m + 1) // 2)
     times = np.where(2 * keep + 1 == m, 1.0, 2.0)
-    own = problem.compliance[0, 0] - problem.compliance[0, m - 1]  # the local law's, the only part in which the two differ
-    compliance, path = ((matrix - own * np.eye(m))[np.ix_(keep, keep)] + np.diag(own / times)
-                        for matrix in (problem.compliance, problem.path))
-    return Problem(problem.omega, problem.zeta, problem.rows[keep], compliance, problem.offset[keep],
-                   dashpot=problem.dashpot[keep] * times, path=path, weight=times)
+    own = (
+        problem.compliance[0, 0] - problem.compliance[0, m - 1]
+    )  # the local law's, the only part in which the two differ
+    compliance, path = (
+        (matrix - own * np.eye(m))[np.ix_(keep, keep)] + np.diag(own / times)
+        for matrix in (problem.compliance, problem.path)
+    )
+    return Problem(
+        problem.omega,
+        problem.zeta,
+        problem.rows[keep],
+        compliance,
+        problem.offset[keep],
+        dashpot=problem.dashpot[keep] * times,
+        path=path,
+        weight=times,
+    )
 
 
 @pytest.mark.parametrize("slices", [4, 5])
@@ -109,8 +135,9 @@ def test_mirrored_slices_as_one_row_change_nothing(slices: int, damping: float) 
 @pytest.mark.parametrize(("integrator", "gamma"), [(0, 1.0), (2, 0.0)], ids=["dg4", "em"])
 @pytest.mark.parametrize(("zeta", "damping"), [(0.0, 0.0), (0.01, 0.0), (0.0, 2e3), (0.01, 2e3), (0.01, 2e4)])
 @pytest.mark.parametrize("slices", [1, 4, 5, 6])
-def test_slices_step_by_step(double_library: Path, slices: int, integrator: int, gamma: float, zeta: float,
-                             damping: float) -> None:
+def test_slices_step_by_step(
+    double_library: Path, slices: int, integrator: int, gamma: float, zeta: float, damping: float
+) -> None:
     two, block = bodies(zeta), replace(BLOCK, slices=slices, damping=damping)
     got = kernel_run(two, block, integrator, double_library)
     expected = reference_forces(reference_problem(two, block), two, gamma)

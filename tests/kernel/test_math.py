@@ -1,5 +1,6 @@
 """Elementary functions of the kernel against mpmath: at most 2 ulp everywhere, exact at the special points,
 the same bits from every compiler."""
+
 from __future__ import annotations
 
 import hashlib
@@ -30,18 +31,41 @@ def signed(x: np.ndarray) -> np.ndarray:
     return np.concatenate([x, -x])
 
 
-EXP_POINTS = np.concatenate([
-    RNG.uniform(-745, 709.7, N), signed(10.0 ** RNG.uniform(-20, 0, N)), np.arange(-708, 709) * np.log(2),
-    RNG.uniform(-745.13, -708, 500)])
-LOG_POINTS = np.concatenate([
-    np.exp(RNG.uniform(-700, 700, N)), RNG.uniform(0.5, 2, N), 1 + signed(10.0 ** RNG.uniform(-15.5, -1, N)),
-    10.0 ** RNG.uniform(-323, -308, 500), np.sqrt(0.5) * (1 + np.arange(-20, 20) * 2.0**-53)])
-CIRCLE_POINTS = np.concatenate([
-    signed(10.0 ** RNG.uniform(-300, 9, N)), RNG.uniform(-8, 8, N), near_multiples_of_half_pi(N),
-    signed(np.array([1e9]))])
-ACOS_POINTS = np.concatenate([
-    RNG.uniform(-1, 1, N), 1 - 10.0 ** RNG.uniform(-16, 0, N), -1 + 10.0 ** RNG.uniform(-16, 0, N),
-    signed(10.0 ** RNG.uniform(-300, 0, N)), 0.5 + np.arange(-20, 20) * 2.0**-54, -0.5 + np.arange(-20, 20) * 2.0**-54])
+EXP_POINTS = np.concatenate(
+    [
+        RNG.uniform(-745, 709.7, N),
+        signed(10.0 ** RNG.uniform(-20, 0, N)),
+        np.arange(-708, 709) * np.log(2),
+        RNG.uniform(-745.13, -708, 500),
+    ]
+)
+LOG_POINTS = np.concatenate(
+    [
+        np.exp(RNG.uniform(-700, 700, N)),
+        RNG.uniform(0.5, 2, N),
+        1 + signed(10.0 ** RNG.uniform(-15.5, -1, N)),
+        10.0 ** RNG.uniform(-323, -308, 500),
+        np.sqrt(0.5) * (1 + np.arange(-20, 20) * 2.0**-53),
+    ]
+)
+CIRCLE_POINTS = np.concatenate(
+    [
+        signed(10.0 ** RNG.uniform(-300, 9, N)),
+        RNG.uniform(-8, 8, N),
+        near_multiples_of_half_pi(N),
+        signed(np.array([1e9])),
+    ]
+)
+ACOS_POINTS = np.concatenate(
+    [
+        RNG.uniform(-1, 1, N),
+        1 - 10.0 ** RNG.uniform(-16, 0, N),
+        -1 + 10.0 ** RNG.uniform(-16, 0, N),
+        signed(10.0 ** RNG.uniform(-300, 0, N)),
+        0.5 + np.arange(-20, 20) * 2.0**-54,
+        -0.5 + np.arange(-20, 20) * 2.0**-54,
+    ]
+)
 
 
 def ulps(value: np.ndarray, exact: list[mp.mpf]) -> np.ndarray:
@@ -50,9 +74,16 @@ def ulps(value: np.ndarray, exact: list[mp.mpf]) -> np.ndarray:
     return np.array([float(abs(mp.mpf(float(v)) - e) / u) for v, e, u in zip(value, exact, unit, strict=True)])
 
 
-@pytest.mark.parametrize(("name", "function", "points"), [
-    ("exp", mp.exp, EXP_POINTS), ("log", mp.log, LOG_POINTS), ("sin", mp.sin, CIRCLE_POINTS),
-    ("cos", mp.cos, CIRCLE_POINTS), ("acos", mp.acos, ACOS_POINTS)])
+@pytest.mark.parametrize(
+    ("name", "function", "points"),
+    [
+        ("exp", mp.exp, EXP_POINTS),
+        ("log", mp.log, LOG_POINTS),
+        ("sin", mp.sin, CIRCLE_POINTS),
+        ("cos", mp.cos, CIRCLE_POINTS),
+        ("acos", mp.acos, ACOS_POINTS),
+    ],
+)
 def test_error_of_functions_of_one_variable(probes: Probes, name: str, function: Callable, points: np.ndarray) -> None:
     error = ulps(probes.one(name, points), [function(mp.mpf(float(x))) for x in points])
     worst = int(np.argmax(error))
@@ -75,9 +106,12 @@ def test_error_against_long_double_on_a_dense_net(probes: Probes) -> None:
         pytest.skip("this machine's long double is no wider than double: nothing to compare with; run on x86-64")
     rng, n = np.random.default_rng(7), 4_000_000
     for name, function, x in (
-        ("exp", np.exp, rng.uniform(-700, 709, n)), ("exp", np.exp, rng.uniform(-1, 1, n)),
-        ("log", np.log, np.exp(rng.uniform(-700, 700, n))), ("log", np.log, rng.uniform(0.5, 2, n)),
-        ("sin", np.sin, rng.uniform(-1e5, 1e5, n)), ("cos", np.cos, rng.uniform(-10, 10, n)),
+        ("exp", np.exp, rng.uniform(-700, 709, n)),
+        ("exp", np.exp, rng.uniform(-1, 1, n)),
+        ("log", np.log, np.exp(rng.uniform(-700, 700, n))),
+        ("log", np.log, rng.uniform(0.5, 2, n)),
+        ("sin", np.sin, rng.uniform(-1e5, 1e5, n)),
+        ("cos", np.cos, rng.uniform(-10, 10, n)),
         ("acos", np.arccos, rng.uniform(-1, 1, n)),
     ):
         exact = function(x.astype(np.longdouble))
@@ -119,8 +153,13 @@ def test_identities_that_the_geometry_uses(probes: Probes) -> None:
 
 def test_monotone_across_the_joints(probes: Probes) -> None:
     """Neighbouring doubles around the joints of the reductions do not step back by more than the error bound."""
-    joints = (("exp", np.log(2) / 2, 1), ("log", np.sqrt(0.5), 1), ("acos", 0.5, -1), ("acos", -0.5, -1),
-              ("sin", np.pi / 4, 1))
+    joints = (
+        ("exp", np.log(2) / 2, 1),
+        ("log", np.sqrt(0.5), 1),
+        ("acos", 0.5, -1),
+        ("acos", -0.5, -1),
+        ("sin", np.pi / 4, 1),
+    )
     for name, joint, sign in joints:
         x = joint + np.arange(-3000, 3000) * np.spacing(joint)
         y = sign * probes.one(name, x)
@@ -139,17 +178,22 @@ def test_coefficients_in_the_source_are_those_of_the_generator() -> None:
 def outputs_hash(probes: Probes) -> str:
     """SHA-256 over the bits of every function on a fixed set of points."""
     rng = np.random.default_rng(1)
-    parts = [probes.one("exp", rng.uniform(-745, 709, 20000)), probes.one("log", np.exp(rng.uniform(-700, 700, 20000))),
-             probes.one("sin", rng.uniform(-1e9, 1e9, 20000)), probes.one("cos", rng.uniform(-10, 10, 20000)),
-             probes.one("acos", rng.uniform(-1, 1, 20000)),
-             probes.atan2(rng.normal(size=20000), rng.normal(size=20000))]
+    parts = [
+        probes.one("exp", rng.uniform(-745, 709, 20000)),
+        probes.one("log", np.exp(rng.uniform(-700, 700, 20000))),
+        probes.one("sin", rng.uniform(-1e9, 1e9, 20000)),
+        probes.one("cos", rng.uniform(-10, 10, 20000)),
+        probes.one("acos", rng.uniform(-1, 1, 20000)),
+        probes.atan2(rng.normal(size=20000), rng.normal(size=20000)),
+    ]
     return hashlib.sha256(b"".join(p.tobytes() for p in parts)).hexdigest()
 
 
 FLAG_SETS = {"O0": ("-O0",), "O1": ("-O1",), "O2": ("-O2",), "O3": ("-O3",), "native": ("-O3", "-march=native")}
 QUICK = {("gcc", "O0"), ("gcc", "native"), ("clang", "O3")}
-VARIANTS = [pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full])
-            for c in compilers() for f in FLAG_SETS]
+VARIANTS = [
+    pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full]) for c in compilers() for f in FLAG_SETS
+]
 
 
 @pytest.mark.parametrize(("compiler", "flags"), VARIANTS)

@@ -1,5 +1,6 @@
 """The reference time step keeps what it promises: order, energy through every change of contact, dissipation,
 impulse, static values."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -25,8 +26,9 @@ def start(reference: Reference, layout: Layout, speed: float, load: float = 0.0)
     return reference.start(q, v, external), external
 
 
-def drift(layout: Layout, scheme: Scheme, speed: float, load: float = 0.0,
-          steps: int = 1500) -> tuple[float, Reference]:
+def drift(
+    layout: Layout, scheme: Scheme, speed: float, load: float = 0.0, steps: int = 1500
+) -> tuple[float, Reference]:
     """Largest change of the invariant (with the potential of the constant load) over the kinetic energy at the
     start."""
     reference = Reference(rattle(layout), scheme)

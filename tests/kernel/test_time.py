@@ -1,4 +1,5 @@
 """Communication times as tools hand them over: n·H, or accumulated with rounding noise in time and step, give the same bits."""
+
 from __future__ import annotations
 
 import numpy as np

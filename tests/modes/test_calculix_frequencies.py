@@ -19,7 +19,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ROOT / "benchmarks" / "calculix"
-GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))["frequencies_Hz"]
+GOLDEN = json.loads((ROOT / "tests" / "reference" / "calculix_fzg_c.json").read_text(encoding="utf-8"))[
+    "frequencies_Hz"
+]
 PRINTED = 2e-6  # CalculiX prints seven digits; its own two frequencies of a pair differ by up to 7e-7
 
 

@@ -39,7 +39,9 @@ def test_a_body_with_its_files(coarse_set: Path, tmp_path: Path, capsys: pytest.
 
 def test_the_whole_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = call("fzg_c", "--torque", "302 N*m", "--count", 7, "--out", tmp_path, capsys=capsys)
-    assert (code, err) == (0, "") and "linearised at 302 N·m, 12 positions" in out and "mesh order 6 meets mode 6" in out
+    assert (
+        (code, err) == (0, "") and "linearised at 302 N·m, 12 positions" in out and "mesh order 6 meets mode 6" in out
+    )
     assert {path.name for path in tmp_path.iterdir()} == {"fzg_c_frequencies.csv", "fzg_c_campbell.png"}
     with open(tmp_path / "fzg_c_frequencies.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

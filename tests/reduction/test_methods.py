@@ -149,9 +149,7 @@ def test_a_tolerance_is_met(name):
     tolerance = {"modal": 0.2, "snapshots": 0.05}.get(name, 1e-3)
     basis = METHODS[name](HELD, Size(tolerance=tolerance, band=(100.0, 8e3)))
     lines = Judging.over((100.0, 8e3), 77)
-    error = relative_error(
-        reference(HELD, lines).matrix, transfer(oscillators(HELD, basis, 0.01), lines, HELD.ground)
-    )
+    error = relative_error(reference(HELD, lines).matrix, transfer(oscillators(HELD, basis, 0.01), lines, HELD.ground))
     assert 1e-3 * tolerance < error.max() <= 1.02 * tolerance or name == "krylov" and error.max() <= tolerance
 
 

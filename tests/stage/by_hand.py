@@ -47,7 +47,9 @@ class Pair:
 
     def local_law(self, rolls: tuple[float, float]) -> tuple[float, float, float]:
         """a, c, β of δ(f) = f (c − ½ a ln βf), f in N per metre of width (theory, eqs. 7 and 8)."""
-        yields = [2 * (1 - g.material.poisson_ratio**2) / (math.pi * g.material.youngs_modulus) for g in self.spec.gears]
+        yields = [
+            2 * (1 - g.material.poisson_ratio**2) / (math.pi * g.material.youngs_modulus) for g in self.spec.gears
+        ]
         c = sum(y * (math.log(4 * g.body.strip_half_width) - 1) for y, g in zip(yields, self.spec.gears, strict=True))
         return sum(yields), c, 2 * sum(yields) / (1 / rolls[0] + 1 / rolls[1])
 

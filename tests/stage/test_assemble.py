@@ -1,4 +1,5 @@
 """The model blob: equal inputs give equal bytes, and the tables hold what the bodies say."""
+
 from __future__ import annotations
 
 import numpy as np

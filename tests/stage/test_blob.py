@@ -1,5 +1,6 @@
 """The model blob in Python: what is written is read back, one content has one sequence of bytes,
 and what is wrong is said."""
+
 from __future__ import annotations
 
 import hashlib
@@ -13,14 +14,22 @@ from hypothesis.extra import numpy as stn
 from gearfmu.errors import ModelError
 from gearfmu.stage.blob import ENTRY, HEADER, blob_hash, read_blob, seal, write_blob
 
-SAMPLE = {"name": "fzg_c µm", "roll": np.linspace(0.01, 0.02, 7), "teeth": np.array([16, 24]), "empty": np.zeros(0),
-          "flags": np.array([True, False])}
+SAMPLE = {
+    "name": "fzg_c µm",
+    "roll": np.linspace(0.01, 0.02, 7),
+    "teeth": np.array([16, 24]),
+    "empty": np.zeros(0),
+    "flags": np.array([True, False]),
+}
 
 names = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=23)
 values = st.one_of(
     st.text(st.characters(min_codepoint=1, codec="utf-8"), max_size=70),
-    stn.arrays(np.float64, stn.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=9),
-               elements=st.floats(allow_nan=False, allow_infinity=False)),
+    stn.arrays(
+        np.float64,
+        stn.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=9),
+        elements=st.floats(allow_nan=False, allow_infinity=False),
+    ),
     stn.arrays(np.int32, st.integers(0, 40)),
 )
 
@@ -52,12 +61,26 @@ def test_arrays_read_are_constant() -> None:
 
 
 def test_all_problems_of_a_write_at_once() -> None:
-    bad = {"": np.zeros(1), "a name with spaces": np.zeros(1), "x" * 24: np.zeros(1),
-           "inf": np.array([1.0, np.inf, np.nan]), "big": np.array([2**31]), "complex": np.array([1j]), "nul": "a\0b"}
+    bad = {
+        "": np.zeros(1),
+        "a name with spaces": np.zeros(1),
+        "x" * 24: np.zeros(1),
+        "inf": np.array([1.0, np.inf, np.nan]),
+        "big": np.array([2**31]),
+        "complex": np.array([1j]),
+        "nul": "a\0b",
+    }
     with pytest.raises(ModelError) as caught:
         write_blob(bad)
-    for part in ("''", "'a name with spaces'", "x" * 24, "2 of 3 values", "'big': integers beyond 32 bits", "'complex'",
-                 "'nul': text contains NUL"):
+    for part in (
+        "''",
+        "'a name with spaces'",
+        "x" * 24,
+        "2 of 3 values",
+        "'big': integers beyond 32 bits",
+        "'complex'",
+        "'nul': text contains NUL",
+    ):
         assert part in str(caught.value)
 
 

@@ -76,7 +76,10 @@ def test_transmission_error_on_rigid_bores(spec: StageSpec, monkeypatch: pytest.
 def test_goldens_are_those_of_the_tables() -> None:
     with open(TABLES / "pitch_point.csv", newline="", encoding="utf-8") as file:
         assert {row["case"]: float(row["secant_N_per_mm_um"]) for row in csv.DictReader(file)} == SECANT
-    for table, name in (("positions", "te_um_by_torque_Nm_and_position"), ("positions_clamped", "te_um_with_clamped_bores")):
+    for table, name in (
+        ("positions", "te_um_by_torque_Nm_and_position"),
+        ("positions_clamped", "te_um_with_clamped_bores"),
+    ):
         with open(TABLES / f"{table}.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         assert len(rows) == sum(len(curve) for curve in GOLDEN[name].values()) == 3 * GOLDEN["positions_per_pitch"]

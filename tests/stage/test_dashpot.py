@@ -22,7 +22,9 @@ def halved(body: ReducedBody) -> ReducedBody:
     middle = body.frequency.size // 2
     gaps = np.diff(np.log(body.frequency[middle - 8 : middle + 8]))
     n = middle - 8 + int(gaps.argmax()) + 1
-    stored = {name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio", "nodal_diameter", "part", "parity")}
+    stored = {
+        name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio", "nodal_diameter", "part", "parity")
+    }
     return replace(body, **stored, flank_rows=body.flank_rows[..., :n].copy(), bore_rows=body.bore_rows[:, :n].copy())
 
 

@@ -108,7 +108,9 @@ def elastic_angle_error(trace: Trace, body: ReducedBody, cut: float, damped: boo
     by_hand = TORQUE * bore_angle(body, time, cut, damped)[acting]
     largest = (by_hand - TORQUE * 0.5 * time[acting] ** 2 / body.inertia[2, 2]).max()
     error = float(np.abs(angle[acting] - by_hand).max() / largest)
-    print(f"{trace.meta['n_dyn']} modes, damped {damped}: elastic up to {1e6 * largest:.2f} µrad, error {error:.1e} of it")
+    print(
+        f"{trace.meta['n_dyn']} modes, damped {damped}: elastic up to {1e6 * largest:.2f} µrad, error {error:.1e} of it"
+    )
     return error
 
 
@@ -163,7 +165,9 @@ def test_coast_flank(free: StageModel, bodies: list[ReducedBody], pair: PairGeom
     off, on = both[0.0]["mesh.te"], both[1.0]["mesh.te"]
     assert np.allclose(off, fall, rtol=1e-4, atol=1e-9) and fall[-1] < -3 * pair.normal_backlash
     met = np.argmax(fall < -pair.normal_backlash)
-    assert np.allclose(on[: met - 1], off[: met - 1], atol=1e-12) and np.all(both[1.0]["mesh.force_coast"][: met - 1] == 0)
+    assert np.allclose(on[: met - 1], off[: met - 1], atol=1e-12) and np.all(
+        both[1.0]["mesh.force_coast"][: met - 1] == 0
+    )
     assert both[1.0]["mesh.force_coast"][met:].max() > 1000 and on.min() > -pair.normal_backlash - 10e-6
 
 
@@ -196,7 +200,9 @@ def test_tip_relief(plain: StageModel, relieved: StageModel, relief_spec: StageS
     flanks = {"effect.tip_contact": 0.0}
     off = loaded_te(relieved, [0.0], 24, **flanks, **{"effect.tip_relief": 0.0})
     on = loaded_te(relieved, [0.0], 24, **flanks)
-    by_hand = [min(depth(relief_spec, pair, rolls) for rolls in Pair(relief_spec, ()).rolls(p).values()) for p in on.position]
+    by_hand = [
+        min(depth(relief_spec, pair, rolls) for rolls in Pair(relief_spec, ()).rolls(p).values()) for p in on.position
+    ]
     print(f"unloaded te up to {1e6 * on.te.max():.3f} µm, by hand {1e6 * max(by_hand):.3f} µm")
     assert np.abs(off.te).max() < 5e-9 and max(by_hand) > 0.5e-6
     assert np.allclose(on.te[0], by_hand, atol=1e-8)

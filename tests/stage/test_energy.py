@@ -57,9 +57,7 @@ def test_invariant_holds_and_damping_never_adds(
 
 
 @pytest.mark.parametrize("slices", [1, 5, 10])
-def test_free_rattle_of_50_ms(
-    pair_free: StageModel, libraries: dict[str, Path | None], slices: int
-) -> None:
+def test_free_rattle_of_50_ms(pair_free: StageModel, libraries: dict[str, Path | None], slices: int) -> None:
     case = energy.CASES["free rattle"]
     run = {**SHORT, "duration": 0.05, "libraries": libraries}
     for build in ("double", "shipped"):

@@ -65,9 +65,7 @@ def test_both_sides_of_the_limit(library: Path, relieved: StageModel, level: str
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_default_step_is_the_largest_that_meets_the_limit(
-    library: Path, relieved: StageModel, level: str
-) -> None:
+def test_default_step_is_the_largest_that_meets_the_limit(library: Path, relieved: StageModel, level: str) -> None:
     probe = Inner(library, relieved.blob, {"level": LEVELS[level]})
     good = np.array([probe.mu(h) <= MU for h in LADDER])
     wanted = LADDER[np.flatnonzero(good)[-1]]

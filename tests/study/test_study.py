@@ -63,8 +63,11 @@ def test_finer_is_better(scene: SceneSpec) -> None:
     the modes left out, which no step makes smaller."""
     model = models_for(scene)
     reference = measure(scene, model, Point("full", h=0.5e-6)).signals
-    te = {(level, h): errors_of(measure(scene, model, Point(level, h=h)).signals, reference).te
-          for level in ("fast", "standard", "full") for h in (2.5e-6, 1.25e-6)}
+    te = {
+        (level, h): errors_of(measure(scene, model, Point(level, h=h)).signals, reference).te
+        for level in ("fast", "standard", "full")
+        for h in (2.5e-6, 1.25e-6)
+    }
     assert te["fast", 1.25e-6] > 3 * te["full", 1.25e-6], "measured: 4.7 times"
     assert te["fast", 1.25e-6] > te["standard", 1.25e-6] > te["full", 1.25e-6]
     assert np.log2(te["full", 2.5e-6] / te["full", 1.25e-6]) == pytest.approx(2.0, abs=0.3)  # measured: 2.1
@@ -141,8 +144,12 @@ def test_rows_read_back_and_other_files_are_refused(tmp_path: Path) -> None:
 
 
 def test_chart_is_the_same_bytes_every_time(tmp_path: Path) -> None:
-    rows = [Row("s", level, "dg4", h, 1, n, 1e4 * h, 0.0, 1e4 * h, 1e4 * h, 1e-6 / h, 1.0)
-            for level in ("rigid", "fast") for h in (1e-5, 5e-6) for n in (1, 5)]
+    rows = [
+        Row("s", level, "dg4", h, 1, n, 1e4 * h, 0.0, 1e4 * h, 1e4 * h, 1e-6 / h, 1.0)
+        for level in ("rigid", "fast")
+        for h in (1e-5, 5e-6)
+        for n in (1, 5)
+    ]
     rows += [Row("s", "full", "rk45", 1e-6, 400, 5, 1e-3, 0.0, 0.02, 0.01, 90.0, 70.0)]
     first = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "a", "title")]
     again = [path.read_bytes() for path in write_chart(rows, 5, tmp_path / "b", "title")]
@@ -168,8 +175,11 @@ def test_wrong_usage_names_what_there_is(
 
 
 def test_bodies_chart_shows_every_scene(tmp_path: Path) -> None:
-    rows = [BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
-            for scene in ("one", "other") for text in ("slices 10", "mesh × 1.3")]
+    rows = [
+        BodyRow(scene, text, "1/2", 400, 5, 32, 0.01, 0.0, 0.02, 0.03, 0.0)
+        for scene in ("one", "other")
+        for text in ("slices 10", "mesh × 1.3")
+    ]
     svg, png = write_bodies_chart(rows, tmp_path / "bodies.csv")
     text = svg.read_text(encoding="utf-8")
     assert png.stat().st_size > 1000 and all(word in text for word in ("one", "other", "slices 10", "mesh × 1.3"))

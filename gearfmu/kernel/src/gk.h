@@ -1,10 +1,10 @@
 /* gearfmu kernel: elastic gear stage, reduced bodies in floating frames, tooth contact, one fixed-step solver.
  *
- * Three kinds of memory, all owned by the caller; the kernel allocates nothing, opens nothing, starts nothing and keeps no globals:
- *   gk_model   pointers into a constant, checked blob (geometry, modes, static compliance)
- *   gk_setup   what is fixed once level, effects and step are chosen (tables for the chosen modes and slices, coefficient cache)
- *   gk_data    everything that changes, without pointers: a copy of its bytes is a snapshot and is the FMU state
- * Life:  gk_model_open → gk_defaults → gk_set … → gk_prepare → gk_initialize → (gk_set, gk_step, gk_get)*
+ * Three kinds of memory, all owned by the caller; the kernel allocates nothing, opens nothing, starts nothing and keeps
+ * no globals: gk_model   pointers into a constant, checked blob (geometry, modes, static compliance) gk_setup   what is
+ * fixed once level, effects and step are chosen (tables for the chosen modes and slices, coefficient cache) gk_data
+ * everything that changes, without pointers: a copy of its bytes is a snapshot and is the FMU state Life: gk_model_open
+ * → gk_defaults → gk_set … → gk_prepare → gk_initialize → (gk_set, gk_step, gk_get)*
  */
 #ifndef GK_H
 #define GK_H
@@ -22,16 +22,16 @@
 
 typedef enum gk_outcome {
     GK_OK = 0,
-    GK_BAD_BLOB,        /* not a model, wrong version, damaged, or out of bounds: see the message               */
-    GK_BAD_VARIABLE,    /* no such value reference in this model                                                 */
-    GK_BAD_VALUE,       /* NaN, infinite or outside the variable's range; nothing was changed                     */
-    GK_BAD_CALL,        /* this call is not allowed now; nothing was changed                                      */
-    GK_BAD_STEP,        /* communication step negative, zero, not finite or not at the current time; unchanged    */
-    GK_STEP_TOO_LARGE,  /* h above the stability limit of this model at this level: see the message for h to use  */
-    GK_NO_EQUILIBRIUM,  /* the initial static equilibrium was not found                                           */
-    GK_DIVERGED,        /* a state became non-finite even with the smallest step and the fallback scheme           */
-    GK_PENETRATION,     /* teeth overlap beyond what the model can mean                                           */
-    GK_ENERGY,          /* the energy balance broke                                                               */
+    GK_BAD_BLOB,       /* not a model, wrong version, damaged, or out of bounds: see the message               */
+    GK_BAD_VARIABLE,   /* no such value reference in this model                                                 */
+    GK_BAD_VALUE,      /* NaN, infinite or outside the variable's range; nothing was changed                     */
+    GK_BAD_CALL,       /* this call is not allowed now; nothing was changed                                      */
+    GK_BAD_STEP,       /* communication step negative, zero, not finite or not at the current time; unchanged    */
+    GK_STEP_TOO_LARGE, /* h above the stability limit of this model at this level: see the message for h to use  */
+    GK_NO_EQUILIBRIUM, /* the initial static equilibrium was not found                                           */
+    GK_DIVERGED,       /* a state became non-finite even with the smallest step and the fallback scheme           */
+    GK_PENETRATION,    /* teeth overlap beyond what the model can mean                                           */
+    GK_ENERGY,         /* the energy balance broke                                                               */
     GK_OUTCOMES
 } gk_outcome;
 
@@ -43,12 +43,12 @@ typedef enum gk_type { GK_REAL, GK_INTEGER, GK_BOOLEAN, GK_ENUM } gk_type;
 typedef enum gk_causality { GK_INPUT, GK_OUTPUT, GK_PARAMETER } gk_causality;
 
 typedef struct gk_variable_info {
-    uint32_t reference;      /* FMI value reference: position in gk_variables.inc, never reused  */
+    uint32_t reference; /* FMI value reference: position in gk_variables.inc, never reused  */
     gk_type type;
     gk_causality causality;
-    char name[64];           /* e.g. "pinion.phi"                                                */
-    char unit[24];           /* "" for none                                                       */
-    char items[64];          /* enumeration items "rigid|fast|…", values 0, 1, …                   */
+    char name[64];  /* e.g. "pinion.phi"                                                */
+    char unit[24];  /* "" for none                                                       */
+    char items[64]; /* enumeration items "rigid|fast|…", values 0, 1, …                   */
     char description[160];
     double start, minimum, maximum;
 } gk_variable_info;
@@ -58,8 +58,8 @@ GK_API int gk_abi(void);
 GK_API const char *gk_outcome_text(gk_outcome outcome);
 GK_API size_t gk_model_size(void);
 GK_API gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char message[GK_MESSAGE]);
-GK_API const char *gk_model_name(const gk_model *model);                 /* stage name                        */
-GK_API const char *gk_model_hash(const gk_model *model);                 /* 64 hex digits, SHA-256 of the blob */
+GK_API const char *gk_model_name(const gk_model *model); /* stage name                        */
+GK_API const char *gk_model_hash(const gk_model *model); /* 64 hex digits, SHA-256 of the blob */
 
 /* variables: only those that exist in this model (ports decide), in the table's order */
 GK_API int gk_variable_count(const gk_model *model);
@@ -74,20 +74,26 @@ GK_API gk_outcome gk_defaults(const gk_model *model, gk_data *data);
 GK_API gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, double value);
 GK_API gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference, double *value);
 /* `count` of them at once: when one is refused none is set */
-GK_API gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *references, size_t count, const double *values);
-GK_API gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_t *references, size_t count, double *values);
+GK_API gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *references, size_t count,
+                              const double *values);
+GK_API gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_t *references, size_t count,
+                              double *values);
 GK_API gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
 GK_API gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *data, double time);
-/* One communication step from `time` to time + H. The first H is taken as given; a later one within 8 ulp(time + H) of the last counts as that one.
- * On failure the data stands at the last good time (gk_time) and the outcome says why. */
+/* One communication step from `time` to time + H. The first H is taken as given; a later one within 8 ulp(time + H) of
+ * the last counts as that one. On failure the data stands at the last good time (gk_time) and the outcome says why. */
 GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, double time, double H);
 GK_API double gk_time(const gk_data *data);
 
-/* Quasi-static loaded transmission error: torque on the pinion's bore, wheel's bore held at phi_wheel; by the contact routine of the step. After gk_prepare; `keep` continues from the last call.
- * out[0] = te (m), then for each of *places tooth pairs {flank 0 drive 1 coast, tooth number of the pinion, force of each slice (N)}; at most 1 + 8·12 numbers. */
-GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque, int keep, double *out, int *places);
+/* Quasi-static loaded transmission error: torque on the pinion's bore, wheel's bore held at phi_wheel; by the contact
+ * routine of the step. After gk_prepare; `keep` continues from the last call. out[0] = te (m), then for each of *places
+ * tooth pairs {flank 0 drive 1 coast, tooth number of the pinion, force of each slice (N)}; at most 1 + 8·12 numbers.
+ */
+GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque,
+                        int keep, double *out, int *places);
 
-/* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds with -DGK_PROFILE only, else they stay 0. */
+/* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds
+ * with -DGK_PROFILE only, else they stay 0. */
 GK_API int gk_profile(const gk_setup *setup, int phase, const char **name, uint64_t *cycles);
 
 /* state = the first gk_state_size bytes of gk_data */

@@ -1,0 +1,87 @@
+/* Small arithmetic: numbers without the C library, sums in fixed lanes. Part of gk_core.h. */
+#ifndef GK_LANES_H
+#define GK_LANES_H
+static inline double gk_clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+/* the C library stays out (only sqrt and memory functions come from the compiler): NaN on the right goes through */
+static inline double gk_max(double x, double y) { return x > y ? x : y; }
+static inline double gk_min(double x, double y) { return x < y ? x : y; }
+static inline double gk_floor(double x)
+{ /* |x| < 2^62 */
+    double whole = (double)(int64_t)x;
+    return whole > x ? whole - 1.0 : whole;
+}
+static inline int gk_finite(double x) { return x - x == 0.0; }
+
+/* four doubles at once, the same bits at every vector width; rows of the small system are padded to them */
+typedef double gk_quad __attribute__((vector_size(4 * sizeof(double)), may_alias, aligned(sizeof(double))));
+typedef int64_t gk_bits __attribute__((vector_size(4 * sizeof(int64_t)), may_alias, aligned(sizeof(double))));
+typedef uint64_t gk_unsigned __attribute__((vector_size(4 * sizeof(uint64_t)), may_alias, aligned(sizeof(double))));
+#define GK_INLINE static inline __attribute__((always_inline))
+/* macros, because compilers differ in how they pass vectors and say so */
+#define GK_ALL(x) ((gk_quad){(x), (x), (x), (x)})
+#define GK_CHOOSE(where, x, y) ((gk_quad)(((where) & (gk_bits)(x)) | (~(where) & (gk_bits)(y))))
+#define GK_LARGER(x, y) GK_CHOOSE((x) > (y), x, y)
+#define GK_MAGNITUDE(x) ((gk_quad)((gk_bits)(x) & INT64_MAX))
+static inline double gk_largest(const gk_quad *x) { return gk_max(gk_max((*x)[0], (*x)[2]), gk_max((*x)[1], (*x)[3])); }
+/* calls f(…, quads) with the usual sizes as constants, so that the compiler keeps short rows in registers */
+#define GK_SIZED(quads, f, ...)                                                                                        \
+    switch (quads) {                                                                                                   \
+    case 2: f(__VA_ARGS__, 2); break;                                                                                  \
+    case 3: f(__VA_ARGS__, 3); break;                                                                                  \
+    case 4: f(__VA_ARGS__, 4); break;                                                                                  \
+    default: f(__VA_ARGS__, quads);                                                                                    \
+    }
+
+/* f(…, quads, block) for every block of a quad of rows, blocks as constants too where quads is one */
+#define GK_BLOCKS(quads, f, ...)                                                                                       \
+    f(__VA_ARGS__, quads, 0);                                                                                          \
+    if (quads > 1) f(__VA_ARGS__, quads, 1);                                                                           \
+    if (quads > 2) f(__VA_ARGS__, quads, 2);                                                                           \
+    for (int block = 3; block < quads; block++) f(__VA_ARGS__, quads, block);
+#define GK_BLOCKS_BACK(quads, f, ...)                                                                                  \
+    for (int block = quads - 1; block > 2; block--) f(__VA_ARGS__, quads, block);                                      \
+    if (quads > 2) f(__VA_ARGS__, quads, 2);                                                                           \
+    if (quads > 1) f(__VA_ARGS__, quads, 1);                                                                           \
+    f(__VA_ARGS__, quads, 0);
+
+/* the same for the strips of a place: those of 1, 5 and 10 slices */
+#define GK_STRIPPED(strips, f, ...)                                                                                    \
+    switch (strips) {                                                                                                  \
+    case 1: f(__VA_ARGS__, 1); break;                                                                                  \
+    case 3: f(__VA_ARGS__, 3); break;                                                                                  \
+    case 5: f(__VA_ARGS__, 5); break;                                                                                  \
+    default: f(__VA_ARGS__, strips);                                                                                   \
+    }
+
+/* y += f x over quads `from` … `to` − 1 */
+GK_INLINE void gk_axpy(double f, const double *x, double *y, int from, int to)
+{
+    const gk_quad *a = (const gk_quad *)x;
+    gk_quad *b = (gk_quad *)y;
+    for (int q = from; q < to; q++) b[q] += f * a[q];
+}
+
+static inline double gk_dot_quads(const double *x, const double *y, int quads)
+{
+    const gk_quad *a = (const gk_quad *)x, *b = (const gk_quad *)y;
+    gk_quad sum = {0};
+    for (int q = 0; q < quads; q++) sum += a[q] * b[q];
+    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
+}
+
+/* Σ a_k b_k in LANES fixed lanes, added up as a tree: the same bits at every vector width. n is a multiple of LANES. */
+typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias,
+                                       aligned(sizeof(gk_real)))); /* states start anywhere */
+
+static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
+{
+    gk_half low = {0}, high = {0};
+    const gk_half *x = (const gk_half *)a, *y = (const gk_half *)b;
+    for (int k = 0; k < 2 * n / LANES; k += 2) {
+        low += x[k] * y[k];
+        high += x[k + 1] * y[k + 1];
+    }
+    low += high;
+    return ((low[0] + low[4]) + (low[2] + low[6])) + ((low[1] + low[5]) + (low[3] + low[7]));
+}
+#endif

@@ -1,0 +1,105 @@
+/* Local line contact: approach of two bodies under the line load f = λ/L of one slice, beyond what the rows over a
+ * strip of half-width w already carry (docs/theory.md, eqs. 7 and 8).  With b² = β f the Hertz half-width, every body
+ * gives 2(1−ν²)/(πE)·[ln(4w/b) − 1]: δ = f (c − ½ a ln βf)      for  b_low < b < w/1.5 Below b_low a parabola with the
+ * same value and slope at b_low (δ(0) = 0, finite slope), above w/1.5 the tangent. δ′ > 0 everywhere, δ continuously
+ * differentiable. */
+#include "model/gk_core.h"
+
+static const double B_LOW = 5e-6; /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
+
+/* the law of a contact with 1/ρA + 1/ρB = curvature, per metre of length. b² at its bounds is the same for all
+ * curvatures, so are the logarithms there. */
+void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law)
+{
+    const gk_gear *A = &model->gear[0], *B = &model->gear[1];
+    law->a = A->local + B->local;
+    law->c = setup->strip_term;           /* Σ local (ln 4w − 1) */
+    law->beta = 2.0 * law->a / curvature; /* b² = 4 f R / (π E*), 1/E* = Σ (1−ν²)/E = Σ π·local/2 */
+    law->low = setup->square_low / law->beta;
+    law->high = setup->square_high / law->beta;
+    if (!GK_ON(setup, hertz)) { /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
+        const double reference = model->torque_max / (A->r_b * setup->width);
+        law->c -= 0.5 * law->a * gk_log(law->beta * gk_clamp(reference, law->low, law->high));
+        law->a = law->low = law->high = 0.0;
+        law->c_low = law->slope_high = law->c;
+        law->q_low = law->phi_log = law->phi_high = law->delta_high = 0.0;
+        return;
+    }
+    const double secant_low = law->c - 0.5 * law->a * setup->log_low,
+                 secant_high = law->c - 0.5 * law->a * setup->log_high; /* δ/f at the bounds */
+    law->c_low = secant_low + 0.5 * law->a;
+    law->q_low = -0.5 * law->a / law->low;
+    law->phi_log = law->low * law->low *
+                   (0.5 * law->c_low + 2.0 / 3.0 * law->q_low * law->low - 0.5 * secant_low + 0.125 * law->a);
+    law->delta_high = secant_high * law->high;
+    law->slope_high = secant_high - 0.5 * law->a;
+    law->phi_high = law->high * law->high * (0.5 * secant_high - 0.125 * law->a - 0.5 * law->slope_high) + law->phi_log;
+}
+
+/* half-widths at which the logarithm begins and ends */
+void gk_law_bounds(const gk_model *model, gk_setup *setup)
+{
+    const double widest = gk_min(model->gear[0].strip, model->gear[1].strip) / 1.5;
+    setup->square_high = widest * widest;
+    setup->square_low = B_LOW < 0.5 * widest ? B_LOW * B_LOW : 0.25 * setup->square_high;
+    setup->log_low = gk_log(setup->square_low);
+    setup->log_high = gk_log(setup->square_high);
+}
+
+/* ln x of four normal numbers, as gk_log */
+GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
+{
+    const gk_unsigned b = (gk_unsigned)*x + ((uint64_t)0x95f62 << 32), biased = (b >> 52) | 0x4330000000000000;
+    const gk_quad m = (gk_quad)((b & (UINT64_MAX >> 12)) + ((uint64_t)0x3fe6a09e << 32)),
+                  n = (gk_quad)biased - (0x1p52 + 1023.0);
+    const gk_quad f = m - 1.0, s = f / (2.0 + f), z = s * s, half_square = 0.5 * f * f;
+    gk_quad r = GK_ALL(GK_LOG[6]);
+    for (int i = 5; i >= 0; i--) r = r * z + GK_LOG[i];
+    *out = n * GK_LN2_HIGH - ((half_square - (s * (half_square + z * r) + n * GK_LN2_LOW)) - f);
+}
+
+/* δ, δ′ and ∫ λ dδ of four strips of lengths `width` (per_width: their inverse, 0 where there is no strip); λ ≤ 0
+ * follows the straight line through the origin, for iterates only */
+GK_INLINE void law_of_four(const gk_local *law, const double *force, const double *width, const double *per_width,
+                           double *delta, double *yield, double *potential)
+{
+    const gk_quad per = *(const gk_quad *)per_width, f = *(const gk_quad *)force * per;
+    gk_quad d = law->delta_high + law->slope_high * (f - law->high), slope = GK_ALL(law->slope_high),
+            energy = law->phi_high + 0.5 * law->slope_high * f * f;
+    if (GK_HAS(hertz) && law->a != 0.0) {
+        const gk_bits low = f <= law->low, high = f >= law->high;
+        const gk_quad q = GK_CHOOSE(f > 0.0, GK_ALL(law->q_low), GK_ALL(0.0));
+        gk_quad square = law->beta * GK_CHOOSE(low, GK_ALL(law->low), f); /* b² */
+        log_of_four(&square, &square);
+        const gk_quad secant = law->c - 0.5 * law->a * square;
+        d = GK_CHOOSE(low, f * (law->c_low + q * f), GK_CHOOSE(high, d, f * secant));
+        slope = GK_CHOOSE(low, law->c_low + 2.0 * q * f, GK_CHOOSE(high, slope, secant - 0.5 * law->a));
+        energy = GK_CHOOSE(low, f * f * (0.5 * law->c_low + 2.0 / 3.0 * q * f),
+                           GK_CHOOSE(high, energy, f * f * (0.5 * secant - 0.125 * law->a) + law->phi_log));
+    }
+    *(gk_quad *)delta = d;
+    *(gk_quad *)yield = slope * per;
+    *(gk_quad *)potential = energy * *(const gk_quad *)width;
+}
+
+gk_approach gk_law_at(const gk_local *law, double width, double force)
+{
+    const double four[3][4] = {{force, force, force, force},
+                               {width, width, width, width},
+                               {1.0 / width, 1.0 / width, 1.0 / width, 1.0 / width}};
+    double delta[4], yield[4], potential[4];
+    law_of_four(law, four[0], four[1], four[2], delta, yield, potential);
+    return (gk_approach){delta[0], yield[0], potential[0]};
+}
+
+GK_INLINE void apply(gk_system *s, const int strips)
+{
+    for (int p = 0, first = 0; first < s->contacts; p++, first += strips)
+        for (int i = first; i < first + strips;
+             i += 4) /* what a quad writes beyond its place the next one writes again; links have no width */
+            law_of_four(&s->local[p], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
+                        s->potential + i);
+}
+
+/* the law of every contact at its present λ */
+void gk_law_apply(gk_system *s) { GK_STRIPPED(GK_STRIPS(s), apply, s) }

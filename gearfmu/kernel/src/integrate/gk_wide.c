@@ -1,0 +1,99 @@
+/* The step in wider vectors: the same sources once more, compiled for AVX2, chosen by our own cpuid (the compilers'
+ * dispatch does not link everywhere). Sums have fixed lanes and nothing is contracted, so both give the same bits. */
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <cpuid.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#ifdef GK_PROFILE
+#include <x86intrin.h>
+#endif
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#endif
+#define GK_WIDE /* only what a step runs through */
+#define gk_flow_for gk_flow_for_avx2
+#define gk_flank_find gk_flank_find_avx2
+#define gk_rows_form gk_rows_form_avx2
+#define gk_table_residual gk_table_residual_avx2
+#define gk_table_for gk_table_for_avx2
+#define gk_table_put gk_table_put_avx2
+#define gk_table_path gk_table_path_avx2
+#define gk_system_form gk_system_form_avx2
+#define gk_system_rates gk_system_rates_avx2
+#define gk_law_set gk_law_set_avx2
+#define gk_law_bounds gk_law_bounds_avx2
+#define gk_law_at gk_law_at_avx2
+#define gk_solve_contacts gk_solve_contacts_avx2
+#define gk_solve_plain gk_solve_plain_avx2
+#define gk_solve_settle gk_solve_settle_avx2
+#define gk_solve_status gk_solve_status_avx2
+#define gk_law_apply gk_law_apply_avx2
+#define gk_solve_times gk_solve_times_avx2
+#define gk_solve_path gk_solve_path_avx2
+#define gk_solve_lag gk_solve_lag_avx2
+#define gk_solve_stored gk_solve_stored_avx2
+#define gk_tangent_factorise gk_tangent_factorise_avx2
+#define gk_tangent_solve gk_tangent_solve_avx2
+#define gk_balance_solve gk_balance_solve_avx2
+#define gk_step_once gk_step_once_avx2
+#define gk_step_recall gk_step_recall_avx2
+#define gk_step_remembered gk_step_remembered_avx2
+#define gk_step_remember gk_step_remember_avx2
+#define gk_step_scatter gk_step_scatter_avx2
+#define gk_step_energy gk_step_energy_avx2
+#define gk_rk45_evaluate gk_rk45_evaluate_avx2
+#define gk_rk45_resist gk_rk45_resist_avx2
+#define gk_rk45_angles gk_rk45_angles_avx2
+#define gk_rk45_advance gk_rk45_advance_avx2
+#define gk_central_step gk_central_step_avx2
+#include "force/gk_law.c"
+#include "setup/gk_flow.c"
+#include "force/gk_flank.c"
+#include "force/gk_rows.c"
+#include "setup/gk_table.c"
+#include "problem/gk_system.c"
+#include "problem/gk_tangent.c"
+#include "problem/gk_solve.c"
+#include "problem/gk_balance.c"
+#include "integrate/gk_step.c"
+#include "integrate/gk_rk45.c"
+#include "integrate/gk_central.c"
+#undef gk_step_once
+#undef gk_central_step
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+gk_step_function gk_step_once, gk_central_step;
+
+/* AVX2 in the processor, and its registers kept by the system over a task switch */
+static int has_avx2(void)
+{
+    unsigned a, b, c, d, low, high;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & (1u << 27))) return 0;
+    __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    return (low & 6) == 6 && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (b & (1u << 5));
+}
+
+/* the step of an integrator in the widest vectors of this processor; widest = 0: the baseline */
+gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
+{
+    if (widest > 0 && has_avx2()) return integrator == CENTRAL ? gk_central_step_avx2 : gk_step_once_avx2;
+    return integrator == CENTRAL ? gk_central_step : gk_step_once;
+}
+#else
+#include "model/gk_core.h"
+gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
+{
+    (void)widest;
+    return integrator == CENTRAL ? gk_central_step : gk_step_once;
+}
+#endif

@@ -1,0 +1,155 @@
+/* The one scalar of a step that keeps its energy (docs/theory.md, eq. 12; discrete gradient after Gonzalez 1996): η =
+ * α·direction on the rows that close or open, α such that the massless part's energy changes by what the forces do to
+ * the gaps. */
+#include "model/gk_core.h"
+
+enum { ENERGY_LIMIT = 12 };
+static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
+#ifdef GK_DOUBLE_MODES
+static const double STEADY_BALANCE = 1e-9;
+#else
+static const double STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
+#endif
+
+typedef struct balance {
+    double defect, c1, c2, scale, rounding;
+} balance;
+
+static int open_balance(const balance *b, double tolerance)
+{
+    return !(fabs(b->defect) <= tolerance * b->scale + b->rounding);
+}
+
+/* change of the gap over the step as the energy balance sees it: what a given torque does to the massless part is work
+ * from outside and counts with its massless displacement alone */
+static double gap_change(const gk_system *s, int i)
+{
+    return (s->active[i] || s->kind[i] == ROW_TORQUE ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
+}
+
+static double share(const gk_system *s, int i)
+{
+    return 0.5 * (s->force0[i] + s->force[i] + s->alpha * s->direction[i]);
+} /* ½ (λ₀ + λ₁ + α d) */
+
+static int takes_part(const gk_system *s, int i)
+{
+    return s->kind[i] != ROW_CLUTCH && (s->force[i] != 0.0 || s->force0[i] != 0.0 || s->direction[i] != 0.0);
+}
+
+/* Δ = U₁ − U₀ + ½ (λ₀ + λ₁ + α d)·(g₁ − g₀), and what earlier steps left of it: small defects of the same sign do not
+ * add up */
+static balance defect(const gk_system *s)
+{
+    balance b = {s->due - s->stored0, 0.0, 0.0, fabs(s->stored0), 0.0};
+    for (int i = 0; i < s->n; i++) {
+        if (!takes_part(s, i)) continue;
+        if (s->force[i] != 0.0) {
+            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + s->potential[i];
+            b.defect += energy;
+            b.scale += fabs(energy);
+        }
+        const double change = gap_change(s, i);
+        b.defect += share(s, i) * change;
+        b.rounding += 4e-16 * (fabs(s->force0[i]) + fabs(s->force[i])) * fabs(change); /* a contact that only grazes */
+    }
+    return b;
+}
+
+/* p = dλ/dα and w_d = dη_d/dα */
+static void sensitivity(const gk_system *s, double *p, double *dash)
+{
+    double moved[MAX_STRIDE], path[MAX_STRIDE];
+    gk_solve_times(s, s->D, s->direction, moved);
+    for (int i = 0; i < s->stride; i++) p[i] = i < s->n && s->active[i] ? -moved[i] : 0.0;
+    gk_tangent_solve(s, p);
+    gk_solve_path(s, p, path);
+    for (int i = 0; i < s->n; i++) {
+        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
+    }
+}
+
+/* expansion of Δ in α along the solved direction */
+static void expand(const gk_system *s, const double *p, const double *dash, balance *b)
+{
+    double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
+    for (int i = 0; i < s->n; i++)
+        w[i] = p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
+    gk_solve_times(s, s->A, p, yields);
+    gk_solve_path(s, p, path);
+    gk_solve_times(s, s->D, w, moved);
+    gk_solve_lag(s, late, dash, lag);
+    for (int i = 0; i < s->n; i++) {
+        const double direct = p[i] + s->direction[i];
+        if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;
+        const double massless = yields[i] + path[i] + s->slope[i] * p[i];
+        const double gap = s->active[i] || s->kind[i] == ROW_TORQUE ? -massless : moved[i] + lag[i];
+        b->c1 += s->force[i] * massless + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
+        b->c2 += 0.5 * p[i] * massless + 0.5 * direct * gap;
+    }
+}
+
+static int status_changed(const gk_system *s)
+{
+    for (int i = 0; i < s->contacts; i++)
+        if ((s->force0[i] > 0.0) != (s->force[i] > 0.0)) return 1;
+    return 0;
+}
+
+/* the rows that share η: the contacts that are closed at either end; bearings, shafts and ports only where that finds
+ * no balance, because η on them rings their modes */
+static void choose_direction(gk_system *s, int all_rows)
+{
+    for (int i = 0; i < s->n; i++) {
+        const int may = s->kind[i] == ROW_CONTACT || (all_rows && s->kind[i] == ROW_SPRING);
+        s->direction[i] = may && (s->force0[i] != 0.0 || s->force[i] != 0.0) ? s->weight[i] * gap_change(s, i) : 0.0;
+    }
+}
+
+/* the step is balanced but for b: the next ones make that good */
+static int leave(gk_system *s, const balance *b)
+{
+    s->owed += b->defect - s->due;
+    return 1;
+}
+
+/* α by Newton on the quadratic; 0 when the limit of rounds is reached or no direction is left */
+static int find_alpha(gk_system *s, balance b)
+{
+    double p[MAX_STRIDE] = {0}, dash[MAX_STRIDE] = {0};
+    for (int round = 0; round < ENERGY_LIMIT; round++) {
+        sensitivity(s, p, dash);
+        expand(s, p, dash, &b);
+        const double root = sqrt(gk_max(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)),
+                     divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
+        if (!(fabs(divisor) > 0.0)) return 0;
+        const double a = -2.0 * b.defect / divisor;
+        s->alpha += a;
+        for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
+        gk_law_apply(s);
+        gk_solve_settle(s);
+        gk_solve_contacts(s);
+        b = defect(s);
+        if (!open_balance(&b, BALANCE)) return leave(s, &b);
+    }
+    return 0;
+}
+
+/* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
+ * massless part's energy change equal its work. */
+void gk_balance_solve(gk_system *s)
+{
+    for (int all_rows = 0; all_rows < 2; all_rows++) {
+        gk_solve_plain(s);
+        const int changed = status_changed(s);
+        if (!changed && !(GK_HAS(hertz) && s->curved)) return;
+        const balance b = defect(s);
+        if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) {
+            leave(s, &b);
+            return;
+        }
+        choose_direction(s, all_rows);
+        if (find_alpha(s, b)) return;
+    }
+    s->limit_reached = 1;
+}

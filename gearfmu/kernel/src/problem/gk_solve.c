@@ -1,0 +1,273 @@
+/* The complementarity problem of a step (docs/theory.md, eq. 10):
+ *
+ *   closed contact, bilateral row, sticking clutch:  gap + deflection = 0;   open contact: λ = 0 and gap + deflection ≥
+ * 0;   slipping clutch: z = ±bound gap = g + D z + lag,   deflection = Aλ + Pλ + δ(λ),   z = λ + η,   η = α·direction +
+ * η_d dashpot of a row closed at either end: η_d = 2c/h times the change of its path Pλ + δ (links: λ/k), limited to
+ * |λ0 + λ1| (no pull)
+ *
+ * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last
+ * one (block principal pivoting, Júdice & Pires 1994). */
+#include "model/gk_core.h"
+
+enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, DASHPOT_ROUNDS = 8 };
+#ifdef GK_DOUBLE_MODES
+static const double SOLVED = 1e-11;
+#else
+static const double SOLVED = 1e-7; /* of the last move: what is left after it is some hundredths of that */
+#endif
+
+static int is_contact(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT; }
+static int is_clutch(const gk_system *s, int i) { return s->kind[i] == ROW_CLUTCH; }
+
+GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, double *y, const int quads)
+{
+    gk_quad sum[MAX_STRIDE / 4];
+    for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
+    for (int j = 0; j < s->n; j++) {
+        const gk_quad *row = (const gk_quad *)(matrix + j * 4 * quads);
+        for (int q = 0; q < quads; q++) sum[q] += x[j] * row[q];
+    }
+    memcpy(y, sum, (size_t)quads * sizeof *sum);
+}
+
+/* y = matrix x; the matrix is symmetric, so its rows are its columns */
+void gk_solve_times(const gk_system *s, const double *matrix, const double *x,
+                    double *y){GK_SIZED(s -> stride / 4, times, s, matrix, x, y)}
+
+GK_INLINE void lagging(const gk_system *s, const double *end, const double *dash, double *lag, const int quads)
+{
+    gk_quad sum[MAX_STRIDE / 4];
+    for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
+    for (int j = 0; j < s->n; j++) {
+        const gk_quad *Q = (const gk_quad *)s->Q + j * quads, *A = (const gk_quad *)s->A + j * quads;
+        const double mean = 0.5 * dash[j], later = end[j] - mean;
+        for (int q = 0; q < quads; q++) sum[q] += later * Q[q] + mean * A[q];
+    }
+    memcpy(lag, sum, (size_t)quads * sizeof *sum);
+}
+
+/* what the dashpots' force deflects outside their paths: Q·end − ½K·dash, K = Q − A */
+void gk_solve_lag(const gk_system *s, const double *end, const double *dash,
+                  double *lag){GK_SIZED(s -> stride / 4, lagging, s, end, dash, lag)}
+
+/* P x; x and y of whole quads */
+GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const int strips)
+{
+    const gk_quad *spring = (const gk_quad *)s->spring, *from = (const gk_quad *)x;
+    for (int q = s->contacts / 4; q < s->stride / 4; q++) ((gk_quad *)y)[q] = spring[q] * from[q];
+    for (int first = 0, p = 0; first < s->contacts; first += strips, p++)
+        for (int a = 0; a < strips; a++) {
+            double sum = 0.0;
+            for (int b = 0; b < strips; b++) sum += s->path[p][a * strips + b] * x[first + b];
+            y[first + a] = sum;
+        }
+}
+
+void gk_solve_path(const gk_system *s, const double *x, double *y) { GK_STRIPPED(GK_STRIPS(s), along_paths, s, x, y) }
+
+/* rows and dashpots as numbers, after their status has changed */
+void gk_solve_status(gk_system *s)
+{
+    s->dashpots = 0;
+    for (int i = s->n; i < s->stride; i++)
+        s->on[i] = s->gain[i] = s->pull[i] = s->late[i] = s->rest[i] = s->held[i] = 0.0;
+    for (int i = 0; i < s->n; i++) {
+        const int clip = s->clip[i], lasts = clip != 2 && s->hold[i] == 0;
+        s->on[i] = s->active[i];
+        s->gain[i] = clip == 0 ? s->damping[i] : 0.0;
+        s->pull[i] = clip == 2 ? 0.0 : clip;
+        s->late[i] = lasts ? s->beta[i] : 0.0;
+        s->rest[i] = lasts ? s->tail[i] : 0.0;
+        s->held[i] = s->hold[i];
+        s->dashpots |= s->gain[i] != 0.0 || s->pull[i] != 0.0 || s->rest[i] != 0.0;
+    }
+}
+
+GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
+{
+#define OF(array) ((gk_quad *)s->array)
+    for (int q = 0; q < quads; q++) {
+        OF(squeeze)[q] = OF(linear)[q] + OF(delta)[q];
+        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
+        OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
+        OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
+        OF(z)[q] = OF(force)[q] + OF(eta)[q] - OF(begin)[q];
+    }
+#undef OF
+    for (int i = s->n - s->clutches; i < s->n; i++)
+        s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
+    times(s, s->D, s->z, s->Dz, quads);
+    times(s, s->A, s->force, s->Al, quads);
+    if (s->dashpots)
+        lagging(s, s->end, s->dash, s->lag, quads);
+    else
+        memset(s->lag, 0, (size_t)quads * sizeof(gk_quad));
+}
+
+/* everything that follows from λ, α and the status of rows and dashpots; the law has been applied */
+void gk_solve_settle(gk_system *s)
+{
+    gk_solve_path(s, s->force, s->linear);
+    GK_SIZED(s->stride / 4, dashpots_and_sums, s)
+}
+
+static void residual(const gk_system *s, double *r)
+{
+    const gk_quad *g = (const gk_quad *)s->g, *Dz = (const gk_quad *)s->Dz, *lag = (const gk_quad *)s->lag,
+                  *Al = (const gk_quad *)s->Al, *squeeze = (const gk_quad *)s->squeeze, *on = (const gk_quad *)s->on;
+    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + squeeze[q]) * on[q];
+}
+
+/* moves the active λ by x; e: what the local law bends away from its tangent. Returns whether the change still matters.
+ */
+static int move(gk_system *s, const double *x, double *e, double *change)
+{
+    const int quads = s->stride / 4;
+    const gk_quad *by = (const gk_quad *)x, *on = (const gk_quad *)s->on, *slope = (const gk_quad *)s->slope,
+                  *delta = (const gk_quad *)s->delta;
+    gk_quad most = {0}, size = {0}, *force = (gk_quad *)s->force, *bent = (gk_quad *)e;
+    for (int q = 0; q < quads; q++) {
+        force[q] += by[q];
+        bent[q] = -delta[q] - slope[q] * by[q];
+        const gk_quad moved = GK_MAGNITUDE(by[q]), now = GK_MAGNITUDE(force[q] * on[q]);
+        most = GK_LARGER(most, moved);
+        size = GK_LARGER(size, now);
+    }
+    gk_law_apply(s);
+    for (int q = 0; q < quads; q++) bent[q] += delta[q];
+    *change = gk_largest(&most);
+    return GK_HAS(hertz) && s->curved && *change > SOLVED * gk_largest(&size);
+}
+
+/* what the law's bend e leaves in the equations: −(e + B Γ e) */
+static void bend(const gk_system *s, const double *e, double *r)
+{
+    const int quads = s->stride / 4;
+    const gk_quad *bent = (const gk_quad *)e, *on = (const gk_quad *)s->on;
+    for (int q = 0; q < quads; q++) ((gk_quad *)r)[q] = -bent[q];
+    for (int j = 0; j < s->contacts; j++)
+        if (s->gain[j] != 0.0) gk_axpy(-s->gain[j] * e[j], s->B + j * s->stride, r, 0, quads);
+    for (int q = 0; q < quads; q++) ((gk_quad *)r)[q] *= on[q];
+}
+
+/* λ of the active rows for the present set. Only the local law and its dashpots are not linear, so that after the first
+ * residual only their bend is left. */
+static void newton(gk_system *s)
+{
+    double x[MAX_STRIDE], e[MAX_STRIDE], change, last = INFINITY;
+    gk_tangent_factorise(s);
+    residual(s, x);
+    for (int round = 0; round < CHORD_LIMIT; round++) {
+        gk_tangent_solve(s, x);
+        if (!move(s, x, e, &change)) break;
+        if (change > 0.2 * last) { /* slow: a new tangent */
+            gk_solve_settle(s);
+            gk_tangent_factorise(s);
+            residual(s, x);
+        } else {
+            bend(s, e, x);
+        }
+        last = change;
+    }
+    gk_solve_settle(s);
+}
+
+/* one row's verdict: does it contradict its status? */
+static int violated(const gk_system *s, int i)
+{
+    if (is_contact(s, i))
+        return s->active[i] ? s->force[i] < 0.0 : gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < 0.0;
+    if (!is_clutch(s, i)) return 0;
+    if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
+    return s->bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0; /* friction must oppose slip */
+}
+
+static void flip(gk_system *s, int i)
+{
+    s->active[i] = !s->active[i];
+    if (is_clutch(s, i)) {
+        if (!s->active[i]) s->slip[i - s->n + s->clutches] = s->force[i] > 0.0 ? s->bound[i] : -s->bound[i];
+        s->force[i] = 0.0;
+    } else if (!s->active[i]) {
+        if (!(s->force0[i] > 0.0)) s->clip[i] = 2; /* closed at neither end */
+        s->hold[i] = s->clip[i] != 2;
+        s->force[i] = 0.0;
+    }
+}
+
+static int beyond(double x, double limit) { return x > limit ? 1 : x < -limit ? -1 : 0; }
+
+/* from one limit to the other by way of what lies between */
+static signed char towards(int old, int new) { return (signed char)(old * new == -1 ? 0 : new); }
+
+/* Where the dashpots of contacts that are closed at either end stand: they never pull, so η_d is limited by ±(λ0 + λ1)
+ * and f_d by ±λ1; a contact lets go without force */
+static int limit_dashpots(gk_system *s)
+{
+    int changed = 0;
+    for (int i = 0; i < s->contacts; i++) {
+        signed char clip = 2, hold = 0;
+        if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
+            const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i];
+            clip = towards(s->clip[i], beyond(free, limit));
+            hold = s->active[i] ? towards(s->hold[i],
+                                          beyond(s->beta[i] * gk_clamp(free, -limit, limit) + s->tail[i], s->force[i]))
+                                : 1;
+        }
+        changed |= clip != s->clip[i] || hold != s->hold[i];
+        s->clip[i] = clip;
+        s->hold[i] = hold;
+    }
+    return changed;
+}
+
+/* λ and z for the present α; starts from the present active set, settled */
+void gk_solve_contacts(gk_system *s)
+{
+    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = DASHPOT_ROUNDS;
+    for (int round = 0; round < ROUND_LIMIT; round++) {
+        newton(s);
+        unsigned char wrong[MAX_ROWS];
+        int count = 0, last = -1;
+        for (int i = 0; i < s->n; i++) {
+            wrong[i] = (unsigned char)violated(s, i);
+            if (wrong[i]) count++, last = i;
+        }
+        if (count) {
+            if (count < fewest)
+                fewest = count, patience = 4;
+            else
+                patience--;
+            if (patience < 0)
+                flip(s, last);
+            else
+                for (int i = 0; i < s->n; i++)
+                    if (wrong[i]) flip(s, i);
+            gk_law_apply(s);
+        } else if (dashpot_rounds-- <= 0 || !limit_dashpots(s)) {
+            return;
+        }
+        gk_solve_status(s);
+        gk_solve_settle(s);
+    }
+    s->limit_reached = 1;
+}
+
+/* Contacts alone, without the scalar: η is the dashpots' */
+void gk_solve_plain(gk_system *s)
+{
+    const int stale = s->alpha != 0.0;
+    s->alpha = 0.0;
+    memset(s->direction, 0, (size_t)s->n * sizeof *s->direction);
+    if (stale) gk_solve_settle(s);
+    gk_solve_contacts(s);
+}
+
+/* stored energy of the massless part at the present λ: ½ λᵀ(A + P)λ + Σ Φ(λ) */
+double gk_solve_stored(const gk_system *s)
+{
+    double sum = 0.0;
+    for (int i = 0; i < s->n; i++)
+        if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + s->potential[i];
+    return sum;
+}

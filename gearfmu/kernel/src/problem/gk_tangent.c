@@ -1,0 +1,133 @@
+/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + ½A + (late − ½)Q,
+ * S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its limit ±(λ0 + λ1) is
+ * ±B instead, an end force at its limit ±λ1 is ±Q with late = 0. By columns of whole quads; an inactive row is an empty
+ * one. Close to symmetric positive definite: no pivoting. */
+#include "model/gk_core.h"
+
+/* column j of B: what the dashpot of row j does to all rows */
+GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
+{
+    const double later = s->late[j] - 0.5;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
+                  *Q = (const gk_quad *)s->Q + j * quads;
+    gk_quad *B = (gk_quad *)s->B + j * quads;
+    for (int q = 0; q < quads; q++) B[q] = D[q] + 0.5 * A[q] + later * Q[q];
+}
+
+/* column j: what λ_j does to all rows */
+GK_INLINE void contact_column(const gk_system *s, int j, double *column, const int quads, const int strips)
+{
+    const int place = s->place_of[j], first = place * strips;
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
+                  *B = (const gk_quad *)s->B, *on = (const gk_quad *)s->on;
+    const double *path = s->path[place] + j - first;
+    gk_quad c[MAX_STRIDE / 4];
+    double own[MAX_SLICES];
+    for (int q = 0; q < quads; q++) c[q] = D[q] + A[q];
+    if (s->pull[j] != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
+    if (s->held[j] != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += s->held[j] * ((const gk_quad *)s->Q)[j * quads + q];
+    for (int e = 0; e < strips; e++) {
+        own[e] = path[e * strips] + (first + e == j ? s->slope[j] : 0.0);
+        const double moves = s->gain[first + e] * own[e];
+        if (moves == 0.0) continue;
+        for (int q = 0; q < quads; q++) c[q] += moves * B[(first + e) * quads + q];
+    }
+    for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
+    for (int e = 0; e < strips; e++) column[first + e] += s->on[first + e] * own[e];
+}
+
+GK_INLINE void link_column(const gk_system *s, int j, double *column, const int quads)
+{
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
+                  *B = (const gk_quad *)s->B + j * quads, *on = (const gk_quad *)s->on;
+    const double moves = s->gain[j] * s->spring[j];
+    for (int q = 0; q < quads; q++) {
+        gk_quad c = D[q] + A[q];
+        if (moves != 0.0) c += moves * B[q];
+        ((gk_quad *)column)[q] = c * on[q];
+    }
+    column[j] += s->spring[j];
+}
+
+GK_INLINE void columns(gk_system *s, const int quads)
+{
+    const int n = s->n, stride = 4 * quads, strips = GK_STRIPS(s);
+    for (int j = 0; j < n; j++)
+        if (s->gain[j] != 0.0 || s->pull[j] != 0.0) form_dashpot(s, j, quads);
+    for (int j = 0; j < n; j++) {
+        double *column = s->J + j * stride;
+        if (!s->active[j]) {
+            memset(column, 0, (size_t)stride * sizeof *column);
+            column[j] = 1.0;
+        } else if (j < s->contacts) {
+            GK_STRIPPED(strips, contact_column, s, j, column, quads)
+        } else {
+            link_column(s, j, column, quads);
+        }
+    }
+}
+
+/* pivots 4·block … of the factors: the columns right of them lose what the pivots explain */
+GK_INLINE void eliminate(gk_system *s, const int quads, const int block)
+{
+    const int n = s->n, stride = 4 * quads, end = 4 * block + 4 < n ? 4 * block + 4 : n;
+    for (int k = 4 * block; k < end; k++) {
+        double *pivot = s->J + k * stride, *lower = s->L + k * stride;
+        gk_quad l[MAX_STRIDE / 4];
+        s->inverse[k] = 1.0 / pivot[k];
+        for (int q = block; q < quads; q++) l[q] = s->inverse[k] * ((gk_quad *)pivot)[q];
+        for (int i = 0; i <= k - 4 * block; i++) l[block][i] = 0.0;
+        for (int q = block; q < quads; q++) ((gk_quad *)lower)[q] = l[q];
+        for (int i = k; i < 4 * block + 4; i++) pivot[i] = 0.0;
+        for (int j = k + 1; j < n; j++) {
+            gk_quad *column = (gk_quad *)s->J + j * quads;
+            const double f = -((double *)column)[k];
+            for (int q = block; q < quads; q++) column[q] += f * l[q];
+        }
+    }
+}
+
+GK_INLINE void factorise(gk_system *s, const int quads)
+{
+    columns(s, quads);
+    GK_BLOCKS(quads, eliminate, s)
+}
+
+void gk_tangent_factorise(gk_system *s)
+{
+    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)s->slope)[q] = ((gk_quad *)s->yield)[q] * ((gk_quad *)s->on)[q];
+    GK_SIZED(s->stride / 4, factorise, s)
+    s->rounds++;
+}
+
+GK_INLINE void forward(const gk_system *s, double *x, const int quads, const int block)
+{
+    const int stride = 4 * quads, end = 4 * block + 4 < s->n ? 4 * block + 4 : s->n;
+    for (int k = 4 * block; k < end; k++) {
+        const gk_quad *lower = (const gk_quad *)(s->L + k * stride);
+        const double f = -x[k];
+        for (int q = block; q < quads; q++) ((gk_quad *)x)[q] += f * lower[q];
+    }
+}
+
+GK_INLINE void backward(const gk_system *s, double *x, const int quads, const int block)
+{
+    const int stride = 4 * quads, end = 4 * block + 4 < s->n ? 4 * block + 4 : s->n;
+    for (int k = end - 1; k >= 4 * block; k--) {
+        const gk_quad *column = (const gk_quad *)(s->J + k * stride);
+        const double f = x[k] * s->inverse[k];
+        for (int q = 0; q <= block; q++) ((gk_quad *)x)[q] -= f * column[q];
+        x[k] = f;
+    }
+}
+
+GK_INLINE void solve(const gk_system *s, double *x, const int quads)
+{
+    GK_BLOCKS(quads, forward, s, x)
+    GK_BLOCKS_BACK(quads, backward, s, x)
+}
+
+/* x ← J⁻¹ x; x (stride) is 0 where a row is not active */
+void gk_tangent_solve(const gk_system *s, double *x) { GK_SIZED(s->stride / 4, solve, s, x) }

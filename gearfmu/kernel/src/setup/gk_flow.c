@@ -1,0 +1,151 @@
+/* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory.md, 3.1 and eq. 9).
+ *
+ *   exponential where ωh < 1.2: exact flow; trapezoidal above. Force constant in the step, ½(f_n + f_{n+1}) with equal
+ * coefficients bq, bv at both ends. σ = sin(ωh)/(ωh), s = σ^(−γ/2), κ = (σ^(−γ) − 1)/ω² (rigid: s = 1, κ = γh²/6): the
+ * sampled system then has the exact pole, residue and static value. The scaled row sW of the derivation is carried by
+ * bq, bv and κ (each times s²): state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. */
+#include "model/gk_core.h"
+
+static const double EXPONENTIAL_BELOW = 1.2;
+
+typedef struct oscillator {
+    double a11, a12, a21, a22, b0q, b0v, bq, bv, mobility, read_q, read_v, kappa, inverse_s2;
+} oscillator;
+
+static oscillator free_flow(double omega, double zeta, double h)
+{
+    double damped = omega * sqrt(1.0 - zeta * zeta), sine, cosine;
+    gk_sincos(damped * h, &sine, &cosine);
+    double e = gk_exp(-zeta * omega * h), ratio = zeta * omega / damped;
+    oscillator o = {e * (cosine + ratio * sine),
+                    e * sine / damped,
+                    -e * omega * omega / damped * sine,
+                    e * (cosine - ratio * sine),
+                    0,
+                    0,
+                    0,
+                    0,
+                    0,
+                    1.0,
+                    0,
+                    0,
+                    1.0};
+    return o;
+}
+
+static oscillator exponential(double omega, double zeta, double h, double gamma)
+{
+    oscillator o = free_flow(omega, zeta, h);
+    double plain, unused, omega2 = omega * omega;
+    gk_sincos(omega * h, &plain, &unused);
+    double sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
+    o.bq = o.b0q = o.mobility = 0.5 * (1.0 - o.a11) / (omega2 * sigma);
+    o.bv = o.b0v = 0.5 * o.a12 / sigma;
+    o.kappa = (1.0 / sigma - 1.0) / omega2;
+    o.inverse_s2 = sigma;
+    return o;
+}
+
+static oscillator trapezoidal(double omega, double zeta, double h)
+{
+    double c = zeta * omega * h, k = 0.25 * omega * omega * h * h, d = 1.0 + c + k, bq = 0.25 * h * h / d,
+           bv = 0.5 * h / d;
+    oscillator o = {
+        (1.0 + c - k) / d, h / d, -omega * omega * h / d, (1.0 - c - k) / d, bq, bv, bq, bv, bq, 1.0, 0, 0, 1.0};
+    return o;
+}
+
+/* mix4: force linear in the step, gap at q − (h²/12) q̈ (the scheme before dg4, for comparison) */
+static oscillator linear_force(double omega, double zeta, double h)
+{
+    oscillator o = free_flow(omega, zeta, h);
+    double omega2 = omega * omega, twelfth = h * h / 12.0, loss = 2.0 * zeta * omega;
+    double q0 = -loss / (h * omega2 * omega2),
+           v0 = 1.0 / (h * omega2); /* particular solution of the ramp at its start */
+    o.bq = q0 + 1.0 / omega2 - o.a11 * q0 - o.a12 * v0;
+    o.bv = v0 - o.a21 * q0 - o.a22 * v0;
+    o.b0q = (1.0 - o.a11) / omega2 - o.bq;
+    o.b0v = o.a12 - o.bv;
+    o.read_q = 1.0 + omega2 * twelfth;
+    o.read_v = loss * twelfth;
+    o.mobility = o.read_q * o.bq + o.read_v * o.bv - twelfth;
+    return o;
+}
+
+/* The flow in gk_real: a11 − 1, a12, a21, a22 − 1, which keeps frequencies to 1e-7 at any h. Rounded one by one to
+ * single precision the four numbers let a mode grow or fade by up to 1e-7 of its energy every step, always the same
+ * way. Where damping does not cover that, the nearest values and their next neighbours, each with the a21 that belongs
+ * to it, are searched for the best determinant: some 1e-9 off the exact one, e^(−2ζωh). */
+static void round_flow(const oscillator *o, gk_real out[4])
+{
+    const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, d11 = o->a11 - 1.0, d22 = o->a22 - 1.0,
+                 covered = 1e-5;
+    double least = INFINITY;
+    out[0] = (gk_real)d11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)d22;
+    if (sizeof(gk_real) > sizeof(float) || 1.0 - wanted > covered) return;
+    for (int choice = 0; choice < 27; choice++) {
+        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 3 - 1))),
+                              (gk_real)(o->a12 * (1.0 + ulp * (choice / 9 - 1))),
+                              (gk_real)(d22 * (1.0 + ulp * (choice / 3 % 3 - 1)))};
+        const double product = (1.0 + (double)a[0]) * (1.0 + (double)a[2]) - wanted; /* what a12·a21 should be */
+        const gk_real a21 = (gk_real)(product / a[1]);
+        const double error = fabs(product - (double)a[1] * a21);
+        if (error < least) least = error, out[0] = a[0], out[1] = a[1], out[2] = a21, out[3] = a[2];
+    }
+}
+
+static void store(gk_flow *f, int i, const oscillator *o)
+{
+    gk_real a[4] = {0, 0, 0, 0};
+    if (o->a12 != 0.0) round_flow(o, a);
+    f->d11[i] = a[0], f->a12[i] = a[1], f->a21[i] = a[2], f->d22[i] = a[3];
+    f->b0q[i] = (gk_real)o->b0q, f->b0v[i] = (gk_real)o->b0v, f->bq[i] = (gk_real)o->bq, f->bv[i] = (gk_real)o->bv;
+    f->mobility[i] = (gk_real)o->mobility, f->read_q[i] = (gk_real)o->read_q, f->read_v[i] = (gk_real)o->read_v;
+    f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
+}
+
+static void fill(const gk_setup *setup, gk_coefficients *k, int g)
+{
+    const gk_modal *modal = &setup->modal[g];
+    int exact = 0;
+    for (int i = 0; i < modal->n; i++) {
+        double omega = modal->omega[i], zeta = GK_ON(setup, modal_damping) ? modal->zeta[i] : 0.0;
+        oscillator o = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+        if (omega > 0.0 && omega * k->h >= EXPONENTIAL_BELOW)
+            o = trapezoidal(omega, zeta, k->h);
+        else if (omega > 0.0 && setup->integrator == MIX4)
+            o = linear_force(omega, zeta, k->h);
+        else if (omega > 0.0) {
+            o = exponential(omega, zeta, k->h, k->gamma);
+            if (i % modal->pairs + 1 > exact) exact = i % modal->pairs + 1;
+        }
+        store(&k->flow[g], i, &o);
+    }
+    k->flow[g].exact = (exact + LANES - 1) / LANES * LANES;
+}
+
+/* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */
+const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma)
+{
+    gk_work *work = setup->work;
+    gk_coefficients *oldest = &work->cache[0];
+    for (int i = 0; i < CACHE; i++) {
+        gk_coefficients *k = &work->cache[i];
+        if (k->age && k->h == h && k->gamma == gamma) {
+            k->age = ++work->clock;
+            return k;
+        }
+        if (k->age < oldest->age) oldest = k;
+    }
+    oldest->h = h;
+    oldest->gamma = gamma;
+    oldest->timeless = 0;
+    oldest->curved_read = setup->integrator == MIX4;
+    oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
+    oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
+    oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
+    oldest->rigid_kappa = gamma * h * h / 6.0;
+    for (int g = 0; g < 2; g++) fill(setup, oldest, g);
+    oldest->age = ++work->clock;
+    return oldest;
+}

@@ -1,0 +1,221 @@
+/* Which internal step: μ′ = largest eigenvalue of C⁻¹K over the roll positions (docs/theory.md, 3.5), C the compliance
+ * that answers at once: outside the paths of the dashpots all of it, in them what the dashpots let move within a step,
+ * S(1 + ΓS)⁻¹. Energy is conserved while C′ > 0, that is μ′ < 1. Modes above ωh = 1.2 have no κ, so μ′ goes up and down
+ * with h. Default h: the largest with μ′ ≤ ½, at most h_max of the stage and 1/40 of the mesh period at speed_max. Any
+ * other h lowers γ until μ′ = ¾ (a lower γ costs more accuracy than a larger μ′); above 1/8 of the period it is
+ * refused. */
+#include <stdio.h>
+#include "model/gk_core.h"
+
+static const double MU = 0.5, MU_MOST = 0.75; /* μ′ of the default step; of any other, by γ */
+static const double WITHIN = 0.9,
+                    BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
+enum { POSITIONS = 8, POWER_ROUNDS = 60 };
+
+/* Cholesky of a (n, n), in place, lower; 0 when not positive */
+int gk_limit_cholesky(double *a, int n)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = a[i * n + j];
+            for (int k = 0; k < j; k++) sum -= a[i * n + k] * a[j * n + k];
+            if (i != j)
+                a[i * n + j] = sum / a[j * n + j];
+            else if (!(sum > 0.0))
+                return 0;
+            else
+                a[i * n + i] = sqrt(sum);
+        }
+    return 1;
+}
+
+/* x ← (L Lᵀ)⁻¹ x */
+void gk_limit_solve(const double *L, double *x, int n)
+{
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++) x[i] -= L[i * n + k] * x[k];
+        x[i] /= L[i * n + i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) x[i] -= L[k * n + i] * x[k];
+        x[i] /= L[i * n + i];
+    }
+}
+
+/* largest eigenvalue of C⁻¹ K, C = L Lᵀ, K symmetric positive semidefinite */
+static double largest(const double *L, const double *K, int n)
+{
+    double x[MAX_ROWS], y[MAX_ROWS], value = 0.0;
+    for (int i = 0; i < n; i++) x[i] = 1.0 + 0.3 * (i % 3);
+    for (int round = 0; round < POWER_ROUNDS; round++) {
+        for (int i = 0; i < n; i++) {
+            y[i] = 0.0;
+            for (int j = 0; j < n; j++) y[i] += K[i * n + j] * x[j];
+        }
+        gk_limit_solve(L, y, n);
+        value = 0.0;
+        for (int i = 0; i < n; i++) value = gk_max(value, fabs(y[i]));
+        if (!(value > 0.0)) return 0.0;
+        for (int i = 0; i < n; i++) x[i] = y[i] / value;
+    }
+    return value;
+}
+
+/* X = S (1 + Γ S)⁻¹ of a block (n, n), by Gauss elimination of (1 + S Γ) X = S */
+static void yielding(const double *S, const double *damping, int n, double *X)
+{
+    double B[MAX_SLICES * MAX_SLICES];
+    for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * damping[i % n] + (i / n == i % n);
+    for (int k = 0; k < n; k++)
+        for (int i = 0; i < n; i++) {
+            if (i == k) continue;
+            const double f = B[i * n + k] / B[k * n + k];
+            for (int j = 0; j < n; j++) B[i * n + j] -= f * B[k * n + j], X[i * n + j] -= f * X[k * n + j];
+        }
+    for (int i = 0; i < n * n; i++) X[i] /= B[i / n * n + i / n];
+}
+
+/* a row that no spring carries has no part in the limit */
+static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING; }
+
+/* C (n, n): compliance of the massless part with all contacts closed under the line load `full`; with dashpots what
+ * answers at once */
+void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C)
+{
+    const int n = s->n, strips = s->strips;
+    for (int i = 0; i < n * n; i++)
+        C[i] = counts(s, i / n) && counts(s, i % n) ? s->Q[i / n * s->stride + i % n] : i / n == i % n;
+    for (int p = 0; p * strips < s->contacts; p++) {
+        const int first = p * strips;
+        double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
+        memcpy(S, s->path[p], (size_t)(strips * strips) * sizeof *S);
+        for (int a = 0; a < strips; a++)
+            S[a * strips + a] += gk_law_at(&s->local[p], s->width[first + a], full * s->width[first + a]).slope;
+        if (dashpots)
+            yielding(S, s->damping + first, strips, X);
+        else
+            memcpy(X, S, (size_t)(strips * strips) * sizeof *X);
+        for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
+    }
+    for (int i = s->contacts; i < n; i++)
+        if (counts(s, i)) C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? s->damping[i] * s->spring[i] : 0.0));
+}
+
+/* K (n, n): κ part */
+static void kappa_part(const gk_system *s, double *K)
+{
+    const int n = s->n;
+    for (int i = 0; i < n * n; i++) {
+        const int at = i / n * s->stride + i % n;
+        K[i] = counts(s, i / n) && counts(s, i % n) ? s->Q[at] - s->A[at] : 0.0;
+    }
+}
+
+static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma,
+                    double position)
+{
+    gk_work *work = setup->work;
+    gk_system *s = &work->system;
+    double frame[RIGID] = {0}, C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
+    frame[PHIA] = 2.0 * GK_PI * position / model->gear[0].teeth;
+    frame[PHIB] = -frame[PHIA] * model->gear[0].r_b / model->gear[1].r_b;
+    if (model->kind == KIND_FLAT) frame[XB] = -model->distance, frame[PHIA] = frame[PHIB] = 0.0;
+    memcpy(work->frame, frame, sizeof frame);
+    memset(work->speed, 0, sizeof work->speed);
+    work->y[0] = work->zero[0], work->y[1] = work->zero[1];
+    work->places = gk_flank_find(model, setup, frame, 50e-6, work->place);
+    if (work->places < 0) return INFINITY;
+    for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
+    gk_rows_form(model, setup, frame, work);
+    gk_system_form(model, setup, data, gk_flow_for(setup, h, gamma), work);
+    gk_limit_compliance(s, model->torque_max / (model->gear[0].r_b * setup->width), 1, C);
+    kappa_part(s, K);
+    return gk_limit_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
+}
+
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
+{
+    double worst = 0.0;
+    gk_data empty;
+    memset(&empty, 0, sizeof empty);
+    for (int i = 0; i < (model->kind == KIND_FLAT ? 1 : POSITIONS); i++)
+        worst = gk_max(worst, mu_at(model, setup, &empty, h, gamma, (double)i / POSITIONS));
+    return worst;
+}
+
+/* γ for which μ′ stays at its bound */
+static double gamma_for(const gk_model *model, const gk_setup *setup, double h)
+{
+    if (gk_limit_mu(model, setup, h, 1.0) <= MU_MOST) return 1.0;
+    double low = 0.0, high = 1.0;
+    for (int i = 0; i < 12; i++) {
+        double middle = 0.5 * (low + high);
+        if (gk_limit_mu(model, setup, h, middle) <= MU_MOST)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static const double QUARTER_OCTAVE = 0.84089641525371454; /* 2^(−1/4) */
+
+/* γ of any h: exact for the internal step of the run, else the smaller of its neighbours on the scale; a pure function
+ * of setup, state and h */
+double gk_limit_gamma(const gk_setup *setup, const gk_data *data, double h)
+{
+    double at = setup->h;
+    int i = 0;
+    if (setup->integrator != DG4) return 0.0;
+    if (h == data->table_h && h == setup->work->run_h) return setup->work->run_gamma;
+    while (i < GAMMAS - 1 && h < at * (1.0 - 1e-9)) at *= QUARTER_OCTAVE, i++;
+    return i && h > at * (1.0 + 1e-9) ? gk_min(setup->gamma_at[i - 1], setup->gamma_at[i]) : setup->gamma_at[i];
+}
+
+/* γ of the internal step of the run */
+void gk_limit_run(const gk_model *model, const gk_setup *setup, const gk_data *data)
+{
+    gk_work *work = setup->work;
+    if (setup->integrator != DG4 || work->run_h == data->table_h) return;
+    work->run_gamma = data->table_h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, data->table_h);
+    work->run_h = data->table_h;
+}
+
+gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE])
+{
+    static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6,
+                                    4e-6,  3e-6,  2.5e-6,  2e-6,  1.5e-6, 1e-6, 0.5e-6};
+    const double period = 2.0 * GK_PI / (model->speed_max * model->gear[0].teeth);
+    const int variational = setup->integrator == DG4, rungs = (int)(sizeof ladder / sizeof *ladder);
+    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup)
+                                                       : INFINITY; /* explicit: a limit of stability */
+    double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
+    if (!(wished > 0.0))
+        for (int i = 0; i < rungs; i++) {
+            h = gk_min(ladder[i], limit);
+            if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) &&
+                (!variational || gk_limit_mu(model, setup, h, 1.0) <= MU))
+                break;
+        }
+    if (h > period / 8.0) {
+        snprintf(message, GK_MESSAGE, "h = %.3g s is more than 1/8 of the mesh period at speed_max; use h <= %.3g s", h,
+                 period / 8.0);
+        return GK_STEP_TOO_LARGE;
+    }
+    if (h > stable) {
+        snprintf(message, GK_MESSAGE,
+                 "h = %.3g s is above the limit of stability of central for this model at this level; use h <= %.3g s",
+                 h, WITHIN * stable);
+        if (h > BEYOND * stable) return GK_STEP_TOO_LARGE;
+    }
+    setup->h = h;
+    double at = h;
+    for (int i = 0; i < GAMMAS; i++, at *= QUARTER_OCTAVE)
+        setup->gamma_at[i] = variational ? gamma_for(model, setup, at) : 0.0;
+    if (variational && setup->gamma_at[0] < 0.7)
+        snprintf(message, GK_MESSAGE,
+                 "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; a smaller h is "
+                 "more accurate",
+                 h, setup->gamma_at[0]);
+    return GK_OK;
+}

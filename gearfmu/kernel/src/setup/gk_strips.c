@@ -1,0 +1,48 @@
+/* Slices across the face width → strips, the contact rows of a place: their number, lengths and weights on the width
+ * functions of the bodies. */
+#include "model/gk_core.h"
+
+/* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row
+ * of twice the length. */
+static int mirrored(const gk_model *model)
+{
+    for (int a = 0; a < model->gear[0].functions; a++)
+        if (model->degree[a] % 2) return 0;
+    return 1;
+}
+
+int gk_strips_count(const gk_model *model, int slices) { return mirrored(model) ? (slices + 1) / 2 : slices; }
+
+/* strip ← width functions: (2a + 1) × mean of P_a over the strip; strips share the common face width */
+static double legendre_integral(int degree, double x)
+{ /* ∫ P_a = (P_{a+1} − P_{a−1})/(2a + 1) */
+    double before = 1.0, now = x, minus = 0.0;
+    if (degree == 0) return x;
+    for (int k = 1; k <= degree; k++) {
+        double next = ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0);
+        minus = before, before = now, now = next;
+    }
+    return (now - minus) / (2.0 * degree + 1.0);
+}
+
+void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out)
+{
+    const double edge = setup->width / model->gear[g].width;
+    for (int s = 0; s < setup->strips; s++)
+        for (int a = 0; a < model->gear[g].functions; a++) {
+            const double from = edge * (2.0 * s / setup->slices - 1.0),
+                         to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
+            const int d = model->degree[a];
+            out[s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+        }
+}
+
+void gk_strips_fill(const gk_model *model, gk_setup *setup)
+{
+    setup->width = gk_min(model->gear[0].width, model->gear[1].width);
+    setup->strip_term = 0.0;
+    for (int s = 0; s < setup->strips; s++)
+        setup->strip_width[s] = setup->width / setup->slices *
+                                (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
+    for (int g = 0; g < 2; g++) setup->strip_term += model->gear[g].local * (gk_log(4.0 * model->gear[g].strip) - 1.0);
+}

@@ -1,0 +1,141 @@
+"""Golden hashes of runs: what a refactoring of the kernel must not move by one bit.
+
+Six scenes on the small pair, at every level and with every integrator, in single and double build. A change of the
+kernel that is meant to change numbers writes them anew, in a commit that says why:
+
+    python tests/kernel/golden.py --write
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import struct
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from probes import build  # noqa: E402  (found through the line above)
+from small_model import pair_blob  # noqa: E402
+
+from gearfmu.kernel import Kernel  # noqa: E402
+
+FILE = Path(__file__).parents[1] / "reference" / "golden_runs.json"
+REALS = ("float", "double")
+STEP = 2e-5  # s, communication step
+LEVELS = ("rigid", "fast", "standard", "full", "paper", "explicit")
+INTEGRATORS = ("dg4", "mix4", "em", "rk45", "central")
+EXPLICIT = ("rk45", "central")
+
+Drive = Callable[[Kernel, int], None]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """ports of pinion and wheel; drive sets the inputs of communication step i; steps; parameters beside the run's."""
+
+    ports: tuple[str, str]
+    drive: Drive
+    steps: int = 150
+    parameters: dict[str, float] = field(default_factory=dict)
+    start: dict[str, float] = field(default_factory=dict)
+
+
+def _loaded(kernel: Kernel, i: int) -> None:
+    kernel.set("pinion.phi", 6e-3 + 200.0 * i * STEP)
+    kernel.set("wheel.phi", 4e-3 - 200.0 * 16 / 24 * i * STEP)
+
+
+def _reversing(kernel: Kernel, i: int) -> None:
+    kernel.set("pinion.tau", 200.0 if i // 40 % 2 else -150.0)
+
+
+def _both_free(kernel: Kernel, i: int) -> None:
+    kernel.set("pinion.tau", 40.0 if i // 25 % 2 else -20.0)
+    kernel.set("wheel.tau", 30.0 if i // 25 % 2 else -55.0)
+
+
+def _closing(kernel: Kernel, i: int) -> None:
+    kernel.set("pinion.phi", 30.0 * i * STEP)
+    kernel.set("pinion.clutch.capacity", min(1.0 * i, 120.0))
+
+
+SCENES: dict[str, Scene] = {
+    "loaded": Scene(("spring", "spring"), _loaded, start={"pinion.w": 200.0, "wheel.w": -200.0 * 16 / 24}),
+    "reversing": Scene(("torque", "spring"), _reversing),
+    "jammed": Scene(("torque", "fixed"), _reversing, parameters={"backlash": -4e-6, "slices": 5}),
+    "rattle": Scene(("torque", "torque"), _both_free, parameters={"contact_damping": 0.0, "slices": 10}),
+    "clutch": Scene(("chain", "spring"), _closing, start={"pinion.w": 30.0, "pinion.clutch.capacity": 20.0}),
+    "plain": Scene(
+        ("torque", "spring"),
+        _reversing,
+        parameters={
+            f"effect.{name}": 0.0 for name in ("hertz", "tip_relief", "bearings", "modal_damping", "roll_motion")
+        },
+    ),
+}
+
+
+def runs() -> Iterator[tuple[str, Scene, dict[str, float]]]:
+    """Name, scene and parameters of every run."""
+    for name, scene in SCENES.items():
+        for i, level in enumerate(LEVELS):
+            if not (level in ("paper", "explicit") and name == "clutch"):
+                yield f"{name}/{level}", scene, {"level": i}
+        for i, integrator in enumerate(INTEGRATORS[1:], 1):
+            if not (integrator in EXPLICIT and name == "clutch"):
+                yield f"{name}/{integrator}", scene, {"level": LEVELS.index("fast"), "integrator": i}
+
+
+def digest(scene: Scene, parameters: dict[str, float], library: Path | None = None) -> str:
+    """16 hex digits over all outputs at every communication step, and over how the run ends if it ends early."""
+    kernel = Kernel(pair_blob(scene.ports), {**scene.parameters, **parameters}, library)
+    for name, value in scene.start.items():
+        kernel.set(name, value)
+    scene.drive(kernel, 0)
+    kernel.initialize()
+    outputs = [v.name for v in kernel.variables.values() if v.causality == "output"]
+    hashed = hashlib.sha256()
+    for i in range(scene.steps):
+        scene.drive(kernel, i)
+        outcome = kernel.try_step(i * STEP, STEP)
+        values = [kernel.get(name) for name in outputs]
+        hashed.update(struct.pack(f"<i{len(values)}d", outcome, *values))
+        if outcome:
+            break
+    return hashed.hexdigest()[:16]
+
+
+def all_digests(library: Path | None = None) -> dict[str, str]:
+    """Run → digest, with this build of the kernel."""
+    return {name: digest(scene, parameters, library) for name, scene, parameters in runs()}
+
+
+def stored() -> dict[str, dict[str, str]]:
+    """Build ("float", "double") → run → digest."""
+    return json.loads(FILE.read_text(encoding="utf-8"))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Golden hashes of the kernel's runs.")
+    parser.add_argument("--write", action="store_true", help="store what this kernel gives")
+    chosen = parser.parse_args()
+    found = {}
+    for real in REALS:
+        with tempfile.TemporaryDirectory() as folder:
+            found[real] = all_digests(build(Path(folder), real=real))
+    if chosen.write:
+        FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        return
+    other = [f"{real} {name}" for real, of in stored().items() for name, d in of.items() if found[real].get(name) != d]
+    print(f"{sum(map(len, found.values()))} runs, {len(other)} moved", *other, sep="\n  ")
+    sys.exit(min(len(other), 99))
+
+
+if __name__ == "__main__":
+    main()
