@@ -16,8 +16,8 @@ help:
 demo: $(VENV)/.base
 	$(RUN) -m gearfmu.cli demo --out $(OUT)/demo
 
-## make test        the fast tests
-test: $(STAMP)
+## make test        gates of form (make lint), then the fast tests
+test: lint
 	$(RUN) -m pytest -n $(JOBS) -rs
 
 ## make test-full   all tests, the slow ones too
@@ -58,10 +58,12 @@ docs: $(VENV)/.base
 	$(RUN) -m gearfmu.cli schema variables --out docs/variables.md
 	$(RUN) -m gearfmu.cli schema effects --out docs/effects.md
 
-## make lint        ruff, where it is installed
+## make lint        form of the sources: ruff (rules, format), mypy, clang-format
 lint: $(STAMP)
-	@$(RUN) -m ruff --version >/dev/null 2>&1 || { echo "ruff is not installed: $(RUN) -m pip install ruff"; exit 1; }
-	$(RUN) -m ruff check gearfmu tests
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+	git ls-files '*.c' '*.h' | xargs $(VENV)/bin/clang-format --dry-run -Werror
 
 $(VENV)/.base: pyproject.toml setup.py
 	$(PYTHON) -m venv $(VENV)

@@ -1,14 +1,15 @@
 """dg4 beside its explicit peer: central differences on the same massless residual (the massless-boundary scheme).
 
-    python benchmarks/central.py [--levels fast standard full] [--starts 5] [--duration 0.03] [--out benchmarks/central.csv]
+    python benchmarks/central.py [--levels fast standard full] [--starts 5] [--duration 0.03]
+        [--out benchmarks/central.csv]
 
-Of each scheme, level and step: drift of the energy in undamped free rattle with the mesh position frozen (20 ms, largest
-of all starts; for central of its own invariant); error of transmission error and mesh force in the loaded damped pair
-(302 N·m, 2000 rpm, after settling) against the same scheme converged, h = 0.23 µs; processor time in the kernel per
-simulated second, smallest of three interleaved runs. For central the limits of stability (eq. 16a), predicted by the
-kernel and measured: without damping (measured: the largest step at which undamped contact, jammed to about full load,
-kept its energy), and of the loaded damped pair, where the dashpot, which central takes explicitly, lowers the limit
-(measured: the largest step of the table at which the pair runs calmly).
+Of each scheme, level and step: drift of the energy in undamped free rattle with the mesh position frozen (20 ms,
+largest of all starts; for central of its own invariant); error of transmission error and mesh force in the loaded
+damped pair (302 N·m, 2000 rpm, after settling) against the same scheme converged, h = 0.23 µs; processor time in the
+kernel per simulated second, smallest of three interleaved runs. For central the limits of stability (eq. 16a),
+predicted by the kernel and measured: without damping (measured: the largest step at which undamped contact, jammed to
+about full load, kept its energy), and of the loaded damped pair, where the dashpot, which central takes explicitly,
+lowers the limit (measured: the largest step of the table at which the pair runs calmly).
 Printed and written as CSV.
 """
 
@@ -25,7 +26,7 @@ import numpy as np
 from gearfmu.body import load_stage_bodies
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
-from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
+from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.trace import write_columns
@@ -67,9 +68,9 @@ def predicted_loaded(model: StageModel, level: int) -> float:
     return predicted_limit(kernel)
 
 
-def measured_limit(free: StageModel, level: int, predicted: float) -> float:
-    """Largest of a ladder of steps at which 5 ms of undamped contact, jammed to about full load, keep their energy within
-    10 %, s."""
+def measured_limit(free: FreePair, level: int, predicted: float) -> float:
+    """Largest of a ladder of steps at which 5 ms of undamped contact, jammed to about full load, keep their energy
+    within 10 %, s."""
     largest = 0.0
     for factor in (0.7, 0.8, 0.9, 0.95, 0.98, 1.02, 1.05, 1.1, 1.2, 1.3, 1.4):
         h = factor * predicted
@@ -86,7 +87,7 @@ def measured_limit(free: StageModel, level: int, predicted: float) -> float:
     return largest
 
 
-def drift(free: StageModel, level: int, scheme: str, h: float, starts: int) -> float:
+def drift(free: FreePair, level: int, scheme: str, h: float, starts: int) -> float:
     """Largest drift of free rattle over random starts; NaN where a run broke off."""
     worst = 0.0
     for seed in range(starts):
@@ -142,7 +143,7 @@ def stable_loaded(runs: dict[tuple[str, int], tuple[np.ndarray, float]], scheme:
     return largest
 
 
-def rows(models: tuple[StageModel, StageModel], level: str, starts: int, duration: float) -> list[dict[str, object]]:
+def rows(models: tuple[StageModel, FreePair], level: str, starts: int, duration: float) -> list[dict[str, object]]:
     """The lines of one level. models: with its ports, and free."""
     model, free = models
     number = LEVELS[level]
@@ -181,10 +182,11 @@ def rows(models: tuple[StageModel, StageModel], level: str, starts: int, duratio
         )
         line = found[-1]
         print(
-            f"{level:9} {scheme:8} {1e6 * line['h_s']:6.3f} µs  drift {line['drift']:.1e}  TE {line['te_error']:.2%}  force "
-            f"{line['force_error']:.2%}  {line['time_per_second']:.3f} s/s  stable to {1e6 * line['stable_predicted_s']:.2f} µs "
-            f"predicted, {1e6 * line['stable_measured_s']:.2f} µs measured, loaded {1e6 * line['stable_loaded_predicted_s']:.2f} µs predicted, {1e6 * line['stable_loaded_s']:.2f} µs "
-            f"the largest here",
+            f"{level:9} {scheme:8} {1e6 * line['h_s']:6.3f} µs  drift {line['drift']:.1e}  TE {line['te_error']:.2%}  "
+            f"force {line['force_error']:.2%}  {line['time_per_second']:.3f} s/s  stable to "
+            f"{1e6 * line['stable_predicted_s']:.2f} µs predicted, {1e6 * line['stable_measured_s']:.2f} µs measured, "
+            f"loaded {1e6 * line['stable_loaded_predicted_s']:.2f} µs predicted, {1e6 * line['stable_loaded_s']:.2f} "
+            "µs the largest here",
             flush=True,
         )
     return found

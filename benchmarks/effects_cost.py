@@ -3,9 +3,10 @@ compiled without its code. Callgrind counts, which repeat exactly.
 
     python benchmarks/effects_cost.py [EFFECT …]
 
-Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; settings of each effect in gearfmu/stage/effects.py.
-Needs valgrind and cc. Prints a table and writes gearfmu/stage/effects_cost.csv, where docs/effects.md takes it from;
-with EFFECT only those rows are measured again. Aim (issue 3): off costs at most 5 % more than without.
+Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; settings of each effect in
+gearfmu/stage/effects.py. Needs valgrind and cc. Prints a table and writes gearfmu/stage/effects_cost.csv, where
+docs/effects.md takes it from; with EFFECT only those rows are measured again. Aim (issue 3): off costs at most 5 %
+more than without.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ class Bench:
         blob = self.folder / f"{model.hash[:12]}.blob"
         blob.write_bytes(model.blob)
         command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--toggle-collect=measured",
-                   "--callgrind-out-file=/dev/null", self.host, library, blob, WARM, STEPS, H, *arguments(model, settings, torque)]  # fmt: skip
+                   "--callgrind-out-file=/dev/null", self.host, library, blob, WARM, STEPS, H,
+                   *arguments(model, settings, torque)]  # fmt: skip
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
         collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
         internal, *outputs = done.stdout.split()
@@ -119,7 +121,8 @@ def main(names: list[str]) -> None:
             row, same = bench.measure(effect)
             rows[effect.name] = row
             print(
-                f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a step: "
+                f"{effect.name:16s} on {row.on:9.0f}  off {row.off:9.0f}  without {row.without:9.0f} instructions a "
+                "step: "
                 f"costs {row.share:6.1%}, off costs {row.price_of_off:+6.1%}, same bits: {same}",
                 flush=True,
             )

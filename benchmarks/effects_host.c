@@ -19,19 +19,21 @@ typedef struct entry {
 typedef struct run {
     gk_model *model;
     gk_setup *setup;
+    gk_work *work;
     gk_data *data;
     double H;
     int entries;
     entry entry[MOST];
 } run;
 
-static size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *);
+static size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *),
+    (*work_size)(const gk_model *);
 static gk_outcome (*model_open)(gk_model *, const void *, size_t, char *), (*defaults)(const gk_model *, gk_data *);
 static gk_outcome (*set)(const gk_model *, gk_data *, uint32_t, double),
     (*get)(const gk_model *, const gk_data *, uint32_t, double *);
-static gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, char *),
-    (*initialize)(const gk_model *, const gk_setup *, gk_data *, double);
-static gk_outcome (*step)(const gk_model *, const gk_setup *, gk_data *, double, double);
+static gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, gk_work *, char *),
+    (*initialize)(const gk_model *, const gk_setup *, gk_work *, gk_data *, double);
+static gk_outcome (*step)(const gk_model *, const gk_setup *, gk_work *, gk_data *, double, double);
 static int (*variable_count)(const gk_model *);
 static gk_outcome (*variable)(const gk_model *, int, gk_variable_info *);
 
@@ -52,6 +54,7 @@ static void bind(const char *path)
     } table[] = {{&model_size, "gk_model_size"},
                  {&setup_size, "gk_setup_size"},
                  {&data_size, "gk_data_size"},
+                 {&work_size, "gk_work_size"},
                  {&model_open, "gk_model_open"},
                  {&defaults, "gk_defaults"},
                  {&set, "gk_set"},
@@ -100,7 +103,7 @@ static void advance(run *r, int from, int to)
 {
     for (int k = from; k < to; k++) {
         put(r, 'i', k * r->H);
-        must(step(r->model, r->setup, r->data, k * r->H, r->H) == GK_OK, "a step failed");
+        must(step(r->model, r->setup, r->work, r->data, k * r->H, r->H) == GK_OK, "a step failed");
     }
 }
 
@@ -134,12 +137,13 @@ int main(int count, char **text)
     r.model = bytes(model_size());
     must(model_open(r.model, blob, size, message) == GK_OK, message);
     r.setup = bytes(setup_size(r.model));
+    r.work = bytes(work_size(r.model));
     r.data = bytes(data_size(r.model));
     defaults(r.model, r.data);
     put(&r, 'p', 0.0);
     put(&r, 'i', 0.0);
-    must(prepare(r.model, r.data, r.setup, message) == GK_OK, message);
-    must(initialize(r.model, r.setup, r.data, 0.0) == GK_OK, "no equilibrium");
+    must(prepare(r.model, r.data, r.setup, r.work, message) == GK_OK, message);
+    must(initialize(r.model, r.setup, r.work, r.data, 0.0) == GK_OK, "no equilibrium");
     advance(&r, 0, warm);
     const double before = steps_done(&r);
     CALLGRIND_START_INSTRUMENTATION; /* what comes before is a preparation of seconds and need not be slow */

@@ -1,6 +1,7 @@
 """Energy of the time step on the shipped bodies: what conservation tests T1–T9 leave of it, and what controls do.
 
-    python benchmarks/energy.py [--starts 20] [--duration 0.05] [--level fast] [--cases NAME …] [--out benchmarks/energy.csv]
+    python benchmarks/energy.py [--starts 20] [--duration 0.05] [--level fast] [--cases NAME …]
+        [--out benchmarks/energy.csv]
 
 Undamped free rattle of ±30 µm along the line of action and its harder relatives, mesh position frozen
 (effect.roll_motion off), random starts: place in the mesh, place in the backlash, speed. Drift: largest change of
@@ -27,9 +28,8 @@ from kernel_variants import LOOSE_SOLVER, WITHOUT_ETA, WRONG_MATRIX, double_stat
 
 from gearfmu.body import load_stage_bodies  # noqa: E402
 from gearfmu.errors import SimulationError  # noqa: E402
-from gearfmu.scenes.rattle import Rattle, energies, free_pair, started  # noqa: E402
+from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
-from gearfmu.stage import StageModel  # noqa: E402
 from gearfmu.stage.trace import write_columns  # noqa: E402
 
 STEPS = (5e-6, 7.5e-6, 10e-6)
@@ -118,15 +118,13 @@ def random_start(base: Rattle, seed: int) -> Rattle:
     return replace(base, position=position, offset=place * max(base.play, 0.0), speed=speed)
 
 
-def row(
-    model: StageModel, name: str, case: Case, chosen: tuple[str, int, int, float], run: Mapping
-) -> dict[str, object]:
+def row(pair: FreePair, name: str, case: Case, chosen: tuple[str, int, int, float], run: Mapping) -> dict[str, object]:
     """One line of the table. chosen: build, law, slices, step; run: libraries, starts, duration, level."""
     build, law, slices, h = chosen
     parameters = {"level": LEVELS[run["level"]], "h": h, "slices": slices, "effect.hertz": law, **case.parameters}
     worst: dict[str, float] = {"drift": 0.0, "growth": -np.inf, "changes": 0, "trouble": 0}
     for seed in range(run["starts"]):
-        kernel = started(model, random_start(case.start, seed), parameters, run["libraries"][build])
+        kernel = started(pair, random_start(case.start, seed), parameters, run["libraries"][build])
         try:
             found = energies(kernel, h, run["duration"])
         except SimulationError:  # the kernel gave the run up: a control, or a failure of the test
@@ -156,7 +154,8 @@ def combinations(case: Case) -> Iterator[tuple[str, int, int, float]]:
 
 
 def keeps(case: Case, line: Mapping) -> bool:
-    """Whether a line is as it should be: within its limit, or a control that is seen to fail; damped runs never grow."""
+    """Whether a line is as it should be: within its limit, or a control that is seen to fail; damped runs never
+    grow."""
     if case.at_least:
         return line["drift"] > case.at_least
     return line["drift"] <= line["limit"] and not line["trouble"] and (case.test != "T9" or line["growth"] <= GROWTH)
@@ -185,7 +184,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec = load_stage("fzg_c/stage_relief")
-    model, bad = free_pair(spec, load_stage_bodies(spec)), 0
+    pair, bad = free_pair(spec, load_stage_bodies(spec)), 0
     lines = kept(chosen.out, chosen.cases) if chosen.cases else []
     with tempfile.TemporaryDirectory() as folder:
         run = {
@@ -197,7 +196,7 @@ def main() -> int:
         for name in chosen.cases or [*CASES, *CONTROLS]:
             case = {**CASES, **CONTROLS}[name]
             for combination in combinations(case):
-                lines.append(row(model, name, case, combination, run))
+                lines.append(row(pair, name, case, combination, run))
                 bad += not shown(case, lines[-1])
             write(chosen.out, lines)
     return bad
@@ -207,8 +206,10 @@ def shown(case: Case, line: Mapping) -> bool:
     """Print a line; returns whether it is as it should be."""
     good = keeps(case, line)
     print(
-        f"{line['test']:9} {line['case']:31} {line['build']:8} {line['law']:7} {line['slices']:3d} {1e6 * line['h_s']:5.1f} µs  "
-        f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth {line['growth']:.1e}  "
+        f"{line['test']:9} {line['case']:31} {line['build']:8} {line['law']:7} {line['slices']:3d} "
+        f"{1e6 * line['h_s']:5.1f} µs  "
+        f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth "
+        f"{line['growth']:.1e}  "
         f"{line['changes']:6d} changes {line['trouble']:3d} trouble{'' if good else '   ← NOT KEPT'}",
         flush=True,
     )

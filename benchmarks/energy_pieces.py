@@ -26,16 +26,16 @@ from kernel_variants import double_states, variant  # noqa: E402
 
 from gearfmu.body import load_stage_bodies  # noqa: E402
 from gearfmu.kernel import Kernel  # noqa: E402
-from gearfmu.scenes.rattle import Rattle, free_pair, started  # noqa: E402
+from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
 from gearfmu.stage import StageModel, Steady, assemble  # noqa: E402
 from gearfmu.stage.trace import write_columns  # noqa: E402
 
 STEP, SETTLE, LOAD, SPEED, FAST = 60e-6, 0.01, 302.0, 2000 * math.pi / 30, 1
-ROWS_STILL = {
-    r"grid\(&model->gear\[i\], p->roll\[i\]": "grid(&model->gear[i], 0.5 * (model->gear[i].s_form + model->gear[i].s_tip)"
+ROWS_STILL = {r"p->roll = corner_roll\(n, p\);": "p->roll = 0.5 * (n->gear->s_form + n->gear->s_tip);"}
+CURVATURE_STILL = {
+    r"gk_law_set\(model, setup, mesh, place->curvature": "gk_law_set(model, setup, mesh, 1.0 / 0.007 + 1.0 / 0.009"
 }
-CURVATURE_STILL = {r"gk_law_set\(model, setup, place->curvature": "gk_law_set(model, setup, 1.0 / 0.007 + 1.0 / 0.009"}
 COLUMNS = (
     "stage",
     "piece",
@@ -77,7 +77,7 @@ def balance(
     }
 
 
-def changes_of_h(free: StageModel, library: Path | None, steps: tuple[float, float]) -> float:
+def changes_of_h(free: FreePair, library: Path | None, steps: tuple[float, float]) -> float:
     """Largest relative change of stored energy over 50 ms of undamped frozen rattle whose communication step alternates
     between two lengths (s); sampled after the first of them."""
     kernel = started(free, Rattle(position=0.3), {"level": FAST, "h": 7.5e-6}, library)
@@ -122,8 +122,10 @@ def main() -> None:
             line = {"stage": model.name, "piece": piece, **balance(model, library, parameters, chosen.duration)}
             lines.append(line)
             print(
-                f"{line['stage']:13} {piece:32} h {1e6 * line['h_s']:.2f} µs  through {line['through_J']:.0f} J  work {line['work_J']:.4f} J  "
-                f"dissipated {line['dissipated_J']:.4f} J  left {line['left_J']:+.1e} J = {line['left_of_through']:+.1e} of through, "
+                f"{line['stage']:13} {piece:32} h {1e6 * line['h_s']:.2f} µs  through {line['through_J']:.0f} J  work "
+                f"{line['work_J']:.4f} J  "
+                f"dissipated {line['dissipated_J']:.4f} J  left {line['left_J']:+.1e} J = "
+                f"{line['left_of_through']:+.1e} of through, "
                 f"{line['left_of_dissipated']:+.1%} of the losses",
                 flush=True,
             )
@@ -131,7 +133,8 @@ def main() -> None:
         for steps in ((5e-6, 5e-6), (5e-6, 7.5e-6), (50e-6, 60e-6)):
             changed = changes_of_h(free, double, steps)
             print(
-                f"communication steps {1e6 * steps[0]:.0f} and {1e6 * steps[1]:.1f} µs in turn: energy within {changed:.1e}"
+                f"communication steps {1e6 * steps[0]:.0f} and {1e6 * steps[1]:.1f} µs in turn: energy within "
+                f"{changed:.1e}"
             )
     write_columns(chosen.out, {column: np.array([line[column] for line in lines]) for column in COLUMNS})
 

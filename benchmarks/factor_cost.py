@@ -1,4 +1,5 @@
-"""What the choice of cuts saves in factorising a whole body: nested dissection by one vector and by combinations of two.
+"""What the choice of cuts saves in factorising a whole body: nested dissection by one vector and by combinations of
+two.
 
     python benchmarks/factor_cost.py [scale]
 

@@ -4,9 +4,9 @@
 
 Scene clutch_closure, master gs_mean, communication step 100 µs; everything recorded (some seventy channels), or one.
 step, stage: median of the quietest hundred steps, of the whole step and of its share inside the stage's `step` (kernel
-and one call); harness: the same of their difference, and that one call, which is timed with nothing to do. Parts, processor time of loops of
-their own: unit (set, step without kernel, get, log), drivetrain (motion ahead and step), signals. trace: what making
-the trace of the kept rows takes, per step.
+and one call); harness: the same of their difference, and that one call, which is timed with nothing to do. Parts,
+processor time of loops of their own: unit (set, step without kernel, get, log), drivetrain (motion ahead and step),
+signals. trace: what making the trace of the kept rows takes, per step.
 Prints a table and writes benchmarks/harness.csv. Aim (issue 3, design): harness 20 µs with the FMU, 5 µs with the
 kernel.
 """

@@ -63,9 +63,11 @@ def line(scene: str, number: int, h: float, found: dict[str, float], wanted: dic
     """One line of the table, printed."""
     made = {"scene": scene, "start": number, "h_s": h, **found, **errors(found, wanted)}
     print(
-        f"{scene:12} {'mean' if number < 0 else number:>5} h {1e6 * h:5.2f} µs  open {100 * found['open_share']:5.2f} %  coast "
+        f"{scene:12} {'mean' if number < 0 else number:>5} h {1e6 * h:5.2f} µs  open {100 * found['open_share']:5.2f} "
+        "%  coast "
         f"{100 * found['coast_share']:4.1f} %  {found['impacts']:6.0f} impacts/s   errors: open "
-        f"{100 * made['open_share_error']:+.2f} points, force {made['force_rms_error']:+.3%}, TE {made['te_std_error']:+.3%}, "
+        f"{100 * made['open_share_error']:+.2f} points, force {made['force_rms_error']:+.3%}, TE "
+        f"{made['te_std_error']:+.3%}, "
         f"impulse {made['impulse_error']:+.3%}",
         flush=True,
     )

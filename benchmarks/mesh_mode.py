@@ -1,6 +1,6 @@
 """Linearised mesh mode of a stage and the contact damping that gives it 3 % of critical: rigid gears on their bearings,
-the tangent mesh stiffness of `te` averaged over a pitch, with modal damping in the flexible part and the dashpots across
-the contacts' own paths (residual beyond all stored modes and local law, docs/theory.md 2.5).
+the tangent mesh stiffness of `te` averaged over a pitch, with modal damping in the flexible part and the dashpots
+across the contacts' own paths (residual beyond all stored modes and local law, docs/theory.md 2.5).
 
     python benchmarks/mesh_mode.py [STAGE] [TORQUE_NM]
 """
@@ -24,7 +24,8 @@ CLOSING = np.array([-1.0, -1.0, 1.0, -1.0])  # along the line of action: pinion'
 
 
 def mesh_mode(stage: str, torque: float) -> dict[str, float]:
-    """Frequency (Hz), mesh stiffness (N/m), compliance of a contact's own path (m/N) and the dashpot (N·s/m²) for RATIO."""
+    """Frequency (Hz), mesh stiffness (N/m), compliance of a contact's own path (m/N) and the dashpot (N·s/m²) for
+    RATIO."""
     spec = load_stage(stage)
     bodies = load_stage_bodies(spec)
     result = loaded_te(assemble(spec, bodies), [torque], positions=64, rigid_bearings=True)
@@ -70,6 +71,8 @@ if __name__ == "__main__":
     found = mesh_mode(chosen, float(load))
     print(
         f"{chosen} at {load} N·m: mesh mode {found['frequency'] / 1e3:.2f} kHz, mean mesh stiffness "
-        f"{found['stiffness'] * 1e-6:.1f} N/µm, own path of a contact {1e-6 / found['path']:.0f} N/µm; damping ratio without "
-        f"contact dashpots {found['without']:.2%}; contact damping for {RATIO:.0%} of critical {found['damping']:.3g} N·s/m²"
+        f"{found['stiffness'] * 1e-6:.1f} N/µm, own path of a contact {1e-6 / found['path']:.0f} N/µm; damping ratio "
+        "without "
+        f"contact dashpots {found['without']:.2%}; contact damping for {RATIO:.0%} of critical {found['damping']:.3g} "
+        "N·s/m²"
     )

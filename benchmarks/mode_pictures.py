@@ -3,8 +3,8 @@
     python benchmarks/mode_pictures.py [pinion] [campbell] [carrier] [ring]  (all when none is named)
 
 Each runs `gearfmu modes` as a user would, in a temporary folder, and writes its picture with a palette of 256 colours
-(a third of the bytes) to docs/pictures/modes_<body>.png and docs/pictures/campbell.png. The ring is the 936 000 unknowns
-of planetary54, the carrier its 67 000.
+(a third of the bytes) to docs/pictures/modes_<body>.png and docs/pictures/campbell.png. The ring is the 936 000
+unknowns of planetary54, the carrier its 67 000.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
-"""Phase profile of the internal step: share and processor cycles of each phase, for every level, on the loaded pair (302 N·m, 2000 rpm, 5 slices).
+"""Phase profile of the internal step: share and processor cycles of each phase, for every level, on the loaded pair
+(302 N·m, 2000 rpm, 5 slices).
 
     python benchmarks/phases.py
 
-Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. Beside the cycles the arithmetic that the phase cannot do without and
-the bytes that it reads and writes, counted from the sizes of the model (`work`). Prints a table and writes benchmarks/phases.csv.
+Builds the kernel with -DGK_PROFILE into a temporary folder; the product's library has no clock in it. Beside the
+cycles the arithmetic that the phase cannot do without and the bytes that it reads and writes, counted from the sizes
+of the model (`work`). Prints a table and writes benchmarks/phases.csv.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ PAIRS = 2  # tooth pairs within reach, nearly always
 
 
 def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
-    """Cycles a step of each phase: median over the blocks, of (steps, cycles) counted from the start, but for the first,
-    in which the tables of the step are made; so neither that nor what else ran on the machine counts."""
+    """Cycles a step of each phase: median over the blocks, of (steps, cycles) counted from the start, but for the
+    first, in which the tables of the step are made; so neither that nor what else ran on the machine counts."""
     found = [
         {phase: (after[phase] - before[phase]) / (n - m) for phase in after}
         for (m, before), (n, after) in pairwise(blocks[1:])
@@ -38,19 +40,21 @@ def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
 
 
 def lanes(model: StageModel, cut: float) -> int:
-    """Lanes of modal state of both gears: a pair of modes is one lane of each half, halves are padded to LANES / 2."""
+    """Lanes of modal state of both gear groups: a pair of modes is one lane of each half, halves are padded to LANES / 2."""
     total, sections = 0, read_blob(model.blob)
     for gear in (0, 1):
-        part = sections[f"part{gear}"][sections[f"omega{gear}"] < 2 * math.pi * cut]
+        part = sections[f"member{gear}"][sections[f"omega{gear}"] < 2 * math.pi * cut]
         total += 2 * math.ceil(int((part != 2).sum()) / 8) * 8
     return total
 
 
 def work(n: int, pairs: float, strips: int) -> dict[str, tuple[float, float]]:
-    """(floating-point operations, bytes) a step of the phases that do arithmetic: n lanes of single precision, `pairs` tooth pairs of `strips` contact rows, six bilateral rows.
+    """(floating-point operations, bytes) a step of the phases that do arithmetic: n lanes of single precision,
+    `pairs` tooth pairs of `strips` contact rows, six bilateral rows.
 
-    predict: eight coefficients, three states. rows: four grid rolls and a turn to the tooth. system: readings of all rows, 16 cells of D, K and Q between any two places on either
-    gear, rigid motion into D and A. solve: tangent, its factors, two solutions and four products. correct: scatter of two forces, new state, damping."""
+    predict: eight coefficients, three states. rows: four grid rolls and a turn to the tooth. system: readings of all
+    rows, 16 cells of D, K and Q between any two places on either gear, rigid motion into D and A. solve: tangent, its
+    factors, two solutions and four products. correct: scatter of two forces, new state, damping."""
     m, cells = pairs * strips + 6, 2 * pairs * (pairs + 1) / 2 * 16 * 3 * strips**2
     rows = pairs * strips
     return {
@@ -112,5 +116,6 @@ if __name__ == "__main__":
         writer.writerows(table)
     for row in table:
         print(
-            f"{row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:7d} cycles a step  {row['share']:6.1%}  {row['flops']:7d} flop {row['bytes']:7d} B   h {1e6 * row['h_s']:.2f} µs, {row['n_dyn']} modes"
+            f"{row['level']:9s} {row['phase']:9s} {row['cycles_per_step']:7d} cycles a step  {row['share']:6.1%}  "
+            f"{row['flops']:7d} flop {row['bytes']:7d} B   h {1e6 * row['h_s']:.2f} µs, {row['n_dyn']} modes"
         )

@@ -17,7 +17,8 @@ from fmpy.fmi2 import FMU2Slave
 
 from gearfmu.body import load_stage_bodies
 from gearfmu.fmu import export
-from gearfmu.spec.stage import ChainSpec, load_stage
+from gearfmu.spec.ports import ChainSpec
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 
 matplotlib.use("Agg")

@@ -56,7 +56,7 @@ class Verbs(click.Group):
         if name not in VERBS:
             return None
         module, function = VERBS[name][0].split(":")
-        return getattr(importlib.import_module(module), function)  # type: ignore[no-any-return]
+        return getattr(importlib.import_module(module), function)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Verbs"):

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 import re
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from gearfmu.errors import UnitError
+
+if TYPE_CHECKING:
+    import pint
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*$")
 _UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
@@ -61,7 +65,7 @@ def _factor(unit_text: str, unit: str) -> float:
 
 
 @lru_cache(maxsize=1)
-def _registry():
+def _registry() -> pint.UnitRegistry:
     import pint
 
     return pint.UnitRegistry(cache_folder=None)

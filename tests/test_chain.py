@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import venv
@@ -64,6 +65,16 @@ def test_te_is_zero_without_load(tmp_path: Path) -> None:
     shown = gearfmu("te", "fzg_c", "--torque", "0 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
     data = np.genfromtxt(tmp_path / "te.csv", delimiter=",", skip_header=1)
     assert np.abs(data[:, 2]).max() < 1e-5 and np.all(data[:, 3] > 50) and "0.0 N·m: mean" in shown
+
+
+def test_te_tells_the_stiffness_of_the_mesh_alone_beside_that_with_bearings(tmp_path: Path) -> None:
+    order = ("te", "fzg_c", "--torque", "302 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
+    alone, both = (
+        [float(number) for number in re.findall(r"([0-9.]+) N/µm", gearfmu(*order, *more))]
+        for more in (("--rigid-bearings",), ())
+    )
+    with_bearings = np.genfromtxt(tmp_path / "te.csv", delimiter=",", names=True)["mesh_stiffness_N_per_um"].mean()
+    assert both == [*alone, pytest.approx(with_bearings, abs=0.06)] and with_bearings < 0.6 * alone[0]
 
 
 def test_export_and_validate(tmp_path: Path) -> None:

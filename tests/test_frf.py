@@ -31,10 +31,20 @@ def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
     code, out, err = call(capsys, "planetary54", "carrier", *options)
     assert code == 0, err
     assert "24 inputs, held at its ground, rotations times 45 mm, 1 % damping" in out
+    assert " has " not in out, "every method has the 120 vectors"
     worst = {method: max(values) for method, values in errors(tmp_path / "carrier_frf.csv").items()}
     assert worst["krylov"] < 1e-2 * worst["rubin"] < 1e-4 * worst["craig_bampton"]
     assert worst["craig_bampton"] < 0.1 and worst["modal"] < 0.1
     assert {p.name for p in tmp_path.iterdir()} == {"carrier_frf.csv", "carrier_frf.svg", "carrier_frf.png"}
+
+
+def test_a_method_with_fewer_vectors_than_asked_for_says_so(tmp_path, capsys) -> None:
+    """24 inputs: four whole blocks of the five that 100 vectors would begin."""
+    options = ["--scale", 0.3, "--lines", 5, "--methods", "rubin,krylov", "--size", 100, "--out", tmp_path]
+    code, out, err = call(capsys, "planetary54", "carrier", *options)
+    assert code == 0, err
+    assert "krylov has 96 vectors where 100 were asked for: it takes whole blocks of one vector per input" in out
+    assert "rubin has" not in out
 
 
 @pytest.mark.full

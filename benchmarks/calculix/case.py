@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-
 from ccx import run_deck, torques
 from deck import Placed, Problem, write_deck
-from gearfmu.geometry import GearGeometry, PairGeometry
 from section import Fineness, gear_plane
 from solid import extruded
+
+from gearfmu.geometry import GearGeometry, PairGeometry
 
 THIN = 1e-6  # m, half thickness that stands for plane stress
 

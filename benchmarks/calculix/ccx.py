@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-
 from deck import Problem, starts
 
 FORCES = re.compile(r" forces \(fx,fy,fz\) for set (\S+) and time")

@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from ccx import require_ccx, run
+from positions import read
+
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
@@ -29,7 +30,6 @@ from gearfmu.modes.cyclic import cyclic_modes
 from gearfmu.modes.planetary import set_sector
 from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
-from positions import read
 
 COUNT, RIGID = 20, 6
 HERE = Path(__file__).parent

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from ccx import require_ccx
-from gearfmu.files import written_whole
 from positions import POSITIONS, read
+
+from gearfmu.files import written_whole
 
 HERE = Path(__file__).parent
 GOLDEN = HERE.parents[1] / "tests" / "reference" / "calculix_fzg_c.json"

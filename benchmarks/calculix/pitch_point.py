@@ -19,10 +19,11 @@ from typing import Any
 
 from case import Case, Load, Solution, pitch_point_turn, solve
 from ccx import require_ccx
+from section import Fineness
+
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec, load_stage
-from section import Fineness
 
 LINE_LOAD = 300e3  # N/m
 HERE = Path(__file__).parent

@@ -24,16 +24,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from case import Case, Load, solve
 from ccx import require_ccx
+from rigid_bores import rigid_bore_bodies
+from section import Fineness
+
 from gearfmu.body import load_stage_bodies
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry, hertz
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import TeResult, assemble, loaded_te
-from rigid_bores import rigid_bore_bodies
-from section import Fineness
 
 POSITIONS = 12
 TORQUES = (80.0, 302.0, 600.0)  # N·m on the pinion

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from section import Plane
 
 FACE_OF_EDGE = np.array([3, 4, 5, 6])  # CalculiX's face number over edge k of the section's quadrilateral

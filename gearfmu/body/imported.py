@@ -12,7 +12,7 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
-from gearfmu.geometry import GearGeometry
+from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
@@ -37,6 +37,8 @@ from gearfmu.reduction.statics import Statics, static_tables
 
 def check_gear(gear: Any, geometry: Any) -> CheckedGear:
     """The imported finite elements of a GearSpec, read, checked and placed. Raises MeshError."""
+    if geometry.beta:
+        raise MeshError(f"{gear.imported.file}: finite elements made elsewhere are read for spur gears only")
     return checked_gear(gear.imported, _wanted(gear, geometry))
 
 
@@ -90,6 +92,11 @@ def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:
     return (InternalGearGeometry if name == "ring" else GearGeometry).of(getattr(spec, name), spec.set)
 
 
+def pair_geometry(spec: Any, name: str) -> GearGeometry:
+    """The geometry of a gear of a StageSpec by its name."""
+    return next(g for gear, g in zip(spec.gears, PairGeometry.of(spec).gears, strict=True) if gear.name == name)
+
+
 def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
     """The imported carrier of a PlanetarySpec before reduction, known to be one solid, and plain facts. MeshError."""
     found = imported_carrier(spec)
@@ -122,6 +129,7 @@ def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Pa
 
 def _by_sector(found: ImportedGear, gear: Any, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
     body, (drawn, report) = found.body, drawing
+    assert isinstance(body, ImportedSector)
     modes = elastic_modes(body, gear.body.modes, report)
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
@@ -132,6 +140,7 @@ def _by_sector(found: ImportedGear, gear: Any, case: FrfCase, drawing: tuple[Any
 
 def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
     gear, (drawn, report) = found.body, drawing
+    assert isinstance(gear, WholeGear)
     space = Elastic(gear.body)
     if problem := hinge_problem(space, float(space.modes(1)[0][0])):
         raise MeshError(f"{found.facts['file']}: {problem}")
@@ -145,7 +154,8 @@ def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tupl
 
 def _whole_display(drawn: Any, found: ImportedGear, modes: Modes, statics: Statics) -> Display:
     """Pictures on the drawn surface: every point moves like the nearest node of the whole mesh."""
-    gear: WholeGear = found.body
+    gear = found.body
+    assert isinstance(gear, WholeGear)
     sector = outline(drawn, found.nodes)
     points, quads = whole_surface(sector, gear.teeth)
     kept = np.unique(gear.body.node_of_dof[gear.body.node_of_dof < len(found.nodes)])

@@ -35,13 +35,14 @@ def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
         "provenance": body.provenance,
         "datasets": [
             {"path": e.path, "shape": list(np.shape(value_of(body, e.field))), "unit": e.unit, "meaning": e.meaning}
-            for e in entries_of(body.internal)
+            for e in entries_of(body.groups)
         ],
     }
 
 
 def _facts(body: ReducedBody) -> dict[str, Any]:
-    middle = len(body.roll) // 2
+    middle, offsets = len(body.roll) // 2, body.static_ff.shape[2]
+    all_offsets = offsets == body.teeth
     return {
         "teeth": body.teeth,
         "mass_kg": body.mass,
@@ -50,11 +51,14 @@ def _facts(body: ReducedBody) -> dict[str, Any]:
         "method": "free eigenmodes and static residual",
         "base_radius_m": body.r_b,
         "face_width_m": body.face_width,
+        **({"base_helix_angle_deg": float(np.degrees(body.base_helix_angle))} if body.base_helix_angle else {}),
         "strip_half_width_m": body.strip_half_width,
         "modes": body.modes,
         "frequency_range_Hz": [float(body.frequency[0]), float(body.frequency[-1])],
         "roll_points": len(body.roll),
         "width_functions": body.width_functions,
+        "tooth_offsets": f"all {body.teeth}" if all_offsets else f"−{offsets // 2} to {offsets // 2}",
+        "rows_along_profile": body.tangent is not None,
         "tooth_compliance_mid_flank_m_per_N": float(body.static_ff[0, 0, 0, middle, middle, 0, 0]),
         **_mounts(body),
     }

@@ -125,11 +125,11 @@ def save_interface_body(body: InterfaceBody, path: str | os.PathLike[str]) -> No
 def load_interface_body(path: str | os.PathLike[str]) -> InterfaceBody:
     """Read and check a body file. Raises BodyError: missing, damaged, of another kind or version, or not sound."""
     with reading(path, FILE) as file:
-        values = {e.field: file[e.path][()] if e.shape else float(file[e.path][()]) for e in ENTRIES}
-        texts = {name: json.loads(file.attrs[name]) for name in TEXTS}
+        values: dict[str, Any] = {e.field: file[e.path][()] if e.shape else float(file[e.path][()]) for e in ENTRIES}
+        texts: dict[str, Any] = {name: json.loads(file.attrs[name]) for name in TEXTS}
         texts["interfaces"], texts["ground"] = tuple(texts["interfaces"]), tuple(texts["ground"])
-        heads = {name: str(file.attrs[name]) for name in ("name", "input_hash")}
-        return InterfaceBody(**heads, **texts, **values)
+        name, input_hash = (str(file.attrs[name]) for name in ("name", "input_hash"))
+        return InterfaceBody(name=name, input_hash=input_hash, **texts, **values)
 
 
 def interface_facts(body: InterfaceBody) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 FORMAT = "gearfmu-body"
@@ -82,11 +83,11 @@ def _static_entries() -> tuple[Entry, ...]:
         Entry(
             "static/c_ff",
             "static_ff",
-            (2, 2, "z", "R", "R", "A", "A"),
+            (2, 2, "M", "R", "R", "A", "A"),
             "m/N",
             "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, "
-            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2, "
-            "the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2 (of "
+            "a helical gear 0 … K), the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
         ),
         Entry(
             "static/c_fb",
@@ -146,13 +147,49 @@ def _rim_entries() -> tuple[Entry, ...]:
     )
 
 
+def _helix_entries() -> tuple[Entry, ...]:
+    return (
+        Entry(
+            "helix/base_angle",
+            "base_helix_angle",
+            (),
+            "rad",
+            "base helix angle β_b, positive for a right-handed gear: the section at z is turned by z tan β_b / r_b",
+        ),
+    )
+
+
+def _tangent_entries() -> tuple[Entry, ...]:
+    table = (2, 2, "R", "R", "A", "A")
+    return (
+        Entry(
+            "tangent/rows",
+            "tangent.rows",
+            (2, "R", "A", "n"),
+            "kg-1/2",
+            "tooth 0: like modes/flank_rows, displacement along the profile towards growing roll",
+        ),
+        Entry(
+            "tangent/c_nt",
+            "tangent.static_nt",
+            table,
+            "m/N",
+            "compliance [f, g, i, j, a, b] of tooth 0 alone: flank f, roll i, function a along the outward normal "
+            "under the load along the profile at flank g, roll j, function b",
+        ),
+        Entry("tangent/c_tt", "tangent.static_tt", table, "m/N", "the same, displacement along the profile"),
+    )
+
+
 ENTRIES = _entries()
-RIM_ENTRIES = _rim_entries()  # besides, in the file of an internal gear
+RIM_ENTRIES = _rim_entries()
+GROUPS = {"rim": RIM_ENTRIES, "helix": _helix_entries(), "tangent": _tangent_entries()}
 
 
-def entries_of(internal: bool) -> tuple[Entry, ...]:
-    """The datasets of a body: those of every gear, and of an internal one those of its rim."""
-    return (*ENTRIES, *RIM_ENTRIES) if internal else ENTRIES
+def entries_of(groups: Iterable[str]) -> tuple[Entry, ...]:
+    """The datasets of a body: those of every gear, and of the `groups` that it has besides: "rim" (an internal gear),
+    "helix" (a helical one), "tangent" (one that is loaded along the profile too)."""
+    return (*ENTRIES, *(entry for name in GROUPS if name in groups for entry in GROUPS[name]))
 
 
 TEXTS = {

@@ -18,9 +18,14 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as sl
 
-from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.reduced import ReducedBody, Rim
 from gearfmu.errors import BodyError
 from gearfmu.fem.coupling import rigid_fields
+
+
+def _rim(body: ReducedBody) -> Rim:
+    assert body.rim is not None, "a ring has a rim"
+    return body.rim
 
 
 @dataclass(frozen=True)
@@ -48,7 +53,7 @@ class MountedRing:
 
     def mount_forces(self) -> np.ndarray:
         """Force (3·mounts, 6 + n) of each mount on the ground per modal coordinate, sector's frame, N·kg^-½/m."""
-        return self.body.rim.mount_stiffness * self.mount_rows()
+        return _rim(self.body).mount_stiffness * self.mount_rows()
 
     def static(self, tooth: int, other: int) -> np.ndarray:
         """Compliance (2·R·A, 2·R·A), m/N, of the flanks of `tooth` under loads on those of `other`."""
@@ -97,7 +102,7 @@ class MountedRing:
     @cached_property
     def _residual_fm(self) -> np.ndarray:
         """C_res of flanks of space 0 per force on the patch of sector m: (z, 2·R·A, 3)."""
-        rim, size = self.body.rim, self.body.flank_rows[..., 0].size
+        rim, size = _rim(self.body), self.body.flank_rows[..., 0].size
         full = rim.static_fp.transpose(1, 0, 2, 3, 4).reshape(self.body.teeth, size, 3)
         return full - _modal_static(self.body, self.body.flank_rows.reshape(size, -1), rim.patch_rows)
 
@@ -116,8 +121,8 @@ def mounted(body: ReducedBody) -> MountedRing:
     if body.rim is None or body.rim.mounts == 0:
         raise BodyError(f"body '{body.name}' has no mounts: declare [ring.mounts] in its stage and reduce it again")
     at_mounts = np.vstack([_mount_rows(body, sector) for sector in mount_sectors(body)])
-    give = np.eye(len(at_mounts)) + body.rim.mount_stiffness * _residual_mm(body)
-    stiffness = body.rim.mount_stiffness * np.linalg.inv(give)
+    give = np.eye(len(at_mounts)) + _rim(body).mount_stiffness * _residual_mm(body)
+    stiffness = _rim(body).mount_stiffness * np.linalg.inv(give)
     stiffness = 0.5 * (stiffness + stiffness.T)
     mass, elastic = np.eye(6 + body.modes), np.zeros(6 + body.modes)
     mass[:6, :6] = _rigid_mass(body)
@@ -128,7 +133,7 @@ def mounted(body: ReducedBody) -> MountedRing:
 
 def mount_sectors(body: ReducedBody) -> list[int]:
     """Sectors whose patches of the rim are held."""
-    return [k * body.teeth // body.rim.mounts for k in range(body.rim.mounts)]
+    return [k * body.teeth // _rim(body).mounts for k in range(_rim(body).mounts)]
 
 
 def turned_rows(body: ReducedBody, rows: np.ndarray, sector: int) -> np.ndarray:
@@ -157,13 +162,13 @@ def _turn(sector: int, teeth: int) -> np.ndarray:
 
 
 def _mount_rows(body: ReducedBody, sector: int) -> np.ndarray:
-    rigid = rigid_fields(body.rim.patch_point) @ _turn(sector, body.teeth)
-    return np.concatenate([rigid, turned_rows(body, body.rim.patch_rows, sector)], axis=1)
+    rigid = rigid_fields(_rim(body).patch_point) @ _turn(sector, body.teeth)
+    return np.concatenate([rigid, turned_rows(body, _rim(body).patch_rows, sector)], axis=1)
 
 
 def _free_flank_rows(body: ReducedBody, tooth: int) -> np.ndarray:
     size = body.flank_rows[..., 0].size
-    rigid = body.rim.flank_rigid.reshape(size, 6) @ _turn(tooth, body.teeth)
+    rigid = _rim(body).flank_rigid.reshape(size, 6) @ _turn(tooth, body.teeth)
     return np.concatenate([rigid, turned_rows(body, body.flank_rows.reshape(size, -1), tooth)], axis=1)
 
 
@@ -176,7 +181,7 @@ def _modal_static(body: ReducedBody, rows: np.ndarray, others: np.ndarray) -> np
 
 def _residual_mm(body: ReducedBody) -> np.ndarray:
     """C_res between the mounts, (3·mounts, 3·mounts)."""
-    free = body.rim.static_pp - _modal_static(body, body.rim.patch_rows, body.rim.patch_rows)
+    free = _rim(body).static_pp - _modal_static(body, _rim(body).patch_rows, _rim(body).patch_rows)
     sectors = mount_sectors(body)
     return np.block([[free[(n - m) % body.teeth] for n in sectors] for m in sectors])
 

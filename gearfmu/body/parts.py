@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gearfmu.body.reduced import Rim
+from gearfmu.body.reduced import Rim, Tangent
 from gearfmu.femesh import FeMesh
 from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
@@ -20,6 +21,9 @@ from gearfmu.spec.gear import MeshSpec
 DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
 PICTURE_MODES = 12
 _PICTURE_LOADS = 5
+_DRAWN_TWIST = 0.08  # rad: largest turn of the section within a drawn layer
+_TABLE_BYTES = 3.5e6  # of static_ff of a helical gear before compression
+_FEWEST_OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,37 @@ def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[Tooth
         gear.face_width,
         gear.body.strip_half_width,
         internal,
+        geometry.beta_b,
     )
     return flank, Points(flank.chebyshev_rolls(gear.body.roll_points), gear.body.width_functions)
+
+
+def drawn_counts(geometry: Any, face_width: float) -> MeshSpec:
+    """Element counts of the coarse sector from which a gear is drawn: one layer, more where the section turns with
+    z."""
+    layers = max(1, math.ceil(abs(geometry.twist) * face_width / _DRAWN_TWIST))
+    return DRAWN.model_copy(update={"width": layers})
+
+
+def kept_offsets(static_ff: np.ndarray, helical: bool) -> np.ndarray:
+    """The table (2, 2, z, …) of all tooth offsets, or of a helical gear those of −K … K only (2, 2, 2K + 1, …): as many
+    as fit into `_TABLE_BYTES` in the file, which holds 0 … K, and never fewer than the kernel reads.
+
+    A spur gear's table is half zeros (even and odd width functions) and compresses to that; a helical one's is not.
+    """
+    teeth, each = static_ff.shape[2], 8 * static_ff[:, :, 0].size
+    most = max(_FEWEST_OFFSETS, int(_TABLE_BYTES // each) - 1)
+    if not helical or 2 * most + 1 >= teeth:
+        return static_ff
+    return np.concatenate([static_ff[:, :, : most + 1], static_ff[:, :, -most:]], axis=2)
+
+
+def tangent_of(modes: Modes, statics: Statics, points: Points) -> Tangent | None:
+    """Rows and tables of the loads along the profile; None where none were made."""
+    if statics.static_tt is None or statics.static_nt is None or modes.tangent_rows is None:
+        return None
+    rows = modes.tangent_rows.reshape(2, len(points.rolls), points.functions, -1)
+    return Tangent(rows, statics.static_nt, statics.static_tt)
 
 
 def rim_of(body: SectorBody, modes: Modes, statics: Statics, mounts: Any) -> Rim | None:

@@ -14,9 +14,9 @@ import numpy as np
 from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
 from gearfmu.body.layout import ALGORITHM_VERSION
-from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.provenance import provenance
 from gearfmu.body.reduce import reduced_gear
+from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report
@@ -72,8 +72,8 @@ def reduce_set(
     force: bool = False,
     progress: Progress | None = None,
 ) -> list[Body]:
-    """Reduce what is missing or stale of a set and store it: gears in two processes where there are two processors, then
-    the carrier, which takes the most memory, alone.
+    """Reduce what is missing or stale of a set and store it: gears in two processes where there are two processors,
+    then the carrier, which takes the most memory, alone.
 
     Where processes are spawned (Windows, macOS) a script that calls this needs `if __name__ == "__main__":`.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.

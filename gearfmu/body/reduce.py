@@ -13,13 +13,22 @@ import numpy as np
 
 from gearfmu.body.imported import imported_parts
 from gearfmu.body.layout import ALGORITHM_VERSION
-from gearfmu.body.parts import DRAWN, Parts, pictured_loads, rim_of, sector_display, tooth_flank
+from gearfmu.body.parts import (
+    Parts,
+    drawn_counts,
+    kept_offsets,
+    pictured_loads,
+    rim_of,
+    sector_display,
+    tangent_of,
+    tooth_flank,
+)
 from gearfmu.body.provenance import provenance
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report, sector_mesh
-from gearfmu.geometry import GearGeometry
+from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -89,7 +98,7 @@ def reduce_stage(
 def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = None) -> ReducedBody:
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
-    geometry = GearGeometry.of(gear, spec.pair)
+    geometry = PairGeometry.of(spec).gears[gear_index]
     try:
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
@@ -132,12 +141,14 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
         strip_half_width=gear.body.strip_half_width,
-        static_ff=statics.static_ff,
+        static_ff=kept_offsets(statics.static_ff, bool(geometry.beta)),
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=made.frf,
         display=made.display,
         rim=made.rim,
+        tangent=tangent_of(modes, statics, points),
+        base_helix_angle=geometry.beta_b,
     )
 
 
@@ -149,7 +160,8 @@ def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Poi
     statics = static_tables(body, pictured_loads(points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
-    display = sector_display(sector_mesh(geometry, gear.face_width, DRAWN), body, modes, statics)
+    drawn = sector_mesh(geometry, gear.face_width, drawn_counts(geometry, gear.face_width))
+    display = sector_display(drawn, body, modes, statics)
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
     return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.layout import ALGORITHM_VERSION, FORMAT_VERSION, entries_of
+from gearfmu.body.layout import ALGORITHM_VERSION, FORMAT_VERSION, Entry, entries_of
 from gearfmu.errors import BodyError
 from gearfmu.reduction.display import Display
 from gearfmu.reduction.frf import FrfError
@@ -36,14 +36,28 @@ class Rim:
 
 
 @dataclass(frozen=True)
+class Tangent:
+    """Displacement along the profile, towards growing roll: what friction loads and reads.
+
+    rows (2, R, A, n), kg^-½, like flank_rows. static_nt, static_tt (2, 2, R, R, A, A), m/N: along the normal and along
+    the profile at (tooth 0, flank f, roll i, function a) per load along the profile at (tooth 0, g, j, b).
+    """
+
+    rows: np.ndarray
+    static_nt: np.ndarray
+    static_tt: np.ndarray
+
+
+@dataclass(frozen=True)
 class ReducedBody:
     """A free gear body, reduced: rigid body + n real elastic modes + static compliance, with its evidence.
 
     Shapes, units and meaning of every field stand in `layout.ENTRIES` and docs/file-formats.md. In short: frequency
-    (n,) Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, z, R, R, A, A), m/N; static_fb (2, R, A, 6);
-    static_bb (6, 6).
+    (n,) Hz; flank_rows (2, R, A, n); bore_rows (6, n); static_ff (2, 2, M, R, R, A, A), m/N; static_fb (2, R, A, 6);
+    static_bb (6, 6). M is z, or 2K + 1 where only the tooth offsets −K … K are kept: offset m stands at m mod M.
     input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of a ring, whose
-    rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one.
+    rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one. tangent: rows along
+    the profile, None where none were made. base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
     Raises BodyError naming every field that cannot be.
     """
 
@@ -74,6 +88,8 @@ class ReducedBody:
     frf: FrfError
     display: Display
     rim: Rim | None = None
+    tangent: Tangent | None = None
+    base_helix_angle: float = 0.0
     format_version: int = FORMAT_VERSION
     algorithm_version: int = ALGORITHM_VERSION
 
@@ -90,6 +106,12 @@ class ReducedBody:
     def internal(self) -> bool:
         """Whether the body is a ring: its index k counts tooth spaces, its normals point into them."""
         return self.rim is not None
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Which of the optional `layout.GROUPS` the body has."""
+        has = {"rim": self.internal, "helix": self.base_helix_angle != 0, "tangent": self.tangent is not None}
+        return tuple(name for name, there in has.items() if there)
 
     @property
     def width_functions(self) -> int:
@@ -109,12 +131,12 @@ def body_problems(body: ReducedBody) -> list[str]:
     """Everything that is wrong with shapes, numbers and order of a body; empty when it is sound."""
     problems: list[str] = []
     sizes: dict[str, int] = {"z": body.teeth}
-    for entry in entries_of(body.rim is not None):
+    for entry in entries_of(body.groups):
         problems += _array_problems(entry, np.asarray(value_of(body, entry.field)), sizes)
     return problems or _meaning_problems(body)
 
 
-def _array_problems(entry, value: np.ndarray, sizes: dict[str, int]) -> list[str]:
+def _array_problems(entry: Entry, value: np.ndarray, sizes: dict[str, int]) -> list[str]:
     if value.dtype.kind != entry.kind[0]:
         return [f"{entry.path} holds {value.dtype}, expected {_KINDS[entry.kind]} numbers"]
     if value.ndim != len(entry.shape):
@@ -139,6 +161,9 @@ def _meaning_problems(body: ReducedBody) -> list[str]:
             body.r_b, body.face_width, body.mass, body.strip_half_width
         )
         > 0,
+        "static/c_ff must hold the tooth offsets −K … K, K at least 3, or all": body.static_ff.shape[2] == body.teeth
+        or (7 <= body.static_ff.shape[2] < body.teeth and body.static_ff.shape[2] % 2 == 1),
+        "helix/base_angle must lie between −π/4 and π/4": abs(body.base_helix_angle) < np.pi / 4,
         "there must be a mode, a roll point and a width function": min(body.flank_rows.shape) > 0,
         "modes/frequency must be above 0 and ascending": body.modes == 0
         or (body.frequency[0] > 0 and bool(np.all(np.diff(body.frequency) >= 0))),

@@ -10,8 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearfmu.body.layout import FORMAT, FORMAT_VERSION, TEXTS, Entry, entries_of
-from gearfmu.body.reduced import ReducedBody, Rim, value_of
+from gearfmu.body.layout import FORMAT, FORMAT_VERSION, GROUPS, TEXTS, Entry, entries_of
+from gearfmu.body.reduced import ReducedBody, Rim, Tangent, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.display import Display
@@ -29,10 +29,10 @@ def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
         file.attrs["input_hash"] = body.input_hash
         for text in TEXTS:
             file.attrs[text] = json.dumps(getattr(body, text), sort_keys=True)
-        for entry in entries_of(body.internal):
+        for entry in entries_of(body.groups):
             value = np.asarray(value_of(body, entry.field), dtype=entry.kind)
             if entry.field == "static_ff":
-                value = value[:, :, : body.teeth // 2 + 1]
+                value = value[:, :, : value.shape[2] // 2 + 1]
             dataset = file.create_dataset(entry.path, data=value, **(_PACKED if value.size > 16 else {}))
             dataset.attrs["unit"] = entry.unit
             dataset.attrs["meaning"] = entry.meaning
@@ -41,7 +41,7 @@ def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
 def load_body(path: str | os.PathLike[str]) -> ReducedBody:
     """Read and check a body file. Raises BodyError: missing, damaged, of another kind or version, or not sound."""
     with reading(path, FILE) as file:
-        values = {entry.field: _read(file, entry) for entry in entries_of("rim" in file)}
+        values = {entry.field: _read(file, entry) for entry in entries_of([name for name in GROUPS if name in file])}
         heads = {name: str(file.attrs[name]) for name in ("name", "input_hash")}
         texts = {name: json.loads(file.attrs[name]) for name in TEXTS}
         versions = {name: int(file.attrs[name]) for name in ("format_version", "algorithm_version")}
@@ -58,18 +58,19 @@ def _read(file: h5py.File, entry: Entry) -> Any:
 
 
 def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
-    """Compliance for every tooth offset from that of 0 … z/2: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]
-    (reciprocity)."""
-    if half.ndim != 7 or half.shape[2] != teeth // 2 + 1:
+    """Compliance for every tooth offset from that of 0 … z/2, or for −K … K from 0 … K: C[f, g, m, i, j, a, b] =
+    C[g, f, −m, j, i, b, a] (reciprocity)."""
+    if half.ndim != 7 or not 0 < half.shape[2] <= teeth // 2 + 1:
         raise BodyError(f"static/c_ff has shape {half.shape}, expected offsets 0 … {teeth // 2} in its third place")
-    mirrored = half[:, :, 1 : (teeth + 1) // 2].transpose(1, 0, 2, 4, 3, 6, 5)
+    single = half.shape[2] == teeth // 2 + 1 and teeth % 2 == 0  # the offset z/2 is its own mirror image
+    mirrored = half[:, :, 1 : half.shape[2] - single].transpose(1, 0, 2, 4, 3, 6, 5)
     return np.concatenate([half, mirrored[:, :, ::-1]], axis=2)
 
 
 def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
     values["static_ff"] = _all_offsets(values["static_ff"], values["teeth"])
     parts: dict[str, Any] = {}
-    groups = (("frf", FrfError), ("display", Display), ("rim", Rim))
-    for group, kind in groups if "rim.mounts" in values else groups[:2]:
-        parts[group] = kind(**{f.name: values.pop(f"{group}.{f.name}") for f in fields(kind)})
+    for group, kind in (("frf", FrfError), ("display", Display), ("rim", Rim), ("tangent", Tangent)):
+        if any(name.startswith(f"{group}.") for name in values):
+            parts[group] = kind(**{f.name: values.pop(f"{group}.{f.name}") for f in fields(kind)})
     return ReducedBody(**values, **parts, **heads)

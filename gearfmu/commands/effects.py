@@ -15,9 +15,9 @@ with the numbers of a stage. What is off is not evaluated.
 
 Costs are instructions of one internal step (callgrind, which repeats exactly; `benchmarks/effects_cost.py`): *cost* is
 the part of a step that goes when the effect is off, negative where off costs more; *off* is what a step with the effect
-off takes more than one of a kernel compiled without its code. Pair with relief, 302 N·m at 2000 rpm, level fast, 5 slices,
-but: residual at level full with `em` against level paper, bodies and modes against rigid ones, tip corners at 80 N·m, pitch
-errors on one tooth.
+off takes more than one of a kernel compiled without its code. Pair with relief, 302 N·m at 2000 rpm, level fast, 5
+slices, but: residual at level full with `em` against level paper, bodies and modes against rigid ones, tip corners at
+80 N·m, pitch errors on one tooth.
 """
 
 

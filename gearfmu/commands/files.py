@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,8 @@ def inspect(path: Path, as_json: bool) -> None:
 @click.argument("kind", type=click.Choice(["stage", "planetary", "scene", "variables", "effects"]))
 @click.option("--out", type=click.Path(path_type=Path), help="File to write; standard output when not given.")
 def schema(kind: str, out: Path | None) -> None:
-    """JSON schema of the stage.toml of a pair or a planetary set, or of scene.toml; or the table of FMU variables (docs/variables.md) or effects
-    (docs/effects.md)."""
+    """JSON schema of the stage.toml of a pair or a planetary set, or of scene.toml; or the table of FMU variables
+    (docs/variables.md) or effects (docs/effects.md)."""
     from gearfmu.files import write_text
 
     text = _schema_text(kind)
@@ -130,22 +131,46 @@ def _toml(path: Path) -> dict[str, Any]:
 
 def _derived(spec: Any) -> dict[str, Any]:
     """What follows from the numbers of a stage (ISO 21771): working pressure angle, contact ratio, radii in m."""
-    import math
-
     from gearfmu.geometry import PairGeometry
 
     if spec.kind == "planetary_set":
         return _derived_set(spec)
+    if spec.kind == "general":
+        from gearfmu.stage.meshes import mesh_geometry
+
+        return {mesh.name: _derived_pair(mesh_geometry(spec, mesh), mesh.gears) for mesh in spec.engagements}
     pair = PairGeometry.of(spec)
+    helix = _derived_helix(spec, pair) if spec.pair.helix_angle else {}
+    return _derived_pair(pair, [gear.name for gear in spec.gears]) | helix
+
+
+def _derived_pair(pair: Any, names: Sequence[str]) -> dict[str, Any]:
+    """What follows from the numbers of two gears in mesh."""
+    import math
+
     radii = {
-        gear.name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a}
-        for gear, shape in zip(spec.gears, pair.gears, strict=True)
+        name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a}
+        for name, shape in zip(names, pair.gears, strict=True)
     }
     return {
         "working_pressure_angle_deg": math.degrees(pair.alpha_wt),
         "contact_ratio": pair.contact_ratio,
         "base_pitch": pair.base_pitch,
         **radii,
+    }
+
+
+def _derived_helix(spec: Any, pair: Any) -> dict[str, Any]:
+    """What a helical pair has besides: angles of the transverse section, overlap of the common face width."""
+    import math
+
+    overlap = pair.overlap_ratio(min(gear.face_width for gear in spec.gears))
+    return {
+        "transverse_pressure_angle_deg": math.degrees(pair.gears[0].alpha_t),
+        "base_helix_angle_deg": math.degrees(pair.gears[0].beta_b),
+        "overlap_ratio": overlap,
+        "total_contact_ratio": pair.contact_ratio + overlap,
+        "virtual_teeth": {g.name: s.z_virtual for g, s in zip(spec.gears, pair.gears, strict=True)},
     }
 
 
@@ -158,7 +183,7 @@ def _derived_set(spec: Any) -> dict[str, Any]:
     from gearfmu.spec.planetary_checks import mesh_torque, ring_half_width
 
     g = PlanetaryGeometry.of(spec)
-    shapes = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
+    shapes: dict[str, Any] = {"sun": g.sun_mesh.gears[0], "planet": g.ring_mesh.planet, "ring": g.ring_mesh.ring}
     carrier = CarrierGeometry.of(spec)
     return {
         "speed_ratio_sun_to_carrier": g.ratio,

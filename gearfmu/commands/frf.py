@@ -8,13 +8,17 @@ import tracemalloc
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from gearfmu.commands.models import by_text
 from gearfmu.commands.shared import Quantity, progress_bar
+
+if TYPE_CHECKING:
+    from gearfmu.reduction.comparison import Contest
+    from gearfmu.reduction.full_order import FullOrder
 
 HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded", "CPU s", "memory MB")
 
@@ -65,17 +69,20 @@ def frf(stage: str, body: str, **options: Any) -> None:
     click.echo(f"{body}: {full.size} unknowns, {inputs} inputs, {_ground(full, options)}, {how}")
     for line in table(found.trials, contest):
         click.echo(line)
+    for line in shortfalls(found.trials, entries):
+        click.echo(line)
     click.echo(f"reference: {found.reference.size} vectors, last change {found.reference.change:.1e}, "
                f"{found.reference_seconds:.1f} s; all {found.seconds:.1f} s of processor time")  # fmt: skip
     written = write(found, contest, options["out"] / f"{body}_frf", f"{body}, {_ground(full, options)}")
     click.echo(", ".join(map(str, written)))
 
 
-def full_order_of(stage: str, body: str, scale: float | None = None) -> Any:
+def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrder:
     """The FullOrder of a body of STAGE: gear, ring or carrier; a usage error for a body it does not have."""
     from gearfmu.spec.stage import load_stage
 
-    spec, factor = load_stage(stage), {} if scale is None else {"scale": scale}
+    spec = load_stage(stage)
+    factor: dict[str, Any] = {} if scale is None else {"scale": scale}
     names = ["sun", "planet", "ring", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
     if body not in names:
         raise click.BadParameter(f"no body '{body}'; the stage has {', '.join(names)}", param_hint="BODY")
@@ -101,13 +108,12 @@ def _keep_scale(part: Any, name: str, scale: float | None) -> None:
         raise click.BadParameter(remedy, param_hint="--scale")
 
 
-def _imported(spec: Any, gear: Any) -> Any:
+def _imported(spec: Any, gear: Any) -> FullOrder:
     """The FullOrder of a gear from finite elements made elsewhere."""
-    from gearfmu.body.imported import imported_full_order, set_geometry
-    from gearfmu.geometry import GearGeometry
+    from gearfmu.body.imported import imported_full_order, pair_geometry, set_geometry
 
-    is_set = spec.kind == "planetary_set"
-    return imported_full_order(gear, set_geometry(spec, gear.name) if is_set else GearGeometry.of(gear, spec.pair))
+    geometry_of = set_geometry if spec.kind == "planetary_set" else pair_geometry
+    return imported_full_order(gear, geometry_of(spec, gear.name))
 
 
 def table(trials: Sequence[Any], contest: Any) -> list[str]:
@@ -121,6 +127,17 @@ def table(trials: Sequence[Any], contest: Any) -> list[str]:
     kept = [k for k, name in enumerate(HEADER) if name != "loaded" or contest.loaded is not None]
     widths = [max(len(row[k]) for row in rows) for k in kept]
     return ["  ".join(row[k].rjust(w) for k, w in zip(kept, widths, strict=True)) for row in rows]
+
+
+def shortfalls(trials: Sequence[Any], entries: Sequence[tuple[str, Any]]) -> list[str]:
+    """Trials, in the order of their entries, that have fewer vectors than were asked for."""
+    return [
+        f"{t.method} has {t.model.size} vectors where {size.count} were asked for: it takes "
+        + ("whole blocks of one vector per input" if t.method == "krylov" else "what there is")
+        + f"; a method of the same size is rubin:{t.model.size}"
+        for t, (_, size) in zip(trials, entries, strict=True)
+        if size.count is not None and t.model.size < size.count
+    ]
 
 
 def write(found: Any, contest: Any, base: Path, title: str) -> list[Path]:
@@ -150,7 +167,7 @@ def loaded_rows(labels: Sequence[tuple[str, str]], patterns: str) -> np.ndarray:
     return np.array(found)
 
 
-def _contest(full: Any, entries: list[tuple[str, Any]], options: dict[str, Any]) -> Any:
+def _contest(full: Any, entries: list[tuple[str, Any]], options: dict[str, Any]) -> Contest:
     from gearfmu.reduction.comparison import Contest
     from gearfmu.reduction.transfer import Judging
 

@@ -35,7 +35,7 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 
     spec = load_stage(stage)
     names = ["sun", "planet", "ring", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
-    if gear not in names:
+    if gear is None or gear not in names:
         raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
     echo_pairs(body_facts(spec, gear, str(file), options))
     place = gear if spec.kind == "planetary_set" else f"gears.{gear}"
@@ -44,8 +44,7 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 
 def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
-    from gearfmu.body.imported import check_gear, set_geometry
-    from gearfmu.geometry import GearGeometry
+    from gearfmu.body.imported import check_gear, pair_geometry, set_geometry
     from gearfmu.reduction.imported_carrier import imported_carrier
     from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
@@ -58,7 +57,7 @@ def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict
     ring = spec.kind == "planetary_set" and name == "ring"
     chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}
     source = (RingImportSpec if ring else ImportSpec)(file=file, **chosen)
-    geometry = set_geometry(spec, name) if spec.kind == "planetary_set" else GearGeometry.of(gear, spec.pair)
+    geometry = set_geometry(spec, name) if spec.kind == "planetary_set" else pair_geometry(spec, name)
     return check_gear(gear.model_copy(update={"imported": source}), geometry).facts
 
 

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import Progress, progress_bar
 
+if TYPE_CHECKING:
+    from gearfmu.spec.stage import StageSpec
+    from gearfmu.stage import StageModel
 
-def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> Any:
+
+def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> StageModel:
     """The StageModel of STAGE, with other kinds of port where `port_kinds` (shaft → kind) says so."""
-    spec, bodies = bodies_of(stage)
+    spec, bodies = bodies_for_motion(stage)
     from gearfmu.stage import assemble
 
     return assemble(with_ports(spec, port_kinds or {}), bodies)
 
 
-def bodies_of(stage: str) -> tuple[Any, list[Any]]:
+def bodies_of(stage: str) -> tuple[StageSpec, list[Any]]:
     """StageSpec and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first, with a
     progress bar."""
     from gearfmu.spec.stage import load_pair
@@ -30,12 +34,21 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
         return spec, reduce_stage(spec, progress=by_text(progress))
 
 
+def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
+    """`bodies_of` for a verb that needs a model of the stage: a SpecError, before anything is reduced, for a stage that
+    has none yet."""
+    from gearfmu.spec.stage import load_pair, require_spur
+
+    require_spur(load_pair(stage))
+    return bodies_of(stage)
+
+
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
     """The progress function of reduce_stage, called with (what is being done, share done)."""
     return None if progress is None else lambda text, share: progress(share, text)
 
 
-def with_ports(spec: Any, kinds: Mapping[str, str]) -> Any:
+def with_ports(spec: StageSpec, kinds: Mapping[str, str]) -> StageSpec:
     """The StageSpec with the ports' kinds replaced; a usage error for a shaft it does not have or a spring without k
     and c."""
     unknown = set(kinds) - set(spec.ports)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.models import bodies_of, by_text
+from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
 from gearfmu.commands.shared import Quantity, progress_bar
+
+if TYPE_CHECKING:
+    from gearfmu.modes.shapes import BodyModes
 
 
 @click.command()
@@ -43,7 +46,7 @@ def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float
 
 
 def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
-    spec, bodies = _pair(stage)
+    spec, bodies = bodies_for_motion(stage)
     from gearfmu.modes.linear import stage_modes
     from gearfmu.report.campbell import RPM, campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
@@ -63,13 +66,6 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     write_columns(paths[0], campbell_columns(found))
     write_campbell(found, shafts, spec.speed_max, paths[1])
     click.echo(f"{paths[0]}, {paths[1]}")
-
-
-def _pair(stage: str) -> tuple[Any, list[Any]]:
-    from gearfmu.spec.stage import load_stage, require_pair
-
-    require_pair(load_stage(stage))
-    return bodies_of(stage)
 
 
 def stage_table(found: Any) -> list[str]:
@@ -103,7 +99,7 @@ def table(body: Any) -> list[str]:
     return lines
 
 
-def _shapes(stage: str, name: str, count: int, mounted: bool) -> Any:
+def _shapes(stage: str, name: str, count: int, mounted: bool) -> BodyModes:
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -121,7 +117,7 @@ def _shapes(stage: str, name: str, count: int, mounted: bool) -> Any:
         return gear_modes(spec, index, bodies[index], count, by_text(progress))
 
 
-def _of_set(spec: Any, name: str, count: int, mounted: bool) -> Any:
+def _of_set(spec: Any, name: str, count: int, mounted: bool) -> BodyModes:
     from gearfmu.modes.planetary import BODIES, mounted_ring_modes, set_body_modes
 
     _check(name, BODIES)

@@ -51,8 +51,9 @@ def stability(
 ) -> int:
     """Run the hard cases. Exit code: the number of failures (at most 99), 0 for none."""
     from gearfmu.stability import suite
+    from gearfmu.stability.scenes import SCENES
 
-    wanted = suite.tasks(scenes or tuple(suite.SCENES), levels or LEVELS, steps or tuple(STEPS))
+    wanted = suite.tasks(scenes or tuple(SCENES), levels or LEVELS, steps or tuple(STEPS))
     with progress_bar("stability") as progress:
         rows = suite.run_suite(wanted, out, jobs, progress)
     click.echo(suite.table(rows), nl=False)

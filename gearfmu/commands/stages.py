@@ -61,11 +61,11 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
     """Reduce the bodies of STAGE to <body>.h5; a body whose input hash matches is left as it is."""
     import time
 
-    from gearfmu.body import reduce_set, reduce_stage
+    from gearfmu.body import reduce_general, reduce_set, reduce_stage
     from gearfmu.spec.stage import load_stage
 
     spec, started = load_stage(stage), time.perf_counter()
-    reduce_all = reduce_set if spec.kind == "planetary_set" else reduce_stage
+    reduce_all: Any = {"planetary_set": reduce_set, "general": reduce_general}.get(spec.kind, reduce_stage)
     with progress_bar("reducing") as progress:
         bodies = reduce_all(spec, out, force, by_text(progress))
     for body in bodies:
@@ -111,12 +111,11 @@ def _body(spec: Any, name: str) -> Any:
 
 def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
-    from gearfmu.body.imported import imported_sector_mesh, imported_set_sector
+    from gearfmu.body.imported import imported_sector_mesh, imported_set_sector, pair_geometry, set_geometry
     from gearfmu.femesh import sector_mesh
     from gearfmu.femesh.carrier import carrier_sector
     from gearfmu.geometry import GearGeometry
     from gearfmu.geometry.carrier import CarrierGeometry
-    from gearfmu.geometry.internal import InternalGearGeometry
 
     body = _body(spec, name)
     if spec.kind == "planetary_set" and getattr(body, "imported", None):
@@ -125,8 +124,10 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     counts = own.model_copy(update={"scale": own.scale * scale})
     if name == "carrier":
         return carrier_sector(CarrierGeometry.of(spec), counts), ()
-    pair = spec.set if spec.kind == "planetary_set" else spec.pair
-    geometry = (InternalGearGeometry if name == "ring" else GearGeometry).of(body, pair)
+    if spec.kind == "planetary_set":
+        geometry = set_geometry(spec, name)
+    else:
+        geometry = pair_geometry(spec, name) if spec.kind == "external_pair" else GearGeometry.of(body, body)
     if getattr(body, "imported", None):
         return imported_sector_mesh(body, geometry), ()
     return sector_mesh(geometry, body.face_width, counts), (geometry.r_b, body.body.strip_half_width)

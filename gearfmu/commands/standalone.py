@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gearfmu.commands.shared import Progress
+
+if TYPE_CHECKING:
+    from gearfmu.stage import StageModel
+    from gearfmu.stage.trace import Trace
 
 
 def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
@@ -23,7 +27,9 @@ def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
     return found
 
 
-def steady_run(model: Any, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None) -> Any:
+def steady_run(
+    model: StageModel, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None
+) -> Trace:
     """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
     from gearfmu.stage import Steady, simulate
 

@@ -36,12 +36,12 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes, for table errors.")
 def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bool, jobs: int) -> None:
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices."""
-    from gearfmu.commands.models import bodies_of
+    from gearfmu.commands.models import bodies_for_motion
     from gearfmu.spec.scene import load_scene
 
     specs = [load_scene(scene) for scene in scenes]
     for spec in specs:
-        bodies_of(spec.stage.name)
+        bodies_for_motion(spec.stage.name)
     for table in dict.fromkeys(tables):
         if table == "errors":
             for spec in specs:
@@ -101,9 +101,9 @@ def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | No
         if len(stages) > 1:
             raise click.UsageError(f"--table bodies takes scenes of one stage, not of {' and '.join(sorted(stages))}")
         return refined.body_rows(windows, refined.cheap(windows[0]) if quick else None, progress)
-    levels = ("rigid",) if quick else order.LEVELS
+    meshing = ("rigid",) if quick else order.LEVELS
     return order.constant_stiffness() + [
-        row for scene in windows for row in order.gear_mesh(scene, levels, progress=progress)
+        row for scene in windows for row in order.gear_mesh(scene, meshing, progress=progress)
     ]
 
 

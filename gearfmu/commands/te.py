@@ -45,13 +45,15 @@ def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: b
     from gearfmu.stage.trace import write_columns
 
     result = loaded_te(model, torques=list(torques), positions=positions, rigid_bearings=rigid_bearings)
+    held = result if rigid_bearings else loaded_te(model, list(torques), positions, rigid_bearings=True)
     write_columns(out, te_columns(result))
     picture = out.with_suffix(".png")
     write_plot(result, picture)
-    for torque, row, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):
+    for torque, row, mesh, stiffness in zip(result.torque, result.te, held.stiffness, result.stiffness, strict=True):
+        with_bearings = "" if rigid_bearings else f", with the bearings {1e-6 * stiffness.mean():.1f} N/µm"
         click.echo(
             f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
-            f"mesh stiffness {1e-6 * stiffness.mean():.1f} N/µm"
+            f"mesh stiffness (bores held) {1e-6 * mesh.mean():.1f} N/µm{with_bearings}"
         )
     click.echo(f"{out}, {picture}")
 

@@ -34,7 +34,7 @@ class Row(NamedTuple):
 
 def rows() -> list[Row]:
     """All rows of the kernel's table in its order; those of a shaft once."""
-    text = files("gearfmu.kernel").joinpath("src/gk_variables.inc").read_text(encoding="utf-8")
+    text = files("gearfmu.kernel").joinpath("src/model/gk_variables.inc").read_text(encoding="utf-8")
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     return [_row(match) for match in re.findall(r"GK_VAR\((.*)\)", text)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 from gearfmu.cosim.masters import Cut, Master, master
 from gearfmu.cosim.recorder import Recorder
@@ -61,7 +61,7 @@ def run_coupled(cut: Cut, plan: Plan) -> Result:
     """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good
     communication point. A failure before the first point is raised as it is."""
     timed = _Timed(cut.stage)
-    coupled = _Run(replace(cut, stage=timed), plan)
+    coupled = _Run(replace(cut, stage=cast(Unit, timed)), plan)
     outcome, message, started, wall = OK, "", clock.process_time(), clock.perf_counter()
     try:
         coupled.go()

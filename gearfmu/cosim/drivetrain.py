@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
 from gearfmu.cosim.signals import Constant, Ramp, Signal
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
+from gearfmu.spec.ports import ChainSpec, PortSpec
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import ChainSpec, PortSpec, StageSpec
+from gearfmu.spec.stage import StageSpec
 
 ROLLING_SPEED = 0.1  # m/s over which rolling resistance builds up: no force at standstill
 SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffens
@@ -37,7 +38,10 @@ def shafts_of(spec: StageSpec) -> Shafts:
 
 def build(scene: SceneSpec, shafts: Shafts) -> Network:
     """The drivetrain of a scene: torque ports named as the shafts."""
-    return _car(scene, scene.passenger_car, shafts) if scene.passenger_car else _rig(scene, scene.test_rig, shafts)
+    if scene.passenger_car:
+        return _car(scene, scene.passenger_car, shafts)
+    assert scene.test_rig is not None, "a scene has one of the two"
+    return _rig(scene, scene.test_rig, shafts)
 
 
 def stage_ports(scene: SceneSpec, shafts: Shafts) -> dict[str, PortSpec]:
@@ -51,6 +55,7 @@ def stage_ports(scene: SceneSpec, shafts: Shafts) -> dict[str, PortSpec]:
             shafts.wheel: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
         }
     car = scene.passenger_car
+    assert car is not None, "a scene has one of the two"
     if car.chain_in_fmu:
         return {shafts.pinion: _clutch_chain(car), shafts.wheel: _final_drive_chain(car)}
     return {
@@ -146,6 +151,7 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
     if car.chain_in_fmu:
         ports = {shafts.pinion: "engine", shafts.wheel: "wheels"}
         return Network((engine, *nodes), (tyres,), (), sources, torque_ports=ports)
+    assert scene.clutch is not None, "a car outside the stage has its clutch outside"
     secondary, disc, final_drive = (
         Inertia("secondary", car.secondary_inertia, w=engine_w),
         Inertia("disc", car.disc_inertia, w=scene.start.pinion_speed),

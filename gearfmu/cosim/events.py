@@ -41,7 +41,7 @@ class Found(NamedTuple):
     there."""
 
     kind: str
-    index: int
+    number: int
     part: str
     fraction: float
     x: np.ndarray
@@ -51,8 +51,8 @@ class Found(NamedTuple):
     def what(self, mode: Mode) -> str:
         """The mode it led to, in words."""
         if self.kind == "clutch":
-            return "lock" if mode[0][self.index] == 0 else "slip"
-        return {1: "drive", -1: "coast", 0: "open"}[mode[1][self.index]]
+            return "lock" if mode[0][self.number] == 0 else "slip"
+        return {1: "drive", -1: "coast", 0: "open"}[mode[1][self.number]]
 
 
 def margins(dynamics: Dynamics, mode: Mode, x: np.ndarray, u: np.ndarray, capacity: np.ndarray) -> list[float]:
@@ -123,25 +123,25 @@ def switch(dynamics: Dynamics, mode: Mode, found: Found, x: np.ndarray) -> Mode:
     momentum."""
     signs, gaps = list(mode[0]), list(mode[1])
     if found.kind == "gap":
-        s = float(dynamics.extension[dynamics.gaps[found.index]] @ x[: dynamics.n])
-        backlash = dynamics.network.springs[dynamics.gaps[found.index]].backlash
-        gaps[found.index] = 0 if gaps[found.index] else (1 if s > -0.5 * backlash else -1)
+        s = float(dynamics.extension[dynamics.gaps[found.number]] @ x[: dynamics.n])
+        backlash = dynamics.network.springs[dynamics.gaps[found.number]].backlash
+        gaps[found.number] = 0 if gaps[found.number] else (1 if s > -0.5 * backlash else -1)
         return tuple(signs), tuple(gaps)
     at_rest = [k for k, sign in enumerate(signs) if sign == 0]
-    if signs[found.index] == 0:
-        at_rest.remove(found.index)
+    if signs[found.number] == 0:
+        at_rest.remove(found.number)
         torque = _stick_torque(dynamics, mode, found)
-        signs[found.index] = 1 if torque > 0 else -1
-        _stop(dynamics, x, [found.index, *at_rest])
+        signs[found.number] = 1 if torque > 0 else -1
+        _stop(dynamics, x, [found.number, *at_rest])
     else:
-        at_rest.append(found.index)
+        at_rest.append(found.number)
         _stop(dynamics, x, at_rest)
     return resolve(dynamics, (tuple(signs), tuple(gaps)), sorted(at_rest), x, found.u, found.capacity)
 
 
 def _stick_torque(dynamics: Dynamics, mode: Mode, found: Found) -> float:
     m, n_c = dynamics.matrices(mode), dynamics.n_clutches
-    row = len(m.c) - 2 * n_c + found.index
+    row = len(m.c) - 2 * n_c + found.number
     return float(m.c[row] @ found.x + m.d[row] @ found.u)
 
 

@@ -209,7 +209,7 @@ class FmuUnit:
                 groups.append(_Group(call, references, c_void_p(view.ctypes.data), view, np.array(places)))
         return FmuHandle(tuple(groups), buffer, len(groups) == 1 and groups[0].view is buffer)
 
-    def set(self, handle: FmuHandle, values: Sequence[float]) -> None:
+    def set(self, handle: FmuHandle, values: Sequence[float] | np.ndarray) -> None:
         """Set variables, one call a type. Raises FmuError when the FMU refuses a value."""
         handle.buffer[:] = values
         for group in handle.groups:
@@ -298,4 +298,6 @@ def outcome_of(message: str) -> str:
 
 
 def _address(function: Any) -> int:
-    return cast(function, c_void_p).value
+    found = cast(function, c_void_p).value
+    assert found is not None, "a function of a loaded library has an address"
+    return found

@@ -79,9 +79,9 @@ class KernelUnit:
             raise CouplingError(f"{self.kernel.name}: no variable {', '.join(unknown)}; it has {', '.join(known)}")
         values = (ctypes.c_double * max(len(names), 1))()
         references = (ctypes.c_uint32 * len(names))(*[known[name].reference for name in names])
-        return KernelHandle(tuple(names), references, values, np.frombuffer(values, count=len(names)))
+        return KernelHandle(tuple(names), references, values, np.ctypeslib.as_array(values)[: len(names)])
 
-    def set(self, handle: KernelHandle, values: Sequence[float]) -> None:
+    def set(self, handle: KernelHandle, values: Sequence[float] | np.ndarray) -> None:
         """Inputs for the next step."""
         handle.buffer[:] = values
         if self.kernel.set_many(handle.references, handle.values):

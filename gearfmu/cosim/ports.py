@@ -107,7 +107,7 @@ class SmoothPorts(Ports):
         """Rows that make φ, w and the acceleration ahead of [x, u at the start, u at the end]."""
         d = self._unit.dynamics
         step, self._h = d.transition(self._unit.state.mode, h), h
-        rows = np.zeros((3 * len(self._nodes), step.shape[1]))
+        rows: np.ndarray = np.zeros((3 * len(self._nodes), step.shape[1]))
         for k, node in enumerate(self._nodes):
             rows[3 * k, node] = rows[3 * k + 1, d.n + node] = 1.0
             rows[3 * k + 2] = 2.0 * (step[node] - rows[3 * k] - h * rows[3 * k + 1]) / h**2

@@ -128,7 +128,8 @@ class NetworkLog:
     """Outputs of a network at many times: `take` keeps the state, `rows` makes the values of all of them at once."""
 
     def __init__(self, outputs: Outputs, names: Sequence[str], state: Callable[[], State]) -> None:
-        self._outputs, self._state, self._kept = outputs, state, []
+        self._outputs, self._state = outputs, state
+        self._kept: list[State] = []
         self._places = [outputs.position[name] for name in names]
 
     def take(self) -> None:

@@ -151,7 +151,7 @@ class PyUnit:
         """Keeps these outputs at up to `points` times."""
         return NetworkLog(self._outputs, names, lambda: self._state)
 
-    def set(self, handle: Handle, values: Sequence[float]) -> None:
+    def set(self, handle: Handle, values: Sequence[float] | np.ndarray) -> None:
         """Inputs for the next step."""
         if handle.inputs is None:
             raise CouplingError(f"not all of {', '.join(handle.names)} are inputs")
@@ -183,6 +183,7 @@ class PyUnit:
         if key not in self._output_rows:
             m, states = self.dynamics.matrices(self._state.mode), self.dynamics.states
             rows = np.zeros((len(handle.names), states + self.dynamics.inputs))
+            assert handle.outputs is not None, "`get` refuses others"
             linear = np.setdiff1d(np.arange(len(handle.names)), handle.special)
             rows[linear] = np.hstack([m.c, m.d])[handle.outputs[linear]]
             self._output_rows[key] = rows if rows[:, states:].any() else np.ascontiguousarray(rows[:, :states])

@@ -15,7 +15,7 @@ from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, shafts_of, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
-from gearfmu.cosim.source import Source
+from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
@@ -78,7 +78,7 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))
 
 
-def run_once(scene: SceneSpec, source: Source, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
+def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected."""
     shafts, choice = shafts_of(source.model.spec), scene.stage
     parameters = {

@@ -6,7 +6,8 @@ The interior is factorised once, real, with both cuts held, and condensed onto t
     S = K_BB − K_BI K_II⁻¹ K_IB,   S_ν = S_mm + S_pp + e^{iθ} S_mp + e^{−iθ} S_pm,
 so that each harmonic costs a dense system of the size of one cut. S_ν is singular only for ν = 0 and 1, by the rigid
 motions, which are known. A sector that is its own mirror image about mid-width (z → −z) splits once more, exactly,
-into symmetric and antisymmetric fields. Source: Thomas, Int. J. Numer. Meth. Eng. 14 (1979) 81 (cyclic symmetry).
+into symmetric and antisymmetric fields; one of a helical gear is not and has one space of all fields. Source: Thomas,
+Int. J. Numer. Meth. Eng. 14 (1979) 81 (cyclic symmetry).
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class Sector:
     """Finite-element model of one sector, in its own frame.
 
     nodes (N, 3), m; elements (E, 20); stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired
-    nodes.
+    nodes. helical: no mirror at mid-width is looked for.
     """
 
     nodes: np.ndarray
@@ -41,6 +42,7 @@ class Sector:
     teeth: int
     cut_minus: np.ndarray
     cut_plus: np.ndarray
+    helical: bool = False
 
 
 class SectorSpace:
@@ -179,7 +181,7 @@ def sector_spaces(sector: Sector) -> list[SectorSpace]:
     Raises MeshError when the cut faces do not match.
     """
     _check_cuts(sector)
-    mirror = mirror_nodes(sector.nodes)
+    mirror = None if sector.helical else mirror_nodes(sector.nodes)
     if mirror is None:
         return [SectorSpace(sector, np.arange(len(sector.nodes)), 0)]
     return [SectorSpace(sector, mirror, parity) for parity in (1, -1)]

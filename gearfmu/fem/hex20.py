@@ -120,9 +120,11 @@ def stiffness_of(spatial: np.ndarray, measure: np.ndarray, d: np.ndarray) -> np.
     for row, (a, b) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
         strain[:, :, row, :, a] = spatial[:, :, b]
         strain[:, :, row, :, b] = spatial[:, :, a]
-    strain = strain.reshape(elements, points, 6, 3 * k)
-    stress = np.matmul(d, strain) * measure[:, :, None, None]
-    k_elements = np.matmul(strain.reshape(elements, -1, 3 * k).transpose(0, 2, 1), stress.reshape(elements, -1, 3 * k))
+    of_nodes = strain.reshape(elements, points, 6, 3 * k)
+    stress = np.matmul(d, of_nodes) * measure[:, :, None, None]
+    k_elements = np.matmul(
+        of_nodes.reshape(elements, -1, 3 * k).transpose(0, 2, 1), stress.reshape(elements, -1, 3 * k)
+    )
     return 0.5 * (k_elements + k_elements.transpose(0, 2, 1))
 
 

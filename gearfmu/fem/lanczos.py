@@ -16,9 +16,14 @@ _DEPENDENT = 1e-11  # relative norm at which a new direction counts as a combina
 class Vibrating(Protocol):
     """A body as the eigensolver sees it: vectors are (n, k), real or complex."""
 
-    size: int
-    elastic: int
-    dtype: type
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def elastic(self) -> int: ...
+
+    @property
+    def dtype(self) -> type[float] | type[complex]: ...
 
     def mass(self, vectors: np.ndarray) -> np.ndarray: ...
 
@@ -52,10 +57,10 @@ class _Krylov:
 
     def __init__(self, body: Vibrating, block: int):
         self.body, self.size = body, 0
-        self.v = np.empty((body.size, 0), body.dtype, order="F")
+        self.v: np.ndarray = np.empty((body.size, 0), body.dtype, order="F")
         self.mv = self.v.copy(order="F")
-        self.t = np.zeros((0, 0), body.dtype)
-        start = np.random.default_rng(1).standard_normal((body.size, block)).astype(body.dtype)
+        self.t: np.ndarray = np.zeros((0, 0), body.dtype)
+        start: np.ndarray = np.random.default_rng(1).standard_normal((body.size, block)).astype(body.dtype)
         self.last = block
         self.next = body.flexibility(body.mass(start))
         self.grow()
@@ -95,10 +100,10 @@ class _Krylov:
         if self.size > self.v.shape[1]:
             room = 2 * self.size
             for name in ("v", "mv"):
-                larger = np.empty((self.body.size, room), self.body.dtype, order="F")
+                larger: np.ndarray = np.empty((self.body.size, room), self.body.dtype, order="F")
                 larger[:, :first] = getattr(self, name)[:, :first]
                 setattr(self, name, larger)
-            t = np.zeros((room, room), self.body.dtype)
+            t: np.ndarray = np.zeros((room, room), self.body.dtype)
             t[:first, :first] = self.t[:first, :first]
             self.t = t
         self.v[:, first : self.size], self.mv[:, first : self.size] = block, inertia

@@ -53,6 +53,13 @@ def boundary_faces(elements: np.ndarray) -> np.ndarray:
     return faces[np.sort(index[count == 1])]
 
 
+def outer_faces(elements: np.ndarray, cut_minus: np.ndarray, cut_plus: np.ndarray) -> np.ndarray:
+    """Faces (F, 8) of a sector that lie on the surface of the whole body, normals outward; cuts: node indices."""
+    faces = boundary_faces(elements)
+    on_cut = np.isin(faces, cut_minus).all(axis=1) | np.isin(faces, cut_plus).all(axis=1)
+    return faces[~on_cut]
+
+
 def faces_within(elements: np.ndarray, node_set: np.ndarray) -> np.ndarray:
     """Boundary faces all of whose eight nodes lie in `node_set`: (F, 8)."""
     faces = boundary_faces(elements)

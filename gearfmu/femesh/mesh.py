@@ -12,7 +12,8 @@ class FlankGrid:
     """One flank of tooth 0 between root form and tip form point, as element faces.
 
     quads: (Q, 8) node indices, VTK_QUADRATIC_QUAD, normal by the right-hand rule out of the tooth; roll: (Q, 8)
-    analytic roll s (m) of these nodes; z: (Q, 8) their face-width coordinate (m). Rows run along the flank (outer)
+    analytic roll s (m) of these nodes in the section at their z; z: (Q, 8) their face-width coordinate (m). Rows run
+    along the flank (outer)
     and across the width (inner): shape = (along, across). All elements have the same length along the involute and
     their mid nodes halve it: s² is linear in the element's natural coordinate.
     """
@@ -33,8 +34,10 @@ class FeMesh:
 
     nodes: (N, 3) m. elements: (E, 20) node indices, VTK_QUADRATIC_HEXAHEDRON. sets: named node indices ("bore").
     teeth: number of equal sectors of the whole body (1: this is the whole body). cut_minus, cut_plus: (C,) node
-    indices of the sector's faces at angle −π/z and +π/z; cut_plus[i] is cut_minus[i] turned by 2π/z. flank: index 0 ↔
-    sg = +1, 1 ↔ sg = −1.
+    indices of the sector's faces at angle −π/z and +π/z (at z = 0 of a helical gear); cut_plus[i] is cut_minus[i]
+    turned
+    by 2π/z. flank: index 0 ↔ sg = +1, 1 ↔ sg = −1. twist: angle by which the transverse section turns about +z per
+    metre of face width (rad/m, positive: right-handed).
     """
 
     nodes: np.ndarray
@@ -44,6 +47,7 @@ class FeMesh:
     cut_minus: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     cut_plus: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     flank: dict[int, FlankGrid] = field(default_factory=dict)
+    twist: float = 0.0
 
     def sector_nodes(self, sector: int) -> np.ndarray:
         """(N,) indices in `full().nodes` of this sector's nodes turned by `sector` teeth."""
@@ -70,6 +74,7 @@ class FeMesh:
                 for name, nodes in self.sets.items()
             },
             flank={side: grid.renumbered(index[0]) for side, grid in self.flank.items()},
+            twist=self.twist,
         )
 
 

@@ -89,10 +89,9 @@ def _blocks(ring: InternalGearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tup
     below = np.concatenate([surface[-1:], surface[-1] + across[1:] * [depth, 0.0]])
     below[-1] = core[-1]
     tooth, root = transfinite(neck, tip, flank, middle), transfinite(neck, below, surface, core)
-    sides = [core[k] + up * (outer[k] - core[k]) for k in (0, -1)]
-    for side, k in zip(sides, (0, -1), strict=True):
-        side[-1] = outer[k]
-    return tooth, root, transfinite(*sides, core, outer)
+    first, last = (core[k] + up * (outer[k] - core[k]) for k in (0, -1))
+    first[-1], last[-1] = outer[0], outer[-1]
+    return tooth, root, transfinite(first, last, core, outer)
 
 
 def _root_curve(ring: InternalGearGeometry, share: np.ndarray) -> np.ndarray:

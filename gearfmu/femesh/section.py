@@ -99,7 +99,8 @@ def _blocks(gear: GearGeometry, mesh: MeshSpec, roll: np.ndarray) -> tuple[np.nd
 
 
 def rim_parameters(height: float, depth: float, mesh: MeshSpec) -> np.ndarray:
-    """Grading through a rim of this height; its first element continues the last one of the root block, `depth` high."""
+    """Grading through a rim of this height; its first element continues the last one of the root block, `depth`
+    high."""
     across = graded(mesh.thickness, mesh.thickness_grading)
     first = depth * (across[-1] - across[-3])
     wanted = math.log1p(height / first * (mesh.rim_grading - 1)) / math.log(mesh.rim_grading)
@@ -120,7 +121,7 @@ def _fitting_growth(sum_of_series: float, terms: int) -> float:
 def root_curve(gear: GearGeometry, share: np.ndarray) -> np.ndarray:
     """Points (P, 2) from the form point over trochoid and root land to mid space, at shares of the way."""
     rounding = gear.rounding
-    tau = np.linspace(gear.alpha, math.pi / 2, 2001)
+    tau = np.linspace(rounding.alpha, math.pi / 2, 2001)
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rounding.point(tau), axis=0), axis=1))])
     land = rounding.land_angle * gear.r_f
     wanted = share * (run[-1] + land)

@@ -1,4 +1,8 @@
-"""The sector of a gear: its plane section, extruded over the face width."""
+"""The sector of a gear: its plane section, extruded over the face width, and of a helical gear turned with z.
+
+The section at z is the one at mid-width turned by z·twist, mid nodes included: every node lies on its helix, the cuts
+are helical surfaces one pitch apart.
+"""
 
 from __future__ import annotations
 
@@ -13,20 +17,24 @@ from gearfmu.spec.gear import MeshSpec
 
 
 def gear_sector(geometry: GearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """One sector of an external spur gear: tooth 0 on +x, half a space on either side, `face_width` b (m) about z = 0.
+    """One sector of an external gear: tooth 0 on +x, half a space on either side, `face_width` b (m) about z = 0.
 
-    Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. The mesh is its own mirror
-    image about z = 0 and about y = 0. MeshError when the geometry leaves no valid element.
+    Flank nodes, mid nodes included, lie on the involute of their section; the tip edge is meshed sharp. The mesh of a
+    spur gear is its own mirror image about z = 0 and about y = 0, that of a helical gear stays as it is when turned by
+    half a turn about x. MeshError when the geometry leaves no valid element.
     """
-    return sector_of(build_section(geometry, mesh), geometry.z, face_width, mesh.scaled(mesh.width), "bore")
+    section, elements = build_section(geometry, mesh), mesh.scaled(mesh.width)
+    return sector_of(section, geometry.z, face_width, elements, "bore", geometry.twist)
 
 
-def sector_of(section: Section, teeth: int, face_width: float, elements: int, held: str) -> FeMesh:
-    """A section extruded over the face width b (m) with `elements` across it; `held` names the set of its held edge.
+def sector_of(section: Section, teeth: int, face_width: float, elements: int, held: str, twist: float = 0.0) -> FeMesh:
+    """A section extruded over the face width b (m) with `elements` across it and turned by `twist` (rad/m); `held`
+    names
+    the set of its held edge.
 
     MeshError when an element is folded.
     """
-    numbers, nodes = _extruded(section, face_width, elements)
+    numbers, nodes = _extruded(section, face_width, elements, twist)
     result = FeMesh(
         nodes=nodes,
         elements=_hexahedra(section.quads, numbers),
@@ -35,6 +43,7 @@ def sector_of(section: Section, teeth: int, face_width: float, elements: int, he
         cut_minus=_column(section.cut_minus, numbers),
         cut_plus=_column(section.cut_plus, numbers),
         flank={side: _flank_grid(section, side, numbers, nodes) for side in (0, 1)},
+        twist=twist,
     )
     if not (worst := float(scaled_jacobian(result).min())) > 0:
         raise MeshError(
@@ -43,7 +52,7 @@ def sector_of(section: Section, teeth: int, face_width: float, elements: int, he
     return result
 
 
-def _extruded(section: Section, width: float, elements: int) -> tuple[np.ndarray, np.ndarray]:
+def _extruded(section: Section, width: float, elements: int, twist: float) -> tuple[np.ndarray, np.ndarray]:
     """Node index (levels, N2) of a section's node at a level, −1 where a mid level has none; node positions (N, 3)."""
     levels = 2 * elements + 1
     exists = np.zeros((levels, len(section.nodes)), dtype=bool)
@@ -52,7 +61,9 @@ def _extruded(section: Section, width: float, elements: int) -> tuple[np.ndarray
     numbers = np.where(exists, np.cumsum(exists.ravel()).reshape(exists.shape) - 1, -1)
     z = 0.5 * width * (np.arange(levels) - elements) / elements
     level, node = np.nonzero(exists)
-    return numbers, np.column_stack([section.nodes[node], z[level]])
+    x, y = section.nodes[node].T
+    c, s = np.cos(twist * z[level]), np.sin(twist * z[level])
+    return numbers, np.column_stack([c * x - s * y, s * x + c * y, z[level]])
 
 
 def _hexahedra(quads: np.ndarray, numbers: np.ndarray) -> np.ndarray:

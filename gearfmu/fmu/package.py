@@ -26,9 +26,14 @@ LONGEST_NAME = 40
 class Model(Protocol):
     """What export needs of a stage model (gearfmu.stage.StageModel): its name, its bytes and their hash."""
 
-    name: str
-    blob: bytes
-    hash: str
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def blob(self) -> bytes: ...
+
+    @property
+    def hash(self) -> str: ...
 
 
 def export(model: Model, path: str | Path, runtime: str = "native", platforms: Sequence[str] = ("host",)) -> Path:

@@ -15,7 +15,6 @@ from fmpy import calloc, free, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
-    byref,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
@@ -232,7 +231,7 @@ def instances(folder: str) -> Findings:
     expected = _plain_run(folder)
     first, second = Subject(folder).initialized(), Subject(folder).initialized()
     in_turn = [(first.run(1), second.run(1)) for _ in range(STEPS)]
-    if any(b"".join(bits) != expected for bits in zip(*in_turn)):
+    if any(b"".join(bits) != expected for bits in zip(*in_turn, strict=True)):
         yield "two instances", "the outputs differ from those of one alone", "instances must share nothing that changes"
     first.fmu.reset()
     first.time = 0

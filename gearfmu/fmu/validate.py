@@ -80,8 +80,8 @@ def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[st
     except etree.XMLSyntaxError as error:
         yield file.name, str(error), EXPORT_AGAIN
         return
-    for error in () if schema.validate(tree) else schema.error_log:
-        yield f"{file.name}:{error.line}", error.message, EXPORT_AGAIN
+    for found in () if schema.validate(tree) else schema.error_log:
+        yield f"{file.name}:{found.line}", found.message, EXPORT_AGAIN
     known = {variable.name for variable in description.modelVariables}
     for member in tree.iter("TerminalMemberVariable"):
         if member.get("variableName") not in known:

@@ -1,4 +1,4 @@
-"""One external spur gear: reference data, flank, root and cross-section."""
+"""One external gear, spur or helical: reference data, and flank, root and cross-section of its transverse section."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ _GAUSS = np.polynomial.legendre.leggauss(40)
 
 @dataclass(frozen=True)
 class GearGeometry(ReferenceGear):
-    """An external spur gear in its body frame: tooth 0 centred on +x (ISO 21771 symbols; lengths m, angles rad).
+    """An external gear in its body frame: tooth 0 centred on +x at z = 0 (ISO 21771 symbols; lengths m, angles rad).
 
-    z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient. r_b, r, r_a: base, reference and tip
-    radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding. h_fp, rho_fp: dedendum and tip rounding of
-    the basic rack (m, not factors).
+    z, m, alpha, x, beta: teeth, normal module, normal pressure angle, profile-shift coefficient, helix angle. r_b, r,
+    r_a: base, reference and tip radius. r_bore: bore radius. tip_edge: radius of the tip edge rounding in the
+    transverse section. h_fp, rho_fp: dedendum and tip rounding of the basic rack (m, not factors). Outlines are those
+    of the transverse section at mid-width.
     """
 
     r_a: float
@@ -32,13 +33,15 @@ class GearGeometry(ReferenceGear):
     rho_fp: float
 
     @classmethod
-    def of(cls, gear: Any, pair: Any) -> GearGeometry:
-        """The geometry of a GearSpec of a PairSpec."""
+    def of(cls, gear: Any, pair: Any, hand: int = 0) -> GearGeometry:
+        """The geometry of a GearSpec of a PairSpec. hand: of a helical pair, +1 for the pinion and −1 for the wheel,
+        whose hand is the opposite one (`PairGeometry.of` knows)."""
+        assert hand or not pair.helix_angle, "which gear of a helical pair is meant?"
         m = pair.normal_module
         return cls(
             z=gear.teeth, m=m, alpha=pair.pressure_angle, x=gear.profile_shift, r_a=gear.tip_diameter / 2,
             r_bore=gear.bore_diameter / 2, tip_edge=gear.tip_edge_radius,
-            h_fp=gear.rack.dedendum * m, rho_fp=gear.rack.fillet_radius * m,
+            h_fp=gear.rack.dedendum * m, rho_fp=gear.rack.fillet_radius * m, beta=hand * pair.helix_angle + 0.0,
         )  # fmt: skip
 
     @property
@@ -50,13 +53,15 @@ class GearGeometry(ReferenceGear):
     def rounding(self) -> RackRounding:
         """The rack's tip rounding that generates the root."""
         height = self.h_fp - self.rho_fp
+        offset = self.m * math.pi / 4 - height * math.tan(self.alpha) - self.rho_fp / math.cos(self.alpha)
         return RackRounding(
             r=self.r,
-            alpha=self.alpha,
+            alpha=self.alpha_t,
             centre_depth=height - self.x * self.m,
-            centre_offset=self.m * math.pi / 4 - height * math.tan(self.alpha) - self.rho_fp / math.cos(self.alpha),
+            centre_offset=offset / math.cos(self.beta),
             radius=self.rho_fp,
             half_pitch=self.half_pitch,
+            stretch=1 / math.cos(self.beta),
         )
 
     @property
@@ -90,7 +95,7 @@ class GearGeometry(ReferenceGear):
         return involute.flank_point(roll, self.r_b, self.psi_b, sg)
 
     def flank_normal(self, roll: ArrayLike, sg: int = 1) -> np.ndarray:
-        """Unit normals (..., 2) out of tooth 0."""
+        """Unit normals (..., 2) out of tooth 0 in the transverse section."""
         return involute.flank_normal(roll, self.r_b, self.psi_b, sg)
 
     def thickness_angle(self, radius: ArrayLike) -> np.ndarray:
@@ -109,7 +114,7 @@ class GearGeometry(ReferenceGear):
         few = max(points // 4, 2)
         rounding = self.rounding
         land = self.half_pitch - rounding.land_angle * np.linspace(0, 1, few, endpoint=False)
-        tau = np.linspace(math.pi / 2, self.alpha, points, endpoint=False)
+        tau = np.linspace(math.pi / 2, self.alpha_t, points, endpoint=False)
         roll = np.linspace(self.s_form, self.s_a, points, endpoint=False)
         tip = self.tip_half_angle * np.linspace(1, 0, few)
         root = self.r_f * np.stack([np.cos(land), np.sin(land)], axis=-1)
@@ -131,25 +136,16 @@ class GearGeometry(ReferenceGear):
         return float(0.5 * (high - low) * np.dot(_GAUSS[1], values))
 
     def _root_moment(self, power: int) -> float:
-        edges = np.linspace(self.alpha, math.pi / 2, 5)
+        edges = np.linspace(self.alpha_t, math.pi / 2, 5)
         total = 0.0
         for low, high in zip(edges[:-1], edges[1:], strict=True):
             tau = 0.5 * (low + high) + 0.5 * (high - low) * _GAUSS[0]
             total += (
                 0.5
                 * (high - low)
-                * float(np.dot(_GAUSS[1], self.rounding.polar(tau)[0] ** power * self._root_slope(tau)))
+                * float(np.dot(_GAUSS[1], self.rounding.polar(tau)[0] ** power * self.rounding.angle_slope(tau)))
             )
         return total
-
-    def _root_slope(self, tau: np.ndarray) -> np.ndarray:
-        """dθ/dτ of the trochoid (θ from the tooth's middle)."""
-        g = self.rounding
-        sin, cos = np.sin(tau), np.cos(tau)
-        across, up = g.radius * cos + g.centre_depth * cos / sin, g.r - g.centre_depth - g.radius * sin
-        d_across, d_up = -g.radius * sin - g.centre_depth / sin**2, -g.radius * cos
-        turn = g.centre_depth / sin**2 / g.r
-        return -((d_across * up - across * d_up) / (across**2 + up**2) + turn)
 
     @property
     def sector_area(self) -> float:

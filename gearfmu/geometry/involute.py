@@ -77,3 +77,9 @@ def flank_normal(roll: ArrayLike, r_b: float, psi_b: float, sg: int = 1) -> np.n
     """Unit normals (..., 2) out of the tooth: sg·e_t(t), e_t(t) = (−sin t, cos t), t = sg (ψ_b − s/r_b)."""
     direction = psi_b - np.asarray(roll, float) / r_b
     return np.stack([-np.sin(direction), sg * np.cos(direction)], axis=-1)
+
+
+def flank_tangent(roll: ArrayLike, r_b: float, psi_b: float, sg: int = 1) -> np.ndarray:
+    """Unit tangents (..., 2) of the flank towards growing roll: e_r(t) = (cos t, sin t), t = sg (ψ_b − s/r_b)."""
+    direction = psi_b - np.asarray(roll, float) / r_b
+    return np.stack([np.cos(direction), sg * np.sin(direction)], axis=-1)

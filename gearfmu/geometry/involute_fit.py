@@ -8,6 +8,7 @@ points lie on the involutes, in the mean square of the distance along the normal
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,7 +136,9 @@ def fit_involute(given: FlankPoints, teeth: int, r_b: float) -> InvoluteFit:
     return InvoluteFit(teeth, float(x[0] * scale), float(x[1]), phase, origin, direction, found.fun * scale)
 
 
-def _first_angles(residual, start: np.ndarray, side: np.ndarray, scale: float, r_b: float) -> tuple[float, float]:
+def _first_angles(
+    residual: Callable[[np.ndarray], np.ndarray], start: np.ndarray, side: np.ndarray, scale: float, r_b: float
+) -> tuple[float, float]:
     """ψ_b and φ that centre both sides at the first base radius."""
     miss = residual(start) * scale / r_b * side
     mean = {sg: float(np.angle(np.exp(1j * miss[side == sg]).mean())) for sg in (1, -1)}

@@ -1,4 +1,5 @@
-"""A pair of external spur gears at its working centre distance (ISO 21771)."""
+"""A pair of external gears, spur or helical, at its working centre distance (ISO 21771): transverse sections at z =
+0."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from gearfmu.geometry.gear import GearGeometry
 class PairGeometry:
     """Pinion and wheel at centre distance `a` (m) with circumferential backlash j_wt (m) on the working pitch circles.
 
-    Rolls along the path of contact are those of gear 0; the other gear's is `length` − s. Gears must reach each
+    Gears of a helical pair have helix angles of opposite sign. Rolls along the path of contact are those of gear 0;
+    the other gear's is `length` − s. Gears must reach each
     other's base circles' common tangent: a > r_b1 + r_b2 (ValueError otherwise).
     """
 
@@ -29,12 +31,12 @@ class PairGeometry:
     @classmethod
     def of(cls, stage: Any) -> PairGeometry:
         """The geometry of a StageSpec."""
-        gears = tuple(GearGeometry.of(gear, stage.pair) for gear in stage.gears)
-        return cls(gears=gears, a=stage.pair.center_distance, backlash=stage.pair.backlash)
+        pinion, wheel = (GearGeometry.of(g, stage.pair, hand) for g, hand in zip(stage.gears, (1, -1), strict=True))
+        return cls(gears=(pinion, wheel), a=stage.pair.center_distance, backlash=stage.pair.backlash)
 
     @property
     def alpha_wt(self) -> float:
-        """Working pressure angle, rad."""
+        """Working transverse pressure angle, rad."""
         return math.atan2(self.length, self.gears[0].r_b + self.gears[1].r_b)
 
     @property
@@ -51,8 +53,12 @@ class PairGeometry:
 
     @property
     def base_pitch(self) -> float:
-        """p_et = π m cos α, m."""
-        return math.pi * self.gears[0].m * math.cos(self.gears[0].alpha)
+        """Transverse base pitch p_bt = p_et = π m_t cos α_t, m."""
+        return math.pi * self.gears[0].m_t * math.cos(self.gears[0].alpha_t)
+
+    def overlap_ratio(self, face_width: float) -> float:
+        """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
+        return face_width * math.sin(abs(self.gears[0].beta)) / (math.pi * self.gears[0].m)
 
     def opposite(self, roll: float) -> float:
         """Roll (m) on the other gear at the contact point that has `roll` (m) on this one."""
@@ -96,8 +102,8 @@ class PairGeometry:
 
     @property
     def normal_backlash(self) -> float:
-        """Gap (m) of the coast flanks along their line of action while the drive flanks touch, j_bn = j_wt cos α_wt."""
-        return self.backlash * math.cos(self.alpha_wt)
+        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
+        return self.backlash * math.cos(self.alpha_wt) * math.cos(self.gears[0].beta_b)
 
     @property
     def backlash_angles(self) -> tuple[float, float]:
@@ -118,7 +124,7 @@ class PairGeometry:
     def zero_backlash_center_distance(self) -> float:
         """Centre distance (m) at which the nominal teeth would have no backlash."""
         first, second = self.gears
-        inv_w = float(involute.inv(first.alpha)) + 2 * (first.x + second.x) * math.tan(first.alpha) / (
+        inv_w = float(involute.inv(first.alpha_t)) + 2 * (first.x + second.x) * math.tan(first.alpha) / (
             first.z + second.z
         )
         return (first.r_b + second.r_b) / math.cos(involute.inverse_inv(max(inv_w, 0.0)))

@@ -1,4 +1,5 @@
-"""The C kernel and the only ctypes of the project: `Kernel` runs one instance of a stage model (src/gk.h is the contract)."""
+"""The C kernel and the only ctypes of the project: `Kernel` runs one instance of a stage model (src/gk.h is the
+contract)."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from gearfmu.errors import ModelError
 from gearfmu.kernel.build import library_path
 
-ABI = 1
+ABI = 2
 MESSAGE = 512
 OUTCOMES = (
     "ok",
@@ -57,16 +57,20 @@ _SIGNATURES = {
     "gk_variable": (c_int, [c_void_p, c_int, POINTER(VariableInfo)]),
     "gk_setup_size": (c_size_t, [c_void_p]),
     "gk_data_size": (c_size_t, [c_void_p]),
+    "gk_work_size": (c_size_t, [c_void_p]),
     "gk_defaults": (c_int, [c_void_p, c_void_p]),
     "gk_set": (c_int, [c_void_p, c_void_p, c_uint32, c_double]),
     "gk_get": (c_int, [c_void_p, c_void_p, c_uint32, POINTER(c_double)]),
     "gk_set_many": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t, c_void_p]),
     "gk_get_many": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t, c_void_p]),
-    "gk_prepare": (c_int, [c_void_p, c_void_p, c_void_p, c_char_p]),
-    "gk_initialize": (c_int, [c_void_p, c_void_p, c_void_p, c_double]),
-    "gk_step": (c_int, [c_void_p, c_void_p, c_void_p, c_double, c_double]),
+    "gk_prepare": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_char_p]),
+    "gk_initialize": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_double]),
+    "gk_step": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double]),
     "gk_time": (c_double, [c_void_p]),
-    "gk_te": (c_int, [c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, POINTER(c_double), POINTER(c_int)]),
+    "gk_te": (
+        c_int,
+        [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, POINTER(c_double), POINTER(c_int)],
+    ),
     "gk_profile": (c_int, [c_void_p, c_int, POINTER(c_char_p), POINTER(c_uint64)]),
     "gk_state_size": (c_size_t, [c_void_p]),
     "gk_state_check": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t]),
@@ -75,20 +79,23 @@ _SIGNATURES = {
 
 @lru_cache(maxsize=8)
 def load(path: Path | None = None) -> ctypes.CDLL:
-    """The library at `path` (default: the built one), symbols kept to itself; ModelError when it speaks another gk.h."""
+    """The library at `path` (default: the built one), symbols kept to itself; ModelError when it speaks another
+    gk.h."""
     library = ctypes.CDLL(str(path or library_path()))
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
     if library.gk_abi() != ABI:
         raise ModelError(
-            f"{path or library_path()} speaks version {library.gk_abi()} of the kernel interface, this Python {ABI}: reinstall gearfmu"
+            f"{path or library_path()} speaks version {library.gk_abi()} of the kernel interface, this Python {ABI}: "
+            "reinstall gearfmu"
         )
     return library
 
 
 def aligned(size: int) -> tuple[ctypes.Array, int]:
-    """A zeroed buffer of `size` bytes whose returned address is a multiple of 64; keep the buffer as long as the address."""
+    """A zeroed buffer of `size` bytes whose returned address is a multiple of 64; keep the buffer as long as the
+    address."""
     buffer = ctypes.create_string_buffer(size + 64)
     address = ctypes.addressof(buffer)
     return buffer, address + (-address) % 64

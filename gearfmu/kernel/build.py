@@ -1,4 +1,5 @@
-"""Builds the one shared library of the project from the C files below gearfmu/kernel/src: the gk_ API and the FMI 2 entry points.
+"""Builds the one shared library of the project from the C files below gearfmu/kernel/src: the gk_ API and the FMI 2
+entry points.
 
 One source list, one set of flags (docs/architecture.md, Kernel): contraction of products and sums is off and there is
 no fast-math, so that gcc, clang and zig, Linux and Windows give the same bits. `-Bsymbolic` and hidden visibility keep

@@ -16,7 +16,7 @@ SLICES = 10
 
 @dataclass(frozen=True)
 class Variable:
-    """One row of the kernel's table of variables (src/gk_variables.inc)."""
+    """One row of the kernel's table of variables (src/model/gk_variables.inc)."""
 
     reference: int
     name: str
@@ -32,7 +32,8 @@ class Variable:
 
 @dataclass(frozen=True)
 class TeState:
-    """Quasi-static transmission at one position: te (m); forces (N) of the slices, keyed (flank 0 drive 1 coast, tooth number of the pinion)."""
+    """Quasi-static transmission at one position: te (m); forces (N) of the slices, keyed (flank 0 drive 1 coast,
+    tooth number of the pinion)."""
 
     te: float
     forces: dict[tuple[int, int], tuple[float, ...]]
@@ -41,8 +42,8 @@ class TeState:
 class Kernel:
     """A stage model with its own parameters, state and time.
 
-    blob: bytes of a StageModel. parameters: values of causality "parameter" by name. library: another build of the kernel.
-    ModelError: the blob or a parameter is refused, with the kernel's message.
+    blob: bytes of a StageModel. parameters: values of causality "parameter" by name. library: another build of the
+    kernel. ModelError: the blob or a parameter is refused, with the kernel's message.
     """
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float] | None = None, library: Path | None = None):
@@ -54,6 +55,7 @@ class Kernel:
         if self._lib.gk_model_open(self._model, self._blob, len(blob), message):
             raise ModelError(message.value.decode(errors="replace"))
         self._setup_keep, self._setup = aligned(self._lib.gk_setup_size(self._model))
+        self._work_keep, self._work = aligned(self._lib.gk_work_size(self._model))
         self._data_keep, self._data = aligned(self._lib.gk_data_size(self._model))
         self._set_many, self._get_many = self._lib.gk_set_many, self._lib.gk_get_many
         self._lib.gk_defaults(self._model, self._data)
@@ -110,7 +112,8 @@ class Kernel:
         if outcome:
             variable = self.variables[name]
             raise ModelError(
-                f"{name} = {value!r}: {self._text(outcome)} (between {variable.minimum:g} and {variable.maximum:g} {variable.unit})"
+                f"{name} = {value!r}: {self._text(outcome)} (between {variable.minimum:g} and {variable.maximum:g} "
+                f"{variable.unit})"
             )
 
     def get(self, name: str) -> float:
@@ -136,9 +139,10 @@ class Kernel:
         return self._get_many(self._model, self._data, references, len(references), values)
 
     def prepare(self) -> None:
-        """Fix level, effects and step. ModelError when the wished h is too large; `warning` holds what the kernel wants said."""
+        """Fix level, effects and step. ModelError when the wished h is too large; `warning` holds what the kernel
+        wants said."""
         message = blank_message()
-        outcome = self._lib.gk_prepare(self._model, self._data, self._setup, message)
+        outcome = self._lib.gk_prepare(self._model, self._data, self._setup, self._work, message)
         self.warning = message.value.decode(errors="replace")
         if outcome:
             raise ModelError(self.warning or self._text(outcome))
@@ -146,17 +150,19 @@ class Kernel:
     def initialize(self, time: float = 0.0) -> None:
         """Prepare and start from static equilibrium. SimulationError(no_equilibrium) when there is none."""
         self.prepare()
-        self._check(self._lib.gk_initialize(self._model, self._setup, self._data, time))
+        self._check(self._lib.gk_initialize(self._model, self._setup, self._work, self._data, time))
 
     def step(self, time: float, h: float) -> None:
-        """One communication step from `time` over `h` (s). SimulationError with the named outcome; the state then stands at `self.time`."""
-        outcome = self._lib.gk_step(self._model, self._setup, self._data, time, h)
+        """One communication step from `time` over `h` (s). SimulationError with the named outcome; the state then
+        stands at `self.time`."""
+        outcome = self._lib.gk_step(self._model, self._setup, self._work, self._data, time, h)
         if outcome:
             self._check(outcome)
 
     def try_step(self, time: float, h: float) -> int:
-        """Fast road: outcome number of gk_step. With h = NaN it is refused before anything is done: what the call alone costs."""
-        return self._lib.gk_step(self._model, self._setup, self._data, time, h)
+        """Fast road: outcome number of gk_step. With h = NaN it is refused before anything is done: what the call
+        alone costs."""
+        return self._lib.gk_step(self._model, self._setup, self._work, self._data, time, h)
 
     def save(self) -> bytes:
         """The state: a copy of its bytes."""
@@ -166,17 +172,19 @@ class Kernel:
         """Take a state of this model and setup back. ModelError when the bytes cannot be one."""
         if self._lib.gk_state_check(self._model, self._setup, state, len(state)):
             raise ModelError(
-                "these bytes are not a state of this model at this level: save and restore with the same model and parameters"
+                "these bytes are not a state of this model at this level: save and restore with the same model and "
+                "parameters"
             )
         ctypes.memmove(self._data, state, len(state))
 
     def transmission(self, phi_wheel: float, torque: float, keep: bool = False) -> TeState:
-        """Quasi-static equilibrium with the wheel's bore held at phi_wheel (rad) and `torque` (N·m) on the pinion's bore; after `prepare`."""
+        """Quasi-static equilibrium with the wheel's bore held at phi_wheel (rad) and `torque` (N·m) on the pinion's
+        bore; after `prepare`."""
         out = (ctypes.c_double * (1 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
         self._check(
             self._lib.gk_te(
-                self._model, self._setup, self._data, phi_wheel, torque, int(keep), out, ctypes.byref(count)
+                self._model, self._setup, self._work, self._data, phi_wheel, torque, int(keep), out, ctypes.byref(count)
             )
         )
         slices = int(self.get("slices"))
@@ -184,10 +192,12 @@ class Kernel:
         return TeState(out[0], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
 
     def profile(self) -> dict[str, int]:
-        """Processor cycles by phase of the step since `prepare`; zeros unless the library was built with -DGK_PROFILE."""
-        found, name, cycles = {}, ctypes.c_char_p(), ctypes.c_uint64()
-        while self._lib.gk_profile(self._setup, len(found), ctypes.byref(name), ctypes.byref(cycles)):
-            found[name.value.decode()] = cycles.value
+        """Processor cycles by phase of the step since `prepare`; zeros unless the library was built with
+        -DGK_PROFILE."""
+        found: dict[str, int] = {}
+        name, cycles = ctypes.c_char_p(), ctypes.c_uint64()
+        while self._lib.gk_profile(self._work, len(found), ctypes.byref(name), ctypes.byref(cycles)):
+            found[(name.value or b"").decode()] = cycles.value
         return found
 
     def _text(self, outcome: int) -> str:

@@ -42,7 +42,7 @@ def cyclic_modes(
     if progress:
         progress("finite elements", 0.2)
     spaces = sector_spaces(
-        Sector(mesh.nodes, mesh.elements, stiffness, mass, mesh.teeth, mesh.cut_minus, mesh.cut_plus)
+        Sector(mesh.nodes, mesh.elements, stiffness, mass, mesh.teeth, mesh.cut_minus, mesh.cut_plus, bool(mesh.twist))
     )
     faces, index = outer_faces(mesh), [mesh.sector_nodes(tooth) for tooth in range(mesh.teeth)]
     used, local = np.unique(np.concatenate([numbers[faces] for numbers in index]), return_inverse=True)
@@ -82,9 +82,7 @@ def _turned(nodes: np.ndarray, shape: np.ndarray, component: int) -> np.ndarray:
 
 def outer_faces(mesh: FeMesh) -> np.ndarray:
     """Faces (F, 8) of a sector that lie on the surface of the whole body, normals outward."""
-    faces = surface.boundary_faces(mesh.elements)
-    on_cut = np.isin(faces, mesh.cut_minus).all(axis=1) | np.isin(faces, mesh.cut_plus).all(axis=1)
-    return faces[~on_cut]
+    return surface.outer_faces(mesh.elements, mesh.cut_minus, mesh.cut_plus)
 
 
 def unfolded(shape: np.ndarray, cyclic_index: int, index: list[np.ndarray]) -> np.ndarray:

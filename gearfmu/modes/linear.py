@@ -23,7 +23,8 @@ from numpy.polynomial.legendre import Legendre
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import PortSpec, StageSpec
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.model import FIXED_K
 from gearfmu.stage.tables import BORE, excited_modes, resampling, symmetric_functions
@@ -127,7 +128,7 @@ def _gear(
                   body, chosen, tooth)
         for (tooth, place), c in zip(places, contacts, strict=True)
     ]  # fmt: skip
-    modal = np.vstack([*flank, body.bore_rows[np.ix_(BORE, chosen)]])
+    modal = np.vstack([*flank, body.bore_rows[np.ix_(np.array(BORE), chosen)]])
     rows = np.hstack([np.vstack([np.tile(rigid, (len(contacts), 1)), np.eye(3)]), modal])
     omega = 2 * np.pi * body.frequency[chosen]
     static = _static(body, degrees, places, weights[[c.slice for c in contacts]])
@@ -284,10 +285,13 @@ def _held(spec: StageSpec, system: Linearised, masses: Sequence[float], contacts
             own[at + 2], dashpot[at + 2] = 1 / port.chain.shaft_k, port.chain.shaft_c
             chains.append((at + 2, port))
         elif port.kind != "torque":
-            own[at + 2] = 1 / (port.k if port.kind == "spring" else FIXED_K)
-            dashpot[at + 2] = port.c if port.kind == "spring" else 0.0
+            own[at + 2], dashpot[at + 2] = 1 / FIXED_K, 0.0
+            if port.kind == "spring":
+                assert port.k is not None and port.c is not None
+                own[at + 2], dashpot[at + 2] = 1 / port.k, port.c
     rows, mass = system.rows, system.mass
     for row, port in chains:
+        assert port.chain is not None and port.k is not None and port.c is not None
         rows = np.hstack([rows, np.zeros((len(rows), 1))])
         rows[row, -1] = -1.0
         rows = np.vstack([rows, np.eye(rows.shape[1])[-1:]])

@@ -42,13 +42,13 @@ def whole_modes(
 
 def at_nodes(body: FullOrder, vector: np.ndarray, nodes: np.ndarray, slaves: dict[str, np.ndarray]) -> np.ndarray:
     """Displacement (N, 3) of all nodes from the unknowns (n,) of the body: slaves move with their masters."""
-    shape = np.full(nodes.size, np.nan)
+    flat = np.full(nodes.size, np.nan)
     free = body.node_of_dof < len(nodes)
     numbers = body.node_of_dof[free]
     _, first = np.unique(numbers, return_index=True)
     component = np.arange(len(numbers)) - first[np.searchsorted(numbers[first], numbers)]
-    shape[3 * numbers + component] = vector[free]
-    shape = shape.reshape(-1, 3)
+    flat[3 * numbers + component] = vector[free]
+    shape = flat.reshape(-1, 3)
     for interface in body.interfaces:
         if interface.kind == "rigid":
             mine = slaves[interface.name]
@@ -60,7 +60,7 @@ def at_nodes(body: FullOrder, vector: np.ndarray, nodes: np.ndarray, slaves: dic
 def _mode(
     mesh: FeMesh, mass: sp.csr_array, shapes: np.ndarray, used: np.ndarray, frequency: float, numbers: tuple[int, ...]
 ) -> Mode:
-    shares = sum(harmonic_shares(mesh.nodes[used], shape[used]) for shape in shapes) / len(shapes)
+    shares = np.mean([harmonic_shares(mesh.nodes[used], shape[used]) for shape in shapes], axis=0)
     energy = np.mean([energy_shares(mesh.nodes, mass, shape) for shape in shapes], axis=0)
     return Mode(
         numbers=numbers,

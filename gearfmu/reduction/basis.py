@@ -27,6 +27,12 @@ class Size:
     tolerance: float | None = None
     band: tuple[float, float] = BAND
 
+    @property
+    def vectors(self) -> int:
+        """`count` of a size that was given by number."""
+        assert self.count is not None
+        return self.count
+
     def __post_init__(self) -> None:
         if (self.count is None) == (self.tolerance is None):
             raise BodyError("size: give the number of vectors or a tolerance, one of them")

@@ -10,7 +10,6 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from gearfmu.fem import surface
-from gearfmu.fem.cyclic import mirror_nodes
 
 
 @dataclass(frozen=True)
@@ -40,15 +39,12 @@ class Outline:
 
 
 def outline(drawn: Any, nodes: np.ndarray) -> Outline:
-    """Surface of the coarse sector mesh `drawn`: both end faces, and one quad across the width along the contour.
+    """Surface of the coarse sector mesh `drawn`: the corners of its outer faces.
 
     nodes (N, 3): the finite-element mesh of the same sector, from whose four nearest nodes the points take their
     displacement (inverse squares of the distance: good enough to look at).
     """
-    end, mirror = _end_face(drawn), mirror_nodes(drawn.nodes)
-    edges = _contour(end, drawn)
-    side = np.stack([edges[:, 1], edges[:, 0], mirror[edges[:, 0]], mirror[edges[:, 1]]], axis=1)
-    quads = np.concatenate([end, mirror[end][:, ::-1], side])
+    quads = surface.outer_faces(drawn.elements, drawn.cut_minus, drawn.cut_plus)[:, :4]
     stand_in = np.arange(len(drawn.nodes))
     stand_in[drawn.cut_plus] = drawn.cut_minus
     used, local = np.unique(stand_in[quads], return_inverse=True)
@@ -89,18 +85,3 @@ def _turned(vectors: np.ndarray) -> np.ndarray:
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = vectors[..., 0], vectors[..., 1]
     return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1)
-
-
-def _end_face(mesh: Any) -> np.ndarray:
-    top = mesh.nodes[:, 2].max()
-    corners = surface.boundary_faces(mesh.elements)[:, :4]
-    return corners[(mesh.nodes[corners, 2] > top - 1e-9 * np.ptp(mesh.nodes)).all(axis=1)]
-
-
-def _contour(quads: np.ndarray, mesh: Any) -> np.ndarray:
-    """Directed edges of the end face that belong to one quad and do not lie on a cut: (E, 2)."""
-    edges = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, index, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    edges = edges[index[count == 1]]
-    on_cut = np.isin(edges, mesh.cut_minus).all(axis=1) | np.isin(edges, mesh.cut_plus).all(axis=1)
-    return edges[~on_cut]

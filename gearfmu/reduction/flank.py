@@ -2,14 +2,21 @@
 
 The load of roll point s, width function a has the density (1/b) P_a(2z/b) across the face width and 1/L along the
 involute's arc length σ = s²/(2 r_b), over the strip |σ − σ(s)| ≤ w clipped at form circle and tip (L: the length that
-is left). It acts along the outward normal of the analytic involute. Integration runs over the quadratic surface
+is left). It acts along the outward normal of the analytic flank, or along the profile. A helical flank is the same
+involute in every transverse section, turned by z·twist: roll, strip and profile direction are those of the section at
+z, and the normal has an axial component,
+    n = cos β_b n_t(s, z) − sg sin β_b e_z,     e_p = e_r(t) turned by z·twist    (β_b > 0: right-handed).
+e_p points to growing roll, lies in the transverse plane and in the flank, square to n: the direction in which flanks of
+gears on parallel axes slide on each other. Integration runs over the quadratic surface
 elements, split exactly where the strip begins and ends, so that the rows are smooth in s, and over the roll (dσ = s
 ds/r_b), in which positions and normals are smooth down to the base circle.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +32,8 @@ _GAUSS_WIDTH = np.polynomial.legendre.leggauss(6)
 class ToothFlank:
     """The involute flanks of tooth 0 and their load strips (m, rad): base radius, half tooth-thickness angle at the
     base circle (of the space for an internal gear), form and tip roll, face width, half-width of the strip in arc
-    length. An internal gear's form roll is its larger one, and its normals point the other way."""
+    length. An internal gear's form roll is its larger one, and its normals point the other way. base_helix_angle: β_b,
+    positive for a right-handed gear."""
 
     r_b: float
     psi_b: float
@@ -34,6 +42,7 @@ class ToothFlank:
     face_width: float
     strip_half_width: float
     internal: bool = False
+    base_helix_angle: float = 0.0
 
     @property
     def roll_range(self) -> tuple[float, float]:
@@ -45,11 +54,28 @@ class ToothFlank:
         arc, low, high = (np.square(s) / (2 * self.r_b) for s in (np.asarray(rolls, float), *self.roll_range))
         return np.clip(arc - self.strip_half_width, low, high), np.clip(arc + self.strip_half_width, low, high)
 
-    def normal(self, roll: np.ndarray, side: int) -> np.ndarray:
-        """Normals (…, 3) out of the material of flank index `side` (0 ↔ sg = +1) at roll (…)."""
+    def normal(self, roll: np.ndarray, side: int, z: np.ndarray | float = 0.0) -> np.ndarray:
+        """Unit normals (…, 3) out of the material of flank index `side` (0 ↔ sg = +1) at roll (…) and face-width
+        coordinate z (m, to be broadcast with the roll; of no influence on a spur gear)."""
         plane = involute.flank_normal(roll, self.r_b, self.psi_b, 1 - 2 * side)
         plane = -plane if self.internal else plane
-        return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
+        if not self.base_helix_angle:
+            return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
+        turned = self._turned(np.cos(self.base_helix_angle) * plane, z)
+        turned[..., 2] = -(1 - 2 * side) * np.sin(self.base_helix_angle)
+        return turned
+
+    def tangent(self, roll: np.ndarray, side: int, z: np.ndarray | float = 0.0) -> np.ndarray:
+        """Unit vectors e_p (…, 3) along the profile towards growing roll, arguments as of `normal`."""
+        return self._turned(involute.flank_tangent(roll, self.r_b, self.psi_b, 1 - 2 * side), z)
+
+    def _turned(self, plane: np.ndarray, z: np.ndarray | float) -> np.ndarray:
+        """Plane vectors (…, 2) of the mid-width section as vectors (…, 3) of the section at z."""
+        if not self.base_helix_angle:
+            return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
+        angle = np.tan(self.base_helix_angle) / self.r_b * np.asarray(z, float)
+        c, s, x, y = np.broadcast_arrays(np.cos(angle), np.sin(angle), plane[..., 0], plane[..., 1])
+        return np.stack([c * x - s * y, s * x + c * y, np.zeros(x.shape)], axis=-1)
 
     def chebyshev_rolls(self, count: int) -> np.ndarray:
         """Chebyshev points of the first kind on the flank, ascending: (count,), m."""
@@ -58,11 +84,22 @@ class ToothFlank:
         return 0.5 * (low + high) + 0.5 * (high - low) * x
 
 
-def flank_loads(nodes: np.ndarray, quads: np.ndarray, flank: ToothFlank, side: int, points: Points) -> np.ndarray:
+Direction = Callable[[np.ndarray, int, np.ndarray], np.ndarray]
+
+
+def flank_loads(
+    nodes: np.ndarray,
+    quads: np.ndarray,
+    flank: ToothFlank,
+    side: int,
+    points: Points,
+    direction: Direction | None = None,
+) -> np.ndarray:
     """Nodal forces of the unit loads: (R, A, 3N), N.
 
     nodes (N, 3); quads (Q, 8): the flank's surface elements, bounded by lines of constant roll and constant z.
-    Read as rows, the same numbers give the load-weighted mean displacement along the outward normal.
+    direction : unit vectors of roll, side and z, `flank.normal` when None. Read as rows, the same numbers give the
+    load-weighted mean displacement along that direction.
     Raises MeshError when the elements do not cover the flank from form circle to tip over the face width.
     """
     patch = _Patch.of(nodes, quads, flank)
@@ -75,13 +112,17 @@ def flank_loads(nodes: np.ndarray, quads: np.ndarray, flank: ToothFlank, side: i
     roll = 0.5 * (start + end)[..., None] + half * _GAUSS_ROLL[0]
     xi = patch.natural(roll**2 / (2 * flank.r_b))
     along = half * _GAUSS_ROLL[1] * roll / flank.r_b / (last - first)[:, None, None]
-    normal = flank.normal(roll, side)
+    vectors = (direction or flank.normal)(roll[..., None], side, patch.z()[:, None])
     across = _width_weights(patch.width, flank.face_width, points.functions)
     grid = np.stack(np.broadcast_arrays(xi[..., None], _GAUSS_WIDTH[0]), axis=-1)
     values = surface.shape(grid.reshape(-1, 2)).reshape(*grid.shape[:-1], 8)
-    per_node = np.einsum("rqg,rqgc,qah,rqghn->raqnc", along, normal, across, values, optimize=True)
+    if vectors.shape[-2] == 1:  # the same across the width
+        per_node = np.einsum("rqg,rqgc,qah,rqghn->raqnc", along, vectors[..., 0, :], across, values, optimize=True)
+    else:
+        per_node = np.einsum("rqg,rqghc,qah,rqghn->raqnc", along, vectors, across, values, optimize=True)
     loads = np.zeros((len(points.rolls), points.functions, len(nodes), 3))
-    np.add.at(loads, (slice(None), slice(None), patch.quads), per_node)
+    places: Any = (slice(None), slice(None), patch.quads)  # numpy's types know no slices here
+    np.add.at(loads, places, per_node)
     return loads.reshape(len(points.rolls), points.functions, -1)
 
 
@@ -127,6 +168,11 @@ class _Patch:
         area = ((self.arc[:, 2] - self.arc[:, 0]) * np.abs(self.width[:, 2] - self.width[:, 0])).sum()
         if not np.isclose(area, np.ptp(self.arc) * flank.face_width, rtol=1e-6):
             raise MeshError("flank elements leave holes, overlap, or do not span the face width")
+
+    def z(self) -> np.ndarray:
+        """Face-width coordinate (Q, H) of the Gauss points across each element, m."""
+        c, b, a = (k[:, None] for k in _quadratic(self.width))
+        return c + _GAUSS_WIDTH[0] * (b + a * _GAUSS_WIDTH[0])
 
     def natural(self, arc: np.ndarray) -> np.ndarray:
         """Natural coordinate of an arc length (R, Q, G), clipped to the element."""

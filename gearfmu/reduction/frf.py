@@ -60,8 +60,8 @@ class FrfCase:
 class Series:
     """Transfer matrix of the elastic part between m ports as modes and a Taylor series of all that is not in them.
 
-    rows : (m, n) kg^-½ of the modes, frequency (n,) Hz. moments : (m, m) each, Fᵀ C (M C)^j F for j = 0, 1, …, m/N · s^2j.
-    The last six ports are the bore; rotations are lengths.
+    rows : (m, n) kg^-½ of the modes, frequency (n,) Hz. moments : (m, m) each, Fᵀ C (M C)^j F for j = 0, 1, …, m/N ·
+    s^2j. The last six ports are the bore; rotations are lengths.
     """
 
     rows: np.ndarray
@@ -83,8 +83,8 @@ def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase) -
 
 
 def compare(full: Series, reduced: Series, rigid: np.ndarray, case: FrfCase) -> FrfError:
-    """Relative error of `reduced`, cut at the wish of the case, against `full`; rigid (m, m): −Ω² times the rigid body's
-    transfer matrix, 1/kg."""
+    """Relative error of `reduced`, cut at the wish of the case, against `full`; rigid (m, m): −Ω² times the rigid
+    body's transfer matrix, 1/kg."""
     cut = _cut_in_gap(reduced.frequency, case.cut)
     kept = reduced.frequency < cut
     frequency = np.geomspace(BAND[0], _HIGHEST, _LINES)

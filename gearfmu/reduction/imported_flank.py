@@ -57,7 +57,8 @@ class FitRange:
     def radii(self, slack: float = 0.0) -> tuple[float, float]:
         """Smallest and largest radius (m) of the flank, `slack` (m) of roll wider."""
         low, high = self.flank.roll_range
-        return tuple(float(involute.radius_at_roll(s, self.flank.r_b)) for s in (low - slack, high + slack))
+        smallest, largest = involute.radius_at_roll(np.array([low - slack, high + slack]), self.flank.r_b)
+        return float(smallest), float(largest)
 
 
 def fit_flanks(nodes: np.ndarray, faces: Faces, wanted: FitRange) -> InvoluteFit:

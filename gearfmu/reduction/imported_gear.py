@@ -82,7 +82,8 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
         if cut is None and wanted.flank.internal:
             raise MeshError(
                 "a ring is taken by sectors only, for the sake of its mounts: give one sector that holds a whole tooth "
-                "space, with its matrices if they are ready-made, or a whole mesh that repeats itself from space to space"
+                "space, with its matrices if they are ready-made, or a whole mesh that repeats itself from space to "
+                "space"
             )
         if cut is None and not whole:
             raise MeshError(
@@ -98,6 +99,7 @@ def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
     """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
     found = checked_gear(source, wanted)
     with naming(Path(source.file)):
+        body: ImportedSector | WholeGear
         if found.cut is None:
             body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
         else:

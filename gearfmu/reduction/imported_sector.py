@@ -21,8 +21,9 @@ from gearfmu.reduction.sector import SectorBody, turned_sum
 class ImportedSector(SectorBody):
     """`SectorBody` on a cut of an imported mesh.
 
-    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). elastic : a material, or ready-made stiffness
-    (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh are not as they should be.
+    cut : the sector in the gear's frame. bore : its nodes on the bore (of a ring: on the rim). elastic : a material,
+    or ready-made stiffness (N/m) and mass (kg) of the free sector. Raises MeshError when flanks or bore of the mesh
+    are not as they should be.
     """
 
     def __init__(
@@ -44,8 +45,8 @@ class ImportedSector(SectorBody):
             teeth=teeth,
         )
         self.faces = solids.boundary(cut.elements)
-        ready = isinstance(elastic, tuple)
-        self.stiffness, self.mass_matrix = elastic if ready else solids.assemble(cut.nodes, cut.elements, elastic)
+        matrices = elastic if isinstance(elastic, tuple) else solids.assemble(cut.nodes, cut.elements, elastic)
+        self.stiffness, self.mass_matrix = matrices
         self.spaces = sector_spaces(
             Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
         )
@@ -62,6 +63,11 @@ class ImportedSector(SectorBody):
         if not self.internal:
             return np.zeros((0, self.cut.nodes.size))
         return averaging_rows(self.cut.nodes - self.patch_point, self.faces.within(self.bore))[:3]
+
+    @property
+    def tangent_rows(self) -> np.ndarray:
+        """Loads along the profile are made on our own meshes only: (0, 3N)."""
+        return np.zeros((0, self.cut.nodes.size))
 
     @property
     def patch_point(self) -> np.ndarray:

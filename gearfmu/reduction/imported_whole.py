@@ -46,7 +46,8 @@ def imported_gear_order(found: CheckedGear, wanted: Wanted, held: Held) -> FullO
         couplings.append(set_coupling(mesh, faces, SetInterface(BORE, held.coupling, np.zeros(3))))
         return full_order(held.name, body, couplings, Judgement((BORE,), held.length))
     names = [name for name in mesh.sets if name != BORE]
-    rows = [set_coupling(mesh, faces, SetInterface(name)).rows[:3] for name in names]
+    mounts = [set_coupling(mesh, faces, SetInterface(name)) for name in names]
+    rows = [mount.rows[:3] for mount in mounts if mount.rows is not None]
     springs = Springs(sp.csr_array(sp.vstack(rows)), np.full(3 * len(rows), held.mounts.stiffness)) if rows else None
     return full_order(held.name, body, couplings, Judgement((), held.length), springs)
 

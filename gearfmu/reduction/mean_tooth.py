@@ -139,16 +139,15 @@ def _as_modes(found: list[_Found], gear: WholeGear, shapes: np.ndarray, count: i
             columns["parity"].append(parity)
             columns["flank"].append(take(flank))
             columns["bore"].append(take(amplitude[len(odd) :]))
-    integers = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
-    diameter, part, parity = integers
+    diameters, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
     return Modes(
         frequency=np.array(columns["frequency"]),
-        nodal_diameter=diameter,
-        part=part,
-        parity=parity,
+        nodal_diameter=diameters,
+        part=parts,
+        parity=parities,
         flank_rows=np.stack(columns["flank"], 1),
         bore_rows=np.stack(columns["bore"], 1),
-        patch_rows=np.zeros((0, len(part))),
+        patch_rows=np.zeros((0, len(parts))),
         shapes=pictures,
     )
 

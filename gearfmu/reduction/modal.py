@@ -1,11 +1,13 @@
 """Elastic modes of a free gear body: all nodal diameters, both mid-width parities, as real mass-normalised modes.
 
+The sector of a helical gear is not its own mirror image: there is one family for each nodal diameter, of parity 0.
+
 A complex mode U e^{iθj} of 0 < ν < z/2 gives two real ones of the same frequency, its real and its imaginary part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +25,8 @@ class Modes:
     """n real elastic modes by ascending frequency; conventions of `body.ReducedBody`.
 
     frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
-    and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½. shapes : index of a mode → (3N,) sector
+    and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½; tangent_rows (2·R·A, n) or (0, n) where there are
+    none, kg^-½: like flank_rows, along the profile. shapes : index of a mode → (3N,) sector
     displacement in kg^-½, complex for a pair's first mode.
     """
 
@@ -35,11 +38,13 @@ class Modes:
     bore_rows: np.ndarray
     patch_rows: np.ndarray
     shapes: dict[int, np.ndarray]
+    tangent_rows: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class _FamilyModes:
-    """Sector modes of one family: ω² (k,), flank (and patch) rows (m, k), bore rows (6, k), complex for weight 2."""
+    """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), complex for weight
+    2."""
 
     weight: int
     complete: bool
@@ -78,7 +83,7 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
             wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
 
 
-def _limit(found, count: int) -> float:
+def _limit(found: Iterable[_FamilyModes], count: int) -> float:
     """ω² of the `count`-th real mode among those found."""
     squared = np.sort(np.concatenate([np.repeat(m.squared, m.weight) for m in found]))
     return squared[min(count, len(squared)) - 1]
@@ -91,8 +96,8 @@ def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
     shapes = shapes * np.sqrt(family.weight / body.teeth)
     flank = np.zeros((len(body.load_rows), len(squared)), shapes.dtype)
     flank[family.columns] = family.flank.conj().T @ shapes
-    shapes = shapes * _gauge(flank)
-    flank = flank * _gauge(flank)
+    gauge = _gauge(flank[: body.profile_loads])
+    shapes, flank = shapes * gauge, flank * gauge
     bore = body.teeth * (family.bore.conj().T @ shapes)
     space = body.spaces[key[0]]
     pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
@@ -130,8 +135,16 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
             columns["parity"].append(body.spaces[key[0]].parity)
             columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
             columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
-    integers = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
-    rows, flank = np.stack(columns["flank"], 1), len(body.flank_rows)
+    numbers, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
+    flank, patch, tangent = np.split(np.stack(columns["flank"], 1), [len(body.flank_rows), body.profile_loads])
     return Modes(
-        np.array(columns["frequency"]), *integers, rows[:flank], np.stack(columns["bore"], 1), rows[flank:], shapes
+        np.array(columns["frequency"]),
+        numbers,
+        parts,
+        parities,
+        flank,
+        np.stack(columns["bore"], 1),
+        patch,
+        shapes,
+        tangent,
     )

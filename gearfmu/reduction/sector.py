@@ -20,7 +20,8 @@ class Family:
     """One harmonic of one mirror parity with its loads.
 
     harmonic : nodal diameter ν of a parity.
-    columns : which loads of a tooth (flat index over side, roll, function; then the patch) this parity sees.
+    columns : which loads of a tooth (flat index over side, roll, function; then the patch; then side, roll, function of
+    the loads along the profile) this parity sees.
     flank : (size, c) their force on one tooth. bore : (size, 6) Fourier coefficient of the unit loads on the bore node
     (force x, y, z, moment x, y, z in the body frame): f_j = Σ_ν bore_ν e^{iθ_ν j} over ν and −ν.
     weight : 2 for 0 < ν < z/2 (ν and −ν together), else 1.
@@ -55,8 +56,9 @@ class SectorBody:
         stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
         self.stiffness, self.internal = stiffness, "rim" in mesh.sets
         sector = Sector(
-            mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus
-        )
+            mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
+            bool(flank.base_helix_angle),
+        )  # fmt: skip
         self.spaces = sector_spaces(sector)
         self._inputs = [self._space_inputs(space) for space in self.spaces]
 
@@ -64,6 +66,17 @@ class SectorBody:
     def flank_rows(self) -> np.ndarray:
         """Unit flank loads (side, roll, function) flattened, as rows over the sector's nodes: (2·R·A, 3N)."""
         both = [flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points) for s in (0, 1)]
+        return np.stack(both).reshape(-1, self.mesh.nodes.size)
+
+    @cached_property
+    def tangent_rows(self) -> np.ndarray:
+        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N); (0, 3N) of an internal gear."""
+        if self.internal:
+            return np.zeros((0, self.mesh.nodes.size))
+        both = [
+            flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points, self.flank.tangent)
+            for s in (0, 1)
+        ]
         return np.stack(both).reshape(-1, self.mesh.nodes.size)
 
     @cached_property
@@ -80,8 +93,13 @@ class SectorBody:
 
     @cached_property
     def load_rows(self) -> np.ndarray:
-        """All loads of one tooth as rows over the sector's nodes: flank rows, then patch rows."""
-        return np.concatenate([self.flank_rows, self.patch_rows])
+        """All loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows."""
+        return np.concatenate([self.flank_rows, self.patch_rows, self.tangent_rows])
+
+    @property
+    def profile_loads(self) -> int:
+        """Number of the first load along the profile in `load_rows`."""
+        return len(self.flank_rows) + len(self.patch_rows)
 
     @property
     def _held_faces(self) -> np.ndarray:
@@ -123,7 +141,9 @@ class SectorBody:
 
     def _space_inputs(self, space: SectorSpace) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         function = np.tile(np.arange(self.points.functions), 2 * len(self.points.rolls))
-        odd = np.concatenate([function % 2, [0, 0, 1][: len(self.patch_rows)]])
+        odd = np.concatenate(
+            [function % 2, [0, 0, 1][: len(self.patch_rows)], (function % 2)[: len(self.tangent_rows)]]
+        )
         seen = {1: odd == 0, -1: odd == 1, 0: odd >= 0}[space.parity]
         columns = np.flatnonzero(seen)
         loads = space.from_nodes @ self.load_rows[columns].T

@@ -14,7 +14,7 @@ from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry.gear import GearGeometry
+from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
@@ -44,9 +44,13 @@ def ring_full_order(spec: Any, scale: float = RING_SCALE, mounted: bool = True) 
 def gear_full_order(spec: Any, name: str, scale: float = GEAR_SCALE) -> FullOrder:
     """The gear `name` ("sun", "planet") of a PlanetarySpec, or of a StageSpec, with one input node a tooth and the
     averaging node of its bore, which is the ground when it is judged."""
-    pair, gears = (spec.set, (spec.sun, spec.planet)) if spec.kind == "planetary_set" else (spec.pair, spec.gears)
-    gear = next(gear for gear in gears if gear.name == name)
-    geometry, counts = GearGeometry.of(gear, pair), gear.body.mesh
+    if spec.kind == "planetary_set":
+        gears = (spec.sun, spec.planet)
+        shapes = tuple(GearGeometry.of(gear, spec.set) for gear in gears)
+    else:
+        gears, shapes = spec.gears, PairGeometry.of(spec).gears
+    gear, geometry = next((gear, shape) for gear, shape in zip(gears, shapes, strict=True) if gear.name == name)
+    counts = gear.body.mesh
     sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, gear.material)
     bore = Coupling("bore", "averaging", sector.full().sets["bore"], np.zeros(3))

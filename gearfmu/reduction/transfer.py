@@ -48,13 +48,13 @@ class Judging:
 
 @dataclass(frozen=True)
 class Reference:
-    """Full-order transfer matrix: H (F, m, m), m/N; `labels` of its rows; change : (F,) by how much the last block of
-    moments moved it, relative; size : vectors it took."""
+    """Full-order transfer matrix: H (F, m, m), m/N; `labels` of its rows; change : by how much the last block of
+    moments moved it at most, relative; size : vectors it took."""
 
     judging: Judging
     matrix: np.ndarray
     labels: tuple[tuple[str, str], ...]
-    change: np.ndarray
+    change: float
     size: int
 
 
@@ -100,12 +100,13 @@ def reference(body: FullOrder, judging: Judging) -> Reference:
     moments = _Moments(body, [(share * top) ** 2 for share in _POINTS])
     step = max(1, len(judging.frequency) // _CHECKED)
     watched = Judging(judging.frequency[::step], judging.damping_ratio)
-    last, best = None, np.inf
+    last: np.ndarray | None = None
+    best = float("inf")
     for _ in range(_BLOCKS):
         grown = moments.grow()
         model = decoupled(body, moments.projection(), judging.damping_ratio)
         now = transfer(model, watched, body.ground)
-        change = np.inf if last is None else float(relative_error(now, last).max())
+        change = float("inf") if last is None else float(relative_error(now, last).max())
         if change < _CONVERGED or not grown or (best < _ROUNDING and change > 0.2 * best):
             labels = tuple(label for label in model.labels if label[0] not in body.ground)
             matrix = transfer(model, judging, body.ground)

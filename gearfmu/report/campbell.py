@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -70,7 +71,7 @@ def _line(figure: Figure, modes: StageModes, k: int, strong: bool, limit: float,
     label = None if group in used else f"energy mostly in {group}"
     used.add(group)
     axis.fill_between([0, limit], low, high, color=colour, alpha=0.22, lw=0, zorder=2)
-    look = {"lw": 1.8, "alpha": 1} if strong else {"lw": 0.8, "alpha": 0.6}
+    look: dict[str, Any] = {"lw": 1.8, "alpha": 1} if strong else {"lw": 0.8, "alpha": 0.6}
     axis.plot([0, limit], [mean, mean], color=colour, label=label, **look)
 
 

@@ -131,8 +131,9 @@ def _on_tooth(unit: np.ndarray, tooth: int, teeth: int) -> np.ndarray:
 
 
 def _mirrored(points: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """The field of flank 1 from that of flank 0 by the tooth's mirror plane y = 0."""
-    mirror = np.array([1.0, -1.0, 1.0])
+    """The field of flank 1 from that of flank 0 by half a turn about the tooth's middle line, the x axis: it leaves
+    spur and helical gears as they are."""
+    mirror = np.array([1.0, -1.0, -1.0])
     _, index = cKDTree(points).query(points * mirror)
     return unit[index] * mirror
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -130,7 +131,7 @@ def distinct(trace: Trace, names: Iterable[str]) -> list[str]:
     return list(found.values())
 
 
-_DASHED = {"ls": "--", "color": MUTED, "lw": 1.2}
+_DASHED: dict[str, Any] = {"ls": "--", "color": MUTED, "lw": 1.2}
 
 
 def _finish(axis: Axes, label: str) -> None:

@@ -6,8 +6,10 @@ import base64
 import io
 import re
 from contextlib import AbstractContextManager
+from typing import Any
 
 import matplotlib
+from cycler import cycler
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from PIL import Image
@@ -47,8 +49,8 @@ RC = {
 
 def styled() -> AbstractContextManager[None]:
     """Context in which figures take this look; leaves the caller's matplotlib settings alone."""
-    cycle = matplotlib.cycler(color=COLOURS)
-    return matplotlib.rc_context({**RC, "axes.prop_cycle": cycle})
+    look: dict[Any, Any] = {**RC, "axes.prop_cycle": cycler(color=COLOURS)}
+    return matplotlib.rc_context(look)
 
 
 def panels(heights: tuple[float, ...], share: bool = True) -> tuple[Figure, list[matplotlib.axes.Axes]]:

@@ -32,6 +32,8 @@ class LightRattle:
 
 
 class _Swinging(Steady):
+    swing: LightRattle
+
     def __init__(self, model: StageModel, speed: float, torque: float, swing: LightRattle):
         super().__init__(model, speed, torque)
         object.__setattr__(self, "swing", swing)
@@ -53,7 +55,8 @@ def run(model: StageModel, scene: LightRattle, duration: float, parameters: Mapp
 
 def statistics(trace: Trace) -> dict[str, float]:
     """After settling: open_share of the time, rms of the mesh force (means over STEP, N), std of the transmission error
-    (m), impulse a second (mean of the force's magnitude, N), share of the time on the coast flanks, impacts a second."""
+    (m), impulse a second (mean of the force's magnitude, N), share of the time on the coast flanks, impacts a
+    second."""
     settled = trace.time > SETTLE
     seconds = trace.time[-1] - SETTLE
     force, before = trace["mesh.force_mean"][settled], np.flatnonzero(~settled)[-1]

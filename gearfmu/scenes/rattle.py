@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,13 @@ import numpy as np
 
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import PortSpec, StageSpec
-from gearfmu.stage import StageModel, assemble
+from gearfmu.spec.gear import Bearing, GearSpec
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.stage import StageSpec
+from gearfmu.stage import assemble
 from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.fields import GEAR_NUMBERS, change_gear
 
-PHASE, BEARING_K, BEARING_C = 5, 16, 17  # places among the numbers of a gear in the blob
 CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
 
 
@@ -72,41 +74,67 @@ class Energies:
         return float(np.diff(self.total).max() / max(self.kinetic, self.stored[0]))
 
 
-def free_pair(spec: StageSpec, bodies: Sequence[Any]) -> StageModel:
-    """The stage with torque ports on both shafts and undamped bearings."""
+@dataclass(frozen=True)
+class FreePair:
+    """A stage with torque ports on both shafts, and its reduced bodies."""
+
+    spec: StageSpec
+    bodies: Sequence[Any]
+    _mounted: dict[tuple[float | None, float], dict[str, Any]] = field(default_factory=dict, repr=False)
+
+    def sections(self, start: Rattle) -> dict[str, Any]:
+        """Sections of the model on the bearings of `start`."""
+        key = start.bearing, start.bearing_damping
+        if key not in self._mounted:
+            gears = tuple(_on_bearing(gear, body.mass, *key) for gear, body in self._pairs())
+            model = assemble(self.spec.model_copy(update={"gears": gears}), self.bodies)
+            self._mounted[key] = dict(read_blob(model.blob))
+        return self._mounted[key]
+
+    def place(self, start: Rattle) -> bytes:
+        """Blob of the model turned to where `start` begins."""
+        shapes, sections = PairGeometry.of(self.spec).gears, dict(self.sections(start))
+        turn = 2 * math.pi * start.position
+        free = start.load == 0.0 and start.play > 0
+        back = (0.5 * start.play - start.offset) / shapes[0].r_b if free else 0.0
+        for name, angle in (("gear0", turn / shapes[0].z - back), ("gear1", -turn / shapes[1].z)):
+            sections[name] = change_gear(sections[name], phase=_numbers(sections[name])["phase"] + angle)
+        return write_blob(sections)
+
+    def _pairs(self) -> Iterator[tuple[GearSpec, Any]]:
+        return zip(self.spec.gears, self.bodies, strict=True)
+
+
+def free_pair(spec: StageSpec, bodies: Sequence[Any]) -> FreePair:
+    """The stage with torque ports on both shafts."""
     ports = {gear.name: PortSpec(kind="torque") for gear in spec.gears}
-    return assemble(spec.model_copy(update={"ports": ports}), bodies)
+    return FreePair(spec.model_copy(update={"ports": ports}), bodies)
 
 
-def placed(model: StageModel, start: Rattle) -> bytes:
-    """Blob of a `free_pair` turned to the place where `start` begins, with its bearings."""
-    geometry = PairGeometry.of(model.spec)
-    sections = dict(read_blob(model.blob))
-    turn = 2 * math.pi * start.position
-    back = (0.5 * start.play - start.offset) / geometry.gears[0].r_b if start.load == 0.0 and start.play > 0 else 0.0
-    for name, angle in (("gear0", turn / geometry.gears[0].z - back), ("gear1", -turn / geometry.gears[1].z)):
-        numbers = np.array(sections[name])
-        numbers[PHASE] += angle
-        numbers[BEARING_C] = start.bearing_damping
-        if start.bearing is not None:
-            numbers[BEARING_K] = start.bearing
-        sections[name] = numbers
-    return write_blob(sections)
+def _on_bearing(gear: GearSpec, mass: float, stiffness: float | None, damping: float) -> GearSpec:
+    """The gear on a bearing of that stiffness (None: its own) and damping (N·s/m)."""
+    k = gear.bearing.stiffness if stiffness is None else stiffness
+    bearing = Bearing(stiffness=k, damping_ratio=damping / (2 * math.sqrt(k * mass)))
+    return gear.model_copy(update={"bearing": bearing})
+
+
+def _numbers(section: np.ndarray) -> dict[str, float]:
+    return dict(zip(GEAR_NUMBERS, section, strict=True))
 
 
 def started(
-    model: StageModel, start: Rattle, parameters: Mapping[str, float] | None = None, library: Path | None = None
+    pair: FreePair, start: Rattle, parameters: Mapping[str, float] | None = None, library: Path | None = None
 ) -> Kernel:
     """A kernel of the pair at its start; `parameters` go over CONSERVING. Momenta along the mesh cancel: the pair
     stays where it is."""
-    geometry = PairGeometry.of(model.spec)
-    inertia, r_b = ([numbers[i] for numbers in map(read_blob(model.blob).get, ("gear0", "gear1"))] for i in (7, 1))
+    geometry, inertia = PairGeometry.of(pair.spec), pair.sections(start)["inertia"]
+    r_b = [gear.r_b for gear in geometry.gears]
     mass = [inertia[i] / r_b[i] ** 2 for i in (0, 1)]
     share = [mass[1 - i] / sum(mass) for i in (0, 1)]
-    names = [gear.name for gear in model.spec.gears]
+    names = [gear.name for gear in pair.spec.gears]
     speeds = {f"{names[i]}.w_start": start.speed * share[i] / r_b[i] for i in (0, 1)}
     backlash = {"backlash": start.play / math.cos(geometry.alpha_wt)}
-    kernel = Kernel(placed(model, start), {**CONSERVING, **speeds, **backlash, **(parameters or {})}, library)
+    kernel = Kernel(pair.place(start), {**CONSERVING, **speeds, **backlash, **(parameters or {})}, library)
     for i in (0, 1):
         kernel.set(f"{names[i]}.tau", start.load * r_b[i] / r_b[0])
     kernel.initialize()

@@ -25,6 +25,7 @@ else:
     import tomli as tomllib
 
 FROM_FILE = {"from_file": True}
+_KINDS_OF_BODY = ("gear", "shaft")
 _NUMBER_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[A-Za-zµμ°].*$"
 
 
@@ -139,6 +140,8 @@ def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     """Dotted path of a place in `raw`: positions are shown by the element's key or `name` where it has one."""
     path = ""
     for part in loc:
+        if isinstance(raw, dict) and part not in raw and part in _KINDS_OF_BODY:
+            continue  # pydantic's mark of the class that was chosen by `kind`
         inside, label = _step(raw, part)
         path += label if label.startswith("[") or not path else f".{label}"
         raw = inside
@@ -181,13 +184,21 @@ def _unknown_key(key: str, known: list[str]) -> str:
 
 def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
     """The fields of the model that stands at `loc` inside a `kind`."""
+    choices = [kind]
     for part in loc:
-        if field := fields_by_key(kind).get(part):
-            inner = inner_model(field.annotation)
-            if inner is None:
+        if field := fields_by_key(choices[0]).get(part):
+            choices = inner_models(field.annotation)
+            if not choices:
                 return {}
-            kind = inner
-    return fields_by_key(kind)
+        else:
+            choices = [choice for choice in choices if part in _kinds(choice)] or choices
+    return fields_by_key(choices[0])
+
+
+def _kinds(kind: type[BaseModel]) -> tuple[Any, ...]:
+    """The values of `kind` by which a class of several is chosen."""
+    field = kind.model_fields.get("kind")
+    return get_args(field.annotation) if field is not None else ()
 
 
 def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
@@ -196,10 +207,15 @@ def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
 
 
 def inner_model(annotation: Any) -> type[BaseModel] | None:
-    """The spec class in an annotation such as `Spec | None` or `dict[str, Spec]`; None without one."""
+    """The first spec class in an annotation such as `Spec | None` or `dict[str, Spec]`; None without one."""
+    return next(iter(inner_models(annotation)), None)
+
+
+def inner_models(annotation: Any) -> list[type[BaseModel]]:
+    """The spec classes in an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((found for part in get_args(annotation) if (found := inner_model(part))), None)
+        return [annotation]
+    return [found for part in get_args(annotation) for found in inner_models(part)]
 
 
 def _shown(value: Any) -> str:

@@ -13,18 +13,19 @@ from gearfmu.spec.stage import StageSpec
 def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
     """Everything that shapes the body of a gear, in SI, and nothing else.
 
-    Backlash, tip relief, contact, ports, levels, names and bearings do not.
+    Backlash, tip relief, lead modifications, misalignment, contact, ports, levels, names and bearings do not. The helix
+    angle is the gear's own, positive for a right-handed one: that of the wheel is minus the pair's.
 
     The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
     contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
     """
     gear, pair = spec.gears[gear_index], spec.pair
-    inputs = {
+    inputs: dict[str, Any] = {
         "kind": spec.kind,
         "teeth": gear.teeth,
         "normal_module": pair.normal_module,
         "pressure_angle": pair.pressure_angle,
-        "helix_angle": pair.helix_angle,
+        "helix_angle": -pair.helix_angle if gear_index else pair.helix_angle,
         "profile_shift": gear.profile_shift,
         "tip_diameter": gear.tip_diameter,
         "tip_edge_radius": gear.tip_edge_radius,

@@ -112,10 +112,12 @@ def table(kind: type[PassengerCar] | type[TestRig]) -> Iterator[Row]:
     for name, field in kind.model_fields.items():
         quantity = next((item for item in field.metadata if isinstance(item, Quantity)), None)
         if quantity is not None:
+            extra = field.json_schema_extra
+            assert isinstance(extra, dict)
             yield Row(
                 name,
-                field.description,
+                field.description or "",
                 None if field.is_required() else field.default,
                 quantity.unit,
-                field.json_schema_extra["source"],
+                str(extra["source"]),
             )

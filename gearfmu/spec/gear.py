@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 
-from gearfmu.spec.base import Count, Name, Quantity, Spec
+from gearfmu.spec.base import Count, Name, Quantity, Spec, refuse
 from gearfmu.spec.imported import ImportSpec
+from gearfmu.spec.lead import LeadSpec, Misalignment
 
 Length = Annotated[float, Quantity("m", above=0)]
 Size = Annotated[float, Quantity("m", at_least=0)]
@@ -19,19 +20,37 @@ Ratio = Annotated[float, Quantity(at_least=0, below=1)]
 Grading = Annotated[float, Quantity(at_least=0.2, at_most=5)]
 
 
+LARGEST_HELIX_ANGLE = 35  # degrees: steeper flanks are beyond what the sector mesh was made for
+
+
+def _in_range(angle: float) -> float:
+    degrees = math.degrees(angle)
+    if abs(degrees) > LARGEST_HELIX_ANGLE * (1 + 1e-12):
+        raise refuse(
+            f"{degrees:g} degrees is out of range: write the helix angle at the reference circle, from -35 deg to "
+            "35 deg, positive for a right-handed pinion (the wheel then is left-handed), 0 deg for spur gears"
+        )
+    return angle
+
+
 class PairSpec(Spec):
-    """The pair as a whole."""
+    """The pair as a whole. Module, pressure angle, profile shift and basic rack are those of the normal section."""
 
     center_distance: Length = Field(description="centre distance a")
     normal_module: Length = Field(description="normal module m_n")
     pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
         description="normal pressure angle of the basic rack"
     )
-    helix_angle: Annotated[float, Quantity("rad", at_least=0, at_most=0)] = Field(
-        default=0.0, description="helix angle; only spur gears so far"
+    helix_angle: Annotated[float, Quantity("rad"), AfterValidator(_in_range)] = Field(
+        default=0.0,
+        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the pinion is right-handed "
+        "and the wheel left-handed",
     )
     backlash: Size = Field(
         description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
+    )
+    misalignment: Misalignment | None = Field(
+        default=None, description="parallelism errors of the axes; parallel axes when the table is absent"
     )
 
 
@@ -63,7 +82,7 @@ class TipRelief(Spec):
 
     amount: Length = Field(description="relief normal to the involute at the tip diameter")
     start_roll: Annotated[float, Quantity("m", above=0, words=("outer_single_contact",))] = Field(
-        default="outer_single_contact",
+        default=cast(Any, "outer_single_contact"),  # the loader puts the roll in its place
         description='roll length of its beginning, or "outer_single_contact"',
     )
     kind: Literal["quadratic"] = Field(default="quadratic", description="shape over the roll length")
@@ -137,6 +156,9 @@ class GearSpec(Spec):
     material: Material = Field(description="material")
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
     tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
+    lead: LeadSpec | None = Field(
+        default=None, description="modifications across the face width; none when the table is absent"
+    )
     index_deviation: dict[Annotated[int, Field(ge=0)], Deviation] = Field(
         default={},
         description="pitch errors: individual index deviation F_pi (ISO 1328-1) by tooth number, arc on the reference "

@@ -1,5 +1,5 @@
-"""[gears.<name>.import], of a planetary set [sun.import], [planet.import], [ring.import], [carrier.import]: a body from finite elements made elsewhere
-(docs/howto-import.md)."""
+"""[gears.<name>.import], of a planetary set [sun.import], [planet.import], [ring.import], [carrier.import]: a body
+from finite elements made elsewhere (docs/howto-import.md)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ Files = TypeVar("Files", bound="FilesSpec")
 
 
 class FilesSpec(Spec):
-    """Mesh of a body, its units, and, where they are ready-made, its matrices; paths relative to the file that says so."""
+    """Mesh of a body, its units, and, where they are ready-made, its matrices; paths relative to the file that says
+    so."""
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
     length: Annotated[float, Quantity("m", above=0)] = Field(
@@ -114,8 +115,11 @@ def _path(layers: Layers, field: str, name: str) -> Path:
 
 def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """The tables `import` of a stage file by their place."""
-    gears = tables.get("gears")
-    bodies = {f"gears.{name}": table for name, table in gears.items()} if isinstance(gears, dict) else {}
+    bodies = {
+        f"{group}.{name}": table
+        for group in ("gears", "bodies")
+        for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
+    }
     bodies |= {name: tables[name] for name in _SET_BODIES if name in tables}
     found = {f"{place}.import": table.get("import") for place, table in bodies.items() if isinstance(table, dict)}
     return {place: section for place, section in found.items() if isinstance(section, dict)}

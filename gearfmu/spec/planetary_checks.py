@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import involute
@@ -56,7 +57,8 @@ def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
         center_distance=s.center_distance, normal_module=s.normal_module, pressure_angle=s.pressure_angle,
         backlash=s.backlash,
     )  # fmt: skip
-    found = geometry_problems(file, pair, (spec.sun, spec.planet), mesh_torque(spec))
+    gears: tuple[Any, Any] = (spec.sun, spec.planet)  # they have the fields of a GearSpec that are checked
+    found = geometry_problems(file, pair, gears, mesh_torque(spec))
     renamed = {"gears.": "", "pair.": "set."}
     for old, new in renamed.items():
         found = [
@@ -101,8 +103,8 @@ def _ring_mesh(spec: PlanetarySpec, mesh: RingMesh) -> Found:
         largest = millimetres(rounded_down(2 * (mesh.ring.r_f - mesh.a), 5))
         yield "planet.tip_diameter", spec.planet.tip_diameter, f"touches the ring's root: less than {largest}"
     elif mesh.planet.r_a > mesh.largest_planet_tip_radius:
-        largest = rounded_down(2 * mesh.largest_planet_tip_radius, 5)
-        remedy = f"interference: the tip meets the ring in its root fillet; at most {millimetres(largest)}"
+        largest = millimetres(rounded_down(2 * mesh.largest_planet_tip_radius, 5))
+        remedy = f"interference: the tip meets the ring in its root fillet; at most {largest}"
         yield "planet.tip_diameter", spec.planet.tip_diameter, remedy
     if mesh.tip_clearance_angle < 0:
         remedy = "planet and ring collide with their tips outside the line of action: make it larger, or more teeth"

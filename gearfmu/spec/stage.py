@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,71 +11,18 @@ from pydantic import Field, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse, validate
+from gearfmu.spec.base import Name, Quantity, Spec, Text, refuse, validate
 from gearfmu.spec.checks import geometry_problems
 from gearfmu.spec.gear import GearSpec, PairSpec
+from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.general_checks import general_problems, with_relief_rolls
 from gearfmu.spec.imported import missing_files
 from gearfmu.spec.layers import Layers, read_layers
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.planetary_checks import set_problems
+from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
 from gearfmu.units import to_si
-
-Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
-Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
-Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
-Frequency = Annotated[float, Quantity("Hz", above=0)]
-
-
-class ContactSpec(Spec):
-    """Tooth contact."""
-
-    slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
-    damping: Annotated[float, Quantity("N*s/m^2", at_least=0)] = Field(
-        description="contact damping per metre of face width"
-    )
-    law: Literal["line"] = Field(default="line", description="contact law")
-
-
-class ChainSpec(Spec):
-    """Inertia, clutch and shaft compiled into a port."""
-
-    inertia: Inertia = Field(description="inertia on the outer side of the clutch, behind the port spring")
-    disc_inertia: Inertia = Field(description="inertia of the clutch disc")
-    shaft_k: Stiffness = Field(description="stiffness of the shaft between disc and bore")
-    shaft_c: Damping = Field(description="damping of that shaft")
-
-
-class PortSpec(Spec):
-    """How a shaft meets the outside. k and c of a port that is no spring are kept for an export that makes it one."""
-
-    kind: Literal["spring", "torque", "fixed"] = Field(
-        default="spring", description="spring: motion in, torque out; torque: torque in, motion out; fixed"
-    )
-    k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
-    c: Damping | None = Field(default=None, description="damping of the port spring")
-    chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
-
-    @model_validator(mode="after")
-    def _complete(self) -> PortSpec:
-        if self.kind == "spring" and (self.k is None or self.c is None):
-            raise refuse('a spring port needs k and c: add them, e.g. k = "20e3 N*m/rad", c = "0.1 N*m*s/rad"')
-        if self.kind != "spring" and self.chain is not None:
-            raise refuse('a chain hangs on a port spring: write kind = "spring" or leave the chain away')
-        return self
-
-
-class LevelSpec(Spec):
-    """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
-
-    fast_cut: Frequency = Field(default=50e3, description="cut frequency of level fast")
-    standard_cut: Frequency = Field(default=120e3, description="cut frequency of level standard")
-
-    @model_validator(mode="after")
-    def _ordered(self) -> LevelSpec:
-        if self.fast_cut > self.standard_cut:
-            raise refuse("fast_cut must not lie above standard_cut")
-        return self
 
 
 class StageSpec(Spec):
@@ -115,7 +63,7 @@ class StageSpec(Spec):
 
 
 def load_stage(stage: str | os.PathLike[str]) -> Any:
-    """The StageSpec or PlanetarySpec of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
+    """The StageSpec, PlanetarySpec or GeneralStage of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
     "fzg_c/stage_relief", "planetary54").
 
     SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that cannot run or carry
@@ -125,6 +73,8 @@ def load_stage(stage: str | os.PathLike[str]) -> Any:
     kind = layers.tables.get("kind", "external_pair")
     if kind == "planetary_set":
         return _load_set(layers)
+    if kind == "general":
+        return _load_general(layers)
     return _load_pair(layers)
 
 
@@ -132,17 +82,28 @@ def load_pair(stage: str | os.PathLike[str]) -> StageSpec:
     """`load_stage` where only a pair will do; SpecError for a planetary set."""
     spec = load_stage(stage)
     require_pair(spec)
-    return spec  # type: ignore[no-any-return]
+    return spec
 
 
 def require_pair(spec: Any) -> None:
-    """SpecError unless `spec` is a pair: a planetary set has bodies, but no contact, ports and FMU yet."""
+    """SpecError unless `spec` is a pair: other stages have bodies, but no motion in time yet."""
     if spec.kind != "external_pair":
         remedy = (
-            "this needs a pair; a planetary set can be meshed, reduced and inspected so far, its motion in time is not "
+            "this needs a pair; other stages can be meshed, reduced and inspected so far, their motion in time is not "
             "built yet: name a stage of kind external_pair, such as fzg_c"
         )
         raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
+
+
+def require_spur(spec: StageSpec) -> None:
+    """SpecError for a helical pair: it has bodies, but no contact and FMU yet."""
+    if spec.pair.helix_angle:
+        remedy = (
+            "helical pairs can be meshed, reduced and inspected so far (mesh, reduce, inspect, modes --body, frf); "
+            "their motion in time is not built yet: name a stage of helix angle 0 deg, such as fzg_c"
+        )
+        angle = f"{math.degrees(spec.pair.helix_angle):g} deg"
+        raise SpecError([Problem(str(spec.source), "pair.helix_angle", angle, remedy)])
 
 
 def _load_pair(layers: Layers) -> StageSpec:
@@ -180,6 +141,24 @@ def _load_set(layers: Layers) -> PlanetarySpec:
     return spec.model_copy(update=located)
 
 
+def _load_general(layers: Layers) -> GeneralStage:
+    path, raw = layers.path, layers.tables
+    problems = [_unknown("source", raw)] if "source" in raw else []
+    spec, found = validate(GeneralStage, raw | {"source": path}, str(path))
+    problems += found
+    if spec is not None:
+        problems += general_problems(str(path), spec)
+    problems += missing_files(layers)
+    if problems or spec is None:
+        raise SpecError(layers.attributed(problem) for problem in problems)
+    bodies = {
+        name: body.model_copy(update={"imported": body.imported.located(layers, f"bodies.{name}.import")})
+        for name, body in ((gear.name, gear) for gear in spec.gears)
+        if body.imported is not None
+    }
+    return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies}))
+
+
 def _unknown(key: str, raw: dict[str, Any]) -> Problem:
     return Problem("", key, str(raw[key]), "unknown key: remove it")
 
@@ -195,8 +174,9 @@ def _geometry_of_what_can_be_read(layers: Layers) -> list[Problem]:
     ):
         return []
     pair, _ = validate(PairSpec, raw.get("pair"), file)
-    gears = tuple(validate(GearSpec, table | {"name": name}, file)[0] for name, table in tables.items())
-    if pair is None or None in gears:
+    read = [validate(GearSpec, table | {"name": name}, file)[0] for name, table in tables.items()]
+    gears = [gear for gear in read if gear is not None]
+    if pair is None or len(gears) < len(read):
         return []
     try:
         torque = to_si(raw.get("torque_max"), "N*m")
@@ -220,7 +200,7 @@ def _with_relief_rolls(spec: StageSpec) -> StageSpec:
     """The same stage with "outer_single_contact" turned into a roll."""
     pair, gears = PairGeometry.of(spec), []
     for index, gear in enumerate(spec.gears):
-        if gear.tip_relief is not None and gear.tip_relief.start_roll == "outer_single_contact":
+        if gear.tip_relief is not None and isinstance(gear.tip_relief.start_roll, str):
             relief = gear.tip_relief.model_copy(update={"start_roll": pair.outer_single_contact(index)})
             gear = gear.model_copy(update={"tip_relief": relief})
         gears.append(gear)

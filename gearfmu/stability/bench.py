@@ -12,9 +12,10 @@ import numpy as np
 from gearfmu.body import ReducedBody, load_stage_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import PortSpec, StageSpec, load_stage
-from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stability.case import STEPS, Case
+from gearfmu.stage import StageModel, assemble, loaded_te
 
 RELIEVED, PLAIN = "fzg_c/stage_relief", "fzg_c"
 SHAFTS = ("pinion", "wheel")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearfmu.spec.stage import PortSpec
+from gearfmu.spec.ports import PortSpec
 from gearfmu.stability.bench import PLAIN, Variant, geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import Expected, at_least, at_most, finding, levels, lost, mean_torque, near, statistics

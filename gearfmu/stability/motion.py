@@ -70,7 +70,9 @@ def winding(variant: Variant, torque: float) -> float:
     and the mean quasi-static transmission error, backlash included where the torque is negative."""
     spec, pair = model(variant).spec, geometry(variant)
     ratio = spec.gears[1].teeth / spec.gears[0].teeth
-    shafts = 1.0 / spec.ports[SHAFTS[0]].k + ratio**2 / spec.ports[SHAFTS[1]].k
+    k = [spec.ports[name].k for name in SHAFTS]
+    assert k[0] is not None and k[1] is not None, "both ports are springs"
+    shafts = 1.0 / k[0] + ratio**2 / k[1]
     return torque * shafts + mean_te(variant, torque) / pair.gears[0].r_b
 
 

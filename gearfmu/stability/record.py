@@ -94,7 +94,7 @@ class Run:
         memory = (ctypes.c_double * len(self.names))()
         self._cells = [ctypes.c_double.from_buffer(memory, 8 * k) for k in range(len(self.names))]
         self._references = [kernel.variables[name].reference for name in self.names]
-        self._buffer = np.frombuffer(memory)
+        self._buffer = np.ctypeslib.as_array(memory)
         self._time, self._samples = np.full(capacity + 1, 0.0), np.full((capacity + 1, len(self.names)), 0.0)
         self._count = 0
         self._set: dict[str, int] = {}

@@ -23,8 +23,8 @@ EXPECTED = {"open_share_up": Expected(0.057, 0.003), "open_share_down": Expected
 
 def run_up_and_down(case: Case) -> Finding:
     """5 000 to 18 000 rpm in 2 s and back, 15 N·m, for which the tip relief is far too much: contact is lost in the
-    mesh resonances, softening ones. Near 3.5 kHz the teeth begin to part at a higher speed on the way up than the one at
-    which they stay together again on the way down."""
+    mesh resonances, softening ones. Near 3.5 kHz the teeth begin to part at a higher speed on the way up than the one
+    at which they stay together again on the way down."""
     pair = geometry(RELIEVED)
     motion = UpAndDown(LOW * RPM, HIGH * RPM, DURATION)
     made = run(kernel(model(RELIEVED), case), loaded(RELIEVED, motion, TORQUE), 2 * DURATION, H)

@@ -13,7 +13,7 @@ import numpy as np
 from gearfmu.stability.bench import Variant, geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import at_most, finding, mean_torque, near
-from gearfmu.stability.loads import DRAG, DRIVEN, LOOSE, NOMINAL, RELIEVED, SWING, H, swinging
+from gearfmu.stability.loads import DRAG, DRIVEN, LOOSE, NOMINAL, RELIEVED, SWING, swinging
 from gearfmu.stability.motion import RPM, Constant, loaded
 from gearfmu.stability.record import Run, run, run_times
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gearfmu.stage.model import StageModel, assemble
+from gearfmu.stage.general import assemble_general as assemble
+from gearfmu.stage.model import StageModel
 from gearfmu.stage.simulate import Steady, simulate
 from gearfmu.stage.te import TeResult, loaded_te
 from gearfmu.stage.trace import Channel, Trace

@@ -23,7 +23,7 @@ HASHED_FROM = 40
 MOST_SECTIONS = 1024
 LONGEST_NAME = 23
 F64, I32, TEXT = 1, 2, 3
-DTYPE = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1")}
+DTYPE: dict[int, np.dtype] = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1")}
 
 Sections = Mapping[str, "np.ndarray | str"]
 

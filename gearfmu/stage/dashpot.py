@@ -1,4 +1,5 @@
-"""The path that a contact's dashpot is parallel to (docs/theory.md, 2.5), and what a damping constant is worth on it."""
+"""The path that a contact's dashpot is parallel to (docs/theory.md, 2.5), and what a damping constant is worth on
+it."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ def strip_weights(slices: int, functions: int) -> np.ndarray:
 
 
 def residual_path(body: ReducedBody, slices: int) -> float:
-    """Path of a contact's dashpot in one tooth: its share of the deflection beyond all stored modes under 1 N shared evenly
-    by the slices, mean over the roll, m/N."""
+    """Path of a contact's dashpot in one tooth: its share of the deflection beyond all stored modes under 1 N shared
+    evenly by the slices, mean over the roll, m/N."""
     weights = strip_weights(slices, body.flank_rows.shape[2]).mean(axis=0)
     omega2 = (2 * np.pi * body.frequency) ** 2
     rows = body.flank_rows[0]
@@ -51,7 +52,8 @@ def local_path(spec: StageSpec, force: float) -> float:
 
 
 def own_path(spec: StageSpec, bodies: Sequence[ReducedBody], force: float) -> float:
-    """Path of a contact's dashpot through both teeth and the local law, for one tooth pair that carries `force` (N), m/N."""
+    """Path of a contact's dashpot through both teeth and the local law, for one tooth pair that carries `force` (N),
+    m/N."""
     return sum(residual_path(body, spec.contact.slices) for body in bodies) + local_path(spec, force)
 
 

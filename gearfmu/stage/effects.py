@@ -80,7 +80,10 @@ EFFECTS: tuple[Effect, ...] = (
         title="elastic bodies",
         formula="m ẍ = F, J φ̈ = M and q̈ + 2ζω q̇ + ω² q = Σ Nλ; C_static",
         equation="1 (eqs. 1, 2)",
-        matters="always, but for first estimates of rigid-body motion: with axes held, rigid gears yield a tenth of it (fzg_c, 302 N·m)",
+        matters=(
+            "always, but for first estimates of rigid-body motion: with axes held, rigid gears yield a tenth of "
+            "it (fzg_c, 302 N·m)"
+        ),
         off="rigid gears; a contact yields by its local law alone, bearings and ports as before",
         code="gk_setup.c (choose): no modes, no tables of compliance",
     ),
@@ -89,7 +92,10 @@ EFFECTS: tuple[Effect, ...] = (
         title="number of dynamic modes",
         formula="modes below the cut are states, those above are compliance; cut in the widest gap within 15 %",
         equation="1 (eq. 2)",
-        matters="where body resonances lie in the band of interest, or mesh harmonics reach the tooth modes (40–60 kHz on fzg_c)",
+        matters=(
+            "where body resonances lie in the band of interest, or mesh harmonics reach the tooth modes (40–60 "
+            "kHz on fzg_c)"
+        ),
         off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
         code="gk_setup.c (modes_below, fill_modes), gk_rows.c, gk_flow.c, gk_step.c (predict, correct_modes)",
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
@@ -117,7 +123,10 @@ EFFECTS: tuple[Effect, ...] = (
         title="load-dependent local compliance",
         formula="δ(λ) = λ(c − ½ a ln βλ)",
         equation="2.4 (eqs. 7, 8)",
-        matters="when the load changes much: light load, rattle, engagement; a pair of fzg_c yields 8 % more per newton at 80 than at 600 N·m, 17 % more at 8",
+        matters=(
+            "when the load changes much: light load, rattle, engagement; a pair of fzg_c yields 8 % more per "
+            "newton at 80 than at 600 N·m, 17 % more at 8"
+        ),
         off="its secant at `torque_max`: a linear law",
         code="gk_law.c; the balance of closed steps in gk_balance.c",
     ),
@@ -126,7 +135,10 @@ EFFECTS: tuple[Effect, ...] = (
         title="slices across the face width",
         formula="tₐ = (2a + 1) × mean of P_a over the slice; one force a slice (mirrored slices: one row)",
         equation="1 (load strip and slices)",
-        matters="distribution of the load over the width (ends of fzg_c: 5 % less than the mean); its transmission error moves by 0.02 %",
+        matters=(
+            "distribution of the load over the width (ends of fzg_c: 5 % less than the mean); its transmission "
+            "error moves by 0.02 %"
+        ),
         off="1 slice: load uniform over the width",
         code="gk_strips.c, gk_system.c (list_contacts)",
         switch="parameter `slices` (1 … 10); `[contact] slices` in stage.toml, `[stage] slices` in a scene",
@@ -168,7 +180,10 @@ EFFECTS: tuple[Effect, ...] = (
         formula="g = ℓ − s′ − ρ + δ_c + δ_c′ u/(1 + u/ρ) + δ_o: tip edge of radius ρ on the other involute",
         equation="2.3 (eq. 6)",
         matters="whenever a loaded pair reaches the end of a flank: without relief always",
-        off="flanks end at their tip roll. Exact while no loaded pair gets there (fzg_c_relief: up to about 100 N·m); else a loaded pair vanishes, the energy balance loses percents, and status bit 16 says so",
+        off=(
+            "flanks end at their tip roll. Exact while no loaded pair gets there (fzg_c_relief: up to about 100 N·m); "
+            "else a loaded pair vanishes, the energy balance loses percents, and status bit 16 says so"
+        ),
         code="gk_flank.c (corner_contact)",
     ),
     _switched(
@@ -194,7 +209,9 @@ EFFECTS: tuple[Effect, ...] = (
         title="motion of the contact along the flanks",
         formula="places, rows, stiffness, normals and curvatures at the rolls of the moment",
         equation="3.3",
-        matters="always; a switch for conservation tests: what moves with the roll is work of the mesh, not of the scheme",
+        matters=(
+            "always; a switch for conservation tests: what moves with the roll is work of the mesh, not of the scheme"
+        ),
         off="all of it stays that of the start, gaps are linear in the coordinates",
         code="gk_still.c, gk_step.c (gk_step_once)",
     ),

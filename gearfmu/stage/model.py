@@ -14,7 +14,8 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.kernel import Kernel, Variable
 from gearfmu.spec.gear import GearSpec
-from gearfmu.spec.stage import PortSpec, StageSpec
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.stage import StageSpec, require_spur
 from gearfmu.stage.blob import blob_hash, write_blob
 from gearfmu.stage.tables import ROLLS, body_sections, resampling, symmetric_functions
 
@@ -59,7 +60,9 @@ def assemble(spec: StageSpec, bodies: Sequence[Any], rolls: int = ROLLS) -> Stag
     rows and compliances along a flank.
 
     ModelError when a body does not belong to its gear: other numbers of teeth, base radius, face width or roll range.
+    SpecError for a helical pair.
     """
+    require_spur(spec)
     geometry = PairGeometry.of(spec)
     problems = [p for i in (0, 1) for p in _mismatches(spec.gears[i], geometry.gears[i], bodies[i])]
     if problems:

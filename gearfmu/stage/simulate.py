@@ -50,7 +50,9 @@ class Steady:
         for gear, sign in zip(spec.gears, (1, -1), strict=True):
             ratio = spec.gears[0].teeth / gear.teeth
             w = sign * self.speed * ratio
-            wound = self.torque / ratio / spec.ports[gear.name].k + (self.winding if sign > 0 else 0.0)
+            stiffness = spec.ports[gear.name].k
+            assert stiffness is not None, "the port is a spring"
+            wound = self.torque / ratio / stiffness + (self.winding if sign > 0 else 0.0)
             values[f"{gear.name}.phi"] = wound + w * time
             values[f"{gear.name}.w"] = w
         return values

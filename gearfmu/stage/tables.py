@@ -1,4 +1,5 @@
-"""Reduced body → the tables of one gear in the model blob: rows and compliances on an even grid of rolls, for the width functions that the stage can excite."""
+"""Reduced body → the tables of one gear in the model blob: rows and compliances on an even grid of rolls, for the
+width functions that the stage can excite."""
 
 from __future__ import annotations
 
@@ -14,10 +15,12 @@ BORE = (0, 1, 5)
 
 
 def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS) -> np.ndarray:
-    """(rolls, R) weights from values at the body's Chebyshev points of the first kind `roll` (R,) to an even grid on [s_form, s_tip].
+    """(rolls, R) weights from values at the body's Chebyshev points of the first kind `roll` (R,) to an even grid on
+    [s_form, s_tip].
 
-    Barycentric formula with the known weights (−1)^k sin((2k + 1)π/2R) (Berrut & Trefethen 2004). Applied to both sides of a compliance it stays
-    positive semidefinite. (scipy's interpolator permutes the points at random: two calls, two last bits.)
+    Barycentric formula with the known weights (−1)^k sin((2k + 1)π/2R) (Berrut & Trefethen 2004). Applied to both
+    sides of a compliance it stays positive semidefinite. (scipy's interpolator permutes the points at random: two
+    calls, two last bits.)
     """
     k = np.arange(roll.size)
     weight = (-1.0) ** k * np.sin((2 * k + 1) * np.pi / (2 * roll.size))
@@ -31,7 +34,8 @@ def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS
 def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
     """`values` with `axis` (R,) replaced by (rolls,): Σ_r weights[:, r]·values[r], summed in the order of r.
 
-    Element by element on purpose: matrix products may sum in another order from call to call, and equal inputs must give an equal blob.
+    Element by element on purpose: matrix products may sum in another order from call to call, and equal inputs must
+    give an equal blob.
     """
     moved = np.moveaxis(values, axis, 0)
     shape = (-1,) + (1,) * (moved.ndim - 1)
@@ -44,14 +48,16 @@ def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
 def symmetric_functions(count: int) -> np.ndarray:
     """Degrees of the Legendre functions that a load symmetric about mid-width can excite, at most MOST_FUNCTIONS.
 
-    A spur pair without lead modification loads its slices symmetrically: odd functions and antisymmetric modes stay at rest exactly.
+    A spur pair without lead modification loads its slices symmetrically: odd functions and antisymmetric modes stay
+    at rest exactly.
     """
     return np.arange(0, count, 2)[:MOST_FUNCTIONS]
 
 
 def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
-    """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay together. Of modes of
-    no parity (imported bodies without a mirror at mid-width) the rows of the chosen functions count."""
+    """Indices of the modes with a row in the chosen width functions or in the planar motion of the bore; pairs stay
+    together. Of modes of no parity (imported bodies without a mirror at mid-width) the rows of the chosen functions
+    count."""
     rows = np.abs(body.flank_rows[:, :, degrees, :]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
     seen = (rows > 1e-9) & (body.parity >= 0)
     second = np.flatnonzero(body.part == 2)
@@ -60,11 +66,12 @@ def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
 
 
 def body_sections(index: int, body: Any, to_grid: np.ndarray, degrees: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/model/gk_model.c); to_grid: of `resampling`."""
+    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/model/gk_model.c); to_grid:
+    of `resampling`."""
     modes = excited_modes(body, degrees)
     rows = blend(to_grid, body.flank_rows[:, :, degrees][..., modes], 1)
     static = body.static_ff[..., degrees, :][..., degrees]
-    static = np.stack([static[:, :, offset % body.teeth] for offset in OFFSETS], axis=2)
+    static = np.stack([static[:, :, offset % static.shape[2]] for offset in OFFSETS], axis=2)
     static = blend(to_grid, blend(to_grid, static, 3), 4)
     flank_bore = blend(to_grid, body.static_fb[:, :, degrees][..., BORE], 1)
     return {
@@ -74,7 +81,7 @@ def body_sections(index: int, body: Any, to_grid: np.ndarray, degrees: np.ndarra
         f"diameter{index}": body.nodal_diameter[modes].astype(np.int32),
         f"part{index}": body.part[modes].astype(np.int32),
         f"rows{index}": rows,
-        f"bore{index}": body.bore_rows[np.ix_(BORE, modes)],
+        f"bore{index}": body.bore_rows[np.ix_(np.array(BORE), modes)],
         f"c_ff{index}": static,
         f"c_fb{index}": flank_bore,
         f"c_bb{index}": body.static_bb[np.ix_(BORE, BORE)],

@@ -5,18 +5,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from gearfmu.kernel import Kernel, TeState
-from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.model import BEARING_K, PORT_CHAIN, StageModel
+from gearfmu.stage.model import StageModel
 
 TANGENT = 1e-4
 LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
 SHARES = 4
-RIGID = 1e13  # N/m: 1 nm at 10 kN
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,8 @@ def loaded_te(
     transmission error. rigid_bearings: the bore nodes are held on their axes. parameters: of the kernel, e.g.
     slices=10. SimulationError(no_equilibrium) where there is none.
     """
-    kernel = statics_of(on_rigid_bearings(model) if rigid_bearings else model, **parameters)
+    held = {"effect.bearings": 0.0} if rigid_bearings else {}
+    kernel = statics_of(model, **held, **parameters)
     pitch = 2 * math.pi / model.spec.gears[1].teeth
     base_radius = (
         model.spec.pair.normal_module * model.spec.gears[0].teeth / 2 * math.cos(model.spec.pair.pressure_angle)
@@ -68,30 +67,11 @@ def loaded_te(
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:
-    """The kernel prepared for statics: level `rigid` (all flexibility static), and without the chains of the ports, whose
-    clutches are open at the start and would hold no torque. parameters: of the kernel."""
-    sections = read_blob(model.blob)
-    for name in ("port0", "port1"):
-        numbers = np.array(sections[name])
-        numbers[PORT_CHAIN] = 0.0
-        sections[name] = numbers
-    kernel = replace(model, blob=write_blob(sections)).kernel(**{"level": 0.0, **parameters})
+    """The kernel prepared for statics: level `rigid`, all flexibility is static. Torque and angle act on the bores:
+    chains of the ports, whose clutches are open at the start, are left out. parameters: of the kernel."""
+    kernel = model.kernel(**{"level": 0.0, **parameters})
     kernel.prepare()
     return kernel
-
-
-def on_rigid_bearings(model: StageModel) -> StageModel:
-    """The same stage with its bores held on their axes.
-
-    Not `effect.bearings` off: that holds the mean-axis frames, and their reaction is spread over the mass of the gear
-    instead of acting on its bore.
-    """
-    sections = read_blob(model.blob)
-    for name in ("gear0", "gear1"):
-        numbers = np.array(sections[name])
-        numbers[BEARING_K] = RIGID
-        sections[name] = numbers
-    return replace(model, blob=write_blob(sections))
 
 
 def _tangent(kernel: Kernel, phi: float, torque: float) -> float:

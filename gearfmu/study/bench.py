@@ -2,8 +2,8 @@
 
 The price is the processor time of the stage's communication steps alone. Inputs of the coupled run are played back to
 a fresh kernel in chunks, in turn with the same chunk of a second run (interleaved pairs: what slows the machine slows
-both), and what the calls from Python cost is taken off by calls that the kernel refuses at its door. What is made once, at initialisation and in
-the first step, is no part of the price.
+both), and what the calls from Python cost is taken off by calls that the kernel refuses at its door. What is made
+once, at initialisation and in the first step, is no part of the price.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.drivetrain import shafts_of, stage_ports
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import run_once
-from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -86,10 +85,13 @@ class _Kept(KernelUnit):
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
         super().__init__(blob, parameters)
-        self.settle, self.now, self.start, self.rows = settle, {}, [], []
+        self.settle = settle
+        self.now: dict[str, float] = {}
+        self.start: list[float] = []
+        self.rows: list[list[float]] = []
         self.first, self.state = -1, b""
 
-    def set(self, handle: KernelHandle, values: Sequence[float]) -> None:
+    def set(self, handle: KernelHandle, values: Sequence[float] | np.ndarray) -> None:
         self.now.update(zip(handle.names, map(float, values), strict=True))
         super().set(handle, values)
 
@@ -111,7 +113,7 @@ class _KeptSource:
     model: StageModel
     settle: float
     unit_made: _Kept | None = None
-    parameters: Mapping[str, Any] | None = None
+    parameters: Mapping[str, float | bool | str] = field(default_factory=dict)
 
     def unit(self, parameters: Mapping[str, float | bool | str]) -> _Kept:
         self.parameters = dict(parameters)
@@ -134,8 +136,9 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     source = _KeptSource(model, scene.settle)
     result = run_once(changed, source)
     kept, facts, end = source.unit_made, result.facts, float(result.trace.time[-1])
+    assert kept is not None, "the run made its unit"
     integrator = _integrator(kept, point)
-    gears = tuple(gear.name for gear in model.spec.gears)
+    pinion, wheel = (gear.name for gear in model.spec.gears)
     recording = Recording(
         model.blob,
         source.parameters,
@@ -149,7 +152,7 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     return Run(
         point,
         integrator,
-        signals_of(result.trace, gears, scene.settle if end > scene.settle else 0.0),
+        signals_of(result.trace, (pinion, wheel), scene.settle if end > scene.settle else 0.0),
         end / facts["solver.steps"] if integrator == "rk45" else facts["solver.h"],
         int(facts["solver.n_dyn"]),
         result.outcome,
@@ -222,6 +225,7 @@ def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
     for a run that stopped early."""
     if run.outcome != OK or base.outcome != OK:
         return Price(float("nan"), float("nan"))
+    assert run.recording is not None and base.recording is not None
     one, other, left = Replay(run.recording), Replay(base.recording), looked_at
     passes: list[tuple[float, float]] = []
     while left > 0.0:
@@ -232,7 +236,8 @@ def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
 
 
 def _one_pass(one: Replay, other: Replay) -> tuple[np.ndarray, int]:
-    """Processor seconds of both (2,) from the settled state to the end, or until `one` has taken LONGEST_PASS; steps."""
+    """Processor seconds of both (2,) from the settled state to the end, or until `one` has taken LONGEST_PASS;
+    steps."""
     one.rewind()
     other.rewind()
     spent, steps = np.zeros(2), 0

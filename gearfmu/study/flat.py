@@ -2,33 +2,131 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from gearfmu.stage.blob import write_blob
+from gearfmu.stage.fields import gear_numbers, order_sections
+from gearfmu.stage.general import GENERAL_VERSION
 
 GRID = 4  # rolls of the tables: all equal
 OFFSETS, OWN = 7, 3
-FLAT, TORQUE = 1, 1.0
+FLAT, TORQUE = 0, 1
 TOUCHING = 1e-15  # m
 NO_LOCAL = 1e-20  # 1/Pa: the local law as good as rigid; all compliance is in the residual
-CUTS, LONGEST_STEP = 1e9, 1e-3  # Hz, s: beyond anything here
+CUTS, LONGEST_STEP, LONGEST_PERIOD = 1e9, 1e-3, 2 * math.pi  # Hz, s, s: beyond anything here
+LOAD = 100.0  # N: where the local law is taken when effect.hertz is off
 
 
 @dataclass(frozen=True)
 class FlatBody:
-    """mass kg · omega (n,) rad/s · rows (A, n): outward displacement by width function and mode, 1/√kg · residual
-    (A, A) m/N."""
+    """mass kg · omega (n,) rad/s and zeta (n,) · rows (A, n): outward displacement by width function and mode, 1/√kg ·
+    residual (A, A) m/N: static compliance beyond the modes."""
 
     mass: float
     omega: np.ndarray
+    zeta: np.ndarray
     rows: np.ndarray
     residual: np.ndarray
 
 
+@dataclass(frozen=True)
+class FlatContact:
+    """Flat engagement 1 m wide: slices, degrees of the width functions, gap m, local 2 (1 − ν²)/(πE) 1/Pa, damping
+    N·s/m per m of width."""
+
+    slices: int = 1
+    degrees: tuple[int, ...] = (0,)
+    gap: float = TOUCHING
+    local: float = NO_LOCAL
+    damping: float = 0.0
+
+
+def flat_blob(name: str, bodies: Sequence[FlatBody], contact: FlatContact) -> bytes:
+    """Model of two bodies, "left" and "right", with torque ports (here forces), that meet in a flat contact: gap =
+    x_right − x_left − outward displacements, in every slice. What spins elsewhere moves along x here."""
+    functions = len(contact.degrees)
+    sections: dict = {
+        "counts": np.array([GENERAL_VERSION, contact.slices, 2, 2, 1, 2, 0, 0, functions, GRID, 1], np.int32),
+        "name": name,
+        "rotor_names": "left|right",
+        "engagement_names": "mesh",
+        "support_names": "",
+        "displacement_names": "",
+        "limits": np.array([CUTS, CUTS, LONGEST_STEP, LONGEST_PERIOD]),
+        "degrees": np.array(contact.degrees, np.int32),
+        "inertia": np.array([body.mass for body in bodies]),
+        "engaged": np.array([[0, 1, FLAT, 0]], np.int32),
+        "engagement": np.array([[0.0, 0.0, contact.gap, 0.0, 0.0, 0.0, contact.damping, LOAD]]),
+        "port_kinds": np.array([[0, TORQUE, 0], [1, TORQUE, 0]], np.int32),
+        "ports": np.array([[1.0, 0.0, 1.0, 1.0, 1.0, 0.0]] * 2),
+        "port_residual": np.zeros((2, 2)),
+        "port_support": np.zeros((2, 0)),
+        "omega_ground0": np.zeros(0),
+        "zeta_ground0": np.zeros(0),
+        "rigid_share0": np.zeros(0),
+        "damper_rows0": np.zeros((0, 0)),
+        "damper0": np.zeros(0),
+        "support_rows0": np.zeros((0, 0)),
+        "support_compliance0": np.zeros(0),
+        "kappa0": np.zeros((0, 0)),
+        "port_rows0": np.zeros((2, 0)),
+    }
+    for g, body in enumerate(bodies):
+        sections |= _body_sections(g, body, contact)
+    return write_blob(order_sections(sections))
+
+
+def _body_sections(g: int, body: FlatBody, contact: FlatContact) -> dict[str, np.ndarray]:
+    n, functions = body.omega.size, len(contact.degrees)
+    static = np.zeros((2, 2, OFFSETS, GRID, GRID, functions, functions))
+    static[0, 0, OWN] = body.residual + (body.rows / body.omega**2) @ body.rows.T
+    return {
+        f"size{g}": np.array([g, 1, n, 0, 0], np.int32),
+        f"gear{g}": _flat_numbers(contact.local),
+        f"omega{g}": body.omega,
+        f"zeta{g}": body.zeta,
+        f"diameter{g}": np.zeros(n, np.int32),
+        f"member{g}": np.zeros(n, np.int32),
+        f"rows{g}": np.broadcast_to(body.rows, (2, GRID, functions, n)),
+        f"residual{g}": static,
+        f"support_residual{g}": np.zeros((3, 2, GRID, functions, 0)),
+        f"port_residual{g}": np.zeros((2, GRID, functions, 2)),
+        f"ground_list{g}_0": np.zeros(0, np.int32),
+        f"centre{g}_0": np.zeros((6, 0)),
+        f"ground_rows{g}_0": np.zeros((3, 2, GRID, functions, 0)),
+    }
+
+
+def _flat_numbers(local: float) -> np.ndarray:
+    """A flank that is there in name only; its width and the local law count."""
+    return gear_numbers(
+        {
+            "r_b": 0.01,
+            "s_form": 0.0,
+            "s_tip": 0.01,
+            "psi_b": 0.0,
+            "phase": 0.0,
+            "face_width": 1.0,
+            "local": local,
+            "strip_half_width": 1e-3,
+            "relief": 0.0,
+            "relief_start": 0.01,
+            "tip_edge": 1e-4,
+            "corner_radius": 0.01,
+            "corner_angle": 0.0,
+            "z_mid": 0.0,
+            "helix": 0.0,
+        }
+    )
+
+
 def _body(mass: float, frequency: tuple[float, ...], rows: tuple[tuple[float, ...], ...]) -> FlatBody:
-    return FlatBody(mass, 2 * np.pi * np.array(frequency), np.array(rows), np.diag([4e-8, 1.5e-8]))
+    omega = 2 * np.pi * np.array(frequency)
+    return FlatBody(mass, omega, np.zeros(omega.size), np.array(rows), np.diag([4e-8, 1.5e-8]))
 
 
 @dataclass(frozen=True)
@@ -45,41 +143,9 @@ class FlatPair:
     def bodies(self) -> tuple[FlatBody, FlatBody]:
         return self.left, self.right
 
-
-def flat_blob(pair: FlatPair) -> bytes:
-    """The model blob (sections: gearfmu/kernel/src/model/gk_model.c)."""
-    sections: dict = {
-        "model": np.array([1, FLAT, pair.slices, 0], np.int32),
-        "name": "flat_pair",
-        "shafts": "left|right",
-        "degrees": np.array([0, 2], np.int32),
-        "pair": np.array([TOUCHING, 0.0, 0.0, 1.0, 1.0, CUTS, CUTS, LONGEST_STEP, 0.0]),
-    }
-    for g, body in enumerate(pair.bodies):
-        sections |= {f"{name}{g}": values for name, values in _sections(body).items()}
-    return write_blob(sections)
-
-
-def _sections(body: FlatBody) -> dict[str, np.ndarray]:
-    n, functions = body.omega.size, len(body.rows)
-    static = np.zeros((2, 2, OFFSETS, GRID, GRID, functions, functions))
-    static[0, 0, OWN] = body.residual + (body.rows / body.omega**2) @ body.rows.T
-    mass = (body.mass, body.mass)
-    gear = [1, 0.01, 0, 0.01, 0, 0, *mass, 1.0, NO_LOCAL, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
-    return {
-        "gear": np.array(gear, float),
-        "port": np.array([TORQUE, 0, 1, 0, 1, 1, 1, 0], float),
-        "size": np.array([n, GRID, functions], np.int32),
-        "omega": body.omega,
-        "zeta": np.zeros(n),
-        "diameter": np.zeros(n, np.int32),
-        "part": np.zeros(n, np.int32),
-        "rows": np.broadcast_to(body.rows, (2, GRID, functions, n)),
-        "bore": np.zeros((3, n)),
-        "c_ff": static,
-        "c_fb": np.zeros((2, GRID, functions, 3)),
-        "c_bb": np.zeros((3, 3)),
-    }
+    def blob(self) -> bytes:
+        """The model that the kernel runs."""
+        return flat_blob("flat_pair", self.bodies, FlatContact(slices=self.slices, degrees=(0, 2)))
 
 
 def contact_rows(pair: FlatPair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -88,10 +154,12 @@ def contact_rows(pair: FlatPair) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     edges = np.linspace(-1, 1, pair.slices + 1)
     second = np.diff(0.5 * (edges**3 - edges)) / np.diff(edges)  # mean of P2 over each slice
     weights = np.stack([np.ones(pair.slices), 5 * second], axis=1)
-    parts, omega, compliance = [], [], np.zeros((pair.slices, pair.slices))
+    parts: list[np.ndarray] = []
+    omega: list[np.ndarray] = []
+    compliance = np.zeros((pair.slices, pair.slices))
     for body, direction in zip(pair.bodies, (-1, 1), strict=True):
         parts += [np.full((pair.slices, 1), direction / np.sqrt(body.mass)), -weights @ body.rows]
-        omega += [[0.0], body.omega]
+        omega += [np.zeros(1), body.omega]
         compliance += weights @ body.residual @ weights.T
     return np.hstack(parts), compliance, np.concatenate(omega)
 

@@ -21,7 +21,7 @@ def notes(rows: tuple[Row, ...], references: tuple[ReferenceRow, ...]) -> Iterat
             found = [(row.h_s, getattr(row, f"{name}_error")) for row in line]
             growth, large, small = max(
                 ((small[1] / large[1], large, small) for large, small in combinations(found, 2) if large[1] > 0),
-                default=(0.0, None, None),
+                default=(0.0, (0.0, 0.0), (0.0, 0.0)),
             )
             if growth > GROWTH:
                 yield (
@@ -33,8 +33,9 @@ def notes(rows: tuple[Row, ...], references: tuple[ReferenceRow, ...]) -> Iterat
         if not r.reached:
             yield (
                 f"reference, {r.slices} slices: at {1e6 * r.h_s:.3g} µs it still moves by "
-                f"{100 * r.te_moved:.2g} % (te), {100 * r.force_moved:.2g} % (force), more than a fifth of the smallest error of level full"
+                f"{100 * r.te_moved:.2g} % (te), {100 * r.force_moved:.2g} % (force), more than a fifth of the "
+                "smallest error of level full"
             )
-        small = [row for row in rows if row.slices == r.slices and row.te_error < 5 * r.te_moved]
-        if small:
-            yield f"reference, {r.slices} slices: {len(small)} errors are smaller than five times what it moved"
+        doubtful = [row for row in rows if row.slices == r.slices and row.te_error < 5 * r.te_moved]
+        if doubtful:
+            yield f"reference, {r.slices} slices: {len(doubtful)} errors are smaller than five times what it moved"

@@ -13,7 +13,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.study.bench import Point, measure, models_for
-from gearfmu.study.flat import FlatPair, contact_frequencies, exact_force, flat_blob
+from gearfmu.study.flat import FlatPair, contact_frequencies, exact_force
 from gearfmu.study.ladder import fitting
 from gearfmu.study.norm import errors
 
@@ -64,7 +64,7 @@ def constant_stiffness(pair: FlatPair | None = None, counts: Sequence[int] = COU
 def _force_errors(pair: FlatPair, integrator: int, h: float, count: int) -> tuple[float, float]:
     """Errors of the contact force without and with that of the start."""
     parameters = {"left.w_start": pair.speed, "h": h, "integrator": integrator, "level": FULL_LEVEL}
-    kernel = Kernel(flat_blob(pair), parameters | {"effect.hertz": 0, "slices": pair.slices})
+    kernel = Kernel(pair.blob(), parameters | {"effect.hertz": 0, "slices": pair.slices})
     kernel.initialize()
     found = np.empty(count)
     for k in range(count):

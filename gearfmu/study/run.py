@@ -149,8 +149,8 @@ class _Study:
             self.tell((done + 1) / (len(missing) + 1), f"{point.level} {point.integrator}, {point.slices} slices")
             self._keep(point, found, references[point.slices])
         kinds = (Row, ReferenceRow, TransientRow)
-        found = [tuple(self.tables[kind].of(self.scene.name)) for kind in kinds]
-        return Study(self.scene, *found, tuple([*notes(found[0], found[1]), *self.said]))
+        rows, against, transients = (tuple(self.tables[kind].of(self.scene.name)) for kind in kinds)
+        return Study(self.scene, rows, against, transients, (*notes(rows, against), *self.said))
 
     def wanted(self) -> list[Point]:
         """Points with their default steps as numbers, each once."""
@@ -172,14 +172,15 @@ class _Study:
         """Reference by number of slices, made or taken from the folder."""
         folder = self.job.out / "reference"
         paths = {count: folder / f"{self.scene.name}_{count}.h5" for count in slices}
-        found = {count: kept_reference(path, self.identity) for count, path in paths.items()}
-        missing = [count for count in slices if found[count] is None]
+        kept = {count: kept_reference(path, self.identity) for count, path in paths.items()}
+        found = {count: reference for count, reference in kept.items() if reference is not None}
+        missing = [count for count in slices if count not in found]
         for count, reference in self._each(_reference_of, missing, self.job.quick):
             found[count] = reference
             keep_reference(reference, paths[count], self.identity)
         table = self.tables[ReferenceRow]
         table.drop(self.scene.name, slices)
-        for count, r in found.items():
+        for count, r in sorted(found.items()):
             moved = (r.moved.te, r.moved.force, r.moved.bearing)
             table.add(ReferenceRow(self.scene.name, count, r.h, r.n_dyn, *moved, r.reached))
         return found
@@ -238,7 +239,7 @@ def _is_at(row: Row, point: Point) -> bool:
     adaptive = row.integrator == "rk45"
     if point.level == "paper":
         return same
-    return same and row.integrator == point.integrator and (adaptive or np.isclose(row.h_s, point.h, rtol=1e-4))
+    return same and row.integrator == point.integrator and (adaptive or bool(np.isclose(row.h_s, point.h, rtol=1e-4)))
 
 
 def _facts(folder: Path) -> dict:

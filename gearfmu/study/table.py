@@ -6,10 +6,13 @@ import csv
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.files import written_whole
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class TransientRow:
     bands_after_lock_dB: float
 
 
-AnyRow = TypeVar("AnyRow")
+AnyRow = TypeVar("AnyRow", bound="DataclassInstance")
 
 
 def read_rows(path: Path, kind: type[AnyRow]) -> list[AnyRow]:
@@ -83,7 +86,7 @@ def write_rows(path: Path, kind: type[AnyRow], rows: Iterable[AnyRow]) -> None:
     with written_whole(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([f.name for f in fields(kind)])
-        writer.writerows(map(_plain, map(astuple, rows)))
+        writer.writerows(map(_plain, (astuple(row) for row in rows)))
 
 
 def tidy(rows: Sequence[Any], columns: Sequence[str] | None = None) -> str:
@@ -100,7 +103,8 @@ class KeptTable:
     """A CSV file of rows, written after every change."""
 
     def __init__(self, path: Path, kind: type) -> None:
-        self.path, self.kind, self.rows = path, kind, read_rows(path, kind)
+        self.path, self.kind = path, kind
+        self.rows: list[Any] = read_rows(path, kind)
 
     def of(self, scene: str) -> list:
         """The scene's rows."""

@@ -191,8 +191,8 @@ def test_the_layout_is_documented():
 
 @pytest.mark.full
 def test_gearfmu_reduce_remakes_the_shipped_set(shipped, tmp_path):
-    """Same hashes, frequencies to 1e-8, statics to 1e-6. The Krylov oscillators of the carrier far above its band are no
-    modes of it: they follow the rounding of the factors, to 1e-6."""
+    """Same hashes, frequencies to 1e-8, statics to 1e-6. The Krylov oscillators of the carrier far above its band are
+    no modes of it: they follow the rounding of the factors, to 1e-6."""
     for made in reduce_set(SPEC, tmp_path):
         old = shipped[made.name]
         assert made.input_hash == old.input_hash

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from blocks import STEEL, ring_sector as smooth_sector
+from blocks import STEEL
+from blocks import ring_sector as smooth_sector
 
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, sector_spaces

@@ -103,6 +103,39 @@ def test_valid_mesh_or_a_reason_at_length(numbers: dict, scale: float) -> None:
     valid_mesh_or_a_reason(scale, numbers)
 
 
+HELICAL = {
+    "teeth": st.integers(12, 80),
+    "shift": st.floats(-0.2, 0.8),
+    "beta": st.floats(-35, 35),
+    "width": st.floats(1, 15),
+    "bore": st.floats(0.1, 0.8),
+}
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.fixed_dictionaries(HELICAL))
+def test_helical_sectors_of_any_angle_are_sound(numbers: dict) -> None:
+    """Up to 35° and face widths of 15 modules: positive Jacobians, the volume of the section times the width, cuts one
+    pitch apart; gears with an undercut or pointed tooth are left out."""
+    m, beta = 2e-3, math.radians(numbers["beta"])
+    root = m * (numbers["teeth"] / math.cos(beta) / 2 - 1.25 + numbers["shift"])
+    shape = GearGeometry(
+        z=numbers["teeth"], m=m, alpha=math.radians(20), x=numbers["shift"], r_a=root + 2.1 * m, tip_edge=0.04 * m,
+        r_bore=numbers["bore"] * root, h_fp=1.25 * m, rho_fp=0.38 * m, beta=beta,
+    )  # fmt: skip
+    if shape.s_form <= 0 or shape.tip_land_half_angle <= 0 or shape.r_f - shape.r_bore < 1.1 * m:
+        event("left out")
+        return
+    width = numbers["width"] * m
+    layers = max(2, math.ceil(abs(shape.twist) * width / 0.1))
+    mesh = gear_sector(shape, width, MeshSpec(flank=8, thickness=2, root=4, rim=2, width=layers))
+    assert scaled_jacobian(mesh).min() > 0.3
+    assert volume(mesh) == pytest.approx(shape.sector_area * width, rel=5e-4)
+    angle = 2 * math.pi / shape.z
+    turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+    assert np.abs(mesh.nodes[mesh.cut_minus] @ turn.T - mesh.nodes[mesh.cut_plus]).max() <= 1e-12 * shape.r_a
+
+
 def test_ordinary_pairs_are_not_refused() -> None:
     """A grid of everyday gears must pass: the checks may not refuse everything."""
     refused = []

@@ -42,10 +42,24 @@ static double now(void)
 
 #define FUNCTIONS(X)                                                                                                   \
     X(SetDebugLogging)                                                                                                 \
-    X(Instantiate) X(FreeInstance) X(SetupExperiment) X(EnterInitializationMode) X(ExitInitializationMode)             \
-        X(Terminate) X(Reset) X(GetReal) X(GetInteger) X(GetBoolean) X(SetReal) X(SetInteger) X(SetBoolean)            \
-            X(GetFMUstate) X(SetFMUstate) X(FreeFMUstate) X(SerializedFMUstateSize) X(SerializeFMUstate)               \
-                X(DeSerializeFMUstate) X(DoStep) X(CancelStep) X(GetStatus) X(GetRealStatus)
+    X(Instantiate)                                                                                                     \
+    X(FreeInstance)                                                                                                    \
+    X(SetupExperiment)                                                                                                 \
+    X(EnterInitializationMode)                                                                                         \
+    X(ExitInitializationMode)                                                                                          \
+    X(Terminate)                                                                                                       \
+    X(Reset)                                                                                                           \
+    X(GetReal)                                                                                                         \
+    X(GetInteger)                                                                                                      \
+    X(GetBoolean)                                                                                                      \
+    X(SetReal)                                                                                                         \
+    X(SetInteger)                                                                                                      \
+    X(SetBoolean)                                                                                                      \
+    X(GetFMUstate)                                                                                                     \
+    X(SetFMUstate)                                                                                                     \
+    X(FreeFMUstate)                                                                                                    \
+    X(SerializedFMUstateSize)                                                                                          \
+    X(SerializeFMUstate) X(DeSerializeFMUstate) X(DoStep) X(CancelStep) X(GetStatus) X(GetRealStatus)
 #define X(name) static fmi2##name##TYPE *name;
 FUNCTIONS(X)
 #undef X
@@ -94,9 +108,7 @@ static void need(int condition, const char *what)
     exit(1);
 }
 
-/* ---- run
- * ------------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- run ---- */
 #define MOST 256
 typedef struct inputs {
     int count;
@@ -163,9 +175,7 @@ static int run(fmi2Component c, int count, char **arguments)
     return 0;
 }
 
-/* ---- fuzz
- * -----------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- fuzz ---- */
 static uint64_t seed;
 static unsigned dice(unsigned sides)
 {
@@ -317,15 +327,14 @@ static int run_fuzz(const char *guid, const char *resources, char **arguments)
     return 0;
 }
 
-/* ---- bench
- * ----------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- bench ---- */
 typedef struct direct {
     gk_outcome (*set)(const gk_model *, gk_data *, uint32_t, double);
     gk_outcome (*get)(const gk_model *, const gk_data *, uint32_t, double *);
-    gk_outcome (*step)(const gk_model *, const gk_setup *, gk_data *, double, double);
+    gk_outcome (*step)(const gk_model *, const gk_setup *, gk_work *, gk_data *, double, double);
     gk_model *model;
     gk_setup *setup;
+    gk_work *work;
     gk_data *data;
 } direct;
 
@@ -355,20 +364,24 @@ static void open_direct(direct *d, void *library, const char *resources)
     char message[GK_MESSAGE];
     long size;
     char *bytes = read_file(resources, &size);
-    size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *);
+    size_t (*model_size)(void), (*setup_size)(const gk_model *), (*data_size)(const gk_model *),
+        (*work_size)(const gk_model *);
     gk_outcome (*open)(gk_model *, const void *, size_t, char *), (*defaults)(const gk_model *, gk_data *);
-    gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, char *),
-        (*initialize)(const gk_model *, const gk_setup *, gk_data *, double);
+    gk_outcome (*prepare)(const gk_model *, const gk_data *, gk_setup *, gk_work *, char *),
+        (*initialize)(const gk_model *, const gk_setup *, gk_work *, gk_data *, double);
     *(void **)&model_size = lookup(library, "gk_model_size"), *(void **)&setup_size = lookup(library, "gk_setup_size");
     *(void **)&data_size = lookup(library, "gk_data_size"), *(void **)&open = lookup(library, "gk_model_open");
     *(void **)&defaults = lookup(library, "gk_defaults"), *(void **)&prepare = lookup(library, "gk_prepare");
     *(void **)&initialize = lookup(library, "gk_initialize"), *(void **)&d->set = lookup(library, "gk_set");
     *(void **)&d->get = lookup(library, "gk_get"), *(void **)&d->step = lookup(library, "gk_step");
+    *(void **)&work_size = lookup(library, "gk_work_size");
     d->model = block(model_size());
     need(open(d->model, bytes, (size_t)size, message) == GK_OK, "gk_model_open");
-    d->setup = block(setup_size(d->model)), d->data = block(data_size(d->model));
-    need(defaults(d->model, d->data) == GK_OK && prepare(d->model, d->data, d->setup, message) == GK_OK, "gk_prepare");
-    need(initialize(d->model, d->setup, d->data, 0) == GK_OK, "gk_initialize");
+    d->setup = block(setup_size(d->model)), d->data = block(data_size(d->model)),
+    d->work = block(work_size(d->model));
+    need(defaults(d->model, d->data) == GK_OK, "gk_defaults");
+    need(prepare(d->model, d->data, d->setup, d->work, message) == GK_OK, "gk_prepare");
+    need(initialize(d->model, d->setup, d->work, d->data, 0) == GK_OK, "gk_initialize");
 }
 
 static int by_size(const void *a, const void *b)
@@ -397,7 +410,7 @@ static int bench(void *library, const char *resources, fmi2Component c, char **a
         GetReal(c, &out, 1, &first);
         double t1 = now();
         d.set(d.model, d.data, in, input);
-        gk_outcome outcome = d.step(d.model, d.setup, d.data, (double)k * H, H);
+        gk_outcome outcome = d.step(d.model, d.setup, d.work, d.data, (double)k * H, H);
         d.get(d.model, d.data, out, &second);
         double t2 = now();
         need(status == fmi2OK && outcome == GK_OK && memcmp(&first, &second, sizeof first) == 0,

@@ -155,7 +155,7 @@ def test_refusals_say_why(unpacked):
     subject.status("doStep", 0.0, 1e-4)
     subject.status("setReal", [reference(subject, "pinion.phi")], [math.nan])
     assert [m[:2] for m in messages] == [(ERROR, "logStatusError")] * 3, "errors are told even with logging off"
-    for message, reason in zip(messages, ("is Integer or Enumeration", "'instantiated'", "nan")):
+    for message, reason in zip(messages, ("is Integer or Enumeration", "'instantiated'", "nan"), strict=True):
         assert reason in message[2]
     subject.fmu.setDebugLogging(True, ["logEvents"])
     subject.fmu.setupExperiment()

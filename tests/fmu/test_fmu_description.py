@@ -62,7 +62,7 @@ def test_description_is_the_kernels_table(model, native):
     description = read_model_description(str(native))
     listed = description.modelVariables
     assert [v.name for v in listed] == [v.name for v in model.kernel_variables()]
-    for ours, theirs in zip(model.kernel_variables(), listed):
+    for ours, theirs in zip(model.kernel_variables(), listed, strict=True):
         assert (ours.reference, ours.type, ours.causality, ours.unit or None) == (
             theirs.valueReference,
             theirs.type,

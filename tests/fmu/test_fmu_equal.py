@@ -146,7 +146,7 @@ def test_libcosim_gives_the_numbers_of_fmpy(native, unpacked):
     for _ in range(STEPS):
         execution.step()
         rows.append(observer.last_real_values(slave, [variables[name] for name in names]))
-    expected = held_run(unpacked, dict(zip(("pinion.phi", "pinion.w"), values)), names)
+    expected = held_run(unpacked, dict(zip(("pinion.phi", "pinion.w"), values, strict=True)), names)
     scale = np.abs(expected).max(axis=0)
     assert (np.abs(np.array(rows) - expected) / scale).max() <= 1e-12
 

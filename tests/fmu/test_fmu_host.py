@@ -67,7 +67,7 @@ def fuzz(host: Host, folder: str, seed: int, calls: int) -> dict[str, int]:
     done = host.run(folder, "fuzz", str(seed), str(calls), str(highest))
     assert done.returncode == 0, f"seed {seed}: {done.stderr[-3000:]}"
     words = done.stdout.split()
-    return dict(zip(words[::2], map(int, words[1::2])))
+    return dict(zip(words[::2], map(int, words[1::2]), strict=True))
 
 
 @pytest.mark.needs("gcc")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 import random
@@ -11,7 +12,7 @@ import sys
 import pytest
 from fmpy.fmi2 import fmi2FMUstate
 
-from gearfmu.fmu.probes import ERROR, OK, Subject
+from gearfmu.fmu.probes import DISCARD, ERROR, OK, Subject
 
 FRESH = """
 import json, sys
@@ -162,7 +163,7 @@ def test_states_of_every_mode(unpacked, history):
     states.append(subject.fmu.getFMUstate())
     images = [subject.fmu.serializeFMUstate(state) for state in states]
     other = Subject(unpacked)
-    for image, mode in zip(images, ("instantiated", "initialization", "terminated")):
+    for image, mode in zip(images, ("instantiated", "initialization", "terminated"), strict=True):
         other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(image))
         if mode == "instantiated":
             other.fmu.setupExperiment(startTime=0.0)
@@ -175,6 +176,70 @@ def test_states_of_every_mode(unpacked, history):
             assert other.outputs() == history[6] and other.status("doStep", 7e-4, 1e-4) == ERROR
     subject.close()
     other.close()
+
+
+def timed(folder: str, steps: int, stop: int | None) -> Subject:
+    """An instance that has taken `steps` steps, and has a stop time after `stop` of them or none."""
+    subject = Subject(folder)
+    subject.fmu.setupExperiment(startTime=0.0, stopTime=None if stop is None else stop * subject.step_size)
+    subject.fmu.enterInitializationMode()
+    subject.excite()
+    subject.fmu.exitInitializationMode()
+    subject.run(steps)
+    return subject
+
+
+def last_good(subject: Subject) -> float:
+    """LastSuccessfulTime of fmi2GetRealStatus, s."""
+    time = ctypes.c_double()
+    assert subject.status("fmi2GetRealStatus", subject.fmu.component, 2, ctypes.byref(time)) == OK
+    return time.value
+
+
+@pytest.mark.parametrize("own, stop", [(None, 10), (6, 10), (6, None), (20, 5)])
+@pytest.mark.parametrize("by", ["handle", "bytes"])
+def test_times_travel_with_the_state(unpacked, by, own, stop):
+    """Stop time, or that there is none, and the last good time are those of the state, whatever the instance had."""
+    origin = timed(unpacked, 4, stop)
+    image = origin.fmu.serializeFMUstate(origin.fmu.getFMUstate())
+    if by == "bytes":
+        subject = timed(unpacked, 3, own)
+        subject.fmu.setFMUstate(subject.fmu.deSerializeFMUstate(image))
+    else:  # back in the same instance, which has meanwhile taken over a state with other times
+        subject, state, other = origin, origin.fmu.getFMUstate(), timed(unpacked, 2, own)
+        foreign = other.fmu.serializeFMUstate(other.fmu.getFMUstate())
+        subject.fmu.setFMUstate(subject.fmu.deSerializeFMUstate(foreign))
+        assert last_good(subject) == 2 * subject.step_size
+        subject.fmu.setFMUstate(state)
+        other.close()
+    h = subject.step_size
+    assert last_good(subject) == 4 * h
+    statuses = [subject.status("doStep", k * h, h) for k in range(4, 25)]
+    allowed = 21 if stop is None else stop - 4
+    assert statuses == [OK] * allowed + [ERROR] * (21 - allowed)
+    assert last_good(subject) == pytest.approx((4 + allowed) * h, rel=1e-12)
+    subject.close()
+
+
+def test_a_discarded_step_travels_with_the_state(unpacked_other):
+    """Last good time within the step, and the status of the step."""
+    origin = Subject(unpacked_other).initialized()
+    h, steps = origin.step_size, 0
+    origin.fmu.setReal([reference(origin, "wheel.tau")], [-1e7])
+    while origin.status("doStep", steps * h, h) == OK:
+        steps += 1
+    reached = last_good(origin)
+    image = origin.fmu.serializeFMUstate(origin.fmu.getFMUstate())
+    subject = Subject(unpacked_other).initialized()
+    subject.run(steps + 3)
+    assert last_good(subject) == pytest.approx((steps + 3) * h, rel=1e-12)
+    subject.fmu.setFMUstate(subject.fmu.deSerializeFMUstate(image))
+    assert last_good(subject) == reached < (steps + 1) * h
+    status = ctypes.c_int()
+    assert subject.status("fmi2GetStatus", subject.fmu.component, 0, ctypes.byref(status)) == OK
+    assert status.value == DISCARD and subject.status("doStep", reached, h) == ERROR
+    for each in (origin, subject):
+        each.close()
 
 
 def test_damaged_bytes_are_refused_and_change_nothing(unpacked, history):

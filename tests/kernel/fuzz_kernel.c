@@ -4,7 +4,7 @@
  * not finite after GK_OK, a refusal without a message. A finding of a sanitizer ends the process, and so does a case
  * that takes longer than CASE_SECONDS. */
 #define _POSIX_C_SOURCE 200112L
-#include "model/gk_core.h"
+#include "setup/gk_setup.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -56,7 +56,7 @@ static const char *not_finite(const gk_model *model, const gk_data *data)
 }
 
 /* a damaged state is refused, or steps on without harm; what it then says is as good as the state was */
-static void step_from_damage(const gk_model *model, const gk_setup *setup, const void *saved, size_t size)
+static void step_from_damage(const gk_model *model, const gk_setup *setup, gk_work *work, const void *saved, size_t size)
 {
     gk_data *data = memory(gk_data_size(model));
     unsigned char *bytes = (unsigned char *)data;
@@ -70,12 +70,13 @@ static void step_from_damage(const gk_model *model, const gk_setup *setup, const
             memset(bytes + at, uniform() < 0.5 ? 0xff : 0x7f, at + 8 <= size ? 8 : size - at);
     }
     if (gk_state_check(model, setup, data, size) == GK_OK)
-        for (int k = 0; k < 2; k++) (void)gk_step(model, setup, data, gk_time(data), setup->h);
+        for (int k = 0; k < 2; k++) (void)gk_step(model, setup, work, data, gk_time(data), setup->h);
     free(data);
 }
 
 /* what went wrong, or "" */
-static const char *run_steps(const gk_model *model, const gk_setup *setup, gk_data *data, gk_outcome *outcome)
+static const char *run_steps(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                             gk_outcome *outcome)
 {
     size_t size = gk_state_size(setup);
     void *saved = memory(size);
@@ -83,9 +84,9 @@ static const char *run_steps(const gk_model *model, const gk_setup *setup, gk_da
     for (int i = 0; i < STEPS && *outcome == GK_OK && !wrong[0]; i++) {
         if (i % 3 == 0) set_some(model, data, GK_INPUT, 0.5);
         memcpy(saved, data, size);
-        *outcome = gk_step(model, setup, data, gk_time(data), setup->h * (1.0 + floor(3.0 * uniform())));
+        *outcome = gk_step(model, setup, work, data, gk_time(data), setup->h * (1.0 + floor(3.0 * uniform())));
         if (*outcome == GK_OK) wrong = not_finite(model, data);
-        if (i % 5 == 4) step_from_damage(model, setup, saved, size);
+        if (i % 5 == 4) step_from_damage(model, setup, work, saved, size);
         if (i % 7 == 6 && gk_state_check(model, setup, saved, size) == GK_OK) memcpy(data, saved, size);
     }
     free(saved);
@@ -101,14 +102,16 @@ static void run_case(unsigned long number, const void *blob, size_t size)
     *outcome = gk_model_open(model, blob, size, message);
     if (*outcome == GK_OK) {
         gk_setup *setup = memory(gk_setup_size(model));
+        gk_work *work = memory(gk_work_size(model));
         gk_data *data = memory(gk_data_size(model));
         call = "defaults", *outcome = gk_defaults(model, data);
         if (uniform() < 0.7) set_some(model, data, GK_PARAMETER, 0.15);
         if (uniform() < 0.5) set_some(model, data, GK_INPUT, 0.5);
-        call = "prepare", *outcome = gk_prepare(model, data, setup, message);
-        if (*outcome == GK_OK) call = "initialize", *outcome = gk_initialize(model, setup, data, 0.0);
-        if (*outcome == GK_OK) call = "step", wrong = run_steps(model, setup, data, outcome);
+        call = "prepare", *outcome = gk_prepare(model, data, setup, work, message);
+        if (*outcome == GK_OK) call = "initialize", *outcome = gk_initialize(model, setup, work, data, 0.0);
+        if (*outcome == GK_OK) call = "step", wrong = run_steps(model, setup, work, data, outcome);
         free(setup);
+        free(work);
         free(data);
     } else if (!message[0]) {
         wrong = "no-message";

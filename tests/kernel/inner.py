@@ -13,12 +13,13 @@ from probes import FLAGS, HERE, source_folder
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import fmi_headers
 
-RIGID = 10
+POSE = 6
 
 
 @dataclass(frozen=True)
 class Place:
-    """One tooth pair: flank 0 drive, 1 coast; gap m; gradient (6,) with respect to xA, yA, φA, xB, yB, φB; rolls m; 1/ρA + 1/ρB in 1/m."""
+    """One tooth pair: flank 0 drive, 1 coast; gap m; gradient (6,) with respect to xA, yA, φA, xB, yB, φB; rolls m;
+    1/ρA + 1/ρB in 1/m."""
 
     flank: int
     tooth: int
@@ -49,9 +50,9 @@ class Inner:
     def _handles(self) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
         return ctypes.c_void_p(self.kernel._model), ctypes.c_void_p(self.kernel._setup)
 
-    def places(self, frame: np.ndarray, reach: float = 1e-3) -> list[Place]:
-        """All places at frame (xA, yA, φA, xB, yB, φB) whose undeformed gap is below `reach`."""
-        full, out = (ctypes.c_double * RIGID)(*frame), (ctypes.c_double * (8 * 12))()
+    def places(self, pose: np.ndarray, reach: float = 1e-3) -> list[Place]:
+        """All places at pose (xA, yA, φA, xB, yB, φB) whose undeformed gap is below `reach`."""
+        full, out = (ctypes.c_double * POSE)(*pose), (ctypes.c_double * (8 * 12))()
         count = self._lib.probe_places(*self._handles(), full, ctypes.c_double(reach), out)
         rows = [out[12 * i : 12 * i + 12] for i in range(count)]
         return [Place(int(r[0]), int(r[1]), r[2], np.array(r[3:9]), (r[9], r[10]), r[11]) for r in rows]
@@ -68,4 +69,5 @@ class Inner:
 
     def mu(self, h: float, gamma: float = 1.0) -> float:
         """μ′ at step h (s)."""
-        return self._lib.probe_mu(*self._handles(), ctypes.c_double(h), ctypes.c_double(gamma))
+        work = ctypes.c_void_p(self.kernel._work)
+        return self._lib.probe_mu(*self._handles(), work, ctypes.c_double(h), ctypes.c_double(gamma))

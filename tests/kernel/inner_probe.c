@@ -1,12 +1,13 @@
 /* Opens inner functions of the kernel to tests: places of contact with gap and gradient, the local law. Compiled
  * together with gearfmu/kernel/src. */
-#include "model/gk_core.h"
+#include "integrate/gk_integrate.h"
 
 /* out: per place {flank, tooth, gap, gradient[6], roll A, roll B, curvature} */
-GK_API int probe_places(const gk_model *model, const gk_setup *setup, const double *frame, double reach, double *out)
+GK_API int probe_places(const gk_model *model, const gk_setup *setup, const double *pose, double reach, double *out)
 {
     gk_place place[MAX_PAIRS];
-    int found = gk_flank_find(model, setup, frame, reach, place);
+    gk_position position[2];
+    int found = gk_flank_find(model, setup, &setup->mesh[0], pose, reach, position, place);
     for (int i = 0; i < found; i++, out += 12) {
         out[0] = place[i].flank;
         out[1] = place[i].key.tooth;
@@ -23,16 +24,16 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
 GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curvature, double force, double *out)
 {
     gk_local law;
-    gk_law_set(model, setup, curvature, &law);
-    const gk_approach at = gk_law_at(&law, setup->width / setup->slices, force);
+    gk_law_set(model, setup, &setup->mesh[0], curvature, &law);
+    const gk_approach at = gk_law_at(&law, model->engagement[0].width / setup->slices, force);
     out[0] = at.delta;
     out[1] = at.slope;
     out[2] = at.energy;
 }
 
-GK_API double probe_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
+GK_API double probe_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
 {
-    return gk_limit_mu(model, setup, h, gamma);
+    return gk_limit_mu(model, setup, work, h, gamma);
 }
 
 /* a prepared setup keeps this γ, whatever its limit is */

@@ -32,8 +32,8 @@ class Problem:
     """Modes and unknown forces; n modes, m forces.
 
     omega (n,) rad/s, 0 for rigid · zeta (n,) · rows (m, n): gap per modal coordinate · compliance (m, m), m/N ·
-    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, parallel to `path` (m, m), m/N, the part of
-    the compliance that is each contact's own (all of it where not said) ·
+    offset (m,), m · bilateral (m,) bool: rows that pull too · dashpot (m,), N·s/m, parallel to `path` (m, m), m/N,
+    the part of the compliance that is each contact's own (all of it where not said) ·
     weight (m,): share of a row in η, proportional to the length it stands for.
     """
 

@@ -1,19 +1,26 @@
-"""Small model blobs made without finite elements: a spur pair of FZG C size with a few invented modes,
-and two coaxial bars.
+"""Small model blobs made without finite elements: a spur pair of FZG C size with a few invented modes, and two coaxial
+bars.
 
-Shapes and meaning of the sections are those of gearfmu/stage (model.py, tables.py) and gearfmu/kernel/src/model/gk_model.c.
+The sections are those of gearfmu/kernel/src/model/gk_fields.inc; the pair's ground oscillators come from its invented
+free bodies by gearfmu.stage.groups, as those of every stage.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from exact_bars import Bar
 
 from gearfmu.stage.blob import write_blob
+from gearfmu.stage.fields import gear_numbers, order_sections
+from gearfmu.stage.free import FreeBody, free_gear
+from gearfmu.stage.general import GENERAL_VERSION, flank_sections, port_compliances, set_sections
+from gearfmu.stage.groups import Group, Layout, Support, mount
+from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
-PAIR, FLAT = 0, 1
+NAMES = ("pinion", "wheel")
 OFFSETS = np.arange(-3, 4)
 DISTANCE, TEETH, SHIFT, MASS, INERTIA = 91.5e-3, (16, 24), (0.1817, 0.1715), (0.35, 0.95), (2.2e-4, 1.5e-3)
 ALPHA = np.radians(20)
@@ -24,91 +31,52 @@ LENGTH = DISTANCE * np.sin(WORKING)
 PHASE = (0.0, np.pi - WORKING - PSI[1] + (LENGTH - BASE[0] * (PSI[0] + WORKING)) / BASE[1])  # drive flanks just touch
 FORM, TIP = (3.0e-3, 9.0e-3), (23.3e-3, 30.2e-3)
 ROLLS, DEGREES = 6, (0, 2)
-SPRING, TORQUE, FIXED = 0.0, 1.0, 2.0
-PORTS = {"spring": (SPRING, 0.0), "torque": (TORQUE, 0.0), "fixed": (FIXED, 0.0), "chain": (SPRING, 1.0)}
+BEARING_K, BEARING_C = 3e8, 600.0
+EXTERNAL, SPRING, TORQUE, FIXED = 1, 0, 1, 2
+PORTS = {"spring": (SPRING, 0), "torque": (TORQUE, 0), "fixed": (FIXED, 0), "chain": (SPRING, 1)}  # kind, chain
+NODES = ((0, 0), (1, 0))  # body and node of the ports: the bores
+FREQUENCY = np.array([9e3, 11e3, 11e3, 14e3, 14e3, 38e3, 38e3])  # Hz
+DIAMETER, MEMBER = np.array([0, 1, 1, 2, 2, 3, 3]), np.array([0, 1, 2, 1, 2, 1, 2])
 
 
 def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> bytes:
-    """A spur pair of 16/24 teeth with 5 modes (two of them pairs) a gear, 3 slices, ports of the kinds named."""
+    """A spur pair of 16/24 teeth with 7 modes (three pairs) a gear: one of nodal diameter 0 and a pair of 1, which go
+    into the ground oscillators with the bearings, two pairs that turn with the gear; 3 slices, ports of the kinds
+    named."""
     rng = np.random.default_rng(seed)
-    sections: dict = {
-        "model": np.array([1, PAIR, 3, _coast_shift()], np.int32),
+    bodies = [_body(g, rng) for g in (0, 1)]
+    groups = _groups([free_gear(body, np.arange(len(FREQUENCY)), np.arange(2), np.eye(ROLLS)) for body in bodies])
+    layout, last = groups[0].layout, (2e4, 5.0, 0.05, 2e-3, 8e3, 0.5)
+    sections = {
+        "counts": np.array([GENERAL_VERSION, 3, 2, 2, 1, 2, 4, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
         "name": "small_pair",
-        "shafts": "pinion|wheel",
+        "rotor_names": "|".join(NAMES),
+        "engagement_names": "mesh",
+        "support_names": "|".join(layout.support_names()),
+        "displacement_names": "|".join(layout.displacement_names()),
+        "limits": np.array([20e3, 60e3, 7.5e-6, 2 * np.pi / (628.0 * TEETH[0])]),
         "degrees": np.array(DEGREES, np.int32),
-        "pair": np.array([DISTANCE, 1e-4, 2e4, 600.0, 628.0, 20e3, 60e3, 7.5e-6, 0.0]),
-    }
-    for g, port in enumerate(ports):
-        sections[f"gear{g}"] = _gear(g)
-        sections[f"port{g}"] = np.array([*PORTS[port], 2e4, 5.0, 0.05, 2e-3, 8e3, 0.5])
-        sections |= _tables(g, rng)
-    return write_blob(sections)
+        "inertia": np.array(INERTIA),
+        "engaged": np.array([[0, 1, EXTERNAL, _coast_shift()]], np.int32),
+        "engagement": np.array([[0.0, 0.0, DISTANCE, 0.0, 1e-4, 0.0, 2e4, 600.0 / BASE[0]]]),
+        "port_kinds": np.array([[g, *PORTS[port]] for g, port in enumerate(ports)], np.int32),
+        "ports": np.array([last, last]),
+    } | port_compliances(groups[0], NODES)
+    for g in (0, 1):
+        sections |= {f"gear{g}": _gear(g)} | _modes(g, bodies[g], groups)
+    for s, group in enumerate(groups):
+        sections |= set_sections(s, group, NODES)
+    return write_blob(order_sections(sections))
 
 
 def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: float = 1e-20) -> bytes:
     """Two coaxial bars `gap` apart, with the residual of the modes left out; `local`: 2 (1 − ν²)/(πE) of the contact
     strip of 1 m, 1/Pa (as good as rigid when left out)."""
-    bodies = tuple(
-        FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.static_compliance()]]))
+    bodies = [
+        FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.residual(n)]]))
         for b, n in zip(bars, modes, strict=True)
-    )
-    return flat_blob(bodies, Block(gap=gap, local=local))
-
-
-@dataclass(frozen=True)
-class FlatBody:
-    """mass kg · omega rad/s, zeta (n,) · rows (A, n): outward displacement of width function a per mode · static (A,
-    A) m/N."""
-
-    mass: float
-    omega: np.ndarray
-    zeta: np.ndarray
-    rows: np.ndarray
-    static: np.ndarray
-
-
-@dataclass(frozen=True)
-class Block:
-    """Flat engagement 1 m wide: slices, degrees of the width functions, gap m, local 1/Pa,
-    damping N·s/m per m of width."""
-
-    slices: int = 1
-    degrees: tuple[int, ...] = (0,)
-    gap: float = 1e-9
-    local: float = 1e-20
-    damping: float = 0.0
-
-
-def flat_blob(bodies: tuple[FlatBody, FlatBody], block: Block) -> bytes:
-    """Two bodies that meet in a flat contact: gap = x_B − x_A − outward displacements, in every slice."""
-    functions = len(block.degrees)
-    sections: dict = {
-        "model": np.array([1, FLAT, block.slices, 0], np.int32),
-        "name": "bars",
-        "shafts": "left|right",
-        "degrees": np.array(block.degrees, np.int32),
-        "pair": np.array([block.gap, 0.0, block.damping, 1.0, 1.0, 1e9, 1e9, 1e-3, 0.0]),
-    }
-    for g, body in enumerate(bodies):
-        n = body.omega.size
-        static = np.zeros((2, 2, 7, 4, 4, functions, functions))
-        static[0, 0, 3] = body.static
-        numbers = [1, 0.01, 0, 0.01, 0, 0, body.mass, body.mass, 1.0, block.local, 1e-3, 0, 0.01, 1e-4, 0.01, 0, 1e8, 0]
-        sections |= {
-            f"gear{g}": np.array(numbers, float),
-            f"port{g}": np.array([TORQUE, 0, 1, 0, 1, 1, 1, 0], float),
-            f"size{g}": np.array([n, 4, functions], np.int32),
-            f"omega{g}": body.omega,
-            f"zeta{g}": body.zeta,
-            f"diameter{g}": np.zeros(n, np.int32),
-            f"part{g}": np.zeros(n, np.int32),
-            f"rows{g}": np.broadcast_to(body.rows, (2, 4, functions, n)),
-            f"bore{g}": np.zeros((3, n)),
-            f"c_ff{g}": static,
-            f"c_fb{g}": np.zeros((2, 4, functions, 3)),
-            f"c_bb{g}": np.zeros((3, 3)),
-        }
-    return write_blob(sections)
+    ]
+    return flat_blob("bars", bodies, FlatContact(gap=gap, local=local))
 
 
 def _coast_shift() -> int:
@@ -123,58 +91,95 @@ def _coast_shift() -> int:
 
 def _gear(g: int) -> np.ndarray:
     edge, inner = 2e-4, TIP[g] - 2e-4
-    local = 2 * (1 - 0.3**2) / (np.pi * 206e9)
-    return np.array(
-        [
-            TEETH[g],
-            BASE[g],
-            FORM[g],
-            TIP[g],
-            PSI[g],
-            PHASE[g],
-            MASS[g],
-            INERTIA[g],
-            14e-3,
-            local,
-            1e-3,
-            15e-6 / (0.2 * TIP[g]) ** 2,
-            0.8 * TIP[g],
-            edge,
-            np.hypot(BASE[g], inner),
-            TIP[g] / BASE[g] - np.arctan2(inner, BASE[g]),
-            3e8,
-            600.0,
-        ]
+    return gear_numbers(
+        {
+            "r_b": BASE[g],
+            "s_form": FORM[g],
+            "s_tip": TIP[g],
+            "psi_b": PSI[g],
+            "phase": PHASE[g],
+            "face_width": 14e-3,
+            "local": 2 * (1 - 0.3**2) / (np.pi * 206e9),
+            "strip_half_width": 1e-3,
+            "relief": 15e-6 / (0.2 * TIP[g]) ** 2,
+            "relief_start": 0.8 * TIP[g],
+            "tip_edge": edge,
+            "corner_radius": np.hypot(BASE[g], inner),
+            "corner_angle": TIP[g] / BASE[g] - np.arctan2(inner, BASE[g]),
+            "z_mid": 0.0,
+            "helix": 0.0,
+        }
     )
 
 
-def _tables(g: int, rng: np.random.Generator) -> dict:
-    """Modes and a static compliance that holds them plus a positive residual."""
-    omega = 2 * np.pi * np.array([9e3, 14e3, 14e3, 38e3, 38e3]) * (1.0, 0.8)[g]
-    diameter, part = np.array([0, 2, 2, 3, 3], np.int32), np.array([0, 1, 2, 1, 2], np.int32)
-    rows = 0.6 * rng.standard_normal((2, 1, 1, 5)) * np.ones((2, ROLLS, 2, 1)) / np.sqrt(MASS[g])
+def _body(g: int, rng: np.random.Generator) -> SimpleNamespace:
+    """What `free_gear` reads of a reduced body: invented modes, and static compliances that hold them plus a positive
+    residual."""
+    omega = 2 * np.pi * FREQUENCY * (1.0, 0.8)[g]
+    rows = 0.6 * rng.standard_normal((2, 1, 1, omega.size)) * np.ones((2, ROLLS, 2, 1)) / np.sqrt(MASS[g])
     rows *= np.linspace(0.7, 1.3, ROLLS)[None, :, None, None] * np.array([1.0, 0.2])[None, None, :, None]
-    bore = 0.3 * rng.standard_normal((3, 5)) / np.sqrt(MASS[g])
-    bore[2] /= BASE[g]
-    turned = np.stack([_turn(rows, diameter, part, 2 * np.pi * o / TEETH[g]) for o in OFFSETS])
+    bore = _bore_rows(0.3 * rng.standard_normal(3) / np.sqrt(MASS[g]), BASE[g])
+    angles = 2 * np.pi * np.arange(TEETH[g]) / TEETH[g]
+    turned = np.stack([_turn(rows, DIAMETER, MEMBER, angle) for angle in angles])
     static = np.einsum("fiak,ogjbk->fgoijab", rows / omega**2, turned)
+    for f in (0, 1):
+        static[f, f, 0] += own_residual()
+    roll = np.linspace(0.7, 1.3, ROLLS)
+    between = 1e-11 * rng.standard_normal((2, 1, 1, 6)) / np.array([1, 1, 1, BASE[g], BASE[g], BASE[g]])
+    between = between * roll[None, :, None, None] * np.array([1.0, 0.2])[None, None, :, None]
+    return SimpleNamespace(
+        name=NAMES[g],
+        teeth=TEETH[g],
+        mass=MASS[g],
+        inertia=np.diag([0.6, 0.6, 1.0]) * INERTIA[g],
+        frequency=omega / (2 * np.pi),
+        damping_ratio=np.full(omega.size, 0.01),
+        nodal_diameter=DIAMETER,
+        part=MEMBER,
+        flank_rows=rows,
+        bore_rows=bore,
+        static_ff=static,
+        static_fb=np.einsum("fiak,ck->fiac", rows / omega**2, bore) + between,
+        static_bb=np.einsum("ck,dk->cd", bore / omega**2, bore) + np.diag([3e-10, 3e-10, 3e-10, 3e-8, 3e-8, 3e-8]),
+    )
+
+
+def _bore_rows(size: np.ndarray, r_b: float) -> np.ndarray:
+    """(6, n): a mode of nodal diameter 0 turns the bore, a pair of 1 moves and tilts it as a vector in the plane."""
+    rows = np.zeros((6, len(FREQUENCY)))
+    rows[5, 0] = size[0] / r_b
+    rows[[0, 1], [1, 2]] = size[1]
+    rows[[3, 4], [1, 2]] = size[2] / r_b
+    return rows
+
+
+def _groups(bodies: list[FreeBody]) -> list[Group]:
+    """As supported by the bearings, and with the bores held on their axes."""
+    bearings = [
+        Support(f"bearing.{name}", (g, 0), None, (0, 1), np.eye(2) / BEARING_K, np.full(2, BEARING_C))
+        for g, name in enumerate(NAMES)
+    ]
+    layout = Layout(bodies, [(0,), (1,)], bearings, planar=True)
+    return [mount(layout), mount(replace(layout, supports=[bearing.hold() for bearing in bearings]))]
+
+
+def _modes(g: int, body: SimpleNamespace, groups: list[Group]) -> dict[str, np.ndarray]:
+    tables, turning = flank_sections(g, groups, NODES), DIAMETER > 1
+    reads = tables[f"ground_list{g}_0"].size
+    return tables | {
+        f"size{g}": np.array([g, TEETH[g], turning.sum(), reads, 0], np.int32),
+        f"omega{g}": 2 * np.pi * body.frequency[turning],
+        f"zeta{g}": body.damping_ratio[turning],
+        f"diameter{g}": DIAMETER[turning].astype(np.int32),
+        f"member{g}": MEMBER[turning].astype(np.int32),
+    }
+
+
+def own_residual() -> np.ndarray:
+    """(ROLLS, ROLLS, A, A), m/N: what a tooth's flank gives way beyond the modes, by its own load."""
     roll = np.linspace(0.7, 1.3, ROLLS)
     own = np.einsum("ij,ab->ijab", np.outer(roll, roll), np.diag([2e-9, 4e-10]))
-    own += np.einsum("ij,ab->ijab", np.eye(ROLLS), 1e-10 * np.eye(2))
-    for f in (0, 1):
-        static[f, f, 3] += own
-    return {
-        f"size{g}": np.array([5, ROLLS, 2], np.int32),
-        f"omega{g}": omega,
-        f"zeta{g}": np.full(5, 0.01),
-        f"diameter{g}": diameter,
-        f"part{g}": part,
-        f"rows{g}": rows,
-        f"bore{g}": bore,
-        f"c_ff{g}": static,
-        f"c_fb{g}": np.einsum("fiak,ck->fiac", rows / omega**2, bore),
-        f"c_bb{g}": np.einsum("ck,dk->cd", bore / omega**2, bore) + np.diag([3e-10, 3e-10, 3e-8]),
-    }
+    return own + np.einsum("ij,ab->ijab", np.eye(ROLLS), 1e-10 * np.eye(2))
 
 
 def _turn(rows: np.ndarray, diameter: np.ndarray, part: np.ndarray, angle: float) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""Line contact: gaps are zero where involutes touch, gradients are derivatives of the gaps, flanks go over into tip corners without a jump, the local law is Hertz's."""
+"""Line contact: gaps are zero where involutes touch, gradients are derivatives of the gaps, flanks go over into tip
+corners without a jump, the local law is Hertz's."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from inner import Inner, Place, compile_inner
 from small_model import BASE, PSI, TEETH, TIP, WORKING, _coast_shift, pair_blob
 
 from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.fields import change_gear
 
 REFERENCE = json.loads((Path(__file__).parent.parent / "reference" / "hertz_line.json").read_text())
 DRIVE, COAST = 0, 1
@@ -41,7 +43,7 @@ def misplaced(library: Path) -> Inner:
 
 def turned(phi: float, dx: float = 0.0, dy: float = 0.0, lead: float = 0.0) -> np.ndarray:
     """Pinion at φ, wheel following without load and ahead by `lead` (m along the line of action); pinion shifted."""
-    return np.array([dx, dy, phi, 0.0, 0.0, -phi * BASE[0] / BASE[1] - lead / BASE[1], 0, 0, 0, 0])
+    return np.array([dx, dy, phi, 0.0, 0.0, -phi * BASE[0] / BASE[1] - lead / BASE[1]])
 
 
 def one(places: list[Place], flank: int, tooth: int) -> Place | None:
@@ -177,14 +179,15 @@ def test_local_law_is_continuous_with_its_slope_and_its_energy_is_the_integral(p
 
 
 def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(library: Path):
-    """Two cylinders: δ = Σ 2(1 − ν²)/(πEL)·F·[ln(4w/b) − 1], b from Hertz (numbers of tests/reference/hertz_line.json)."""
+    """Two cylinders: δ = Σ 2(1 − ν²)/(πEL)·F·[ln(4w/b) − 1], b from Hertz (numbers of
+    tests/reference/hertz_line.json)."""
     case = REFERENCE
     sections = read_blob(pair_blob())
     for g in (0, 1):
-        gear = sections[f"gear{g}"].copy()
-        gear[9] = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"])
-        gear[8], gear[10] = case["L"], 1e-3
-        sections[f"gear{g}"] = gear
+        local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"])
+        sections[f"gear{g}"] = change_gear(
+            sections[f"gear{g}"], local=local, face_width=case["L"], strip_half_width=1e-3
+        )
     inner = Inner(library, write_blob(sections), {"slices": 1})
     curvature = 1 / case["R1"] + 1 / case["R2"]
     local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"] * case["L"])

@@ -10,37 +10,35 @@ import numpy as np
 import pytest
 from numpy.polynomial import Legendre
 from reference_dg4 import Problem, Reference, Scheme
-from small_model import Block, FlatBody, flat_blob
 
 from gearfmu.kernel import Kernel
+from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 H, STEPS, SPEED = 5e-6, 600, 0.2
-BLOCK = Block(slices=6, degrees=(0, 2), gap=1.3e-6, local=2.8e-12)
+BLOCK = FlatContact(slices=6, degrees=(0, 2), gap=1.3e-6, local=2.8e-12)
 SEED = 2
 PATH_SHARE = 0.95  # of the residual, what a dashpot is parallel to (docs/theory.md, 2.5)
-REFERENCE_LOAD = 100.0  # N over the width: torque_max over base radius of the blob
+REFERENCE_LOAD = 100.0  # N over the width: LOAD of gearfmu.study.flat
 
 
 def bodies(zeta: float) -> tuple[FlatBody, FlatBody]:
-    """Two bodies with seven and nine modes that tilt and bend the slices,
-    stored with a static compliance that holds them."""
+    """Two bodies with seven and nine modes that tilt and bend the slices."""
     rng, made = np.random.default_rng(SEED), []
     for mass, n in ((0.8, 7), (1.7, 9)):
         omega = 2 * np.pi * np.sort(rng.uniform(1e3, 40e3, n))
         rows = rng.uniform(-1, 1, (2, n)) * np.array([[1.0], [1.0]]) / np.sqrt(mass)
-        static = (rows / omega**2) @ rows.T + np.diag([1.5e-10, 4e-11])
-        made.append(FlatBody(mass, omega, np.full(n, zeta), rows, static))
+        made.append(FlatBody(mass, omega, np.full(n, zeta), rows, np.diag([1.5e-10, 4e-11])))
     return made[0], made[1]
 
 
-def slice_weights(block: Block) -> np.ndarray:
+def slice_weights(block: FlatContact) -> np.ndarray:
     """(slices, A): (2d + 1) times the mean of P_d over each slice."""
     edges = np.linspace(-1, 1, block.slices + 1)
     means = [np.diff(Legendre.basis(d).integ()(edges)) / np.diff(edges) for d in block.degrees]
     return np.stack([(2 * d + 1) * mean for d, mean in zip(block.degrees, means, strict=True)], axis=1)
 
 
-def reference_problem(two: tuple[FlatBody, FlatBody], block: Block) -> Problem:
+def reference_problem(two: tuple[FlatBody, FlatBody], block: FlatContact) -> Problem:
     """The same contact with every slice's row written out, rigid motion first in each body."""
     t = slice_weights(block)
     rows, omega, zeta, compliance = [], [], [], np.zeros((block.slices, block.slices))
@@ -48,7 +46,7 @@ def reference_problem(two: tuple[FlatBody, FlatBody], block: Block) -> Problem:
         rows += [np.full((block.slices, 1), direction / np.sqrt(body.mass)), -t @ body.rows]
         omega += [[0.0], body.omega]
         zeta += [[0.0], body.zeta]
-        compliance += t @ (body.static - (body.rows / body.omega**2) @ body.rows.T) @ t.T
+        compliance += t @ body.residual @ t.T
     share = block.local * block.slices
     half_width = np.sqrt(4 * share * REFERENCE_LOAD / block.slices)
     local = 2 * share * (np.log(4e-3 / half_width) - 1) * np.eye(block.slices)
@@ -64,7 +62,7 @@ def reference_problem(two: tuple[FlatBody, FlatBody], block: Block) -> Problem:
     )
 
 
-def kernel_run(two: tuple[FlatBody, FlatBody], block: Block, integrator: int, library: Path) -> np.ndarray:
+def kernel_run(two: tuple[FlatBody, FlatBody], block: FlatContact, integrator: int, library: Path) -> np.ndarray:
     """(STEPS, 3): mesh force, stored energy and dissipated energy after every step."""
     parameters = {
         "left.w_start": SPEED,
@@ -74,7 +72,7 @@ def kernel_run(two: tuple[FlatBody, FlatBody], block: Block, integrator: int, li
         "slices": block.slices,
         "effect.hertz": 0,
     }
-    kernel = Kernel(flat_blob(two, block), parameters, library)
+    kernel = Kernel(flat_blob("slices", two, block), parameters, library)
     kernel.initialize()
     record = np.empty((STEPS, 3))
     for i in range(STEPS):

@@ -1,4 +1,5 @@
-"""Communication times as tools hand them over: n·H, or accumulated with rounding noise in time and step, give the same bits."""
+"""Communication times as tools hand them over: n·H, or accumulated with rounding noise in time and step, give the
+same bits."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ H, STEPS = 1e-4, 600
 
 
 def forces(start: float, times: np.ndarray) -> list[bytes]:
-    """Mesh force and state time after every step from times[i] to times[i + 1]; inputs depend on the number of the step alone."""
+    """Mesh force and state time after every step from times[i] to times[i + 1]; inputs depend on the number of the
+    step alone."""
     kernel = Kernel(pair_blob(("spring", "spring")), {"level": 1})
     kernel.set("pinion.w", 100.0)
     kernel.set("wheel.w", -100.0 * 16 / 24)

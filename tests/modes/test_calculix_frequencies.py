@@ -1,8 +1,8 @@
 """Free frequencies of gear, ring and carrier against CalculiX: the same mesh, and the mesh of the stage file.
 
-The goldens come from CalculiX's own elements (C3D20) and eigensolver on all teeth, or, on the meshes of the stage files,
-on one sector with its own cyclic symmetry and every nodal diameter (benchmarks/calculix/frequencies.py); ours from one
-sector.
+The goldens come from CalculiX's own elements (C3D20) and eigensolver on all teeth, or, on the meshes of the stage
+files, on one sector with its own cyclic symmetry and every nodal diameter (benchmarks/calculix/frequencies.py); ours
+from one sector.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def test_gear_ring_and_carrier_on_the_meshes_of_the_stage_files(
 
 @pytest.mark.full
 def test_what_the_shipped_carrier_mesh_costs(benchmark_module: ModuleType) -> None:
-    """Against CalculiX on 1½ times its counts the carrier of the file is up to 0.62 % stiff: more than the 0.3 % that gear
-    and ring keep. Stated in docs/decisions.md."""
+    """Against CalculiX on 1½ times its counts the carrier of the file is up to 0.62 % stiff: more than the 0.3 % that
+    gear and ring keep. Stated in docs/decisions.md."""
     difference = benchmark_module.ours(benchmark_module.CASES["carrier"]) / np.array(GOLDEN["carrier_finer"]) - 1
     print(f"{100 * difference.min():+.3f} … {100 * difference.max():+.3f} %")
     assert np.all((difference > 0) & (difference < 6.5e-3))

@@ -11,7 +11,8 @@ import pytest
 
 from gearfmu.body import ReducedBody, load_stage_bodies
 from gearfmu.modes.linear import Linearised, linearised, stage_modes
-from gearfmu.spec.stage import ChainSpec, StageSpec, load_stage
+from gearfmu.spec.ports import ChainSpec
+from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -88,8 +89,8 @@ def _row_compliance(system: Linearised, row: int) -> float:
 def test_mesh_mode_and_its_damping(
     model: StageModel, bodies: list[ReducedBody], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Against benchmarks/mesh_mode.py, which takes gears as rigid on a mean mesh stiffness: elastic gears change its 7.8
-    kHz a little; the contact dashpots that give it 3 % there give 3 % here."""
+    """Against benchmarks/mesh_mode.py, which takes gears as rigid on a mean mesh stiffness: elastic gears change its
+    7.8 kHz a little; the contact dashpots that give it 3 % there give 3 % here."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     rigid = importlib.import_module("mesh_mode").mesh_mode("fzg_c", TORQUE)
     free = with_ports(model, bodies, pinion={"kind": "torque", "chain": None}, wheel={"kind": "torque", "chain": None})
@@ -121,7 +122,8 @@ def test_shares_add_up_and_frequencies_ascend(model: StageModel, bodies: list[Re
 
 
 def test_ports(model: StageModel, bodies: list[ReducedBody]) -> None:
-    """With torques on both shafts the stage turns freely: one rigid mode, which is not shown, in place of the lowest."""
+    """With torques on both shafts the stage turns freely: one rigid mode, which is not shown, in place of the
+    lowest."""
     free = with_ports(model, bodies, pinion={"kind": "torque", "chain": None}, wheel={"kind": "torque", "chain": None})
     held = with_ports(model, bodies, pinion={"kind": "fixed", "chain": None}, wheel={"kind": "fixed", "chain": None})
     values = {

@@ -9,6 +9,7 @@ import pytest
 
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.gear import BodySpec
+from gearfmu.spec.lead import EndRelief, LeadSpec, Misalignment
 from gearfmu.spec.stage import StageSpec, load_stage
 
 STAGE = load_stage("fzg_c")
@@ -57,6 +58,7 @@ SHAPING = [
     ("gears.0.body.mesh.rim", 99),
     ("pair.normal_module", 4.4e-3),
     ("pair.pressure_angle", 0.4),
+    ("pair.helix_angle", 0.2),
 ]
 OTHERS = [
     ("name", "x"),
@@ -70,6 +72,8 @@ OTHERS = [
     ("gears.1.teeth", 25),
     ("gears.0.bearing.stiffness", 1e8),
     ("gears.0.index_deviation", {3: 50e-6}),
+    ("gears.0.lead", LeadSpec(slope=5e-6, crowning=3e-6, end_relief=EndRelief(amount=4e-6, length=1e-3))),
+    ("pair.misalignment", Misalignment(out_of_plane=5e-6, in_plane=-5e-6, span=0.1)),
     ("contact.slices", 1),
     ("contact.damping", 0.0),
     ("ports.pinion.k", 1.0),
@@ -92,6 +96,13 @@ def test_every_field_of_a_gear_is_in_one_of_the_two_lists() -> None:
     named = {field.split(".")[2] for field, _ in SHAPING + OTHERS if field.startswith("gears.0")}
     elsewhere = {"tip_relief", "imported"}  # below, and tests/imports
     assert named | elsewhere == set(type(STAGE.gears[0]).model_fields)
+
+
+def test_the_hand_of_a_gear_is_part_of_its_body() -> None:
+    """Pinion and wheel of one pair are of opposite hand, and turning the pair's hand round changes both bodies."""
+    right, left = with_field("pair.helix_angle", 0.2), with_field("pair.helix_angle", -0.2)
+    assert [body_inputs(right, k)["helix_angle"] for k in (0, 1)] == [0.2, -0.2]
+    assert all(fingerprint(right, k) != fingerprint(left, k) for k in (0, 1))
 
 
 def test_tip_relief_shares_the_bodies() -> None:

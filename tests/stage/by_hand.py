@@ -105,8 +105,13 @@ class Pair:
 
     def corner_gap(self, position: float, tooth: int) -> float:
         """Distance (m) of the pinion's tip edge from the wheel's involute, by search along the involute."""
+        return self.corner(position, tooth)[0]
+
+    def corner(self, position: float, tooth: int, te: float = 0.0) -> tuple[float, float]:
+        """Distance (m) of the pinion's tip edge from the wheel's involute, and the roll (m) there, by search along the
+        involute; the pinion has turned by te (m) more."""
         pinion, wheel = self.geometry.gears
-        beta = 2 * math.pi * (position + tooth) / pinion.z + pinion.psi_b
+        beta = 2 * math.pi * (position + tooth) / pinion.z + te / pinion.r_b + pinion.psi_b
         turned = self.geometry.wheel_phase - 2 * math.pi * (position + tooth) / wheel.z + wheel.psi_b
         edge = self.spec.gears[0].tip_edge_radius
         centre = _on_tangent(pinion, beta, pinion.s_tip, pinion.s_tip - edge)
@@ -115,8 +120,19 @@ class Pair:
         def distance(roll: float) -> float:
             return float(np.hypot(*(axis + _on_tangent(wheel, turned, roll, roll) - centre)))
 
-        return minimize_scalar(distance, (1e-4, wheel.s_tip), bounds=(1e-4, wheel.s_tip), method="bounded",
-                               options={"xatol": 1e-12}).fun - edge  # fmt: skip
+        found = minimize_scalar(distance, (1e-4, wheel.s_tip), bounds=(1e-4, wheel.s_tip), method="bounded",
+                                options={"xatol": 1e-12})  # fmt: skip
+        return found.fun - edge, float(found.x)
+
+    def corner_approach(self, beyond: float, roll: float, load: float) -> float:
+        """δ (m) of the pinion's tip edge on the wheel's involute at `roll` under the line load (N/m), the pinion's roll
+        `beyond` (m) the end of its flank: over the half-width of the load strip the curvature of the edge takes the
+        place of the flank's (theory, 2.3)."""
+        share = min(beyond / self.spec.gears[0].body.strip_half_width, 1.0)
+        share *= share * (3 - 2 * share)
+        own = (1 - share) / self.geometry.gears[0].s_tip + share / self.spec.gears[0].tip_edge_radius
+        a, c, _ = self.local_law((1.0, 1.0))
+        return load * (c - 0.5 * a * math.log(2 * a * load / (own + 1 / roll)))
 
 
 def _on_tangent(gear: GearGeometry, beta: float, roll: float, along: float) -> np.ndarray:
@@ -141,7 +157,8 @@ def _at(body: ReducedBody, roll: float, values: np.ndarray) -> np.ndarray:
 
 
 def _static(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """(A, A) of a tooth's drive flank with itself, (A,) with the bore's rotation, rotation with itself, per N and N·m."""
+    """(A, A) of a tooth's drive flank with itself, (A,) with the bore's rotation, rotation with itself, per N and
+    N·m."""
     flank = _at(body, roll, _at(body, roll, body.static_ff[DRIVE, DRIVE, 0]))
     return flank, _at(body, roll, body.static_fb[DRIVE, :, :, RZ]), float(body.static_bb[RZ, RZ])
 

@@ -9,6 +9,7 @@ from gearfmu.body import load_stage_bodies
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 from gearfmu.stage.blob import read_blob
+from gearfmu.stage.fields import GEAR_NUMBERS
 from gearfmu.stage.tables import ROLLS, blend, resampling
 
 
@@ -26,22 +27,36 @@ def test_static_table_is_the_body_s_polynomial_on_an_even_grid(spec):
     body = load_stage_bodies(spec)[0]
     sections = read_blob(assemble(spec, [body, load_stage_bodies(spec)[1]]).blob)
     R, A = ROLLS, sections["degrees"].size
-    table = sections["c_ff0"].reshape(2, 2, 7, R, R, A, A)
-    gear = sections["gear0"]
-    to_grid = resampling(body.roll, gear[2], gear[3])
-    expected = to_grid @ body.static_ff[0, 0, 1, :, :, 0, 0] @ to_grid.T
+    table = sections["residual0"].reshape(2, 2, 7, R, R, A, A)
+    gear = dict(zip(GEAR_NUMBERS, sections["gear0"], strict=True))
+    to_grid = resampling(body.roll, gear["s_form"], gear["s_tip"])
+    expected = to_grid @ (body.static_ff[0, 0, 1] - _by_ground_modes(body, 1))[:, :, 0, 0] @ to_grid.T
     assert np.allclose(table[0, 0, 4, :, :, 0, 0], expected, rtol=1e-12, atol=1e-22)
     block = table[0, 0, 3, :, :, 0, 0]
     assert np.linalg.eigvalsh(0.5 * (block + block.T)).min() > -1e-14 * np.abs(block).max()
+
+
+def _by_ground_modes(body, offset: int) -> np.ndarray:
+    """(R, R, A, A), drive flank: what the body's modes of nodal diameter 0 and 1 carry from tooth 0 to `offset`."""
+    low = np.flatnonzero((body.nodal_diameter <= 1) & (body.parity >= 0))
+    rows, angle = body.flank_rows[0], 2 * np.pi * offset / body.teeth
+    there = rows * np.cos(body.nodal_diameter * angle)
+    for first in low[body.part[low] == 1]:
+        there[..., first] -= rows[..., first + 1] * np.sin(body.nodal_diameter[first] * angle)
+        there[..., first + 1] += rows[..., first] * np.sin(body.nodal_diameter[first] * angle)
+    omega2 = (2 * np.pi * body.frequency[low]) ** 2
+    return np.einsum("iak,jbk->ijab", rows[..., low] / omega2, there[..., low])
 
 
 def test_bearings_are_damped_by_their_ratio_and_the_mass_of_the_body(spec):
     """c = 2 D √(k m)."""
     bodies = load_stage_bodies(spec)
     sections = read_blob(assemble(spec, bodies).blob)
+    assert sections["support_names"].split("|") == [f"bearing.{g.name}.f{d}" for g in spec.gears for d in "xy"]
     for index, body in enumerate(bodies):
-        k, c = sections[f"gear{index}"][16:18]
-        assert k == 3e8 and c == pytest.approx(2 * 0.03 * np.sqrt(3e8 * body.mass), rel=1e-12)
+        compliance, c = (sections[name].reshape(2, 2)[index] for name in ("support_compliance0", "damper0"))
+        assert np.all(compliance == 1 / 3e8)
+        assert c == pytest.approx(2 * 0.03 * np.sqrt(3e8 * body.mass), rel=1e-12)
     assert [body.mass for body in bodies] == pytest.approx([0.381, 0.885], rel=2e-3)
 
 

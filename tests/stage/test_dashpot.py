@@ -1,5 +1,5 @@
-"""The constant of the contact's dashpots belongs to the modes that are stored: with half of them the path is longer, and
-`same_loss` says with which constant the mesh loses the same."""
+"""The constant of the contact's dashpots belongs to the modes that are stored: with half of them the path is longer,
+and `same_loss` says with which constant the mesh loses the same."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearfmu.body import ReducedBody
+from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import Steady, assemble
 from gearfmu.stage.dashpot import own_path, same_loss
@@ -53,6 +54,12 @@ def test_half_of_the_modes_lose_the_same_with_their_own_constant(
     fewer = [halved(body) for body in bodies]
     assert own_path(relief_spec, fewer, 1e4) > 1.05 * own_path(relief_spec, bodies, 1e4)
     damping = same_loss(relief_spec, bodies, fewer)
+    force = 0.5 * relief_spec.torque_max / PairGeometry.of(relief_spec).gears[0].r_b
+    losses = [  # of a contact that carries an alternating force: as c times the square of its path
+        c * own_path(relief_spec, some, force) ** 2
+        for c, some in ((damping, fewer), (relief_spec.contact.damping, bodies))
+    ]
+    assert losses[0] / losses[1] == pytest.approx(1.0, rel=1e-12)
     own = relief_spec.model_copy(update={"contact": relief_spec.contact.model_copy(update={"damping": damping})})
     reference = alternating(relief_spec, bodies)
     with_same, with_own = (

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from by_hand import Pair, bore_angle, cut_near
+from by_hand import DRIVE, Pair, bore_angle, cut_near
 
 from gearfmu import cli
 from gearfmu.body import ReducedBody
 from gearfmu.commands.effects import effects_page
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
+from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.scene import Effects
-from gearfmu.spec.stage import PortSpec, StageSpec
+from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, loaded_te, simulate
 from gearfmu.stage.effects import EFFECTS, torque_on_flanks_alone
 
@@ -233,9 +234,25 @@ def test_tip_contact(plain: StageModel, hand: Pair, beyond: float) -> None:
         assert on.te == pytest.approx(off.te, rel=1e-9) if not closed else gap < on.te < off.te
 
 
+@pytest.mark.parametrize("beyond", [0.1e-3, 0.2e-3, 0.4e-3])
+def test_a_tip_corner_yields_by_the_law_with_the_curvature_of_its_edge(
+    plain: StageModel, hand: Pair, beyond: float
+) -> None:
+    """Rigid gears: what the corner gives way under its share of the load is how far the two have come closer."""
+    pinion = hand.geometry.gears[0]
+    position = (pinion.s_tip + beyond - _roll_at_zero(hand)) / hand.geometry.base_pitch
+    (rolls,) = hand.rolls(position).values()
+    found = state(plain, position, 4 * hand.touch_torque(rolls, hand.corner_gap(position, 0)), **HELD | STIFF)
+    gap, roll = hand.corner(position, 0, found.te)
+    load = sum(found.forces[DRIVE, 0]) / hand.width
+    by_hand = hand.corner_approach(beyond + found.te, roll, load)
+    print(f"{load * hand.width:.0f} N: {-1e6 * gap:.4f} µm closer, by hand {1e6 * by_hand:.4f} µm")
+    assert load > 1e3 and -gap == pytest.approx(by_hand, rel=1e-4)
+
+
 def test_tip_contact_off_is_exact_until_a_loaded_flank_ends(relieved: StageModel) -> None:
-    """Below the torque at which corners begin to carry: nothing changes. Above: a loaded pair vanishes, and bit 16 of the
-    status says so."""
+    """Below the torque at which corners begin to carry: nothing changes. Above: a loaded pair vanishes, and bit 16 of
+    the status says so."""
     limit = torque_on_flanks_alone(relieved)
     print(f"flanks carry alone up to {limit:.1f} N·m")
     for torque, ended in ((0.8 * limit, 0), (2 * limit, 16)):

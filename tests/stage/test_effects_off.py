@@ -11,46 +11,51 @@ import pytest
 
 from gearfmu.stage import StageModel, simulate
 from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.fields import ENGAGEMENT_NUMBERS, GEAR_NUMBERS, change_gear
 
 H, DURATION = 60e-6, 4e-3
-CURVE, EDGE, BEARING = 11, 13, slice(16, 18)  # places in a gear's numbers
-BACKLASH, DASHPOT = 1, 2  # in the pair's
+GEARS = (0, 1)
 Sections = dict[str, np.ndarray]
 
 
-def of_gears(place: int | slice, factor: float) -> Callable[[Sections], None]:
+def of_gears(name: str, factor: float) -> Callable[[Sections], None]:
     def change(sections: Sections) -> None:
-        for name in ("gear0", "gear1"):
-            sections[name][place] *= factor
+        for g in GEARS:
+            value = factor * sections[f"gear{g}"][GEAR_NUMBERS.index(name)]
+            sections[f"gear{g}"] = change_gear(sections[f"gear{g}"], **{name: value})
 
     return change
 
 
-def of_pair(place: int, factor: float) -> Callable[[Sections], None]:
+def of_pair(name: str, factor: float) -> Callable[[Sections], None]:
     def change(sections: Sections) -> None:
-        sections["pair"][place] *= factor
+        sections["engagement"].reshape(-1, len(ENGAGEMENT_NUMBERS))[0, ENGAGEMENT_NUMBERS.index(name)] *= factor
 
     return change
 
 
-def of_modes(sections: Sections) -> None:
-    for name in ("zeta0", "zeta1"):
-        sections[name][:] *= 20
+def of_sections(factor: float, *names: str) -> Callable[[Sections], None]:
+    def change(sections: Sections) -> None:
+        for name in names:
+            sections[name][:] *= factor
+
+    return change
 
 
-def of_bodies(sections: Sections) -> None:
-    for name in ("c_ff0", "c_ff1"):
-        sections[name][:] *= 1.2
+def of_supports(sections: Sections) -> None:
+    """What only a stage on its bearings has: the set that is not held."""
+    for name in ("omega_ground0", "damper0", "kappa0", "support_compliance0"):
+        sections[name][:] *= 0.3
 
 
 DATA = {
-    "effect.elastic": of_bodies,
-    "effect.tip_relief": of_gears(CURVE, 2.0),
-    "effect.tip_contact": of_gears(EDGE, 1.001),  # more would leave a step between flank and edge
-    "effect.contact_damping": of_pair(DASHPOT, 5.0),
-    "effect.coast_flank": of_pair(BACKLASH, 0.5),
-    "effect.bearings": of_gears(BEARING, 0.3),
-    "effect.modal_damping": of_modes,
+    "effect.elastic": of_sections(1.2, "residual0", "residual1"),
+    "effect.tip_relief": of_gears("relief", 2.0),
+    "effect.tip_contact": of_gears("tip_edge", 1.001),  # more would leave a step between flank and edge
+    "effect.contact_damping": of_pair("damping", 5.0),
+    "effect.coast_flank": of_pair("backlash", 0.5),
+    "effect.bearings": of_supports,
+    "effect.modal_damping": of_sections(20, "zeta0", "zeta1", "zeta_ground0"),
 }
 
 

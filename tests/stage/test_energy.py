@@ -1,6 +1,6 @@
-"""Energy of the time step on the shipped bodies: with the mesh position frozen the invariant holds exactly, with damping
-it never grows, controls are seen to fail (benchmarks/energy.py: the whole table, 20 starts); order in closed contact;
-the balance of a loaded damped run closes; central is the same physics."""
+"""Energy of the time step on the shipped bodies: with the mesh position frozen the invariant holds exactly, with
+damping it never grows, controls are seen to fail (benchmarks/energy.py: the whole table, 20 starts); order in closed
+contact; the balance of a loaded damped run closes; central is the same physics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from gearfmu.body import ReducedBody
 from gearfmu.scenes.light_rattle import run, statistics
-from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
+from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, simulate
 
@@ -35,14 +35,14 @@ def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path | None
 
 
 @pytest.fixture(scope="module")
-def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 
 @pytest.mark.parametrize("build", ["double", "shipped"])
 @pytest.mark.parametrize("name", [name for name, case in energy.CASES.items() if "double" in case.builds])
 def test_invariant_holds_and_damping_never_adds(
-    pair_free: StageModel, libraries: dict[str, Path | None], name: str, build: str
+    pair_free: FreePair, libraries: dict[str, Path | None], name: str, build: str
 ) -> None:
     """Cases T1 to T6 and T9, both laws, one start, another number of slices and another step each; the whole table is
     `python benchmarks/energy.py`."""
@@ -57,7 +57,7 @@ def test_invariant_holds_and_damping_never_adds(
 
 
 @pytest.mark.parametrize("slices", [1, 5, 10])
-def test_free_rattle_of_50_ms(pair_free: StageModel, libraries: dict[str, Path | None], slices: int) -> None:
+def test_free_rattle_of_50_ms(pair_free: FreePair, libraries: dict[str, Path | None], slices: int) -> None:
     case = energy.CASES["free rattle"]
     run = {**SHORT, "duration": 0.05, "libraries": libraries}
     for build in ("double", "shipped"):
@@ -66,7 +66,7 @@ def test_free_rattle_of_50_ms(pair_free: StageModel, libraries: dict[str, Path |
 
 
 @pytest.mark.parametrize("name", [name for name, case in energy.CONTROLS.items() if case.builds != ("wrong",)])
-def test_controls_are_seen_to_fail(pair_free: StageModel, libraries: dict[str, Path | None], name: str) -> None:
+def test_controls_are_seen_to_fail(pair_free: FreePair, libraries: dict[str, Path | None], name: str) -> None:
     case = energy.CONTROLS[name]
     (build,) = case.builds
     line = energy.row(pair_free, name, case, (build, 0, 5, 10e-6), {**SHORT, "duration": 0.02, "libraries": libraries})
@@ -79,10 +79,10 @@ def test_the_whole_table_of_the_fast_level(monkeypatch: pytest.MonkeyPatch, tmp_
     assert energy.main() == 0
 
 
-def speeds(model: StageModel, library: Path | None, h: float, integrator: int) -> np.ndarray:
+def speeds(pair: FreePair, library: Path | None, h: float, integrator: int) -> np.ndarray:
     """Speeds of both gears every 3.2 µs of 0.16 ms; loaded, linear law, no contact opens, place frozen."""
     parameters = {"level": FAST, "h": h, "slices": 1, "effect.hertz": 0.0, "integrator": integrator}
-    kernel = started(model, Rattle(position=0.8, load=LOAD, speed=0.05), parameters, library)
+    kernel = started(pair, Rattle(position=0.8, load=LOAD, speed=0.05), parameters, library)
     inner, samples = round(3.2e-6 / h), []
     for i in range(50):
         for j in range(inner):
@@ -94,7 +94,7 @@ def speeds(model: StageModel, library: Path | None, h: float, integrator: int) -
 
 @pytest.mark.parametrize("integrator, order", [(DG4, 4), (MIX4, 4), (EM, 2), (CENTRAL, 2)])
 def test_order_in_closed_contact(
-    pair_free: StageModel, libraries: dict[str, Path | None], integrator: int, order: int
+    pair_free: FreePair, libraries: dict[str, Path | None], integrator: int, order: int
 ) -> None:
     """T10: all modes below 50 kHz are exponential at these steps, the stiffness is constant."""
     double = libraries["double"]
@@ -108,18 +108,19 @@ def test_order_in_closed_contact(
 
 
 def test_balance_of_a_loaded_damped_run(relieved: StageModel) -> None:
-    """What is left of stored energy, port work and losses is below 1e-4 of the work: of the net work of the ports, which
-    is what goes into losses, and far below that of the energy that passes through."""
+    """What is left of stored energy, port work and losses: 7.5e-6 of the energy that passes through (28 mJ of 3795 J).
+    Of the net work of the ports, which is the small difference of what goes in and comes out (0.322 J, of which 0.293 J
+    are lost), that is 8.8 %: a turning mesh moves what the invariant does not know (theory, 3.3)."""
     speed = 2000 * np.pi / 30
     trace = simulate(relieved, Steady(relieved, speed, LOAD), 0.06, 60e-6, {"level": FAST})
     stored, work, lost, left = (trace[f"energy.{name}"][1:] for name in ("stored", "work", "dissipated", "residual"))
     through = float(np.trapezoid(np.abs(trace["pinion.tau"] * trace["pinion.gear.w"]), trace.time))
     print(f"through {through:.1f} J, net work {work[-1]:.4f} J, lost {lost[-1]:.4f} J, left {np.ptp(left):.2e} J")
-    assert np.ptp(left) < 1e-4 * through
+    assert np.ptp(left) < 1e-5 * through and np.ptp(left) < 0.12 * work[-1]
     assert np.ptp(stored - work + lost - left) < 1e-9 * stored.max()
 
 
-def test_central_is_the_same_physics_and_drifts(pair_free: StageModel, relieved: StageModel) -> None:
+def test_central_is_the_same_physics_and_drifts(pair_free: FreePair, relieved: StageModel) -> None:
     """Loaded run against dg4, both at 0.94 µs; undamped rattle at 2 µs keeps its energy to a percent, not exactly."""
     inputs = Steady(relieved, 2000 * np.pi / 30, LOAD)
     runs = [

@@ -1,4 +1,5 @@
-"""Around the energy of the step: changes of h, the start of a free train, the limits of central and the level explicit."""
+"""Around the energy of the step: changes of h, the start of a free train, the limits of central and the level
+explicit."""
 
 from __future__ import annotations
 
@@ -9,9 +10,8 @@ import pytest
 
 from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError
-from gearfmu.scenes.rattle import Rattle, free_pair, started
+from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started
 from gearfmu.spec.stage import StageSpec
-from gearfmu.stage import StageModel
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -23,11 +23,11 @@ CENTRAL = 4
 
 
 @pytest.fixture(scope="module")
-def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
+def pair_free(relief_spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
     return free_pair(relief_spec, bodies)
 
 
-def test_changes_of_h_cost_little(pair_free: StageModel) -> None:
+def test_changes_of_h_cost_little(pair_free: FreePair) -> None:
     """Communication steps of 50 and 60 µs in turn: 2.6e-3 measured (docs/decisions.md); without changes rounding."""
     assert energy_pieces.changes_of_h(pair_free, None, (50e-6, 50e-6)) < 1e-5
     assert energy_pieces.changes_of_h(pair_free, None, (50e-6, 60e-6)) < 1e-2
@@ -36,7 +36,7 @@ def test_changes_of_h_cost_little(pair_free: StageModel) -> None:
 @pytest.mark.parametrize("position", [0.3, 0.8])
 @pytest.mark.parametrize("motion", [0.0, 1.0])
 def test_a_free_train_goes_on_with_the_force_it_starts_with(
-    pair_free: StageModel, position: float, motion: float
+    pair_free: FreePair, position: float, motion: float
 ) -> None:
     """Also where tip relief turns the torque arms by different shares, so that the train accelerates (0.3)."""
     parameters = {"level": 0, "h": 1e-6, "effect.roll_motion": motion}
@@ -46,14 +46,14 @@ def test_a_free_train_goes_on_with_the_force_it_starts_with(
     assert kernel.get("mesh.force") == pytest.approx(before, rel=1e-6) and before > 8000
 
 
-def test_level_explicit_is_central_with_all_modes_below_its_limit(pair_free: StageModel) -> None:
+def test_level_explicit_is_central_with_all_modes_below_its_limit(pair_free: FreePair) -> None:
     kernel = started(pair_free, Rattle(), {"level": EXPLICIT})
     full = started(pair_free, Rattle(), {"level": FULL})
     kernel.step(0.0, 1e-4)
     assert kernel.get("solver.n_dyn") == full.get("solver.n_dyn") and 1e-6 < kernel.get("solver.h") < 1.5e-6
 
 
-def test_central_is_warned_above_its_limit_and_refused_far_above(pair_free: StageModel) -> None:
+def test_central_is_warned_above_its_limit_and_refused_far_above(pair_free: FreePair) -> None:
     limit = central.predicted_limit(started(pair_free, Rattle(), {"level": FAST, "integrator": CENTRAL}))
     parameters = {"level": FAST, "integrator": CENTRAL}
     assert started(pair_free, Rattle(), {**parameters, "h": 0.95 * limit}).warning == ""
@@ -62,7 +62,7 @@ def test_central_is_warned_above_its_limit_and_refused_far_above(pair_free: Stag
         started(pair_free, Rattle(), {**parameters, "h": 1.6 * limit})
 
 
-def test_runs_confirm_the_predicted_limit(pair_free: StageModel) -> None:
+def test_runs_confirm_the_predicted_limit(pair_free: FreePair) -> None:
     """Stable just below it; unstable some way above (the prediction is for the stiffest roll position)."""
     predicted = central.predicted_limit(started(pair_free, Rattle(), {"level": FAST, "integrator": CENTRAL}))
     measured = central.measured_limit(pair_free, FAST, predicted)

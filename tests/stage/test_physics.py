@@ -12,7 +12,8 @@ from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import PortSpec, StageSpec
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, Trace, assemble, simulate
 
 PITCH = 2 * math.pi / 24  # rad, of the wheel

@@ -88,8 +88,8 @@ def test_integrators_agree_at_small_steps(relieved: StageModel, fine: dict[int, 
         trace = run(relieved, 0.03, integrator=scheme, h=H / 64)
         te, force = error(trace, fine[FAST], "mesh.te"), error(trace, fine[FAST], "mesh.force")
         print(f"{name}: te {te:.2%}, force {force:.2%} of the alternating part")
-        # rk45 reads the closing speed from the coordinates, the steps from the path's deflection: they differ by what the
-        # rows' own motion along the flank adds (decisions.md)
+        # rk45 reads the closing speed from the coordinates, the steps from the path's deflection: they differ by what
+        # the rows' own motion along the flank adds (decisions.md)
         assert te < 5e-3 and force < (5e-2 if scheme == RK45 else 2e-2)
 
 

@@ -11,7 +11,8 @@ import pytest
 from gearfmu.body import ReducedBody
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.stage import ChainSpec, StageSpec
+from gearfmu.spec.ports import ChainSpec
+from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 LOAD = 302.0  # N·m on the pinion
@@ -58,7 +59,8 @@ def test_overload_finds_its_equilibrium_everywhere(plain: StageModel, relieved: 
 
 @pytest.mark.parametrize("rigid_bearings", [False, True])
 def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageModel, rigid_bearings: bool) -> None:
-    """The zero of the scale: with nothing to bend them the involutes of the pair as drawn touch at te = 0 everywhere."""
+    """The zero of the scale: with nothing to bend them the involutes of the pair as drawn touch at te = 0
+    everywhere."""
     result = loaded_te(plain, [0.0, 302.0], 64, rigid_bearings=rigid_bearings)
     assert np.abs(result.te[0]).max() < 1e-11 and result.te[1].min() > 2e-5
     assert np.all(result.stiffness[0] > 0.4 * result.stiffness[1])

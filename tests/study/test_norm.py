@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearfmu.study.norm import Signals, band_error, band_levels, errors, kept_signals, lock_time
 from gearfmu.stage import Trace
+from gearfmu.study.norm import Signals, band_error, band_levels, errors, kept_signals, lock_time
 
 STEP = 1e-4
 TIME = STEP * np.arange(4000)

@@ -59,8 +59,8 @@ def test_every_level_once_and_modes_pay(made: tuple[Path, tuple[Row, ...]]) -> N
 
 
 def test_finer_is_better(scene: SceneSpec) -> None:
-    """Steps of 2.5 and 1.25 µs: at level full the error of time is left, of 2nd order in a turning mesh; at fast that of
-    the modes left out, which no step makes smaller."""
+    """Steps of 2.5 and 1.25 µs: at level full the error of time is left, of 2nd order in a turning mesh; at fast that
+    of the modes left out, which no step makes smaller."""
     model = models_for(scene)
     reference = measure(scene, model, Point("full", h=0.5e-6)).signals
     te = {

@@ -1,10 +1,12 @@
-/* gearfmu kernel: elastic gear stage, reduced bodies in floating frames, tooth contact, one fixed-step solver.
+/* gearfmu kernel: elastic gear stage, reduced bodies, tooth contact, one fixed-step solver.
  *
- * Three kinds of memory, all owned by the caller; the kernel allocates nothing, opens nothing, starts nothing and keeps
- * no globals: gk_model   pointers into a constant, checked blob (geometry, modes, static compliance) gk_setup   what is
- * fixed once level, effects and step are chosen (tables for the chosen modes and slices, coefficient cache) gk_data
- * everything that changes, without pointers: a copy of its bytes is a snapshot and is the FMU state Life: gk_model_open
- * → gk_defaults → gk_set … → gk_prepare → gk_initialize → (gk_set, gk_step, gk_get)*
+ * Four kinds of memory, all owned by the caller; the kernel allocates nothing, opens nothing, starts nothing and keeps no
+ * globals:
+ *   gk_model   pointers into a constant, checked blob (geometry, modes, static compliance)
+ *   gk_setup   what is fixed once level, effects and step are chosen (tables for the chosen modes and slices)
+ *   gk_data    everything that changes, without pointers: a copy of its bytes is a snapshot and is the FMU state
+ *   gk_work    scratch and coefficients of the steps in use: neither model nor state; one for every thread
+ * Life: gk_model_open → gk_defaults → gk_set … → gk_prepare → gk_initialize → (gk_set, gk_step, gk_get)*
  */
 #ifndef GK_H
 #define GK_H
@@ -17,7 +19,7 @@
 #define GK_API __attribute__((visibility("default")))
 #endif
 
-#define GK_ABI 1
+#define GK_ABI 2
 #define GK_MESSAGE 512
 
 typedef enum gk_outcome {
@@ -38,12 +40,13 @@ typedef enum gk_outcome {
 typedef struct gk_model gk_model;
 typedef struct gk_setup gk_setup;
 typedef struct gk_data gk_data;
+typedef struct gk_work gk_work;
 
 typedef enum gk_type { GK_REAL, GK_INTEGER, GK_BOOLEAN, GK_ENUM } gk_type;
 typedef enum gk_causality { GK_INPUT, GK_OUTPUT, GK_PARAMETER } gk_causality;
 
 typedef struct gk_variable_info {
-    uint32_t reference; /* FMI value reference: position in gk_variables.inc, never reused  */
+    uint32_t reference; /* FMI value reference: 256 × number in gk_variables.inc + instance */
     gk_type type;
     gk_causality causality;
     char name[64];  /* e.g. "pinion.phi"                                                */
@@ -68,6 +71,7 @@ GK_API gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info
 /* sizes in bytes; upper bounds over all levels, effects and slices, so that memory can be taken at instantiation */
 GK_API size_t gk_setup_size(const gk_model *model);
 GK_API size_t gk_data_size(const gk_model *model);
+GK_API size_t gk_work_size(const gk_model *model);
 
 /* life */
 GK_API gk_outcome gk_defaults(const gk_model *model, gk_data *data);
@@ -78,23 +82,26 @@ GK_API gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32
                               const double *values);
 GK_API gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_t *references, size_t count,
                               double *values);
-GK_API gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
-GK_API gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_data *data, double time);
+GK_API gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
+                             char message[GK_MESSAGE]);
+GK_API gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                                double time);
 /* One communication step from `time` to time + H. The first H is taken as given; a later one within 8 ulp(time + H) of
  * the last counts as that one. On failure the data stands at the last good time (gk_time) and the outcome says why. */
-GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_data *data, double time, double H);
+GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time,
+                          double H);
 GK_API double gk_time(const gk_data *data);
 
 /* Quasi-static loaded transmission error: torque on the pinion's bore, wheel's bore held at phi_wheel; by the contact
  * routine of the step. After gk_prepare; `keep` continues from the last call. out[0] = te (m), then for each of *places
  * tooth pairs {flank 0 drive 1 coast, tooth number of the pinion, force of each slice (N)}; at most 1 + 8·12 numbers.
  */
-GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_data *data, double phi_wheel, double torque,
-                        int keep, double *out, int *places);
+GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_wheel,
+                        double torque, int keep, double *out, int *places);
 
 /* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds
  * with -DGK_PROFILE only, else they stay 0. */
-GK_API int gk_profile(const gk_setup *setup, int phase, const char **name, uint64_t *cycles);
+GK_API int gk_profile(const gk_work *work, int phase, const char **name, uint64_t *cycles);
 
 /* state = the first gk_state_size bytes of gk_data */
 GK_API size_t gk_state_size(const gk_setup *setup);

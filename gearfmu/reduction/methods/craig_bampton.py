@@ -29,12 +29,12 @@ def _build(body: FullOrder, size: Size) -> Basis:
     space, basis = elastic(body), Growing(elastic(body))
     basis.add(static_response(body) @ balanced(space, input_loads(body)))
     constraint = basis.size
-    if size.count < constraint:
+    if size.vectors < constraint:
         raise BodyError(
             f"{body.name}: Craig–Bampton starts with {constraint} constraint modes of this body's interfaces: "
-            f"n = {size.count} is too small; give at least that"
+            f"n = {size.vectors} is too small; give at least that"
         )
-    wanted = min(size.count, space.elastic) - constraint
+    wanted = min(size.vectors, space.elastic) - constraint
     if wanted:
         inside = Elastic(body.held(body.rows()), twin=space)
         basis.add(inside.modes(min(wanted, inside.elastic))[1])

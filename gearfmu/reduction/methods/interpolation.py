@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 
 from gearfmu.errors import BodyError
 from gearfmu.reduction.basis import Basis
@@ -116,7 +117,7 @@ def _problems(samples: Sequence[Sample]) -> list[str]:
     return problems
 
 
-def _alignment(bases: list[np.ndarray], mass) -> list[np.ndarray]:
+def _alignment(bases: list[np.ndarray], mass: sp.csr_array) -> list[np.ndarray]:
     """T_i = (Rᵀ M̄ V_i)⁻¹ with R the dominant directions of all bases, orthonormal in M̄."""
     count = bases[0].shape[1]
     together = np.hstack(bases)

@@ -19,5 +19,5 @@ def reduce(body: FullOrder, size: Size) -> Basis:
 
 
 def _lowest(body: FullOrder, size: Size) -> Basis:
-    squared, shapes = elastic(body).modes(size.count)
+    squared, shapes = elastic(body).modes(size.vectors)
     return Basis("modal", shapes, {"modes": len(squared)})

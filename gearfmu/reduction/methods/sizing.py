@@ -25,6 +25,7 @@ def sized(body: FullOrder, size: Size, build: Callable[[FullOrder, Size], Basis]
     """
     if size.count is not None:
         return build(body, size)
+    assert size.tolerance is not None
     judging = Judging.over((max(size.band[0], 1e-3 * size.band[1]), size.band[1]), _LINES)
     full = reference(body, judging)
     count, best, last = max(body.rows().shape[0], 20), float("inf"), 0

@@ -24,9 +24,9 @@ def reduce(body: FullOrder, size: Size) -> Basis:
 def _build(body: FullOrder, size: Size) -> Basis:
     loads = input_loads(body)
     response = static_response(body)
-    if size.count < loads.shape[1]:
+    if size.vectors < loads.shape[1]:
         compliance = loads.T @ response
-        response = response @ np.linalg.eigh(0.5 * (compliance + compliance.T))[1][:, : -size.count - 1 : -1]
+        response = response @ np.linalg.eigh(0.5 * (compliance + compliance.T))[1][:, ::-1][:, : size.vectors]
     basis = Growing(elastic(body))
     basis.add(response)
     return Basis("static", np.array(basis.vectors), {"inputs": loads.shape[1]})

@@ -1,6 +1,18 @@
-/* Small arithmetic: numbers without the C library, sums in fixed lanes. Part of gk_core.h. */
+/* Small arithmetic: numbers without the C library, sums in fixed lanes. */
 #ifndef GK_LANES_H
 #define GK_LANES_H
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef GK_DOUBLE_MODES
+typedef double gk_real; /* test build: modal states and rows of the gear groups in double */
+#else
+typedef float gk_real;
+#endif
+enum { LANES = 16 }; /* sums run in this many lanes, whatever the vector width */
+
 static inline double gk_clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 /* the C library stays out (only sqrt and memory functions come from the compiler): NaN on the right goes through */
 static inline double gk_max(double x, double y) { return x > y ? x : y; }
@@ -70,6 +82,8 @@ static inline double gk_dot_quads(const double *x, const double *y, int quads)
 }
 
 /* Σ a_k b_k in LANES fixed lanes, added up as a tree: the same bits at every vector width. n is a multiple of LANES. */
+typedef gk_real gk_four __attribute__((vector_size(4 * sizeof(gk_real)), may_alias, aligned(sizeof(gk_real))));
+#define GK_WIDENED(four) __builtin_convertvector(four, gk_quad)
 typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)), may_alias,
                                        aligned(sizeof(gk_real)))); /* states start anywhere */
 

@@ -6,8 +6,7 @@
 #include "fmi2/fmi2_face.h"
 #include <string.h>
 
-/* ---- who may call when (FMI 2.0.4, 4.2.4)
- * ------------------------------------------------------------------------------------------------------------- */
+/* ---- who may call when (FMI 2.0.4, 4.2.4) ---- */
 enum {
     I = MODE_INSTANTIATED,
     N = MODE_INITIALIZATION,
@@ -20,10 +19,17 @@ enum {
 
 #define CALLS(X)                                                                                                       \
     X(SetDebugLogging, ANY)                                                                                            \
-    X(SetupExperiment, I) X(EnterInitializationMode, I) X(ExitInitializationMode, N) X(Terminate, S | D) X(Reset, ANY) \
-        X(Get, N | S | D | T) X(Set, I | N | S) X(GetFMUstate, I | N | S | D | T) X(SetFMUstate, ANY)                  \
-            X(FreeFMUstate, ANY) X(SerializeFMUstate, ANY) X(DeSerializeFMUstate, ANY) X(DoStep, S)                    \
-                X(GetStatus, S | D | T) X(NotOffered, ANY)
+    X(SetupExperiment, I)                                                                                              \
+    X(EnterInitializationMode, I)                                                                                      \
+    X(ExitInitializationMode, N)                                                                                       \
+    X(Terminate, S | D)                                                                                                \
+    X(Reset, ANY)                                                                                                      \
+    X(Get, N | S | D | T)                                                                                              \
+    X(Set, I | N | S)                                                                                                  \
+    X(GetFMUstate, I | N | S | D | T)                                                                                  \
+    X(SetFMUstate, ANY)                                                                                                \
+    X(FreeFMUstate, ANY)                                                                                               \
+    X(SerializeFMUstate, ANY) X(DeSerializeFMUstate, ANY) X(DoStep, S) X(GetStatus, S | D | T) X(NotOffered, ANY)
 enum {
 #define X(name, modes) CALL_##name,
     CALLS(X)
@@ -51,7 +57,6 @@ static const char *mode_name(face_mode mode)
 }
 
 /* ---- handles
- * --------------------------------------------------------------------------------------------------------------------------------------------
  * An fmi2Component is a number: slot and generation. A freed or invented one is recognised without touching memory.
  * This table is the only thing instances share; it is empty when no instance lives. */
 #define SLOTS 1024u
@@ -102,9 +107,7 @@ static face *enter(fmi2Component c, int call)
 #define NEED(f, pointer)                                                                                               \
     if (!(pointer)) return REFUSE(f, "%s: the argument " #pointer " is NULL", __func__)
 
-/* ---- life
- * -----------------------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- life ---- */
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
@@ -209,9 +212,7 @@ fmi2Status fmi2Reset(fmi2Component c)
     return face_reset(f);
 }
 
-/* ---- variables
- * ------------------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- variables ---- */
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     ENTER(Get);
@@ -268,9 +269,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return nvr ? REFUSE(f, "set String: this model has no String variables") : fmi2OK;
 }
 
-/* ---- saved states
- * ---------------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- saved states ---- */
 #define OWN(f, state)                                                                                                  \
     face_state *own = face_state_find(f, state);                                                                       \
     if (!own) return REFUSE(f, "%s: this is not a saved state of this instance, or it was freed", __func__)
@@ -337,9 +336,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     return status;
 }
 
-/* ---- steps
- * ----------------------------------------------------------------------------------------------------------------------------------------------
- */
+/* ---- steps ---- */
 static int given_up(gk_outcome outcome)
 {
     return outcome == GK_DIVERGED || outcome == GK_PENETRATION || outcome == GK_ENERGY;
@@ -353,7 +350,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     double end = currentCommunicationPoint + communicationStepSize;
     if (f->stop_defined && end > f->stop + 0.5 * communicationStepSize)
         return REFUSE(f, "fmi2DoStep to %.17g s goes beyond the stop time %.17g s", end, f->stop);
-    gk_outcome outcome = gk_step(f->model, f->setup, f->data, currentCommunicationPoint, communicationStepSize);
+    gk_outcome outcome = gk_step(f->model, f->setup, f->work, f->data, currentCommunicationPoint,
+                                 communicationStepSize);
     if (outcome == GK_OK) {
         f->last_good = end;
         f->step_status = fmi2OK;
@@ -414,8 +412,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
     return fmi2OK;
 }
 
-/* ---- what modelDescription.xml does not declare
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- what modelDescription.xml does not declare ---- */
 static fmi2Status not_offered(fmi2Component c, const char *what)
 {
     ENTER(NotOffered);

@@ -66,6 +66,7 @@ typedef struct face {
     void *blob, *tables; /* two blocks of memory: the model file, and all that follows here */
     gk_model *model;
     gk_setup *setup;
+    gk_work *work;
     gk_data *given;          /* settings before the initialisation: defaults and what was set */
     gk_data *data;           /* the running model */
     int settled;             /* data is the initial state that belongs to given (initialisation mode) */

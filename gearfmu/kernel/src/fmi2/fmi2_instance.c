@@ -64,6 +64,7 @@ static size_t lay_out(face *f, unsigned char *block)
 {
     size_t used = 0;
     f->setup = take(block, &used, gk_setup_size(f->model));
+    f->work = take(block, &used, gk_work_size(f->model));
     f->given = take(block, &used, gk_data_size(f->model));
     f->data = take(block, &used, gk_data_size(f->model));
     f->prepared_values = take(block, &used, (size_t)f->settables * sizeof(double));
@@ -187,7 +188,7 @@ fmi2Status face_prepare(face *f)
     }
     if (same) return fmi2OK;
     char message[GK_MESSAGE] = "";
-    gk_outcome outcome = gk_prepare(f->model, f->given, f->setup, message);
+    gk_outcome outcome = gk_prepare(f->model, f->given, f->setup, f->work, message);
     f->prepared = outcome == GK_OK;
     if (outcome != GK_OK) return REFUSE(f, "%s: %s", gk_outcome_text(outcome), message);
     if (message[0]) SAY(f, LOG_WARNING, "%s", message);
@@ -200,7 +201,7 @@ fmi2Status face_settle(face *f)
     if (f->settled) return fmi2OK;
     if (face_prepare(f) != fmi2OK) return fmi2Error;
     memcpy(f->data, f->given, gk_data_size(f->model));
-    gk_outcome outcome = gk_initialize(f->model, f->setup, f->data, f->start);
+    gk_outcome outcome = gk_initialize(f->model, f->setup, f->work, f->data, f->start);
     if (outcome != GK_OK) return REFUSE(f, "initialisation at %.17g s: %s", f->start, gk_outcome_text(outcome));
     f->settled = 1;
     f->last_good = f->start;

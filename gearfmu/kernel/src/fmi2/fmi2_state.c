@@ -116,13 +116,13 @@ static const char *head_trouble(const face *f, const face_head *head, const unsi
     return zero == 0 && head->stop_defined <= 1 && head->reserved == 0 ? NULL : "a time is not finite";
 }
 
-static const char *kernel_trouble(const face *f, const face_state *state, gk_data *data, gk_setup *setup)
+static const char *kernel_trouble(const face *f, const face_state *state, gk_data *data, gk_setup *setup, gk_work *work)
 {
     char message[GK_MESSAGE] = "";
     size_t bytes = state->head.bytes;
     if (take_settings(f, data, values_of(state)) != GK_OK) return "a setting is out of its range";
     if (bytes == 0) return NULL;
-    if (gk_prepare(f->model, data, setup, message) != GK_OK) return "the model cannot run with its parameters";
+    if (gk_prepare(f->model, data, setup, work, message) != GK_OK) return "the model cannot run with its parameters";
     if (gk_state_size(setup) != bytes) return "its length does not fit its parameters";
     memcpy(data, bytes_of(state), bytes);
     return gk_state_check(f->model, setup, data, bytes) == GK_OK ? NULL : "the kernel refuses its contents";
@@ -132,11 +132,13 @@ static const char *kernel_trouble(const face *f, const face_state *state, gk_dat
 static const char *deep_trouble(const face *f, const face_state *state)
 {
     size_t data_size = (gk_data_size(f->model) + FACE_ALIGNMENT - 1) / FACE_ALIGNMENT * FACE_ALIGNMENT;
-    void *block = face_allocate(&f->environment, data_size + gk_setup_size(f->model) + FACE_ALIGNMENT);
+    size_t setup_size = (gk_setup_size(f->model) + FACE_ALIGNMENT - 1) / FACE_ALIGNMENT * FACE_ALIGNMENT;
+    void *block = face_allocate(&f->environment, data_size + setup_size + gk_work_size(f->model) + FACE_ALIGNMENT);
     if (!block) return "no memory to check it";
     gk_data *data = (gk_data *)(void *)face_align(block);
     gk_setup *setup = (gk_setup *)(void *)((unsigned char *)data + data_size);
-    const char *trouble = kernel_trouble(f, state, data, setup);
+    gk_work *work = (gk_work *)(void *)((unsigned char *)setup + setup_size);
+    const char *trouble = kernel_trouble(f, state, data, setup, work);
     face_release(&f->environment, block);
     return trouble;
 }

@@ -7,19 +7,46 @@
  * s_tip) the tip edge, an arc of radius ρ tangent to the flank, meets the other involute along that involute's normal.
  * Gap and gradient go over continuously. Gradients are exact derivatives of these gaps, relief slope included. A tooth
  * with an index deviation ε is the same tooth at β + ε (eq. 4a). */
-#include "model/gk_core.h"
+#include "problem/gk_work.h"
+
+typedef struct pair { /* the gears of an engagement at their poses */
+    const gk_setup *setup;
+    const gk_engagement *e;
+    const gk_gear *gear[2];
+    const double *pose;
+    double allowance;
+} pair;
 
 typedef struct line {              /* line of action of one side */
     double sg, L, sine, cosine, t; /* of t */
     double nx, ny;                 /* n */
-    double dt_x, dt_y;             /* ∂t/∂d */
+    double dt_x, dt_y;             /* ∂t/∂(C_B − C_A) */
 } line;
 
-static line line_of_action(const double *frame, const gk_model *model, double sg)
+static pair pair_of(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose)
 {
-    double R = model->gear[0].r_b + model->gear[1].r_b;
-    double dx = model->distance + frame[XB] - frame[XA], dy = frame[YB] - frame[YA];
-    double a2 = dx * dx + dy * dy;
+    const gk_engagement *e = &model->engagement[mesh->index];
+    return (pair){setup, e, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
+}
+
+static int internal(const pair *q) { return q->e->kind == MESH_INTERNAL; }
+
+/* from the axis of A to that of B */
+static void apart(const pair *q, double d[2])
+{
+    for (int c = 0; c < 2; c++)
+        d[c] = q->e->position[1][c] + q->pose[XB + c] - (q->e->position[0][c] + q->pose[XA + c]);
+}
+
+static double reach_of(const pair *q) { return q->gear[1]->r_b + (internal(q) ? -1.0 : 1.0) * q->gear[0]->r_b; }
+
+static line line_of_action(const pair *q, double sg)
+{
+    const double R = reach_of(q), turn = internal(q) ? -1.0 : 1.0;
+    double d[2];
+    apart(q, d);
+    const double dx = turn * d[0], dy = turn * d[1],
+                 a2 = dx * dx + dy * dy; /* external: A to B; internal: ring to planet */
     line l = {.sg = sg};
     l.L = sqrt(a2 - R * R);
     l.cosine = (dx * R + sg * dy * l.L) / a2;
@@ -27,27 +54,28 @@ static line line_of_action(const double *frame, const gk_model *model, double sg
     l.t = gk_atan2(l.sine, l.cosine);
     l.nx = -sg * l.sine;
     l.ny = sg * l.cosine;
-    double radial = -sg * R / (a2 * l.L); /* ∂t = ∂arg d − sg R/(a L) ∂a */
-    l.dt_x = -dy / a2 + radial * dx;
-    l.dt_y = dx / a2 + radial * dy;
+    const double radial = -sg * R / (a2 * l.L); /* ∂t = ∂arg d − sg R/(a L) ∂a */
+    l.dt_x = turn * (-dy / a2 + radial * dx);
+    l.dt_y = turn * (dx / a2 + radial * dy);
     return l;
 }
 
 static double relief(const gk_gear *gear, int on, double s, double *slope)
 {
-    double over = on ? s - gear->relief_start : 0.0;
+    const double towards_tip = gear->s_tip > gear->s_form ? 1.0 : -1.0,
+                 over = on ? towards_tip * (s - gear->relief_start) : 0.0;
     if (over <= 0.0) {
         *slope = 0.0;
         return 0.0;
     }
-    *slope = 2.0 * gear->relief * over;
+    *slope = 2.0 * towards_tip * gear->relief * over;
     return gear->relief * over * over;
 }
 
 /* add the derivative of c·s, s = sg r_b (β − t), to a place's gradient; gear 0 or 1 */
 static void add_roll(gk_place *p, const line *l, const gk_gear *gear, int which, double c)
 {
-    double k = c * l->sg * gear->r_b;
+    const double k = c * l->sg * gear->r_b;
     p->gradient[which ? PHIB : PHIA] += k;
     p->gradient[XA] += k * l->dt_x;
     p->gradient[YA] += k * l->dt_y;
@@ -55,32 +83,34 @@ static void add_roll(gk_place *p, const line *l, const gk_gear *gear, int which,
     p->gradient[YB] -= k * l->dt_y;
 }
 
-static void flank_contact(const gk_model *model, const gk_setup *setup, const line *l, double g, gk_place *p)
+static void flank_contact(const pair *q, const line *l, double g, gk_place *p)
 {
+    const double sense = internal(q) ? -1.0 : 1.0;
     p->gap = g;
-    p->curvature = 1.0 / gk_max(p->roll[0], 1e-4) + 1.0 / gk_max(p->roll[1], 1e-4);
-    const double gradient[6] = {-l->nx, -l->ny, -l->sg * model->gear[0].r_b, l->nx, l->ny, -l->sg * model->gear[1].r_b};
+    p->curvature = 1.0 / gk_max(p->roll[0], 1e-4) + sense / gk_max(p->roll[1], 1e-4);
+    const double gradient[POSE] = {-l->nx, -l->ny, -l->sg * q->gear[0]->r_b,
+                                   l->nx,  l->ny,  -sense * l->sg * q->gear[1]->r_b};
     memcpy(p->gradient, gradient, sizeof gradient);
     for (int i = 0; i < 2; i++) {
-        double slope, depth = relief(&model->gear[i], GK_ON(setup, tip_relief), p->roll[i], &slope);
+        double slope, depth = relief(q->gear[i], GK_ON(q->setup, tip_relief), p->roll[i], &slope);
         p->gap += depth;
-        if (slope != 0.0) add_roll(p, l, &model->gear[i], i, slope);
+        if (slope != 0.0) add_roll(p, l, q->gear[i], i, slope);
     }
 }
 
 /* Eq. 6: tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l =
  * line of action. Returns 0 when the edge's centre lies inside the base circle of o: no involute there. All formulas
  * for c = 0; for c = 1 the roles and the direction of n swap, which the signs below say. */
-static int corner_contact(const gk_model *model, const gk_setup *setup, const double *frame, const line *l, int c,
-                          const double beta[2], gk_place *p)
+static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_place *p)
 {
-    const int o = 1 - c;
-    const gk_gear *tip = &model->gear[c], *other = &model->gear[o];
+    const int o = 1 - c, on = GK_ON(q->setup, tip_relief);
+    const gk_gear *tip = q->gear[c], *other = q->gear[o];
+    double d[2];
     double over = p->roll[c] - tip->s_tip, sine, cosine;
     gk_sincos(beta[c] - l->sg * tip->corner_angle, &sine, &cosine);
     double rx = tip->corner_radius * cosine, ry = tip->corner_radius * sine; /* edge centre from the axis of c */
-    double ox = (c == 0 ? -model->distance : model->distance) + frame[3 * c] - frame[3 * o],
-           oy = frame[3 * c + 1] - frame[3 * o + 1];
+    apart(q, d);
+    const double ox = c == 0 ? -d[0] : d[0], oy = c == 0 ? -d[1] : d[1];
     double dx = ox + rx, dy = oy + ry, r2 = dx * dx + dy * dy, l2 = r2 - other->r_b * other->r_b;
     if (l2 <= 1e-10) return 0;
     double length = sqrt(l2);
@@ -91,8 +121,8 @@ static int corner_contact(const gk_model *model, const gk_setup *setup, const do
     double turn = gk_atan2(st * cosine - ct * sine, ct * cosine + st * sine);
     double s = other->r_b * l->sg * (beta[o] - nominal - turn);
     double mx = -l->sg * st, my = l->sg * ct; /* outward normal of the other's flank */
-    double slope_c, slope_o, relief_c = relief(tip, GK_ON(setup, tip_relief), tip->s_tip, &slope_c),
-                             relief_o = relief(other, GK_ON(setup, tip_relief), s, &slope_o);
+    double slope_c, slope_o, relief_c = relief(tip, on, tip->s_tip, &slope_c),
+                             relief_o = relief(other, on, s, &slope_o);
     double fade = 1.0 / (1.0 + over / tip->edge);
     p->gap = length - s - tip->edge + relief_c + slope_c * over * fade + relief_o;
     memset(p->gradient, 0, sizeof p->gradient);
@@ -122,116 +152,154 @@ static int corner_contact(const gk_model *model, const gk_setup *setup, const do
     return 1;
 }
 
-static int modulo(int k, int z)
-{
-    int m = k % z;
-    return m < 0 ? m + z : m;
-}
-
-static void grid(const gk_gear *gear, double roll, int *index, double *w)
-{
-    /* cubic convolution (Keys 1981, a = −½): continuous slope, exact for parabolas; quadratic extrapolation gives the
-     * ghost points at the ends */
-    double u = (gk_clamp(roll, gear->s_form, gear->s_tip) - gear->s_form) / (gear->s_tip - gear->s_form) *
-               (gear->rolls - 1);
-    int cell = (int)u < gear->rolls - 2 ? (int)u : gear->rolls - 2;
-    double x = u - cell, x2 = x * x, x3 = x2 * x;
-    double k[4] = {-0.5 * x + x2 - 0.5 * x3, 1.0 - 2.5 * x2 + 1.5 * x3, 0.5 * x + 2.0 * x2 - 1.5 * x3,
-                   -0.5 * x2 + 0.5 * x3};
-    *index = (int)gk_clamp(cell - 1, 0, gear->rolls - 4);
-    for (int i = 0; i < 4; i++) w[i] = k[i];
-    if (cell == 0) { /* ghost f(−1) = 3 f0 − 3 f1 + f2 */
-        w[0] = k[1] + 3.0 * k[0], w[1] = k[2] - 3.0 * k[0], w[2] = k[3] + k[0], w[3] = 0.0;
-    } else if (cell == gear->rolls - 2) {
-        w[3] = k[2] + 3.0 * k[3], w[2] = k[1] - 3.0 * k[3], w[1] = k[0] + k[3], w[0] = 0.0;
-    }
-}
-
 /* Teeth out of their places (index deviation, ISO 1328-1): flank, roll and base angle turn with the tooth. Returns what
  * the gap loses. */
-static double misplace(const gk_model *model, double sg, gk_place *p, double beta[2])
+static double misplace(const pair *q, double sg, gk_place *p, double beta[2])
 {
     double closer = 0.0;
     for (int i = 0; i < 2; i++) {
-        const gk_gear *gear = &model->gear[i];
+        const gk_gear *gear = q->gear[i];
         if (!gear->index) continue;
         const double angle = gear->index[p->flank * gear->z + p->tooth[i]], roll = sg * gear->r_b * angle;
         beta[i] += angle;
         p->roll[i] += roll;
-        closer += roll;
+        closer += i && internal(q) ? -roll : roll;
     }
     return closer;
 }
 
-static int side(const gk_model *model, const gk_setup *setup, const double *frame, int flank, double reach,
-                gk_place *place, int room)
+typedef struct flank_side { /* one side of the teeth: base angles and lengths of roll of the teeth 0 */
+    int flank, shift, step; /* step: B's tooth is shift + step·k */
+    double sg, pitch[2], p_b, base[2], roll[2], gap, beyond, allowance;
+    line l;
+} flank_side;
+
+static flank_side side_of(const pair *q, int flank)
 {
-    const gk_gear *A = &model->gear[0], *B = &model->gear[1];
-    double sg = flank ? -1.0 : 1.0;
-    line l = line_of_action(frame, model, sg);
-    int shift = flank ? model->coast_shift : 0;
-    double pitch = 2.0 * GK_PI / A->teeth, pitch_b = 2.0 * GK_PI / B->teeth, p_b = A->r_b * pitch;
-    double base_a = frame[PHIA] + A->phase + sg * A->psi_b,
-           base_b = frame[PHIB] + B->phase + sg * B->psi_b + shift * pitch_b;
-    double s_a = A->r_b * sg * (base_a - l.t), s_b = B->r_b * sg * (base_b - l.t - GK_PI);
-    double allowance = flank ? setup->allowance : 0.0, g = l.L - s_a - s_b + allowance,
-           misplaced = GK_HAS(pitch_errors) ? A->index_most + B->index_most : 0.0;
-    if (!(g - misplaced < reach)) return 0; /* the whole side is open: it costs this one comparison */
-    double beyond = GK_ON(setup, tip_contact) ? 0.5 * p_b : 0.0;
-    /* teeth whose roll on A lies between B's and A's ends */
-    double first = l.L - B->s_tip - beyond, last = A->s_tip + beyond;
-    double from = sg > 0 ? (first - s_a) / p_b : (s_a - last) / p_b,
-           to = sg > 0 ? (last - s_a) / p_b : (s_a - first) / p_b;
-    if (!(from > -1e8 && to < 1e8)) return -1;
-    int found = 0;
-    for (int k = (int)gk_floor(from) + 1; k <= (int)gk_floor(to) && found < room; k++) {
-        gk_place *p = &place[found];
-        p->key.flank = p->flank = flank;
-        p->key.tooth = k;
-        p->roll[0] = s_a + sg * k * p_b;
-        p->roll[1] = s_b - sg * k * p_b;
-        double beta[2] = {base_a + k * pitch, base_b - k * pitch_b};
-        p->number[0] = k;
-        p->number[1] = shift - k;
-        p->tooth[0] = modulo(k, A->z);
-        p->tooth[1] = modulo(shift - k, B->z);
-        const double closer = misplaced > 0.0 ? misplace(model, sg, p, beta) : 0.0;
-        int corner = p->roll[0] > A->s_tip ? 0 : p->roll[1] > B->s_tip ? 1 : -1;
-        if (corner >= 0 && !GK_ON(setup, tip_contact))
-            continue; /* a loaded pair reaches past the end by its deflection */
-        if (corner < 0)
-            flank_contact(model, setup, &l, g - closer, p);
-        else if (!corner_contact(model, setup, frame, &l, corner, beta, p))
-            continue;
-        else
-            p->gap += allowance;
-        if (!(p->gap < reach)) continue;
-        for (int i = 0; i < 2; i++) grid(&model->gear[i], p->roll[i], &p->index[i], p->weight[i]);
-        found++;
+    const double sg = flank ? -1.0 : 1.0;
+    flank_side s = {.flank = flank, .shift = flank ? q->e->coast_shift : 0, .sg = sg, .l = line_of_action(q, sg)};
+    s.step = internal(q) ? 1 : -1;
+    for (int i = 0; i < 2; i++) {
+        const gk_gear *gear = q->gear[i];
+        s.pitch[i] = 2.0 * GK_PI / gear->z;
+        s.base[i] = q->pose[3 * i + 2] + gear->phase + sg * gear->psi_b + (i ? s.shift * s.pitch[1] : 0.0);
+        s.roll[i] = gear->r_b * sg * (s.base[i] - s.l.t - (i && !internal(q) ? GK_PI : 0.0));
     }
-    return found;
+    s.p_b = q->gear[0]->r_b * s.pitch[0];
+    s.allowance = flank ? q->allowance : 0.0;
+    s.gap = (internal(q) ? s.roll[1] - s.roll[0] - s.l.L : s.l.L - s.roll[0] - s.roll[1]) + s.allowance;
+    s.beyond = GK_ON(q->setup, tip_contact) && !internal(q) ? 0.5 * s.p_b : 0.0;
+    return s;
 }
 
-static int flat(const gk_model *model, const double *frame, double reach, gk_place *p)
+/* the teeth k of A that may touch: their rolls lie between the other gear's end and their own; 0: nonsense */
+static int teeth(const pair *q, const flank_side *s, double ends[2])
 {
-    memset(p, 0, sizeof *p);
-    p->gap = model->distance + frame[XB] - frame[XA];
-    p->gradient[XA] = -1.0;
-    p->gradient[XB] = 1.0;
-    p->curvature = 1.0;
-    for (int i = 0; i < 2; i++) grid(&model->gear[i], 0.0, &p->index[i], p->weight[i]);
+    const double first = (internal(q) ? q->gear[1]->s_tip - s->l.L : s->l.L - q->gear[1]->s_tip) - s->beyond;
+    const double last = q->gear[0]->s_tip + s->beyond;
+    ends[0] = s->sg > 0 ? (first - s->roll[0]) / s->p_b : (s->roll[0] - last) / s->p_b;
+    ends[1] = s->sg > 0 ? (last - s->roll[0]) / s->p_b : (s->roll[0] - first) / s->p_b;
+    return ends[0] > -1e8 && ends[1] < 1e8;
+}
+
+static int modulo(int64_t k, int z)
+{
+    const int m = (int)(k % z);
+    return m < 0 ? m + z : m;
+}
+
+/* where both gears stand in the tables of their sides; 0 when the poses are meaningless */
+static void place_sides(const pair *q, const gk_mesh *mesh, const flank_side *drive, gk_position position[2])
+{
+    for (int w = 0; w < 2; w++) {
+        gk_position *at = &position[w];
+        const gk_side *side = &mesh->side[w];
+        const double u = drive->roll[w] / side->pitch, whole = gk_floor(u), x = (u - whole) * side->nodes;
+        at->reference = -(int64_t)whole;
+        at->tooth = modulo(at->reference, q->gear[w]->z);
+        at->node = (int)x < side->nodes ? (int)x : side->nodes - 1;
+        at->part = x - at->node;
+    }
+}
+
+/* entries of a place in the tables of both sides; 0 when it lies beyond one of them */
+static int in_tables(const gk_mesh *mesh, const gk_position position[2], gk_place *p)
+{
+    for (int w = 0; w < 2; w++) {
+        const gk_side *side = &mesh->side[w];
+        const int64_t offset = side->step * (p->number[w] - position[w].reference - side->first[p->flank]);
+        if (offset < 0 || offset >= side->count[p->flank]) return 0;
+        p->candidate[w] = (int)offset + (p->flank ? side->count[0] : 0);
+    }
+    return 1;
+}
+
+/* one tooth pair; 0 when it does not come within `reach` */
+static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, gk_place *p)
+{
+    double beta[2] = {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]};
+    p->key.flank = p->flank = s->flank;
+    p->key.tooth = k;
+    p->roll[0] = s->roll[0] + s->sg * k * s->p_b;
+    p->roll[1] = s->roll[1] + s->step * s->sg * k * s->p_b;
+    p->number[0] = k, p->number[1] = s->shift + s->step * k;
+    for (int i = 0; i < 2; i++) p->tooth[i] = modulo(p->number[i], q->gear[i]->z);
+    const double closer = q->gear[0]->index || q->gear[1]->index ? misplace(q, s->sg, p, beta) : 0.0;
+    const int tip_b = internal(q) ? p->roll[1] < q->gear[1]->s_tip : p->roll[1] > q->gear[1]->s_tip;
+    const int corner = p->roll[0] > q->gear[0]->s_tip ? 0 : tip_b ? 1 : -1;
+    if (corner >= 0 && (internal(q) || !GK_ON(q->setup, tip_contact)))
+        return 0; /* a loaded pair reaches past the end by its
+                                                                                    deflection */
+    if (corner < 0)
+        flank_contact(q, &s->l, s->gap - closer, p);
+    else if (!corner_contact(q, &s->l, corner, beta, p))
+        return 0;
+    else
+        p->gap += s->allowance;
     return p->gap < reach;
 }
 
-/* All places whose undeformed gap is below `reach` at the given frames; −1 when the frames are meaningless */
-int gk_flank_find(const gk_model *model, const gk_setup *setup, const double *frame, double reach, gk_place *place)
+static int find_side(const pair *q, const gk_mesh *mesh, const flank_side *s, double reach,
+                     const gk_position position[2], gk_place *place, int room)
 {
-    if (model->kind == KIND_FLAT) return flat(model, frame, reach, place);
-    double dx = model->distance + frame[XB] - frame[XA], dy = frame[YB] - frame[YA],
-           R = model->gear[0].r_b + model->gear[1].r_b;
-    if (!(dx * dx + dy * dy > 1.0001 * R * R) || !(dx * dx + dy * dy < 1e4)) return -1;
-    int found = side(model, setup, frame, 0, reach, place, MAX_PAIRS);
+    const double misplaced = GK_HAS(pitch_errors) ? q->gear[0]->index_most + q->gear[1]->index_most : 0.0;
+    double ends[2];
+    int found = 0;
+    if (!(s->gap - misplaced < reach)) return 0; /* the whole side is open: it costs this one comparison */
+    if (!teeth(q, s, ends)) return -1;
+    for (int k = (int)gk_floor(ends[0]) + 1; k <= (int)gk_floor(ends[1]) && found < room; k++)
+        if (tooth_pair(q, s, k, reach, &place[found]) && in_tables(mesh, position, &place[found])) found++;
+    return found;
+}
+
+static int find_flat(const pair *q, double reach, gk_position position[2], gk_place *p)
+{
+    memset(p, 0, sizeof *p);
+    memset(position, 0, 2 * sizeof *position);
+    p->gap = q->e->position[1][0] - q->e->position[0][0] + q->pose[PHIB] - q->pose[PHIA];
+    p->gradient[PHIA] = -1.0;
+    p->gradient[PHIB] = 1.0;
+    p->curvature = 1.0;
+    return p->gap < reach;
+}
+
+/* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their tables; −1
+ * when the poses are meaningless. The spins of a flat engagement are translations. */
+int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
+                  gk_position position[2], gk_place *place)
+{
+    const pair q = pair_of(model, setup, mesh, pose);
+    if (q.e->kind == MESH_FLAT) return find_flat(&q, reach, position, place);
+    const double R = reach_of(&q);
+    double d[2];
+    apart(&q, d);
+    const double a2 = d[0] * d[0] + d[1] * d[1];
+    if (!(a2 > 1.0001 * R * R) || !(a2 < 1e4) || !(fabs(pose[PHIA]) < 1e9) || !(fabs(pose[PHIB]) < 1e9)) return -1;
+    const flank_side drive = side_of(&q, 0);
+    place_sides(&q, mesh, &drive, position);
+    const int found = find_side(&q, mesh, &drive, reach, position, place, MAX_PAIRS);
     if (found < 0 || !GK_ON(setup, coast_flank)) return found;
-    int coast = side(model, setup, frame, 1, reach, place + found, MAX_PAIRS - found);
-    return coast < 0 ? -1 : found + coast;
+    const flank_side coast = side_of(&q, 1);
+    const int back = find_side(&q, mesh, &coast, reach, position, place + found, MAX_PAIRS - found);
+    return back < 0 ? -1 : found + back;
 }

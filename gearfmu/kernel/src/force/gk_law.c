@@ -3,30 +3,30 @@
  * gives 2(1−ν²)/(πE)·[ln(4w/b) − 1]: δ = f (c − ½ a ln βf)      for  b_low < b < w/1.5 Below b_low a parabola with the
  * same value and slope at b_low (δ(0) = 0, finite slope), above w/1.5 the tangent. δ′ > 0 everywhere, δ continuously
  * differentiable. */
-#include "model/gk_core.h"
+#include "problem/gk_system.h"
 
 static const double B_LOW = 5e-6; /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
 
 /* the law of a contact with 1/ρA + 1/ρB = curvature, per metre of length. b² at its bounds is the same for all
  * curvatures, so are the logarithms there. */
-void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, gk_local *law)
+void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double curvature, gk_local *law)
 {
-    const gk_gear *A = &model->gear[0], *B = &model->gear[1];
-    law->a = A->local + B->local;
-    law->c = setup->strip_term;           /* Σ local (ln 4w − 1) */
+    const gk_engagement *e = &model->engagement[mesh->index];
+    law->a = model->gear[e->gear[0]].local + model->gear[e->gear[1]].local;
+    law->c = mesh->strip_term;            /* Σ local (ln 4w − 1) */
     law->beta = 2.0 * law->a / curvature; /* b² = 4 f R / (π E*), 1/E* = Σ (1−ν²)/E = Σ π·local/2 */
-    law->low = setup->square_low / law->beta;
-    law->high = setup->square_high / law->beta;
+    law->low = mesh->square_low / law->beta;
+    law->high = mesh->square_high / law->beta;
     if (!GK_ON(setup, hertz)) { /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
-        const double reference = model->torque_max / (A->r_b * setup->width);
+        const double reference = e->force_max / e->width;
         law->c -= 0.5 * law->a * gk_log(law->beta * gk_clamp(reference, law->low, law->high));
         law->a = law->low = law->high = 0.0;
         law->c_low = law->slope_high = law->c;
         law->q_low = law->phi_log = law->phi_high = law->delta_high = 0.0;
         return;
     }
-    const double secant_low = law->c - 0.5 * law->a * setup->log_low,
-                 secant_high = law->c - 0.5 * law->a * setup->log_high; /* δ/f at the bounds */
+    const double secant_low = law->c - 0.5 * law->a * mesh->log_low,
+                 secant_high = law->c - 0.5 * law->a * mesh->log_high; /* δ/f at the bounds */
     law->c_low = secant_low + 0.5 * law->a;
     law->q_low = -0.5 * law->a / law->low;
     law->phi_log = law->low * law->low *
@@ -37,13 +37,14 @@ void gk_law_set(const gk_model *model, const gk_setup *setup, double curvature, 
 }
 
 /* half-widths at which the logarithm begins and ends */
-void gk_law_bounds(const gk_model *model, gk_setup *setup)
+void gk_law_bounds(const gk_model *model, gk_mesh *mesh)
 {
-    const double widest = gk_min(model->gear[0].strip, model->gear[1].strip) / 1.5;
-    setup->square_high = widest * widest;
-    setup->square_low = B_LOW < 0.5 * widest ? B_LOW * B_LOW : 0.25 * setup->square_high;
-    setup->log_low = gk_log(setup->square_low);
-    setup->log_high = gk_log(setup->square_high);
+    const gk_engagement *e = &model->engagement[mesh->index];
+    const double widest = gk_min(model->gear[e->gear[0]].strip, model->gear[e->gear[1]].strip) / 1.5;
+    mesh->square_high = widest * widest;
+    mesh->square_low = B_LOW < 0.5 * widest ? B_LOW * B_LOW : 0.25 * mesh->square_high;
+    mesh->log_low = gk_log(mesh->square_low);
+    mesh->log_high = gk_log(mesh->square_high);
 }
 
 /* ln x of four normal numbers, as gk_log */

@@ -1,56 +1,299 @@
-/* Displacement rows of the dynamic modes at the places of contact and at the bore, in body-fixed lanes.
- * A place's row is the tooth-0 table at its roll (four grid rolls), turned to its tooth (docs/theory.md, eq. 3): (a, b)
- * → (a cos θ − b sin θ, a sin θ + b cos θ), θ = 2πνj/z. */
-#include "model/gk_core.h"
+/* What the rows of an engagement read of the oscillators, and what their forces do to them. A contact's row on a gear
+ * group is the interpolated row of its candidate, for the reference tooth 0: the group's state is turned to the
+ * reference tooth before it is read, and its force turned back (docs/theory.md, eq. 3). On the ground group a row is
+ * minus the outward displacement of both gears plus the gap's gradient times their rigid motion. */
+#include "problem/gk_work.h"
 
-static void place_rows(const gk_setup *setup, const gk_gear *gear, int g, const gk_place *p, gk_real *out)
+static const int RIGID_ROW[3] = {0, 1, 5}; /* x, y, rz among the rows of a gear's rigid motion */
+
+/* rigid motion of both gears of an engagement by displacements (or speeds) of the ground group */
+static void read_rigid(const gk_model *model, const gk_setup *setup, int e, const double *ground, double rigid[POSE])
 {
-    const gk_modal *modal = &setup->modal[g];
-    const int n = 2 * modal->n / LANES, P = n / 2, strips = GK_STRIPS(setup); /* in halves of LANES */
-    const gk_real w0 = (gk_real)p->weight[g][0], w1 = (gk_real)p->weight[g][1], w2 = (gk_real)p->weight[g][2],
-                  w3 = (gk_real)p->weight[g][3];
-    const gk_half *t0 = (const gk_half *)modal->rows + ((size_t)p->flank * gear->rolls + p->index[g]) * strips * n;
-    const gk_half *t1 = t0 + strips * n, *t2 = t1 + strips * n, *t3 = t2 + strips * n;
-    const gk_half *c = (const gk_half *)modal->cosine + p->tooth[g] * P,
-                  *s = (const gk_half *)modal->sine + p->tooth[g] * P;
+    const gk_base *base = &setup->base;
+    for (int w = 0; w < 2; w++) {
+        const int g = model->engagement[e].gear[w], from = base->from[g], quads = base->width[g] / 4;
+        for (int c = 0; c < 3; c++)
+            rigid[3 * w + c] = gk_dot_quads(base->centre[g] + RIGID_ROW[c] * base->n + from, ground + from, quads);
+    }
+}
+
+/* positions and angles of both gears of an engagement: spin, and rigid motion by the ground oscillators */
+void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
+                  double *pose)
+{
+    read_rigid(model, setup, e, ground, pose);
+    for (int w = 0; w < 2; w++) pose[3 * w + 2] += spin[model->gear[model->engagement[e].gear[w]].rotor];
+}
+
+static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *work, gk_real *out)
+{
+    const gk_position *at = &work->position[side->which];
+    const int halves = 2 * GK_LANES(setup, side->gear) / LANES, strips = GK_STRIPS(setup),
+              points = side->candidates * strips;
+    const gk_real part = (gk_real)at->part;
     gk_half *to = (gk_half *)out;
-    for (int strip = 0; strip < strips; strip++, t0 += n, t1 += n, t2 += n, t3 += n, to += n)
-        for (int k = 0; k < P; k++) {
-            const gk_half first = (w0 * t0[k] + w1 * t1[k]) + (w2 * t2[k] + w3 * t3[k]);
-            const gk_half second = (w0 * t0[P + k] + w1 * t1[P + k]) + (w2 * t2[P + k] + w3 * t3[P + k]);
-            to[k] = first * c[k] - second * s[k];
-            to[P + k] = first * s[k] + second * c[k];
+    for (int p = 0; p < work->places; p++) {
+        const size_t first = ((size_t)at->node * points + (size_t)(work->place[p].candidate[side->which] * strips)) *
+                             halves;
+        const gk_half *low = (const gk_half *)side->rows + first, *high = low + (size_t)points * halves;
+        for (int k = 0; k < strips * halves; k++) to[k] = low[k] + part * (high[k] - low[k]);
+        to += strips * halves;
+    }
+}
+
+/* what the ground oscillators displace outward at the contacts */
+static void outward_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *work, double *out)
+{
+    const gk_position *at = &work->position[side->which];
+    const int quads = setup->base.width[side->gear] / 4, strips = GK_STRIPS(setup), points = side->candidates * strips;
+    gk_quad *to = (gk_quad *)out;
+    for (int p = 0; p < work->places; p++, to += strips * quads) {
+        const size_t first = ((size_t)at->node * points + (size_t)(work->place[p].candidate[side->which] * strips)) *
+                             quads;
+        const gk_quad *low = (const gk_quad *)side->ground + first, *high = low + (size_t)points * quads;
+        for (int q = 0; q < strips * quads; q++) to[q] = low[q] + at->part * (high[q] - low[q]);
+    }
+}
+
+/* Fills the rows of the contacts that were found: on the gear groups and on the ground group */
+void gk_rows_form(const gk_model *model, const gk_setup *setup, gk_work *work, int e)
+{
+    gk_engaged *engaged = &work->engaged[e];
+    (void)model;
+    for (int w = 0; w < 2; w++) {
+        const gk_side *side = &setup->mesh[e].side[w];
+        if (GK_LANES(setup, side->gear)) contact_rows(setup, side, engaged, engaged->basis[w]);
+        if (setup->base.width[side->gear]) outward_rows(setup, side, engaged, engaged->outward[w]);
+    }
+}
+
+/* the whole rows on the ground group, of contacts and joints: for steps that have no tables */
+void gk_rows_whole(const gk_model *model, const gk_setup *setup, gk_work *work, int e)
+{
+    const gk_base *base = &setup->base;
+    const gk_engaged *engaged = &work->engaged[e];
+    const gk_system *s = &engaged->system;
+    const size_t size = (size_t)base->n * sizeof(double);
+    for (int i = 0; i < s->n; i++) {
+        double *row = engaged->ground + (size_t)i * base->n;
+        memset(row, 0, size);
+        if (i >= s->contacts) {
+            if (gk_rows_at_bore(setup, s, i)) memcpy(row, base->port_rows + s->port_of[i] * base->n, size);
+            continue;
         }
+        const gk_place *place = &engaged->place[s->place_of[i]];
+        for (int w = 0; w < 2; w++) {
+            const int g = model->engagement[e].gear[w], from = base->from[g], width = base->width[g];
+            for (int c = 0; c < 3; c++)
+                gk_axpy(place->gradient[3 * w + c], base->centre[g] + RIGID_ROW[c] * base->n, row, from / 4,
+                        (from + width) / 4);
+            gk_axpy(-1.0, engaged->outward[w] + (size_t)i * width, row + from, 0, width / 4);
+        }
+    }
 }
 
-/* x and y stay away where no bearing reads them */
-static void bore_rows(const gk_modal *modal, int radial, const double *axes, gk_real *out)
+/* a gear group's state in the frame of a tooth: what tooth 0 of a state turned back would have */
+static void turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out)
 {
-    const int n = 2 * modal->n / LANES;
-    memcpy(out + BORE_RZ * modal->n, modal->bore + BORE_RZ * modal->n, (size_t)modal->n * sizeof *out);
-    if (!radial) return;
-    const gk_real c = (gk_real)axes[0], s = (gk_real)axes[1];
-    const gk_half *x = (const gk_half *)modal->bore, *y = x + n;
+    const int half = m->n / LANES; /* halves of LANES in one half of the lanes */
+    const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
+    const gk_half *a = (const gk_half *)y, *b = a + half;
     gk_half *to = (gk_half *)out;
-    for (int k = 0; k < n; k++) {
-        to[k] = c * x[k] - s * y[k];
-        to[n + k] = s * x[k] + c * y[k];
+    for (int k = 0; k < half; k++) {
+        to[k] = a[k] * c[k] + b[k] * s[k];
+        to[half + k] = b[k] * c[k] - a[k] * s[k];
     }
 }
 
-/* fills work->attitude and work->basis of both gears for the places found: a row a strip and place, then the three bore
- * rows in inertial axes */
-void gk_rows_form(const gk_model *model, const gk_setup *setup, const double *frame, gk_work *work)
+/* adds a force in the frame of a tooth to the group's */
+static void turn_forth(const gk_modal *m, int tooth, const gk_real *f, gk_real *sum)
 {
-    for (int g = 0; g < 2; g++) {
-        const gk_modal *modal = &setup->modal[g];
-        work->attitude[g] = frame[g ? PHIB : PHIA] + model->gear[g].phase;
-        gk_sincos(work->attitude[g], &work->axes[g][1], &work->axes[g][0]);
-        if (!GK_LANES(setup, g)) continue;
-        size_t row = (size_t)GK_STRIPS(setup) * modal->n;
-        for (int p = 0; p < work->places; p++)
-            place_rows(setup, &model->gear[g], g, &work->place[p], work->basis[g] + p * row);
-        bore_rows(modal, GK_HAS(bearings) && setup->link[BEARING_0X + 2 * g], work->axes[g],
-                  work->basis[g] + work->places * row);
+    const int half = m->n / LANES;
+    const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
+    const gk_half *a = (const gk_half *)f, *b = a + half;
+    gk_half *to = (gk_half *)sum;
+    for (int k = 0; k < half; k++) {
+        to[k] += a[k] * c[k] - b[k] * s[k];
+        to[half + k] += a[k] * s[k] + b[k] * c[k];
     }
+}
+
+/* What the rows of an engagement read of displacements (or speeds) y of the gear groups and `ground`, rigid motion of the
+ * gears left out: the gap reads that */
+void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
+                  double *read)
+{
+    const gk_base *base = &setup->base;
+    const gk_engaged *engaged = &work->engaged[e];
+    const gk_system *s = &engaged->system;
+    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    for (int w = 0; w < 2; w++) {
+        const int g = setup->mesh[e].side[w].gear, n = GK_LANES(setup, g), from = base->from[g], width = base->width[g];
+        if (n && s->contacts) turn_back(&setup->modal[g], engaged->position[w].tooth, y[g], work->turned);
+        for (int i = 0; i < s->contacts; i++) {
+            if (n) read[i] -= gk_dot(engaged->basis[w] + (size_t)i * n, work->turned, n);
+            read[i] -= gk_dot_quads(engaged->outward[w] + (size_t)i * width, ground + from, width / 4);
+        }
+    }
+    for (int i = s->contacts; i < s->n; i++)
+        if (gk_rows_at_bore(setup, s, i))
+            read[i] = gk_dot_quads(base->port_rows + s->port_of[i] * base->n, ground, base->n / 4);
+}
+
+/* what the rows of an engagement read of displacements of the ground group, rigid motion included */
+void gk_rows_read_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                         const double *ground, double *read)
+{
+    const gk_base *base = &setup->base;
+    const gk_system *s = &engaged->system;
+    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    for (int w = 0; w < 2; w++) {
+        const int g = model->engagement[e].gear[w], from = base->from[g], width = base->width[g];
+        for (int i = 0; i < s->contacts; i++)
+            read[i] -= gk_dot_quads(engaged->outward[w] + (size_t)i * width, ground + from, width / 4);
+    }
+    for (int i = s->contacts; i < s->n; i++)
+        if (gk_rows_at_bore(setup, s, i))
+            read[i] = gk_dot_quads(base->port_rows + s->port_of[i] * base->n, ground, base->n / 4);
+    gk_rows_read_rigid(model, setup, engaged, e, ground, read);
+}
+
+/* interpolated far row of a contact on one side, its sign that of the contact's row */
+static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, double *out)
+{
+    const gk_position *at = &engaged->position[side->which];
+    const int strips = GK_STRIPS(setup), points = side->candidates * strips, far = setup->far;
+    const int point = engaged->place[engaged->system.place_of[i]].candidate[side->which] * strips + i % strips;
+    const gk_real *low = side->far + ((size_t)at->node * points + point) * far, *high = low + (size_t)points * far;
+    for (int k = 0; k < far; k++) out[k] -= low[k] + at->part * (high[k] - low[k]);
+}
+
+static void whole_far_row(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int i, double *row)
+{
+    const gk_engaged *engaged = &work->engaged[e];
+    const gk_system *s = &engaged->system;
+    (void)model;
+    memset(row, 0, (size_t)setup->far * sizeof *row);
+    if (i < s->contacts)
+        for (int w = 0; w < 2; w++) far_row(setup, engaged, &setup->mesh[e].side[w], i, row);
+    else if (gk_rows_at_bore(setup, s, i))
+        memcpy(row, work->port_far + (size_t)s->port_of[i] * setup->far, (size_t)setup->far * sizeof *row);
+}
+
+/* what the rows read through the residual that engagements share */
+void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
+                      double *read)
+{
+    const gk_system *s = &work->engaged[e].system;
+    double row[MAX_GROUND + MAX_SUPPORTS];
+    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    for (int i = 0; i < s->n && setup->far; i++) {
+        const int supports = setup->far - model->supports;
+        whole_far_row(model, setup, work, e, i, row);
+        for (int k = 0; k < setup->far; k++) read[i] += k < supports ? row[k] * far[k] : -row[k] * far[k];
+    }
+}
+
+void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *x,
+                      double *out)
+{
+    const gk_system *s = &work->engaged[e].system;
+    double row[MAX_GROUND + MAX_SUPPORTS];
+    for (int i = 0; i < s->n && setup->far; i++) {
+        if (x[i] == 0.0) continue;
+        whole_far_row(model, setup, work, e, i, row);
+        for (int k = 0; k < setup->far; k++) out[k] += x[i] * row[k];
+    }
+}
+
+/* adds what rigid motion of the gears by `ground` makes of the gaps of the contacts */
+void gk_rows_read_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                        const double *ground, double *read)
+{
+    double rigid[POSE];
+    read_rigid(model, setup, e, ground, rigid);
+    for (int i = 0; i < engaged->system.contacts; i++)
+        for (int d = 0; d < POSE; d++) read[i] += engaged->place[engaged->system.place_of[i]].gradient[d] * rigid[d];
+}
+
+/* Σ rows·x and Σ rows·y of a gear group, in the frame of the reference tooth */
+static void contact_forces(const gk_setup *setup, const gk_engaged *work, const gk_side *side, const double *x,
+                           const double *y, gk_real *out_x, gk_real *out_y)
+{
+    const gk_system *s = &work->system;
+    const int halves = 2 * GK_LANES(setup, side->gear) / LANES;
+    const gk_half *rows[MAX_CONTACTS];
+    gk_half of_x[MAX_CONTACTS], of_y[MAX_CONTACTS];
+    int count = 0;
+    for (int r = 0; r < s->contacts; r++) {
+        if (x[r] == 0.0 && y[r] == 0.0) continue;
+        of_x[count] = (gk_half){0} - (gk_real)x[r];
+        of_y[count] = (gk_half){0} - (gk_real)y[r];
+        rows[count++] = (const gk_half *)work->basis[side->which] + (size_t)r * halves;
+    }
+    for (int i = 0; i < halves; i++) {
+        gk_half sum_x = {0}, sum_y = {0};
+        for (int r = 0; r < count; r++) {
+            const gk_half b = rows[r][i];
+            sum_x += of_x[r] * b;
+            sum_y += of_y[r] * b;
+        }
+        ((gk_half *)out_x)[i] = sum_x;
+        ((gk_half *)out_y)[i] = sum_y;
+    }
+}
+
+/* adds the forces x of the rows on the ground group */
+void gk_rows_push_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *work, int e, const double *x,
+                         double *out)
+{
+    const gk_base *base = &setup->base;
+    const gk_system *s = &work->system;
+    double rigid[POSE] = {0};
+    for (int i = 0; i < s->contacts; i++) {
+        const gk_place *place = &work->place[s->place_of[i]];
+        if (x[i] == 0.0) continue;
+        for (int d = 0; d < POSE; d++) rigid[d] += x[i] * place->gradient[d];
+        for (int w = 0; w < 2; w++) {
+            const int g = model->engagement[e].gear[w], width = base->width[g];
+            gk_axpy(-x[i], work->outward[w] + (size_t)i * width, out + base->from[g], 0, width / 4);
+        }
+    }
+    for (int d = 0; d < POSE; d++) {
+        const int g = model->engagement[e].gear[d / 3], from = base->from[g];
+        gk_axpy(rigid[d], base->centre[g] + RIGID_ROW[d % 3] * base->n, out, from / 4, (from + base->width[g]) / 4);
+    }
+    for (int i = s->contacts; i < s->n; i++)
+        if (x[i] != 0.0 && gk_rows_at_bore(setup, s, i))
+            gk_axpy(x[i], base->port_rows + s->port_of[i] * base->n, out, 0, base->n / 4);
+}
+
+/* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */
+void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
+                     const double *(*y)(const gk_system *))
+{
+    const size_t width = (size_t)setup->base.n * sizeof(double);
+    for (int g = 0; g < model->gears; g++) {
+        const size_t size = (size_t)GK_LANES(setup, g) * sizeof(gk_real);
+        memset(work->force[g], 0, size);
+        memset(work->next[g], 0, size);
+    }
+    memset(work->ground_force, 0, width);
+    memset(work->ground_next, 0, width);
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_engaged *engaged = &work->engaged[e];
+        const double *of_x = x(&engaged->system), *of_y = y(&engaged->system);
+        for (int w = 0; w < 2; w++) {
+            const gk_side *side = &setup->mesh[e].side[w];
+            if (!GK_LANES(setup, side->gear) || !engaged->system.contacts) continue;
+            contact_forces(setup, engaged, side, of_x, of_y, work->turned, work->turned_next);
+            turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, work->turned, work->force[side->gear]);
+            turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, work->turned_next,
+                       work->next[side->gear]);
+        }
+        if (!width) continue;
+        gk_rows_push_ground(model, setup, engaged, e, of_x, work->ground_force);
+        if (of_x != of_y) gk_rows_push_ground(model, setup, engaged, e, of_y, work->ground_next);
+    }
+    if (width && model->engagements && x == y) memcpy(work->ground_next, work->ground_force, width);
 }

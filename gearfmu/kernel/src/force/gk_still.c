@@ -1,18 +1,18 @@
 /* Places of contact for conservation tests (effect.roll_motion off): teeth, rolls, normals and curvatures stay those of
  * the start, gaps are linear in the coordinates. Then rows and C′ are constant, the mesh does no work of its own, and
  * the scheme's invariant (docs/theory.md, eq. 11) must hold exactly. */
-#include "model/gk_core.h"
+#include "problem/gk_work.h"
 
 static const double STILL_REACH =
     0.4e-3; /* m: every flank that the motion of a test can close is among the places all the time */
 
-/* All places at the frames `still`, their gaps moved on to `frame` along the gradients; −1 when the frames are
+/* All places at the poses `still`, their gaps moved on to `pose` along the gradients; −1 when the poses are
  * meaningless */
-int gk_still_find(const gk_model *model, const gk_setup *setup, const double *still, const double *frame,
-                  gk_place *place)
+int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *still,
+                  const double *pose, gk_position position[2], gk_place *place)
 {
-    const int found = gk_flank_find(model, setup, still, STILL_REACH, place);
+    const int found = gk_flank_find(model, setup, mesh, still, STILL_REACH, position, place);
     for (int p = 0; p < found; p++)
-        for (int d = 0; d < 6; d++) place[p].gap += place[p].gradient[d] * (frame[d] - still[d]);
+        for (int d = 0; d < POSE; d++) place[p].gap += place[p].gradient[d] * (pose[d] - still[d]);
     return found;
 }

@@ -8,126 +8,130 @@
  *
  * 2nd order while contacts keep their status; stable while ¼h²ω² + hχ < 1 with all contacts closed (eq. 16a): ω² of the
  * stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
-#include "model/gk_core.h"
+#include "integrate/gk_integrate.h"
 
 enum { PLACES_TRIED = 8, POWER = 150 };
 static const double FIRST = 1e-6; /* s: where the search for the limit begins */
 
 /* trial state ← positions and speeds after h with the accelerations at its start */
-static void approach(const gk_setup *setup, const gk_data *data, double h)
+static void approach(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h)
 {
-    gk_work *work = setup->work;
-    const gk_real *q = data->modal, step = (gk_real)h, half = (gk_real)(0.5 * h);
-    for (int d = 0; d < RIGID; d++) {
-        work->trial_rigid[d] = data->x[d] + h * (data->v[d] + 0.5 * h * data->f[d]);
-        work->trial_rigid[RIGID + d] = data->v[d] + h * data->f[d]; /* the speed that dampers see */
+    const gk_real step = (gk_real)h, half = (gk_real)(0.5 * h);
+    const int width = setup->base.n;
+    const double *x = gk_ground_seen(data);
+    for (int d = 0; d < setup->spins; d++) {
+        work->trial_spin[d] = data->x[d] + h * (data->v[d] + 0.5 * h * data->f[d]);
+        work->trial_spin[MAX_SPINS + d] = data->v[d] + h * data->f[d]; /* the speed that dampers see */
     }
-    for (int g = 0; g < 2; g++) {
+    for (int i = 0; i < width; i++) {
+        work->ground_trial[i] = x[i] + h * (x[width + i] + 0.5 * h * x[2 * width + i]);
+        work->ground_trial[width + i] = x[width + i] + h * x[2 * width + i];
+    }
+    for (int g = 0; g < model->gears; g++) {
         const int n = setup->modal[g].n;
-        const gk_real *v = q + n, *a = v + n;
+        const gk_real *q = gk_modal_seen(setup, data, g), *v = q + n, *a = v + n;
         for (int i = 0; i < n; i++) {
             work->trial[g][i] = q[i] + step * (v[i] + half * a[i]);
             work->trial[g][n + i] = v[i] + step * a[i];
         }
-        q += 3 * n;
     }
 }
 
 /* positions of the trial state, speeds by the mean of both accelerations */
-static void arrive(const gk_setup *setup, gk_data *data, double h)
+static void arrive(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h)
 {
-    const gk_work *work = setup->work;
-    gk_real *q = data->modal;
     const gk_real half = (gk_real)(0.5 * h);
-    for (int d = 0; d < RIGID; d++) {
-        const double a = work->stage_rigid[0][RIGID + d];
+    const int width = setup->base.n;
+    double *x = gk_ground_of(data);
+    for (int d = 0; d < setup->spins; d++) {
+        const double a = work->stage_spin[0][MAX_SPINS + d];
         data->v[d] += 0.5 * h * (data->f[d] + a);
-        data->x[d] = work->trial_rigid[d];
+        data->x[d] = work->trial_spin[d];
         data->f[d] = a;
     }
-    for (int g = 0; g < 2; g++) {
+    for (int i = 0; i < width; i++) {
+        const double a = work->ground_stage[0][width + i];
+        x[i] = work->ground_trial[i];
+        x[width + i] += 0.5 * h * (x[2 * width + i] + a);
+        x[2 * width + i] = a;
+    }
+    for (int g = 0; g < model->gears; g++) {
         const int n = setup->modal[g].n;
+        gk_real *q = gk_modal_of(setup, data, g);
         const gk_real *a = work->stage[g][0] + n;
         for (int i = 0; i < n; i++) {
             q[i] = work->trial[g][i];
             q[n + i] += half * (q[2 * n + i] + a[i]);
             q[2 * n + i] = a[i];
         }
-        q += 3 * n;
     }
 }
 
 static int overlaps(const gk_model *model, const gk_work *work)
 {
-    for (int p = 0; p < work->places; p++)
-        if (work->place[p].gap < -model->overlap_max) return 1;
+    for (int e = 0; e < model->engagements; e++)
+        for (int p = 0; p < work->engaged[e].places; p++)
+            if (work->engaged[e].place[p].gap < -model->engagement[e].overlap_max) return 1;
     return 0;
 }
 
 /* One step of length h. GK_OK, or GK_DIVERGED / GK_PENETRATION with data unchanged. γ has no meaning here. */
-gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma)
+gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
+                           double gamma)
 {
-    gk_work *work = setup->work;
-    const gk_coefficients *k = &work->explicit_rows;
+    double outer[MAX_PORTS];
     (void)gamma;
-    for (int g = 0; g < 2; g++) work->outer_speed[g] = (work->outer[g] - work->outer_before[g]) / h;
+    for (int p = 0; p < model->ports; p++) work->outer_speed[p] = (work->outer[p] - work->outer_before[p]) / h;
+    memcpy(outer, work->outer, sizeof outer);
     if (!(data->rk_h >
           0.0)) { /* the first step: what stands where accelerations belong are the forces of the equilibrium */
-        approach(setup, data, 0.0);
-        if (!gk_rk45_evaluate(model, setup, data, k, 0, work->outer_before)) return GK_DIVERGED;
-        arrive(setup, data, 0.0);
+        approach(model, setup, work, data, 0.0);
+        if (!gk_rk45_evaluate(model, setup, work, data, 0, work->outer_before)) return GK_DIVERGED;
+        arrive(model, setup, work, data, 0.0);
         data->rk_h = h;
     }
-    approach(setup, data, h);
-    const double outer[2] = {work->outer[0], work->outer[1]};
-    if (!gk_rk45_evaluate(model, setup, data, k, 0, outer)) return GK_DIVERGED;
+    approach(model, setup, work, data, h);
+    if (!gk_rk45_evaluate(model, setup, work, data, 0, outer)) return GK_DIVERGED;
     if (overlaps(model, work)) return GK_PENETRATION;
-    arrive(setup, data, h);
-    gk_step_remember(setup, data);
-    gk_rk45_angles(setup, data);
-    data->rounds += work->system.rounds;
+    arrive(model, setup, work, data, h);
+    gk_step_remember(model, setup, work, data);
+    gk_rk45_angles(model, work, data);
+    for (int e = 0; e < model->engagements; e++) { /* reported force: that of the end */
+        gk_system *s = &work->engaged[e].system;
+        data->rounds += s->rounds;
+        memcpy(s->force0, s->z, sizeof s->force0);
+    }
     data->steps++;
-    memcpy(work->system.force0, work->system.z, sizeof work->system.z); /* reported force: that of the end */
     return GK_OK;
 }
 
 #ifndef GK_WIDE
-/* What the undamped scheme keeps while contacts keep their status and the law is straight: ½ v M v + V(x) − ⅛h² a M a,
- * V with the contacts' energy */
-double gk_central_energy(const gk_setup *setup, const gk_data *data, double h)
+/* What the undamped scheme keeps while contacts keep their status and the law is straight: ½ v M v + V(x) − ⅛h² a M a, V
+ * with the contacts' energy */
+double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                         double h)
 {
-    const gk_real *q = data->modal;
+    const double *ground = gk_ground_seen(data) + 2 * setup->base.n;
     double sum = 0.0;
-    for (int d = 0; d < RIGID; d++)
-        if (setup->inverse_mass[d] > 0.0) sum += data->f[d] * data->f[d] / setup->inverse_mass[d];
-    for (int g = 0; g < 2; g++) {
+    for (int d = 0; d < setup->spins; d++) sum += data->f[d] * data->f[d] / setup->inverse_inertia[d];
+    for (int i = 0; i < setup->base.n; i++) sum += ground[i] * ground[i];
+    for (int g = 0; g < model->gears; g++) {
         const int n = setup->modal[g].n;
-        for (int i = 0; i < n; i++) sum += (double)q[2 * n + i] * q[2 * n + i];
-        q += 3 * n;
+        const gk_real *a = gk_modal_seen(setup, data, g) + 2 * n;
+        for (int i = 0; i < n; i++) sum += (double)a[i] * a[i];
     }
-    return gk_step_energy(setup, data, &setup->work->explicit_rows) - 0.125 * h * h * sum;
+    return gk_step_energy(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
 }
 
-/* Cholesky factor of the whole massless compliance at a position, contacts closed under the full load (that is
- * stiffest); 0: not positive */
-static int closed(const gk_model *model, const gk_setup *setup, double position)
+/* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the full load
+ * (that is stiffest); 0: not positive */
+static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, int e, double position)
 {
-    gk_work *work = setup->work;
-    gk_system *s = &work->system;
-    const double full = model->torque_max / (model->gear[0].r_b * setup->width);
+    gk_system *s = &work->engaged[e].system;
     gk_data empty;
+    const double full = model->engagement[e].force_max / model->engagement[e].width;
     memset(&empty, 0, sizeof empty);
-    memset(work->frame, 0, sizeof work->frame);
-    memset(work->speed, 0, sizeof work->speed);
-    work->frame[PHIA] = 2.0 * GK_PI * position / model->gear[0].teeth;
-    work->frame[PHIB] = -work->frame[PHIA] * model->gear[0].r_b / model->gear[1].r_b;
-    if (model->kind == KIND_FLAT) work->frame[XB] = -model->distance, work->frame[PHIA] = work->frame[PHIB] = 0.0;
-    work->y[0] = work->zero[0], work->y[1] = work->zero[1];
-    work->places = gk_flank_find(model, setup, work->frame, 50e-6, work->place);
-    if (work->places < 0) return work->places = 0, 0;
-    for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
-    gk_rows_form(model, setup, work->frame, work);
-    gk_system_form(model, setup, &empty, &work->explicit_rows, work);
+    if (!gk_limit_place(model, setup, work, &empty, &work->explicit_rows, e, position)) return 0;
     for (int i = 0; i < s->n; i++) {
         s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
         s->slope[i] = i < s->contacts ? gk_law_at(&s->local[s->place_of[i]], s->width[i], full * s->width[i]).slope
@@ -141,73 +145,122 @@ typedef struct quotient {
     double stiff, damped;
 } quotient; /* ω², χ of a shape */
 
-/* One round of power iteration with ¼h² M⁻¹(K + WᵀC⁻¹W) + h M⁻¹(damping + WᵀC⁻¹ S c S C⁻¹W) on the trial speeds;
- * returns Rayleigh's quotients of both parts */
-static quotient round_of_power(const gk_setup *setup, double h)
+typedef struct shape { /* of all coordinates, its energy and its product with the operator */
+    double up_stiff, up_damped, down, size, next[MAX_SPINS];
+} shape;
+
+/* C⁻¹ of what the rows of an engagement read of the trial speeds (y), and with the dashpots (c, both) */
+static void press(const gk_model *model, const gk_setup *setup, gk_work *work, int e, double h, shape *of)
 {
-    gk_work *work = setup->work;
-    gk_system *s = &work->system;
-    const gk_real *u[2] = {work->trial[0] + setup->modal[0].n, work->trial[1] + setup->modal[1].n};
-    const double stiff = 0.25 * h * h;
-    double *r = work->trial_rigid + RIGID, y[MAX_STRIDE], c[MAX_STRIDE], both[MAX_STRIDE], next[RIGID], down = 0.0,
-           size = 0.0;
-    quotient up = {0.0, 0.0};
-    work->outer_speed[0] = work->outer_speed[1] = 0.0;
-    gk_system_rates(setup, work, u, r, y);
-    for (int i = 0; i < s->n; i++)
-        if (!s->active[i]) y[i] = 0.0;
+    gk_system *s = &work->engaged[e].system;
+    const gk_real *u[MAX_GEARS];
+    double rate[MAX_STRIDE], *y = s->force, *both = s->z, *c = s->eta;
+    for (int g = 0; g < model->gears; g++) u[g] = work->trial[g] + setup->modal[g].n;
+    gk_form_rates(model, setup, work, e, u, work->ground_trial + setup->base.n, work->trial_spin + MAX_SPINS, rate);
+    for (int i = 0; i < s->n; i++) y[i] = s->active[i] ? rate[i] : 0.0;
     gk_limit_solve(s->J, y, s->n);
     memcpy(c, y, (size_t)s->n * sizeof *c);
-    gk_rk45_resist(setup, s, c);
-    for (int i = 0; i < s->n; i++) up.damped += y[i] * c[i];
+    gk_rk45_resist(setup, &setup->mesh[e], s, c);
+    for (int i = 0; i < s->n; i++) of->up_damped += y[i] * c[i];
     gk_limit_solve(s->J, c, s->n);
-    for (int i = 0; i < s->n; i++) both[i] = stiff * y[i] + h * c[i];
-    for (int d = 0; d < RIGID; d++) {
-        double force = 0.0;
-        next[d] = 0.0;
-        for (int i = 0; i < s->n; i++)
-            force += s->rigid[d][i] * y[i], next[d] += s->rigid[d][i] * both[i] * setup->inverse_mass[d];
-        if (setup->inverse_mass[d] > 0.0)
-            up.stiff += r[d] * force, down += r[d] * r[d] / setup->inverse_mass[d],
-                size += next[d] * next[d] / setup->inverse_mass[d];
-    }
-    for (int g = 0; g < 2; g++) {
-        const gk_modal *m = &setup->modal[g];
-        if (!m->n) continue;
-        gk_step_scatter(setup, g, y, both, work->force[g], work->reading[g]);
-        for (int j = 0; j < m->n; j++) {
-            const double of_mode = GK_ON(setup, modal_damping) ? 2.0 * m->zeta[j] * m->omega[j] : 0.0, x = u[g][j];
-            const double a = work->reading[g][j] + (stiff * m->omega2[j] + h * of_mode) * x;
-            up.stiff += ((double)m->omega2[j] * x + work->force[g][j]) * x, up.damped += of_mode * x * x;
-            down += x * x, size += a * a;
-            work->stage[g][0][j] = (gk_real)a;
-        }
-    }
-    const double scale = size > 0.0 ? 1.0 / sqrt(size) : 0.0;
-    for (int d = 0; d < RIGID; d++) r[d] = next[d] * scale;
-    for (int g = 0; g < 2; g++)
-        for (int j = 0; j < setup->modal[g].n; j++)
-            work->trial[g][setup->modal[g].n + j] = (gk_real)(work->stage[g][0][j] * scale);
-    return down > 0.0 ? (quotient){up.stiff / down, up.damped / down} : (quotient){0.0, 0.0};
+    for (int i = 0; i < s->n; i++) both[i] = 0.25 * h * h * y[i] + h * c[i];
 }
 
-/* Largest stable step over the roll positions, all candidate contacts closed (fewer are softer): ¼h²ω² + hχ = 1 (eq.
- * 16a) for the shape that is worst at this h */
-double gk_central_limit(const gk_model *model, const gk_setup *setup)
+static void spin_round(const gk_setup *setup, const gk_work *work, int e, shape *of)
 {
-    gk_work *work = setup->work;
+    const gk_system *s = &work->engaged[e].system;
+    const gk_mesh *mesh = &setup->mesh[e];
+    const double *r = work->trial_spin + MAX_SPINS;
+    for (int l = 0; l < mesh->spins; l++) {
+        const int d = mesh->spin[l];
+        double force = 0.0, next = 0.0;
+        for (int i = 0; i < s->n; i++) force += s->rigid[l][i] * s->force[i], next += s->rigid[l][i] * s->z[i];
+        of->next[d] = next * setup->inverse_inertia[d];
+        of->up_stiff += r[d] * force;
+        of->down += r[d] * r[d] / setup->inverse_inertia[d];
+        of->size += of->next[d] * of->next[d] / setup->inverse_inertia[d];
+    }
+}
+
+static void ground_round(const gk_model *model, const gk_setup *setup, gk_work *work, double h, shape *of)
+{
+    const gk_base *base = &setup->base;
+    const int n = base->n;
+    const double *u = work->ground_trial + n, stiff = 0.25 * h * h;
+    double *a = work->ground_stage[0];
+    for (int j = 0; j < n; j++) {
+        const double of_mode = GK_ON(setup, modal_damping) ? 2.0 * base->zeta[j] * base->omega[j] : 0.0;
+        a[j] = work->ground_next[j] + (stiff * base->omega2[j] + h * of_mode) * u[j];
+        of->up_stiff += (base->omega2[j] * u[j] + work->ground_force[j]) * u[j];
+        of->up_damped += of_mode * u[j] * u[j];
+        of->down += u[j] * u[j];
+    }
+    for (int d = 0; d < model->dampers && n; d++) {
+        const double *e = base->damper_rows + d * n, speed = gk_dot_quads(e, u, n / 4);
+        const double c = model->ground[base->set].damper[d];
+        of->up_damped += c * speed * speed;
+        for (int j = 0; j < n; j++) a[j] += h * c * speed * e[j];
+    }
+    for (int j = 0; j < n; j++) of->size += a[j] * a[j];
+}
+
+static void gear_round(const gk_setup *setup, gk_work *work, int g, double h, shape *of)
+{
+    const gk_modal *m = &setup->modal[g];
+    const gk_real *u = work->trial[g] + m->n;
+    for (int j = 0; j < m->n; j++) {
+        const double of_mode = GK_ON(setup, modal_damping) ? 2.0 * m->zeta[j] * m->omega[j] : 0.0, x = u[j];
+        const double a = work->next[g][j] + (0.25 * h * h * m->omega2[j] + h * of_mode) * x;
+        of->up_stiff += ((double)m->omega2[j] * x + work->force[g][j]) * x;
+        of->up_damped += of_mode * x * x;
+        of->down += x * x, of->size += a * a;
+        work->stage[g][0][j] = (gk_real)a;
+    }
+}
+
+/* One round of power iteration with ¼h² M⁻¹(K + WᵀC⁻¹W) + h M⁻¹(damping + WᵀC⁻¹ S c S C⁻¹W) on the trial speeds; returns
+ * Rayleigh's quotients of both parts */
+static quotient round_of_power(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
+{
+    shape of = {0};
+    memset(work->outer_speed, 0, sizeof work->outer_speed);
+    for (int e = 0; e < model->engagements; e++) press(model, setup, work, e, h, &of);
+    for (int e = 0; e < model->engagements; e++) spin_round(setup, work, e, &of);
+    gk_rows_scatter(model, setup, work, gk_step_force, gk_step_z);
+    ground_round(model, setup, work, h, &of);
+    for (int g = 0; g < model->gears; g++) gear_round(setup, work, g, h, &of);
+    const double scale = of.size > 0.0 ? 1.0 / sqrt(of.size) : 0.0;
+    for (int d = 0; d < setup->spins; d++) work->trial_spin[MAX_SPINS + d] = of.next[d] * scale;
+    for (int j = 0; j < setup->base.n; j++) work->ground_trial[setup->base.n + j] = work->ground_stage[0][j] * scale;
+    for (int g = 0; g < model->gears; g++)
+        for (int j = 0; j < setup->modal[g].n; j++)
+            work->trial[g][setup->modal[g].n + j] = (gk_real)(work->stage[g][0][j] * scale);
+    return of.down > 0.0 ? (quotient){of.up_stiff / of.down, of.up_damped / of.down} : (quotient){0.0, 0.0};
+}
+
+static void first_shape(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    for (int d = 0; d < setup->spins; d++) work->trial_spin[MAX_SPINS + d] = sqrt(setup->inverse_inertia[d]);
+    for (int j = 0; j < setup->base.n; j++)
+        work->ground_trial[setup->base.n + j] = setup->base.omega[j] > 0.0 ? 1.0 + 0.1 * (j % 7) : 0.0;
+    for (int g = 0; g < model->gears; g++)
+        for (int j = 0; j < setup->modal[g].n; j++)
+            work->trial[g][setup->modal[g].n + j] = setup->modal[g].omega[j] > 0.0 ? (gk_real)(1.0 + 0.1 * (j % 7)) : 0;
+}
+
+/* Largest stable step over the roll positions, all candidate contacts closed (fewer are softer): ¼h²ω² + hχ = 1 (eq. 16a)
+ * for the shape that is worst at this h */
+double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
     double smallest = INFINITY;
-    for (int i = 0; i < (model->kind == KIND_FLAT ? 1 : PLACES_TRIED); i++) {
+    for (int i = 0; i < PLACES_TRIED; i++) {
         double h = FIRST;
-        if (!closed(model, setup, (double)i / PLACES_TRIED)) continue;
-        for (int d = 0; d < RIGID; d++)
-            work->trial_rigid[RIGID + d] = setup->inverse_mass[d] > 0.0 ? sqrt(setup->inverse_mass[d]) : 0.0;
-        for (int g = 0; g < 2; g++)
-            for (int j = 0; j < setup->modal[g].n; j++)
-                work->trial[g][setup->modal[g].n + j] = setup->modal[g].omega[j] > 0.0 ? (gk_real)(1.0 + 0.1 * (j % 7))
-                                                                                       : 0;
+        int all = model->engagements > 0;
+        for (int e = 0; e < model->engagements; e++) all &= closed(model, setup, work, e, (double)i / PLACES_TRIED);
+        if (!all) continue;
+        first_shape(model, setup, work);
         for (int round = 0; round < POWER; round++) {
-            const quotient of = round_of_power(setup, h);
+            const quotient of = round_of_power(model, setup, work, h);
             h = of.stiff > 0.0 ? 2.0 / (sqrt(of.stiff + of.damped * of.damped) + of.damped) : INFINITY;
             if (!(h < INFINITY)) break;
         }

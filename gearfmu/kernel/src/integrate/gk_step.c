@@ -1,105 +1,194 @@
 /* One internal step of dg4 (docs/theory.md, 3). It reads like its description: predict, find, form, recall, solve, and
- * only if all is finite: correct and remember. Until `correct` nothing of gk_data changes but its expression for
- * another h, so a step that fails can be repeated with another h or scheme. */
-#include "model/gk_core.h"
+ * only if all is finite: correct and remember. Until `correct` nothing of gk_data changes but its expression for another
+ * h, so a step that fails can be repeated with another h or scheme. */
+#include "integrate/gk_integrate.h"
 
 static const double PAYABLE =
-    1e-4; /* of the energy of the massless part: what a contact that only grazes cannot repay waits */
+    1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot repay
+                                       waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
 static const double MEMORY =
-    0.75; /* of a dashpot's force at the end of the step: how much of the last one's goes into it (docs/theory, 3.4) */
+    0.75; /* of a damper's force at the end of the step: how much of the last one's goes into it
+                                      (docs/theory, 3.4) */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
 
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
 static double speed_lead(double h, double gamma) { return h * h * (2.0 * gamma - 1.0) / 12.0; }
 
-/* energy of the dynamic coordinates in a state expressed for k */
-static double dynamic_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
+/* ---- state --------------------------------------------------------------------------------------------------------- */
+/* Σ (½ v² + ½ ω² q²)/s² of a gear group, summed in double in fixed lanes */
+static double modal_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int g)
 {
-    const gk_real *q = data->modal;
-    double sum = ENERGY_SMALL;
-    for (int d = 0; d < RIGID; d++)
-        if (setup->inverse_mass[d] > 0.0) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_mass[d];
-    for (int g = 0; g < 2; g++) {
-        const int n = GK_LANES(setup, g);
-        for (int i = 0; i < n; i++) {
-            const double omega = setup->modal[g].omega[i], v = q[n + i], x = q[i];
-            sum += 0.5 * k->flow[g].inverse_s2[i] * (v * v + omega * omega * x * x);
-        }
-        q += 3 * n;
+    const int n = GK_LANES(setup, g);
+    const gk_real *q = gk_modal_seen(setup, data, g), *v = q + n, *weight = k->flow[g].inverse_s2;
+    const double *omega = setup->modal[g].omega;
+    gk_quad sum = {0};
+    for (int i = 0; i < n; i += 4) {
+        const gk_quad speed = {v[i], v[i + 1], v[i + 2], v[i + 3]}, at = {q[i], q[i + 1], q[i + 2], q[i + 3]};
+        const gk_quad w = {weight[i], weight[i + 1], weight[i + 2], weight[i + 3]};
+        const gk_quad strain = *(const gk_quad *)(omega + i) * at;
+        sum += w * (speed * speed + strain * strain);
     }
+    return 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3]));
+}
+
+/* energy of the dynamic coordinates in a state expressed for k */
+static double dynamic_energy(const gk_model *model, const gk_setup *setup, const gk_data *data,
+                             const gk_coefficients *k)
+{
+    const gk_base *base = &setup->base;
+    const double *x = gk_ground_seen(data), *v = x + base->n;
+    double sum = ENERGY_SMALL;
+    for (int d = 0; d < setup->spins; d++) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
+    for (int i = 0; i < base->n; i++)
+        sum += 0.5 * k->ground.inverse_s2[i] * (v[i] * v[i] + base->omega2[i] * x[i] * x[i]);
+    for (int g = 0; g < model->gears; g++) sum += modal_energy(setup, data, k, g);
     return sum;
 }
 
 /* A state of the scheme is displacement + κ f (docs/theory, 3.1): when h or γ changes, the displacement stays, and the
  * speed of free masses. At rest κ = 0. Another expression has another energy: the balance goes on from there. */
-static void express(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
+static void express(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                    const gk_coefficients *k)
 {
     if (data->state_h == k->h && data->state_gamma == k->gamma) return;
-    const gk_coefficients *old = data->state_h > 0.0 ? gk_flow_for(setup, data->state_h, data->state_gamma)
-                                                     : &setup->work->explicit_rows;
-    const double before = dynamic_energy(setup, data, old);
-    gk_real *q = data->modal;
-    for (int g = 0; g < 2; g++) {
+    const gk_coefficients *old = data->state_h > 0.0 ? gk_flow_for(model, setup, work, data->state_h, data->state_gamma)
+                                                     : &work->explicit_rows;
+    const double before = dynamic_energy(model, setup, data, old);
+    double *x = gk_ground_of(data), *f = x + 2 * setup->base.n;
+    for (int i = 0; i < setup->base.n; i++) x[i] += (k->ground.kappa[i] - old->ground.kappa[i]) * f[i];
+    for (int g = 0; g < model->gears; g++) {
         const int n = GK_LANES(setup, g);
+        gk_real *q = gk_modal_of(setup, data, g);
         for (int i = 0; i < n; i++) q[i] += (k->flow[g].kappa[i] - old->flow[g].kappa[i]) * q[2 * n + i];
-        q += 3 * n;
     }
     const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma)
                                             : 0.0;
-    for (int d = 0; d < RIGID; d++) data->v[d] += lead * setup->inverse_mass[d] * data->f_rate[d];
-    for (int d = 0; d < RIGID; d++)
-        data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_mass[d] * data->f[d];
-    data->ledger.baseline += dynamic_energy(setup, data, k) - before;
+    for (int d = 0; d < setup->spins; d++) data->v[d] += lead * setup->inverse_inertia[d] * data->f_rate[d];
+    for (int d = 0; d < setup->spins; d++)
+        data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_inertia[d] * data->f[d];
+    data->ledger.baseline += dynamic_energy(model, setup, data, k) - before;
     data->state_h = k->h;
     data->state_gamma = k->gamma;
 }
 
-/* modal and rigid state one step ahead under the forces of the last step */
-static void predict(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
+/* half a step of the dashpots of the supports: speeds contract along them; what that takes */
+static double damp_supports(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, double *v)
 {
-    gk_work *work = setup->work;
-    const gk_real *q = data->modal;
-    for (int g = 0; g < 2; g++) {
-        const int n = GK_LANES(setup, g);
-        const gk_real *v = q + n, *f = v + n;
-        const gk_flow *w = &k->flow[g];
-        for (int i = 0; i < n; i++) {
-            work->qp[g][i] = q[i] + (w->d11[i] * q[i] + w->a12[i] * v[i] + w->b0q[i] * f[i]);
-            work->vp[g][i] = v[i] + (w->a21[i] * q[i] + w->d22[i] * v[i] + w->b0v[i] * f[i]);
-        }
-        work->y[g] = work->qp[g];
-        if (k->curved_read) {
-            for (int i = 0; i < n; i++)
-                work->reading[g][i] = w->read_q[i] * work->qp[g][i] + w->read_v[i] * work->vp[g][i];
-            work->y[g] = work->reading[g];
-        }
-        q += 3 * n;
+    const int n = setup->base.n;
+    double taken = 0.0;
+    for (int d = 0; d < model->dampers; d++) {
+        const double *e = setup->base.damper_rows + d * n, *pulls = k->ground.pulls + d * n;
+        const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_quads(e, v, n / 4) : 0.0;
+        if (speed == 0.0) continue;
+        gk_axpy(-decay * speed, pulls, v, 0, n / 4);
+        taken += 0.5 * decay * (2.0 - decay) * speed * speed / k->ground.mass[d];
     }
-    for (int d = 0; d < RIGID; d++) {
-        const double acceleration = data->f[d] * setup->inverse_mass[d];
-        work->frame[d] = data->x[d] + k->h * data->v[d] + k->rigid_b0 * acceleration;
+    return taken;
+}
+
+/* ---- prediction ------------------------------------------------------------------------------------------------------ */
+/* where arrays are whole halves (gk_real) or quads (double): the compiler need not prove that they do not overlap */
+#define HALVES(array) ((gk_half *)(array))
+#define SEEN_HALVES(array) ((const gk_half *)(array))
+#define QUADS(array) ((gk_quad *)(array))
+#define SEEN_QUADS(array) ((const gk_quad *)(array))
+
+static void predict_gear(const gk_setup *setup, gk_work *work, const gk_data *data, const gk_coefficients *k, int g)
+{
+    const int n = GK_LANES(setup, g), halves = 2 * n / LANES;
+    const gk_half *q = SEEN_HALVES(gk_modal_seen(setup, data, g)), *v = q + halves, *f = v + halves;
+    const gk_flow *w = &k->flow[g];
+    const gk_half *d11 = SEEN_HALVES(w->d11), *a12 = SEEN_HALVES(w->a12), *b0q = SEEN_HALVES(w->b0q);
+    const gk_half *a21 = SEEN_HALVES(w->a21), *d22 = SEEN_HALVES(w->d22), *b0v = SEEN_HALVES(w->b0v);
+    gk_half *qp = HALVES(work->qp[g]), *vp = HALVES(work->vp[g]);
+    for (int i = 0; i < halves; i++) {
+        qp[i] = q[i] + (d11[i] * q[i] + a12[i] * v[i] + b0q[i] * f[i]);
+        vp[i] = v[i] + (a21[i] * q[i] + d22[i] * v[i] + b0v[i] * f[i]);
+    }
+    work->y[g] = work->qp[g];
+    if (!k->curved_read) return;
+    for (int i = 0; i < n; i++) work->reading[g][i] = w->read_q[i] * work->qp[g][i] + w->read_v[i] * work->vp[g][i];
+    work->y[g] = work->reading[g];
+}
+
+/* the ground group; its speeds have contracted by half a step of the dashpots. Returns what those take. */
+static double predict_ground(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                             const gk_coefficients *k)
+{
+    const int n = setup->base.n;
+    const double *x = gk_ground_seen(data), *f = x + 2 * n;
+    const gk_ground_flow *w = &k->ground;
+    double *v = work->ground_start;
+    memcpy(v, x + n, (size_t)n * sizeof *v);
+    const double taken = damp_supports(model, setup, k, v);
+    const gk_quad *x4 = SEEN_QUADS(x), *v4 = SEEN_QUADS(v), *f4 = SEEN_QUADS(f);
+    const gk_quad *d11 = SEEN_QUADS(w->d11), *a12 = SEEN_QUADS(w->a12), *b0q = SEEN_QUADS(w->b0q);
+    const gk_quad *a21 = SEEN_QUADS(w->a21), *d22 = SEEN_QUADS(w->d22), *b0v = SEEN_QUADS(w->b0v);
+    for (int i = 0; i < n / 4; i++) {
+        QUADS(work->ground_q)[i] = x4[i] + (d11[i] * x4[i] + a12[i] * v4[i] + b0q[i] * f4[i]);
+        QUADS(work->ground_v)[i] = v4[i] + (a21[i] * x4[i] + d22[i] * v4[i] + b0v[i] * f4[i]);
+    }
+    work->ground_y = work->ground_q;
+    if (!k->curved_read) return taken;
+    for (int i = 0; i < n; i++)
+        work->ground_reading[i] = w->read_q[i] * work->ground_q[i] + w->read_v[i] * work->ground_v[i];
+    work->ground_y = work->ground_reading;
+    return taken;
+}
+
+/* modal state and spins one step ahead under the forces of the last step */
+static double predict(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                      const gk_coefficients *k)
+{
+    for (int g = 0; g < model->gears; g++) predict_gear(setup, work, data, k, g);
+    for (int d = 0; d < setup->spins; d++) {
+        const double acceleration = data->f[d] * setup->inverse_inertia[d];
+        work->spin[d] = data->x[d] + k->h * data->v[d] + k->rigid_b0 * acceleration;
         work->speed[d] = data->v[d] + 0.5 * k->h * acceleration;
     }
+    return predict_ground(model, setup, work, data, k);
 }
 
 /* a step may not carry a gear past its teeth: contact would not see it */
-static int passable(const gk_model *model, const gk_data *data, const gk_work *work)
+static int passable(const gk_model *model, const gk_work *work, const gk_data *data)
 {
-    if (model->kind == KIND_FLAT) return 1;
-    for (int g = 0; g < 2; g++)
-        if (!(fabs(work->frame[3 * g + 2] - data->x[3 * g + 2]) * model->gear[g].teeth < FARTHEST)) return 0;
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2 && model->engagement[e].kind != MESH_FLAT; w++) {
+            const gk_gear *gear = &model->gear[model->engagement[e].gear[w]];
+            if (!(fabs(work->spin[gear->rotor] - data->x[gear->rotor]) * gear->z < FARTHEST)) return 0;
+        }
     return 1;
 }
 
 /* entry of the memory that a tooth pair has, −1: none */
-int gk_step_remembered(const gk_data *data, gk_key key)
+int gk_step_remembered(const gk_meshing *meshing, gk_key key)
 {
-    for (int i = 0; i < data->pairs; i++)
-        if (data->memory[i].key.flank == key.flank && data->memory[i].key.tooth == key.tooth) return i;
+    for (int i = 0; i < meshing->pairs; i++)
+        if (meshing->memory[i].key.flank == key.flank && meshing->memory[i].key.tooth == key.tooth) return i;
     return -1;
 }
 
+/* places of an engagement at the predicted poses, and their rows */
+static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
+{
+    const gk_meshing *meshing = &data->meshing[e];
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_engaged *engaged = &work->engaged[e];
+    gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
+    engaged->places =
+        GK_ON(setup, roll_motion)
+            ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->reach, engaged->position, engaged->place)
+            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
+    if (engaged->places < 0) return engaged->places = 0, GK_DIVERGED;
+    for (int p = 0; p < engaged->places; p++) {
+        engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
+        if (engaged->place[p].gap < -model->engagement[e].overlap_max) return GK_PENETRATION;
+    }
+    return GK_OK;
+}
+
+/* ---- the start of the step -------------------------------------------------------------------------------------------- */
 /* λ0 without dashpots, settled: massless deflection and energy at the start; linear: forces of the step are (mix4) */
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
@@ -117,7 +206,7 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
     else
         memset(s->begin, 0, size);
     for (int i = s->n - s->clutches; i < s->n; i++) {
-        s->active[i] = (unsigned char)data->locked[s->link_of[i] - CLUTCH_0];
+        s->active[i] = (unsigned char)data->locked[s->port_of[i]];
         s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
     }
     gk_law_apply(s);
@@ -130,12 +219,12 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
 
 /* The start of the step as this step's compliance sees it: massless deflection and energy under λ0, gaps g0 = s0 − C′λ0
  * − δ(λ0); then the first guess of status and forces */
-void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
+void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s)
 {
-    const gk_work *work = setup->work;
+    const gk_engaged *engaged = &work->engaged[e];
     int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
-    recall_forces(data, s, setup->integrator == MIX4);
+    recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
     memcpy(s->squeeze0, s->squeeze, (size_t)s->stride * sizeof *s->squeeze);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
@@ -145,8 +234,9 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         s->hold[i] = 0;
     }
     for (int i = 0; i < s->contacts; i++) {
-        const int memory = work->place[s->place_of[i]].memory;
-        s->g0[i] = memory < 0 ? s->g[i] : s->g0[i] + data->memory[memory].gap[i % GK_STRIPS(s)];
+        const int memory = engaged->place[s->place_of[i]].memory;
+        s->recalled[i] = memory >= 0;
+        s->g0[i] = memory < 0 ? s->g[i] : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }
@@ -156,7 +246,7 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         if (s->kind[i] == ROW_CLUTCH) s->g0[i] = s->g[i];
         if (s->kind[i] != ROW_TORQUE) continue;
         s->active[i] = 0;
-        s->force[i] = work->torque[s->link_of[i] - PORT_0];
+        s->force[i] = work->torque[s->port_of[i]];
         given |= s->force[i] != s->force0[i];
     }
     gk_solve_status(s);
@@ -166,18 +256,18 @@ void gk_step_recall(const gk_setup *setup, const gk_data *data, gk_system *s)
         memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
         gk_solve_lag(s, s->end, s->dash, s->lag);
     }
-    s->owed = data->ledger.owed;
+    s->owed = data->meshing[e].owed;
     s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
 /* Tip corners off: did a pair that carried load end with its flank? */
-static int flank_ended(const gk_data *data, const gk_work *work, int strips)
+static int flank_ended(const gk_meshing *meshing, const gk_engaged *engaged, int strips)
 {
-    for (int m = 0; m < data->pairs; m++) {
+    for (int m = 0; m < meshing->pairs; m++) {
         double load = 0.0;
         int there = 0;
-        for (int i = 0; i < strips; i++) load += data->memory[m].force[i];
-        for (int p = 0; p < work->places; p++) there |= work->place[p].memory == m;
+        for (int i = 0; i < strips; i++) load += meshing->memory[m].force[i];
+        for (int p = 0; p < engaged->places; p++) there |= engaged->place[p].memory == m;
         if (load > 0.0 && !there) return 1;
     }
     return 0;
@@ -193,118 +283,145 @@ static int all_finite(const gk_system *s)
     return (fine[0] & fine[1] & fine[2] & fine[3]) != 0;
 }
 
-/* Σ rows·x and Σ rows·y into lanes: modal forces of the row forces x and y on gear g */
-void gk_step_scatter(const gk_setup *setup, int g, const double *x, const double *y, gk_real *out_x, gk_real *out_y)
+/* ---- the end of the step ----------------------------------------------------------------------------------------------- */
+const double *gk_step_force(const gk_system *s) { return s->force; }
+const double *gk_step_z(const gk_system *s) { return s->z; }
+/* forces at the end that the next prediction is made with, where forces are linear in the step */
+static const double *force_with_dampers(const gk_system *s) { return s->last; }
+
+/* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of energy, mode
+ * by mode */
+static double correct_damped(const gk_setup *setup, const gk_work *work, const gk_coefficients *k, int g,
+                             gk_real *state)
 {
-    const gk_work *work = setup->work;
-    const gk_system *s = &work->system;
     const int halves = 2 * GK_LANES(setup, g) / LANES;
-    const gk_half *rows[MAX_BASIS];
-    gk_half of_x[MAX_BASIS], of_y[MAX_BASIS];
-    int count = 0;
-    for (int r = 0; r < s->contacts + BORE_ROWS; r++) {
-        const int row = r < s->contacts ? r : s->bore[g][r - s->contacts];
-        if (row < 0 || (x[row] == 0.0 && y[row] == 0.0)) continue;
-        const gk_real sign = r < s->contacts ? -1 : 1;
-        of_x[count] = (gk_half){0} + sign * (gk_real)x[row];
-        of_y[count] = (gk_half){0} + sign * (gk_real)y[row];
-        rows[count++] = (const gk_half *)work->basis[g] + (size_t)r * halves;
-    }
+    gk_half *q = HALVES(state), *v = q + halves, sum = {0};
+    const gk_half *f = v + halves, *z = SEEN_HALVES(work->force[g]), *qp = SEEN_HALVES(work->qp[g]);
+    const gk_half *vp = SEEN_HALVES(work->vp[g]), *omega2 = SEEN_HALVES(setup->modal[g].omega2);
+    const gk_half *bq = SEEN_HALVES(k->flow[g].bq), *bv = SEEN_HALVES(k->flow[g].bv);
+    const gk_half *weight = SEEN_HALVES(k->flow[g].inverse_s2);
     for (int i = 0; i < halves; i++) {
-        gk_half sum_x = {0}, sum_y = {0};
-        for (int r = 0; r < count; r++) {
-            const gk_half b = rows[r][i];
-            sum_x += of_x[r] * b;
-            sum_y += of_y[r] * b;
-        }
-        ((gk_half *)out_x)[i] = sum_x;
-        ((gk_half *)out_y)[i] = sum_y;
+        const gk_half q1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i], moved = q1 - q[i];
+        sum += (f[i] + z[i]) * moved - weight[i] * ((v1 - v[i]) * (v1 + v[i]) + omega2[i] * (moved * (q1 + q[i])));
+        q[i] = q1;
+        v[i] = v1;
     }
+    return 0.5 * (((double)sum[0] + sum[4]) + ((double)sum[2] + sum[6]) + ((double)sum[1] + sum[5]) +
+                  ((double)sum[3] + sum[7]));
 }
 
-/* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of energy,
- * mode by mode */
-GK_INLINE double correct_modes(const gk_setup *setup, const gk_coefficients *k, int g, gk_real *q, const int damped)
+/* the same without damping: nothing but rounding, so it takes more digits to see */
+static double correct_undamped(const gk_setup *setup, const gk_work *work, const gk_coefficients *k, int g, gk_real *q)
 {
-    const gk_work *work = setup->work;
     const int n = GK_LANES(setup, g);
-    gk_real *v = q + n, lane[LANES] = {0};
-    const gk_real *f = v + n, half = (gk_real)0.5;
     const gk_flow *w = &k->flow[g];
+    gk_real *v = q + n;
+    const gk_real *f = v + n;
     double sum = 0.0;
-    for (int i = 0; i < n; i += LANES)
-        for (int l = 0; l < LANES; l++) {
-            const int j = i + l;
-            const gk_real z = work->force[g][j], q1 = work->qp[g][j] + w->bq[j] * z, v1 = work->vp[g][j] + w->bv[j] * z;
-            if (damped) {
-                const gk_real energy = half * w->inverse_s2[j] *
-                                       ((v1 - v[j]) * (v1 + v[j]) +
-                                        setup->modal[g].omega2[j] * ((q1 - q[j]) * (q1 + q[j])));
-                lane[l] += half * (f[j] + z) * (q1 - q[j]) - energy;
-            } else { /* nothing but rounding, so it takes more digits to see */
-                const double dq = (double)q1 - q[j], dv = (double)v1 - v[j], omega = setup->modal[g].omega[j];
-                sum += 0.5 * (((double)f[j] + z) * dq -
-                              w->inverse_s2[j] * (dv * ((double)v1 + v[j]) + omega * omega * dq * ((double)q1 + q[j])));
-            }
-            q[j] = q1;
-            v[j] = v1;
-        }
-    for (int l = 0; l < LANES; l++) sum += lane[l];
+    for (int j = 0; j < n; j++) {
+        const gk_real z = work->force[g][j], q1 = work->qp[g][j] + w->bq[j] * z, v1 = work->vp[g][j] + w->bv[j] * z;
+        const double dq = (double)q1 - q[j], dv = (double)v1 - v[j], omega = setup->modal[g].omega[j];
+        sum += 0.5 * (((double)f[j] + z) * dq -
+                      w->inverse_s2[j] * (dv * ((double)v1 + v[j]) + omega * omega * dq * ((double)q1 + q[j])));
+        q[j] = q1;
+        v[j] = v1;
+    }
     return sum;
 }
 
-static void correct(const gk_setup *setup, gk_data *data, const gk_coefficients *k)
+/* an engagement that knows the gear: it owes what rounding did to the gear's modes */
+static int engagement_of(const gk_model *model, int g)
 {
-    gk_work *work = setup->work;
-    const gk_system *s = &work->system;
-    gk_real *q = data->modal;
-    double with_dashpots[MAX_STRIDE];
-    const double *last = s->force; /* forces at the end that the next prediction is made with */
-    if (setup->integrator == MIX4) {
-        for (int q4 = 0; q4 < s->stride / 4; q4++)
-            ((gk_quad *)with_dashpots)[q4] = ((const gk_quad *)s->force)[q4] + ((const gk_quad *)s->end)[q4];
-        last = with_dashpots;
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++)
+            if (model->engagement[e].gear[w] == g) return e;
+    return -1;
+}
+
+/* the ground group to the end of the step: returns what damping took, that of the supports included */
+static double correct_ground(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                             const gk_coefficients *k)
+{
+    const gk_base *base = &setup->base;
+    const int n = base->n, damped = GK_ON(setup, modal_damping);
+    const gk_ground_flow *w = &k->ground;
+    double *v = gk_ground_of(data) + n;
+    gk_quad *x4 = QUADS(gk_ground_of(data)), *v4 = QUADS(v), *f4 = QUADS(v + n), sum = {0};
+    const gk_quad *qp = SEEN_QUADS(work->ground_q), *vp = SEEN_QUADS(work->ground_v),
+                  *z = SEEN_QUADS(work->ground_force);
+    const gk_quad *v0 = SEEN_QUADS(work->ground_start), *next = SEEN_QUADS(work->ground_next);
+    const gk_quad *bq = SEEN_QUADS(w->bq), *bv = SEEN_QUADS(w->bv), *weight = SEEN_QUADS(w->inverse_s2);
+    const gk_quad *omega2 = SEEN_QUADS(base->omega2);
+    for (int i = 0; i < n / 4; i++) {
+        const gk_quad x1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i], moved = x1 - x4[i];
+        sum += (f4[i] + z[i]) * moved - weight[i] * ((v1 - v0[i]) * (v1 + v0[i]) + omega2[i] * moved * (x1 + x4[i]));
+        x4[i] = x1;
+        v4[i] = v1;
+        f4[i] = next[i];
     }
-    for (int g = 0; g < 2; g++) {
-        const int n = GK_LANES(setup, g);
-        if (n) {
-            gk_real *next = work->reading[g];
-            gk_step_scatter(setup, g, s->z, last, work->force[g], next);
-            if (GK_ON(setup, modal_damping))
-                data->ledger.dissipated += correct_modes(setup, k, g, q, 1);
-            else
-                work->system.owed -= correct_modes(setup, k, g, q, 0); /* what rounding gave or took */
-            memcpy(q + 2 * n, next, (size_t)n * sizeof *next);
+    const double taken = damped ? 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3])) : 0.0;
+    return taken + damp_supports(model, setup, k, v);
+}
+
+static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                          const gk_coefficients *k)
+{
+    double z[MAX_SPINS] = {0}, force[MAX_SPINS] = {0};
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_mesh *mesh = &setup->mesh[e];
+        const gk_system *s = &work->engaged[e].system;
+        for (int l = 0; l < mesh->spins; l++) {
+            double last = gk_dot_quads(s->rigid[l], s->last, s->stride / 4);
+            for (int i = s->n - s->clutches; i < s->n; i++) last -= s->rigid[l][i] * s->force[i];
+            z[mesh->spin[l]] += gk_dot_quads(s->rigid[l], s->z, s->stride / 4);
+            force[mesh->spin[l]] += last;
         }
-        q += 3 * n;
     }
-    const int coordinates = setup->link[SHAFT_0] || setup->link[SHAFT_1] ? RIGID : INERTIA_0;
-    for (int d = 0; d < coordinates; d++) {
-        const double z = gk_dot_quads(s->rigid[d], s->z, s->stride / 4);
-        double force = gk_dot_quads(s->rigid[d], last, s->stride / 4);
-        for (int i = s->n - s->clutches; i < s->n; i++) force -= s->rigid[d][i] * s->force[i];
+    for (int d = 0; d < setup->spins; d++) {
         const double before = data->x[d];
-        data->x[d] = work->frame[d] + k->rigid_bq * setup->inverse_mass[d] * z;
-        data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_mass[d] * z;
-        data->f_rate[d] = (force - data->f[d]) / k->h;
-        data->f[d] = force;
+        data->x[d] = work->spin[d] + k->rigid_bq * setup->inverse_inertia[d] * z[d];
+        data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_inertia[d] * z[d];
+        data->f_rate[d] = (force[d] - data->f[d]) / k->h;
+        data->f[d] = force[d];
         work->moved[d] = data->x[d] - before;
     }
 }
 
-/* What ports brought in and what dashpots and clutches took in this step. A dashpot takes −½ η_d·Δgap; what its force
- * deflects elsewhere (lag) it holds as energy or gives back. */
-static void account(const gk_setup *setup, gk_data *data)
+static void correct(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                    const gk_coefficients *k)
 {
-    gk_work *work = setup->work;
-    const gk_system *s = &work->system;
+    const int linear = gk_scheme_of(setup->integrator)->linear_force;
+    for (int e = 0; e < model->engagements; e++) {
+        gk_system *s = &work->engaged[e].system;
+        memcpy(s->last, s->force, (size_t)s->stride * sizeof *s->last);
+        for (int i = 0; linear && i < s->stride; i++) s->last[i] += s->end[i];
+    }
+    gk_rows_scatter(model, setup, work, gk_step_z, force_with_dampers);
+    for (int g = 0; g < model->gears; g++) {
+        const int n = GK_LANES(setup, g), e = engagement_of(model, g);
+        gk_real *q = gk_modal_of(setup, data, g);
+        if (!n || e < 0) continue;
+        if (GK_ON(setup, modal_damping))
+            data->ledger.dissipated += correct_damped(setup, work, k, g, q);
+        else
+            work->engaged[e].system.owed -= correct_undamped(setup, work, k, g, q); /* what rounding gave or took */
+        memcpy(q + 2 * n, work->next[g], (size_t)n * sizeof *q);
+    }
+    data->ledger.dissipated += correct_ground(model, setup, work, data, k);
+    correct_spins(model, setup, work, data, k);
+}
+
+/* What ports brought in and what dampers and clutches took in this step. A damper takes −½ η_d·Δgap; what its force
+ * deflects elsewhere (lag) it holds as energy or gives back. Returns the energy of the quasi-static part. */
+static double account(const gk_model *model, const gk_work *work, gk_data *data, const gk_system *s)
+{
     double held = 0.0, taken = 0.0;
     for (int i = 0; i < s->n; i++) {
-        const int link = s->link_of[i], port = link - PORT_0, clutch = link - CLUTCH_0;
+        const int port = s->port_of[i];
         const double mean = gk_solve_mean(s, i);
         if (s->kind[i] == ROW_CLUTCH) {
-            taken -= mean * (work->moved[INERTIA_0 + clutch] - work->moved[DISC_0 + clutch]);
-            data->locked[clutch] = s->active[i];
+            taken -= mean * (work->moved[gk_inertia_of(model, port)] - work->moved[gk_disc_of(model, port)]);
+            data->locked[port] = s->active[i];
             continue;
         }
         taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->dash[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
@@ -313,93 +430,125 @@ static void account(const gk_setup *setup, gk_data *data)
             const double angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
             data->ledger.work += mean * (angle - data->angle[port]);
             data->angle[port] = angle;
-        } else if (link == PORT_0 || link == PORT_1) {
+        } else if (s->joint_of[i] == JOINT_PORT) {
             data->ledger.work += mean * (work->outer[port] - work->outer_before[port]);
         }
     }
     data->ledger.dissipated += taken - (held - s->held0);
-    if (setup->work->another) data->ledger.baseline += s->stored0 + s->held0 - data->ledger.massless;
-    data->ledger.massless = gk_solve_stored(s) + held;
+    if (work->another) data->ledger.baseline += s->stored0 + s->held0;
+    return gk_solve_stored(s) + held;
 }
 
-void gk_step_remember(const gk_setup *setup, gk_data *data)
+static void remember_engagement(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
 {
-    gk_work *work = setup->work;
-    gk_system *s = &work->system;
+    const gk_system *s = &engaged->system;
+    gk_meshing *meshing = &data->meshing[e];
     double deepest = 0.0;
-    data->pairs = work->places;
-    memset(data->memory, 0, sizeof data->memory);
-    for (int p = 0; p < work->places; p++) data->memory[p].key = work->place[p].key;
-    for (int i = 0; i < s->n; i++) {
-        if (i >= s->contacts) {
-            data->link[s->link_of[i]] = s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i];
-            data->link_dash[s->link_of[i]] = s->dash[i];
-            data->link_end[s->link_of[i]] = s->end[i];
-            continue;
-        }
-        gk_memory *m = &data->memory[s->place_of[i]];
-        m->force[i % GK_STRIPS(s)] = s->force[i];
-        m->gap[i % GK_STRIPS(s)] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-        m->dash[i % GK_STRIPS(s)] = s->dash[i];
-        m->end[i % GK_STRIPS(s)] = s->end[i];
-        deepest = gk_max(deepest, -work->place[s->place_of[i]].gap);
-        if (GK_ON(setup, hertz) && s->force[i] > s->local[s->place_of[i]].high * s->width[i]) data->status |= 1;
+    meshing->pairs = engaged->places;
+    memset(meshing->memory, 0, sizeof meshing->memory);
+    for (int p = 0; p < engaged->places; p++) meshing->memory[p].key = engaged->place[p].key;
+    for (int i = 0; i < s->contacts; i++) {
+        gk_memory *m = &meshing->memory[s->place_of[i]];
+        const int strip = i % GK_STRIPS(s);
+        m->force[strip] = s->force[i];
+        m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+        m->dash[strip] = s->dash[i];
+        m->end[strip] = s->end[i];
+        deepest = gk_max(deepest, -engaged->place[s->place_of[i]].gap);
+        if (GK_ON(setup, hertz) && s->force[i] > s->local[s->place_of[i]].high * s->width[i])
+            data->status |= STATUS_LAW;
     }
-    data->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
+    for (int i = s->contacts; i < s->n; i++)
+        data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){
+            s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i], s->dash[i], s->end[i]};
+    meshing->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
+    meshing->owed = s->owed;
+}
+
+void gk_step_remember(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data)
+{
+    for (int e = 0; e < model->engagements; e++) remember_engagement(setup, &work->engaged[e], data, e);
+}
+
+/* ---- the step ------------------------------------------------------------------------------------------------------------ */
+/* problems of all engagements, island by island */
+static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                            const gk_coefficients *k)
+{
+    const int balanced = !gk_scheme_of(setup->integrator)->linear_force;
+    for (int i = 0; i < setup->islands; i++) {
+        gk_coupled coupled = {model, setup, work, k, i};
+        const gk_island island = gk_couple_island(&coupled);
+        if (island.sweep) gk_couple_recall(&coupled);
+        if (balanced)
+            gk_balance_solve(&island);
+        else
+            gk_balance_plain(&island);
+    }
+    for (int e = 0; e < model->engagements; e++) {
+        gk_system *s = &work->engaged[e].system;
+        if (!all_finite(s)) return GK_DIVERGED;
+        if (GK_HAS(tip_contact) && !setup->on.tip_contact &&
+            flank_ended(&data->meshing[e], &work->engaged[e], s->strips))
+            data->status |= STATUS_TIP_ENDED;
+    }
+    return GK_OK;
+}
+
+static void settle_accounts(const gk_model *model, const gk_work *work, gk_data *data)
+{
+    const double before = data->ledger.massless;
+    data->ledger.massless = 0.0;
+    if (work->another) data->ledger.baseline -= before;
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_system *s = &work->engaged[e].system;
+        data->ledger.massless += account(model, work, data, s);
+        data->rounds += s->rounds;
+        if (s->limit_reached) data->trouble++, data->status |= STATUS_LIMIT;
+    }
 }
 
 /* One step of length h with γ (γ = 0: em). GK_OK, or GK_DIVERGED / GK_PENETRATION with data unchanged. */
-gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma)
+gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
+                        double gamma)
 {
-    gk_work *work = setup->work;
-    gk_system *s = &work->system;
-    const gk_coefficients *k = gk_flow_for(setup, h, gamma);
+    const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
+    gk_outcome outcome;
     GK_MARK(work);
-    if (GK_ON(setup, elastic) && h == data->table_h && gamma == gk_limit_gamma(setup, data, h) &&
+    if (GK_ON(setup, elastic) && h == data->table_h && gamma == gk_limit_gamma(setup, work, data, h) &&
         !(h == work->table_h && gamma == work->table_gamma))
-        gk_table_for(model, setup, k);
+        gk_side_step(model, setup, work, k);
     work->another = data->expressed_h != h || data->expressed_gamma != gamma;
-    express(setup, data, k);
-    predict(setup, data, k);
-    if (!passable(model, data, work)) return GK_DIVERGED;
+    express(model, setup, work, data, k);
+    const double damped = predict(model, setup, work, data, k);
+    if (!passable(model, work, data)) return GK_DIVERGED;
     GK_LAP(work, PHASE_PREDICT);
-    const double *where = GK_ON(setup, roll_motion) ? work->frame : data->still;
-    work->places = GK_ON(setup, roll_motion) ? gk_flank_find(model, setup, where, data->reach, work->place)
-                                             : gk_still_find(model, setup, where, work->frame, work->place);
-    if (work->places < 0) return work->places = 0, GK_DIVERGED;
-    for (int p = 0; p < work->places; p++) {
-        work->place[p].memory = gk_step_remembered(data, work->place[p].key);
-        if (work->place[p].gap < -model->overlap_max) return GK_PENETRATION;
-    }
+    for (int e = 0; e < model->engagements; e++)
+        if ((outcome = find_places(model, setup, work, data, e)) != GK_OK) return outcome;
     GK_LAP(work, PHASE_FIND);
-    gk_rows_form(model, setup, where, work);
+    for (int e = 0; e < model->engagements; e++) gk_rows_form(model, setup, work, e);
     GK_LAP(work, PHASE_ROWS);
-    gk_system_form(model, setup, data, k, work);
-    gk_step_recall(setup, data, s);
+    for (int e = 0; e < model->engagements; e++) {
+        gk_form_system(model, setup, data, k, work, e);
+        gk_step_recall(setup, work, data, e, &work->engaged[e].system);
+    }
     GK_LAP(work, PHASE_SYSTEM);
-    if (setup->integrator == MIX4)
-        gk_solve_plain(s);
-    else
-        gk_balance_solve(s);
-    if (!all_finite(s)) return GK_DIVERGED;
+    if ((outcome = solve_all(model, setup, work, data, k)) != GK_OK) return outcome;
     GK_LAP(work, PHASE_SOLVE);
-    if (GK_HAS(tip_contact) && !setup->on.tip_contact && flank_ended(data, work, s->strips)) data->status |= 16;
-    correct(setup, data, k);
+    data->ledger.dissipated += damped;
+    correct(model, setup, work, data, k);
     GK_LAP(work, PHASE_CORRECT);
-    account(setup, data);
-    gk_step_remember(setup, data);
-    data->rounds += s->rounds;
-    data->ledger.owed = s->owed;
+    settle_accounts(model, work, data);
+    gk_step_remember(model, setup, work, data);
     data->expressed_h = h, data->expressed_gamma = gamma;
     data->steps++;
-    if (s->limit_reached) data->trouble++, data->status |= 4;
     GK_LAP(work, PHASE_REMEMBER);
     return GK_OK;
 }
 
-/* The scheme's invariant (eq. 11): ½ m v² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the end of the last step; with
- * what dashpots hold */
-double gk_step_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
+/* The scheme's invariant (eq. 11): ½ J w² + Σ (½ v² + ½ ω² q²)/s² + ½ λᵀC′λ + Σ Φ(λ), at the end of the last step; with
+ * what dampers hold */
+double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {
-    return dynamic_energy(setup, data, k) + data->ledger.massless;
+    return dynamic_energy(model, setup, data, k) + data->ledger.massless;
 }

@@ -18,22 +18,37 @@
 #endif
 #define GK_WIDE /* only what a step runs through */
 #define gk_flow_for gk_flow_for_avx2
+#define gk_flow_known gk_flow_known_avx2
 #define gk_flank_find gk_flank_find_avx2
+#define gk_still_find gk_still_find_avx2
+#define gk_rows_pose gk_rows_pose_avx2
 #define gk_rows_form gk_rows_form_avx2
-#define gk_table_residual gk_table_residual_avx2
-#define gk_table_for gk_table_for_avx2
-#define gk_table_put gk_table_put_avx2
-#define gk_table_path gk_table_path_avx2
-#define gk_system_form gk_system_form_avx2
-#define gk_system_rates gk_system_rates_avx2
+#define gk_rows_read gk_rows_read_avx2
+#define gk_rows_whole gk_rows_whole_avx2
+#define gk_rows_read_rigid gk_rows_read_rigid_avx2
+#define gk_rows_scatter gk_rows_scatter_avx2
+#define gk_side_step gk_side_step_avx2
+#define gk_side_fill gk_side_fill_avx2
+#define gk_side_plan gk_side_plan_avx2
+#define gk_side_scratch gk_side_scratch_avx2
+#define gk_form_system gk_form_system_avx2
+#define gk_form_rates gk_form_rates_avx2
 #define gk_law_set gk_law_set_avx2
 #define gk_law_bounds gk_law_bounds_avx2
 #define gk_law_at gk_law_at_avx2
+#define gk_law_apply gk_law_apply_avx2
 #define gk_solve_contacts gk_solve_contacts_avx2
-#define gk_solve_plain gk_solve_plain_avx2
+#define gk_solve_clear gk_solve_clear_avx2
+#define gk_balance_plain gk_balance_plain_avx2
+#define gk_couple_island gk_couple_island_avx2
+#define gk_couple_recall gk_couple_recall_avx2
+#define gk_rows_read_ground gk_rows_read_ground_avx2
+#define gk_rows_push_ground gk_rows_push_ground_avx2
+#define gk_rows_read_far gk_rows_read_far_avx2
+#define gk_rows_push_far gk_rows_push_far_avx2
+#define gk_side_port_far gk_side_port_far_avx2
 #define gk_solve_settle gk_solve_settle_avx2
 #define gk_solve_status gk_solve_status_avx2
-#define gk_law_apply gk_law_apply_avx2
 #define gk_solve_times gk_solve_times_avx2
 #define gk_solve_path gk_solve_path_avx2
 #define gk_solve_lag gk_solve_lag_avx2
@@ -45,34 +60,38 @@
 #define gk_step_recall gk_step_recall_avx2
 #define gk_step_remembered gk_step_remembered_avx2
 #define gk_step_remember gk_step_remember_avx2
-#define gk_step_scatter gk_step_scatter_avx2
 #define gk_step_energy gk_step_energy_avx2
+#define gk_step_force gk_step_force_avx2
+#define gk_step_z gk_step_z_avx2
 #define gk_rk45_evaluate gk_rk45_evaluate_avx2
 #define gk_rk45_resist gk_rk45_resist_avx2
 #define gk_rk45_angles gk_rk45_angles_avx2
-#define gk_rk45_advance gk_rk45_advance_avx2
+#define gk_rk45_step gk_rk45_step_avx2
 #define gk_central_step gk_central_step_avx2
 #include "force/gk_law.c"
 #include "setup/gk_flow.c"
 #include "force/gk_flank.c"
+#include "force/gk_still.c"
 #include "force/gk_rows.c"
-#include "setup/gk_table.c"
-#include "problem/gk_system.c"
+#include "setup/gk_side.c"
+#include "problem/gk_form.c"
 #include "problem/gk_tangent.c"
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"
+#include "problem/gk_couple.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"
 #undef gk_step_once
 #undef gk_central_step
+#undef gk_rk45_step
 #if defined(__clang__)
 #pragma clang attribute pop
 #else
 #pragma GCC pop_options
 #endif
 
-gk_step_function gk_step_once, gk_central_step;
+gk_step_function gk_step_once, gk_central_step, gk_rk45_step;
 
 /* AVX2 in the processor, and its registers kept by the system over a task switch */
 static int has_avx2(void)
@@ -86,14 +105,18 @@ static int has_avx2(void)
 /* the step of an integrator in the widest vectors of this processor; widest = 0: the baseline */
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
 {
-    if (widest > 0 && has_avx2()) return integrator == CENTRAL ? gk_central_step_avx2 : gk_step_once_avx2;
-    return integrator == CENTRAL ? gk_central_step : gk_step_once;
+    const int wide = widest > 0 && has_avx2();
+    switch (integrator) {
+    case RK45: return wide ? gk_rk45_step_avx2 : gk_rk45_step;
+    case CENTRAL: return wide ? gk_central_step_avx2 : gk_central_step;
+    default: return wide ? gk_step_once_avx2 : gk_step_once;
+    }
 }
 #else
-#include "model/gk_core.h"
+#include "integrate/gk_integrate.h"
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
 {
     (void)widest;
-    return integrator == CENTRAL ? gk_central_step : gk_step_once;
+    return integrator == RK45 ? gk_rk45_step : integrator == CENTRAL ? gk_central_step : gk_step_once;
 }
 #endif

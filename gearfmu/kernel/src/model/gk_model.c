@@ -1,153 +1,291 @@
-/* Blob → gk_model: every section present, of the right size and plausible, or one message that says which is not.
+/* Blob → gk_model: every field present, of the right size and plausible, or one message that says which is not.
  * Nothing is trusted before it is checked. */
+#include "model/gk_model.h"
+#include "base/gk_lanes.h"
+#include "model/gk_fields.h"
 #include <stdio.h>
-#include "model/gk_core.h"
+#include <string.h>
 
-#define GK_MODEL_VERSION 1
-enum { PAIR_NUMBERS = 9, GEAR_NUMBERS = 18, PORT_NUMBERS = 8, NAME_MAX_LENGTH = 64 };
+enum { MODEL_VERSION = 2, MOST_NAME = 64 };
 
-static gk_outcome refuse(char message[GK_MESSAGE], const char *what, const char *why)
+/* what is read with: blob, shape so far, and the first thing that was wrong */
+typedef struct reader {
+    const gk_blob *blob;
+    gk_shape shape;
+    gk_outcome outcome;
+    char *message;
+} reader;
+
+static void refuse(reader *r, const char *what, const char *why)
 {
-    snprintf(message, GK_MESSAGE, "model blob: %s %s; make the model again with this version of gearfmu", what, why);
-    return GK_BAD_BLOB;
+    if (r->outcome) return;
+    snprintf(r->message, GK_MESSAGE, "model blob: %s %s; make the model again with this version of gearfmu", what, why);
+    r->outcome = GK_BAD_BLOB;
 }
 
-static const double *numbers(const gk_blob *blob, const char *name, uint64_t wanted)
+static const void *take(reader *r, int field)
 {
-    uint64_t count;
-    const double *v = gk_blob_f64(blob, name, &count);
-    return v && count == wanted ? v : NULL;
+    const char *wrong = NULL;
+    if (r->outcome) return NULL;
+    const void *found = gk_field_find(r->blob, field, &r->shape, &wrong);
+    if (wrong) refuse(r, gk_field_name(field), wrong);
+    return wrong ? NULL : found;
 }
 
-static const double *gear_numbers(const gk_blob *blob, const char *stem, int g, uint64_t wanted)
+static void demand(reader *r, int holds, const char *what)
 {
-    char name[24];
-    snprintf(name, sizeof name, "%s%d", stem, g);
-    return numbers(blob, name, wanted);
-}
-
-static const int32_t *gear_integers(const gk_blob *blob, const char *stem, int g, uint64_t wanted)
-{
-    char name[24];
-    uint64_t count;
-    snprintf(name, sizeof name, "%s%d", stem, g);
-    const int32_t *v = gk_blob_i32(blob, name, &count);
-    return v && count == wanted ? v : NULL;
+    if (!holds) refuse(r, what, "are out of range");
 }
 
 static int between(double x, double low, double high) { return x >= low && x <= high; }
 
-/* rows of mass-normalised modes are of order 1/√m, compliances of tooth and bore far below 1 */
-static int bounded(const double *v, uint64_t count, double limit)
+static uint64_t length_of(const reader *r, int field) { return gk_field_count(r->blob, field, &r->shape); }
+
+/* numbers of a field, none of them beyond ±limit */
+static const double *bounded(reader *r, int field, double limit)
 {
-    for (uint64_t i = 0; i < count; i++)
-        if (!between(v[i], -limit, limit)) return 0;
-    return 1;
+    const double *v = take(r, field);
+    if (!v) return NULL;
+    for (uint64_t i = 0, count = length_of(r, field); i < count; i++)
+        if (!between(v[i], -limit, limit)) {
+            refuse(r, gk_field_name(field), "is out of range");
+            return NULL;
+        }
+    return v;
 }
 
-static int plausible_gear(const gk_gear *g)
+static int counted(const int32_t *c, int32_t low, int32_t high) { return *c >= low && *c <= high; }
+
+static void read_counts(reader *r, gk_model *m)
 {
-    return between(g->teeth, 1, 1000) && g->teeth == gk_floor(g->teeth) && between(g->r_b, 1e-4, 10) &&
-           between(g->s_form, 0, 10) && g->s_tip > g->s_form + 1e-6 && between(g->s_tip, 0, 20) &&
-           between(g->psi_b, 0, 4) && between(g->phase, -10, 10) && between(g->mass, 1e-9, 1e7) &&
-           between(g->inertia, 1e-12, 1e7) && between(g->width, 1e-6, 10) && between(g->local, 1e-20, 1) &&
-           between(g->strip, 1e-6, 0.1) && between(g->relief, 0, 1e4) && between(g->relief_start, -1, 20) &&
-           between(g->edge, 1e-6, 0.1) && between(g->corner_radius, 1e-4, 20) && between(g->corner_angle, -10, 10) &&
-           between(g->bearing_k, 1, 1e15) && between(g->bearing_c, 0, 1e12);
+    const int32_t *c = take(r, F_MODEL_counts);
+    if (!c) return;
+    if (c[0] != MODEL_VERSION) return refuse(r, "model version", "is not the one this kernel reads");
+    demand(r,
+           counted(c + 1, 1, MAX_SLICES) && counted(c + 2, 1, MAX_ROTORS) && counted(c + 3, 0, MAX_GEARS) &&
+               counted(c + 4, 0, MAX_ENGAGEMENTS) && counted(c + 5, 0, MAX_PORTS) && counted(c + 6, 0, MAX_SUPPORTS) &&
+               counted(c + 7, 0, MAX_SUPPORTS) && counted(c + 8, 1, MAX_FUNCTIONS) && counted(c + 9, 4, 1000) &&
+               counted(c + 10, 1, SETS),
+           "counts");
+    if (r->outcome) return;
+    m->slices = c[1], m->rotors = c[2], m->gears = c[3], m->engagements = c[4], m->ports = c[5], m->supports = c[6];
+    m->dampers = c[7], m->functions = c[8], m->rolls = c[9], m->sets = c[10];
+    static const gk_symbol counts[] = {SYMBOL_rotors,   SYMBOL_gears,   SYMBOL_engagements, SYMBOL_ports,
+                                       SYMBOL_supports, SYMBOL_dampers, SYMBOL_functions,   SYMBOL_rolls};
+    for (int i = 0; i < 8; i++) r->shape.size[counts[i]] = (uint64_t)c[2 + i];
 }
 
-static gk_outcome open_gear(gk_model *model, int i, char message[GK_MESSAGE])
+/* the names in a text, separated by bars, into rows of NAME_LENGTH */
+static void read_names(reader *r, int field, int count, char (*out)[NAME_LENGTH])
 {
-    gk_gear *g = &model->gear[i];
-    const double *v = gear_numbers(&model->blob, "gear", i, GEAR_NUMBERS);
-    const int32_t *size = gear_integers(&model->blob, "size", i, 3);
-    if (!v || !size) return refuse(message, "gear data", "are missing or of the wrong length");
-    g->teeth = v[0], g->r_b = v[1], g->s_form = v[2], g->s_tip = v[3], g->psi_b = v[4], g->phase = v[5], g->mass = v[6],
-    g->inertia = v[7], g->width = v[8];
-    g->local = v[9], g->strip = v[10], g->relief = v[11], g->relief_start = v[12], g->edge = v[13],
-    g->corner_radius = v[14], g->corner_angle = v[15];
-    g->bearing_k = v[16], g->bearing_c = v[17];
-    if (!plausible_gear(g)) return refuse(message, "gear data", "are out of range");
-    g->z = (int)g->teeth, g->modes = size[0], g->rolls = size[1], g->functions = size[2];
-    if (g->modes < 0 || g->modes > MAX_MODES || g->rolls < 4 || g->rolls > 1000 || g->functions < 1 ||
-        g->functions > MAX_FUNCTIONS)
-        return refuse(message, "table sizes", "are out of range");
-    uint64_t n = (uint64_t)g->modes, R = (uint64_t)g->rolls, A = (uint64_t)g->functions;
-    g->omega = gear_numbers(&model->blob, "omega", i, n);
-    g->zeta = gear_numbers(&model->blob, "zeta", i, n);
-    g->rows = gear_numbers(&model->blob, "rows", i, 2 * R * A * n);
-    g->bore = gear_numbers(&model->blob, "bore", i, BORE_ROWS * n);
-    g->c_ff = gear_numbers(&model->blob, "c_ff", i, 4 * OFFSETS * R * R * A * A);
-    g->c_fb = gear_numbers(&model->blob, "c_fb", i, 2 * R * A * 3);
-    g->c_bb = gear_numbers(&model->blob, "c_bb", i, 9);
-    g->diameter = gear_integers(&model->blob, "diameter", i, n);
-    g->part = gear_integers(&model->blob, "part", i, n);
-    if (!g->omega || !g->zeta || !g->rows || !g->bore || !g->c_ff || !g->c_fb || !g->c_bb || !g->diameter || !g->part)
-        return refuse(message, "mode or compliance tables", "are missing or of the wrong length");
-    if (!bounded(g->rows, 2 * R * A * n, 1e6) || !bounded(g->bore, BORE_ROWS * n, 1e6) ||
-        !bounded(g->c_ff, 4 * OFFSETS * R * R * A * A, 1e3) || !bounded(g->c_fb, 2 * R * A * 3, 1e3) ||
-        !bounded(g->c_bb, 9, 1e3))
-        return refuse(message, "mode or compliance tables", "are out of range");
-    for (uint64_t k = 0; k < n; k++) {
-        if (!between(g->omega[k], 1e-3, 1e12) || !between(g->zeta[k], 0, 0.9))
-            return refuse(message, "frequencies or damping ratios", "are out of range");
-        if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) return refuse(message, "frequencies", "are not sorted");
-        if (g->diameter[k] < 0 || g->diameter[k] > g->z || g->part[k] < 0 || g->part[k] > 2)
-            return refuse(message, "nodal diameters or parts", "are out of range");
-        if ((g->part[k] == 1 && (k + 1 == n || g->part[k + 1] != 2)) ||
-            (g->part[k] == 2 && (k == 0 || g->part[k - 1] != 1)))
-            return refuse(message, "mode pairs", "are torn");
+    const char *at = take(r, field);
+    if (r->outcome || count == 0) return;
+    for (int i = 0; i < count; i++) {
+        const size_t length = strcspn(at, "|");
+        const int last = i + 1 == count;
+        if (!length || length >= NAME_LENGTH || (at[length] == 0) != last)
+            return refuse(r, gk_field_name(field), "does not hold the names there should be");
+        memcpy(out[i], at, length);
+        out[i][length] = 0;
+        at += length + 1;
     }
-    return GK_OK;
 }
 
-/* optional section: index deviation of every tooth, rad, flank by flank */
-static gk_outcome open_index(gk_model *model, int i, char message[GK_MESSAGE])
+static void read_stage(reader *r, gk_model *m)
 {
-    static const char *const names[2] = {"index0", "index1"};
-    gk_gear *g = &model->gear[i];
-    uint64_t count;
-    g->index = gk_blob_f64(&model->blob, names[i], &count);
+    const int32_t *degree = take(r, F_MODEL_degrees);
+    const double *limits = take(r, F_MODEL_limits), *inertia = take(r, F_MODEL_inertia);
+    m->name = take(r, F_MODEL_name);
+    if (r->outcome) return;
+    demand(r, m->name[0] && strlen(m->name) <= MOST_NAME, "name");
+    m->cut[0] = limits[0], m->cut[1] = limits[1], m->h_max = limits[2], m->period_min = limits[3];
+    demand(r,
+           between(m->cut[0], 0, 1e9) && between(m->cut[1], 0, 1e9) && between(m->h_max, 1e-9, 1e-3) &&
+               between(m->period_min, 1e-9, 1e9),
+           "limits");
+    for (int i = 0; i < m->functions; i++) {
+        demand(r, counted(degree + i, 0, 20), "degrees of the width functions");
+        m->degree[i] = degree[i];
+    }
+    for (int i = 0; i < m->rotors; i++) {
+        demand(r, between(inertia[i], 1e-12, 1e7), "moments of inertia");
+        m->inertia[i] = inertia[i];
+    }
+}
+
+static void read_port(reader *r, gk_model *m, int i, const int32_t *kind, const double *v)
+{
+    gk_port *p = &m->port[i];
+    demand(r, counted(kind, 0, m->rotors - 1) && counted(kind + 1, 0, 2) && counted(kind + 2, 0, 1), "kinds of ports");
+    if (r->outcome) return;
+    p->rotor = kind[0], p->kind = (gk_port_kind)kind[1], p->chain = kind[2] ? ++m->chains : 0;
+    p->k = v[0], p->c = v[1], p->inertia = v[2], p->disc = v[3], p->shaft_k = v[4], p->shaft_c = v[5];
+    if (p->kind != PORT_TORQUE) demand(r, between(p->k, 1e-6, 1e15) && between(p->c, 0, 1e12), "port springs");
+    if (p->chain)
+        demand(r,
+               p->kind == PORT_SPRING && between(p->inertia, 1e-12, 1e7) && between(p->disc, 1e-12, 1e7) &&
+                   between(p->shaft_k, 1e-6, 1e15) && between(p->shaft_c, 0, 1e12),
+               "chains of ports");
+}
+
+static void read_ports(reader *r, gk_model *m)
+{
+    const int32_t *kinds = take(r, F_MODEL_port_kinds);
+    const double *v = take(r, F_MODEL_ports);
+    m->port_residual = bounded(r, F_MODEL_port_residual, 1e3);
+    m->port_support = bounded(r, F_MODEL_port_support, 1e3);
+    for (int i = 0; i < m->ports && !r->outcome; i++) read_port(r, m, i, kinds + 3 * i, v + 6 * i);
+    for (int i = 0; i < m->ports; i++)
+        for (int j = 0; j < i; j++)
+            if (m->port[i].rotor == m->port[j].rotor) refuse(r, "ports", "share a rotor");
+}
+
+static void read_numbers(reader *r, gk_gear *g)
+{
+    const double *v = take(r, F_GEAR_gear);
+    if (!v) return;
+    double *const to[] = {&g->r_b,   &g->s_form,        &g->s_tip,        &g->psi_b,  &g->phase,
+                          &g->width, &g->local,         &g->strip,        &g->relief, &g->relief_start,
+                          &g->edge,  &g->corner_radius, &g->corner_angle, &g->z_mid,  &g->helix};
+    for (size_t i = 0; i < sizeof to / sizeof *to; i++) *to[i] = v[i];
+    demand(r,
+           between(g->r_b, 1e-4, 10) && between(g->s_form, 0, 20) && between(g->s_tip, 0, 20) &&
+               fabs(g->s_tip - g->s_form) > 1e-6 && between(g->psi_b, 0, 4) && between(g->phase, -10, 10) &&
+               between(g->width, 1e-6, 10) && between(g->local, 1e-20, 1) && between(g->strip, 1e-6, 0.1) &&
+               between(g->relief, 0, 1e4) && between(g->relief_start, -1, 20) && between(g->edge, 1e-6, 0.1) &&
+               between(g->corner_radius, 1e-4, 20) && between(g->corner_angle, -10, 10) && between(g->z_mid, -10, 10) &&
+               between(g->helix, -1.2, 1.2),
+           "gear data");
+}
+
+static void check_modes(reader *r, const gk_gear *g)
+{
+    for (int k = 0; k < g->modes && !r->outcome; k++) {
+        const int next = k + 1 < g->modes ? g->member[k + 1] : -1, before = k ? g->member[k - 1] : -1;
+        demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "frequencies or damping ratios");
+        if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "frequencies", "are not sorted");
+        demand(r, counted(g->diameter + k, 0, g->z) && counted(g->member + k, 0, 2), "nodal diameters or members");
+        if ((g->member[k] == 1 && next != 2) || (g->member[k] == 2 && before != 1)) refuse(r, "mode pairs", "are torn");
+    }
+}
+
+static void read_ground_of(reader *r, gk_model *m, gk_gear *g, int set)
+{
+    r->shape.set = set;
+    r->shape.size[SYMBOL_ground] = (uint64_t)m->ground[set].n;
+    r->shape.size[SYMBOL_reads] = gk_field_count(r->blob, F_GEAR_SET_ground_list, &r->shape);
+    if (r->shape.size[SYMBOL_reads] > r->shape.size[SYMBOL_ground])
+        refuse(r, "ground oscillators of a gear", "are too many");
+    g->ground[set].reads = (int)r->shape.size[SYMBOL_reads];
+    g->ground[set].list = take(r, F_GEAR_SET_ground_list);
+    g->ground[set].centre = bounded(r, F_GEAR_SET_centre, 1e6);
+    g->ground[set].rows = bounded(r, F_GEAR_SET_ground_rows, 1e6);
+    for (int k = 0; k < g->ground[set].reads && !r->outcome; k++) {
+        demand(r, counted(g->ground[set].list + k, 0, m->ground[set].n - 1), "ground oscillators of a gear");
+        if (k && g->ground[set].list[k] <= g->ground[set].list[k - 1])
+            refuse(r, "ground oscillators of a gear", "are not sorted");
+    }
+}
+
+static void read_index(reader *r, gk_gear *g)
+{
+    g->index = take(r, F_GEAR_index);
     g->index_most = 0.0;
-    if (!g->index) return GK_OK;
-    if (count != 2 * (uint64_t)g->z || !bounded(g->index, count, 0.1 / g->teeth))
-        return refuse(message, "index deviations", "are not two small angles a tooth");
-    for (uint64_t k = 0; k < count; k++) g->index_most = gk_max(g->index_most, g->r_b * fabs(g->index[k]));
-    return GK_OK;
+    for (int k = 0; g->index && k < 2 * g->z; k++) {
+        demand(r, between(g->index[k], -0.1 / g->z, 0.1 / g->z), "index deviations");
+        g->index_most = gk_max(g->index_most, g->r_b * fabs(g->index[k]));
+    }
 }
 
-static gk_outcome open_port(gk_model *model, int i, char message[GK_MESSAGE])
+static void read_gear(reader *r, gk_model *m, int i)
 {
-    gk_port *p = &model->port[i];
-    const double *v = gear_numbers(&model->blob, "port", i, PORT_NUMBERS);
-    if (!v) return refuse(message, "port data", "are missing or of the wrong length");
-    if (!(v[0] == PORT_SPRING || v[0] == PORT_TORQUE || v[0] == PORT_FIXED) || !(v[1] == 0 || v[1] == 1))
-        return refuse(message, "port kind", "is unknown");
-    p->kind = (gk_port_kind)(int)v[0], p->chain = (int)v[1];
-    p->k = v[2], p->c = v[3], p->inertia = v[4], p->disc = v[5], p->shaft_k = v[6], p->shaft_c = v[7];
-    if (p->kind != PORT_TORQUE && !(between(p->k, 1e-6, 1e15) && between(p->c, 0, 1e12)))
-        return refuse(message, "port stiffness or damping", "is out of range");
-    if (p->chain && (p->kind != PORT_SPRING || !between(p->inertia, 1e-12, 1e7) || !between(p->disc, 1e-12, 1e7) ||
-                     !between(p->shaft_k, 1e-6, 1e15) || !between(p->shaft_c, 0, 1e12)))
-        return refuse(message, "port chain", "is out of range");
-    return GK_OK;
+    gk_gear *g = &m->gear[i];
+    r->shape.gear = i;
+    const int32_t *size = take(r, F_GEAR_size);
+    if (!size) return;
+    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 1, 1, 1000) && counted(size + 2, 0, MAX_MODES),
+           "sizes of a gear");
+    if (r->outcome) return;
+    g->rotor = size[0], g->z = size[1], g->modes = size[2];
+    r->shape.size[SYMBOL_z] = (uint64_t)g->z;
+    r->shape.size[SYMBOL_modes] = (uint64_t)g->modes;
+    read_numbers(r, g);
+    g->omega = take(r, F_GEAR_omega), g->zeta = take(r, F_GEAR_zeta);
+    g->diameter = take(r, F_GEAR_diameter), g->member = take(r, F_GEAR_member);
+    g->rows = bounded(r, F_GEAR_rows, 1e6);
+    g->residual = bounded(r, F_GEAR_residual, 1e3);
+    g->support_residual = bounded(r, F_GEAR_support_residual, 1e3);
+    g->port_residual = bounded(r, F_GEAR_port_residual, 1e3);
+    if (!r->outcome) check_modes(r, g);
+    for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
+    if (!r->outcome) read_index(r, g);
 }
 
-static gk_outcome open_names(gk_model *model, char message[GK_MESSAGE])
+static void read_ground(reader *r, gk_model *m, int set)
 {
-    uint64_t count;
-    const char *shafts = gk_blob_text(&model->blob, "shafts", &count), *bar;
-    model->name = gk_blob_text(&model->blob, "name", &count);
-    if (!model->name || !count || strlen(model->name) > NAME_MAX_LENGTH || !shafts)
-        return refuse(message, "name or shafts", "are missing or too long");
-    bar = strchr(shafts, '|');
-    if (!bar || bar == shafts || (size_t)(bar - shafts) >= sizeof model->shaft[0] || !bar[1] ||
-        strlen(bar + 1) >= sizeof model->shaft[1])
-        return refuse(message, "shaft names", "are not two short names");
-    memset(model->shaft, 0, sizeof model->shaft);
-    memcpy(model->shaft[0], shafts, (size_t)(bar - shafts));
-    memcpy(model->shaft[1], bar + 1, strlen(bar + 1));
-    return GK_OK;
+    gk_ground *g = &m->ground[set];
+    r->shape.set = set;
+    const uint64_t n = length_of(r, F_SET_omega_ground);
+    demand(r, n <= MAX_GROUND, "ground oscillators");
+    if (r->outcome) return;
+    g->n = (int)n;
+    r->shape.size[SYMBOL_ground] = n;
+    g->omega = take(r, F_SET_omega_ground), g->zeta = take(r, F_SET_zeta_ground);
+    g->rigid_share = bounded(r, F_SET_rigid_share, 1.001);
+    g->damper_rows = bounded(r, F_SET_damper_rows, 1e6), g->damper = take(r, F_SET_damper);
+    g->support_rows = bounded(r, F_SET_support_rows, 1e6), g->kappa = bounded(r, F_SET_kappa, 1e16);
+    g->support_compliance = bounded(r, F_SET_support_compliance, 1e3);
+    g->port_rows = bounded(r, F_SET_port_rows, 1e6);
+    for (int k = 0; k < g->n && !r->outcome; k++) {
+        demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "ground oscillators");
+        if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "ground oscillators", "are not sorted");
+    }
+    for (int k = 0; k < m->dampers && !r->outcome; k++)
+        demand(r, between(g->damper[k], 0, 1e12), "dashpots of the supports");
+}
+
+static double squared_distance(const gk_engagement *e)
+{
+    const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
+    return x * x + y * y;
+}
+
+static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, const double *v)
+{
+    gk_engagement *e = &m->engagement[i];
+    demand(r,
+           counted(who, 0, m->gears - 1) && counted(who + 1, 0, m->gears - 1) && who[0] != who[1] &&
+               counted(who + 2, -1, 1) && counted(who + 3, -4, 4),
+           "engagements");
+    if (r->outcome) return;
+    e->gear[0] = who[0], e->gear[1] = who[1], e->kind = (gk_mesh_kind)who[2], e->coast_shift = who[3];
+    memcpy(e->position, v, sizeof e->position);
+    e->backlash = v[4], e->nominal_backlash = v[5], e->damping = v[6], e->force_max = v[7];
+    demand(r,
+           between(v[0], -100, 100) && between(v[1], -100, 100) && between(v[2], -100, 100) &&
+               between(v[3], -100, 100) && between(e->backlash, -1e-3, 1e-2) &&
+               between(e->nominal_backlash, -1e-2, 1e-2) && between(e->damping, 0, 1e9) &&
+               between(e->force_max, 1e-9, 1e12),
+           "engagements");
+    const gk_gear *A = &m->gear[e->gear[0]], *B = &m->gear[e->gear[1]];
+    const double reach = e->kind == MESH_INTERNAL ? B->r_b - A->r_b : A->r_b + B->r_b;
+    if (e->kind != MESH_FLAT && !(squared_distance(e) > 1.0002 * reach * reach))
+        refuse(r, "centre distance", "is smaller than the base radii allow");
+    if (A->rotor == B->rotor) refuse(r, "engagements", "join gears of one rotor");
+    e->width = gk_min(A->width, B->width);
+    e->overlap_max = e->kind == MESH_FLAT ? 1.0 : 0.25 * fabs(A->s_tip - A->s_form);
+}
+
+static void read_engagements(reader *r, gk_model *m)
+{
+    char names[MAX_ENGAGEMENTS][NAME_LENGTH];
+    const int32_t *who = take(r, F_MODEL_engaged);
+    const double *v = take(r, F_MODEL_engagement);
+    read_names(r, F_MODEL_engagement_names, m->engagements, names);
+    for (int i = 0; i < m->engagements && !r->outcome; i++) {
+        memcpy(m->engagement[i].name, names[i], NAME_LENGTH);
+        read_engagement(r, m, i, who + 4 * i, v + 8 * i);
+    }
 }
 
 gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char message[GK_MESSAGE])
@@ -156,44 +294,17 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     message[0] = 0;
     gk_outcome outcome = gk_blob_open(&model->blob, blob, size, message);
     if (outcome) return outcome;
-    uint64_t count;
-    const int32_t *format = gk_blob_i32(&model->blob, "model", &count);
-    if (!format || count != 4) return refuse(message, "section 'model'", "is missing");
-    if (format[0] != GK_MODEL_VERSION) return refuse(message, "model version", "is not the one this kernel reads");
-    if (format[1] != KIND_PAIR && format[1] != KIND_FLAT) return refuse(message, "kind of engagement", "is unknown");
-    model->kind = (gk_kind)format[1];
-    model->slices = format[2];
-    model->coast_shift = format[3];
-    const double *v = numbers(&model->blob, "pair", PAIR_NUMBERS);
-    if (!v) return refuse(message, "section 'pair'", "is missing");
-    model->distance = v[0], model->backlash = v[1], model->damping = v[2], model->torque_max = v[3],
-    model->speed_max = v[4];
-    model->cut[0] = v[5], model->cut[1] = v[6], model->h_max = v[7], model->nominal_backlash = v[8];
-    if (!between(model->distance, -1, 100) || !between(model->backlash, -1e-3, 1e-2) ||
-        !between(model->nominal_backlash, -1e-2, 1e-2) || !between(model->damping, 0, 1e9) ||
-        !between(model->torque_max, 1e-9, 1e9) || !between(model->speed_max, 1e-6, 1e6) ||
-        !between(model->cut[0], 0, 1e9) || !between(model->cut[1], 0, 1e9) || !between(model->h_max, 1e-9, 1e-3) ||
-        model->slices < 1 || model->slices > MAX_SLICES || model->coast_shift < -2 || model->coast_shift > 2)
-        return refuse(message, "stage data", "are out of range");
-    if ((outcome = open_names(model, message))) return outcome;
-    for (int i = 0; i < 2; i++)
-        if ((outcome = open_gear(model, i, message)) || (outcome = open_index(model, i, message)) ||
-            (outcome = open_port(model, i, message)))
-            return outcome;
-    if (model->gear[0].functions != model->gear[1].functions)
-        return refuse(message, "width functions", "differ between the gears");
-    if (model->kind == KIND_PAIR && !(model->distance > (model->gear[0].r_b + model->gear[1].r_b) * 1.0001))
-        return refuse(message, "centre distance", "is smaller than the base radii allow");
-    model->overlap_max = model->kind == KIND_FLAT ? 1.0 : 0.25 * (model->gear[0].s_tip - model->gear[0].s_form);
-    const int32_t *degree = gk_blob_i32(&model->blob, "degrees", &count);
-    if (!degree || count != (uint64_t)model->gear[0].functions)
-        return refuse(message, "degrees of the width functions", "are missing");
-    for (uint64_t k = 0; k < count; k++) {
-        if (degree[k] < 0 || degree[k] > 20)
-            return refuse(message, "degrees of the width functions", "are out of range");
-        model->degree[k] = degree[k];
-    }
-    return GK_OK;
+    reader r = {.blob = &model->blob, .message = message};
+    read_counts(&r, model);
+    read_names(&r, F_MODEL_rotor_names, model->rotors, model->rotor_name);
+    read_names(&r, F_MODEL_support_names, model->supports, model->support_name);
+    read_names(&r, F_MODEL_displacement_names, model->supports, model->displacement_name);
+    if (!r.outcome) read_stage(&r, model);
+    if (!r.outcome) read_ports(&r, model);
+    for (int i = 0; i < model->sets && !r.outcome; i++) read_ground(&r, model, i);
+    for (int i = 0; i < model->gears && !r.outcome; i++) read_gear(&r, model, i);
+    if (!r.outcome) read_engagements(&r, model);
+    return r.outcome;
 }
 
 size_t gk_model_size(void) { return sizeof(gk_model); }

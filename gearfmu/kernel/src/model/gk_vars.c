@@ -1,10 +1,13 @@
 /* Variables by value reference: one table (gk_variables.inc) decides names, ranges and which of them exist in a model.
- */
-#include "model/gk_core.h"
+ * A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are added. */
+#include "model/gk_data.h"
+#include "setup/gk_setup.h"
 
 typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN } gk_exists;
+enum { STAGE = SCOPE_STAGE, SHAFT = SCOPE_SHAFT, ROTOR = SCOPE_ROTOR, MESH = SCOPE_MESH, SUPPORT = SCOPE_SUPPORT };
 typedef struct gk_row {
-    int shaft;
+    gk_scope scope;
+    int number, place; /* place: among the values of its scope */
     const char *name;
     gk_type type;
     gk_causality causality;
@@ -14,78 +17,144 @@ typedef struct gk_row {
     const char *items, *description;
 } gk_row;
 
-enum { SHAFT_OF_0 = 0, SHAFT_OF_1 = 1, SHAFT_OF_M = 0 };
-static const gk_row TABLE[GK_VARS] = {
-#define GK_VAR(S, ID, NAME, TYPE, CAUSALITY, EXISTS, UNIT, START, MIN, MAX, ITEMS, TEXT)                               \
-    {SHAFT_OF_##S, NAME, TYPE, CAUSALITY, EXISTS, UNIT, START, MIN, MAX, ITEMS, TEXT},
+static const gk_row TABLE[] = {
+#define GK_VAR(SCOPE, NUMBER, ID, NAME, TYPE, CAUSALITY, EXISTS, UNIT, START, MIN, MAX, ITEMS, TEXT)                   \
+    {(gk_scope)SCOPE, NUMBER, V_##ID, NAME, TYPE, CAUSALITY, EXISTS, UNIT, START, MIN, MAX, ITEMS, TEXT},
 #include "model/gk_variables.inc"
 #undef GK_VAR
 };
+enum { ROWS = sizeof TABLE / sizeof *TABLE, INSTANCES = 256 };
 
-static int exists(const gk_model *model, int reference)
+static int instances(const gk_model *model, gk_scope scope)
 {
-    const gk_row *row = &TABLE[reference];
-    const gk_port *port = &model->port[row->shaft];
+    switch (scope) {
+    case SCOPE_SHAFT: return model->ports;
+    case SCOPE_ROTOR: return model->rotors;
+    case SCOPE_MESH: return model->engagements;
+    case SCOPE_SUPPORT: return model->supports;
+    default: return 1;
+    }
+}
+
+static int exists(const gk_model *model, const gk_row *row, int instance)
+{
+    if (instance < 0 || instance >= instances(model, row->scope)) return 0;
+    const gk_port *port = row->scope == SCOPE_SHAFT ? &model->port[instance] : NULL;
     switch (row->exists) {
     case ALWAYS: return 1;
     case SPRING: return port->kind == PORT_SPRING;
     case TORQUE: return port->kind == PORT_TORQUE;
     case FIXED: return port->kind == PORT_FIXED;
     case SPRING_OR_FIXED: return port->kind != PORT_TORQUE;
-    case CHAIN: return port->chain;
+    case CHAIN: return port->chain > 0;
     }
     return 0;
 }
 
-/* starts that the stage decides */
-static double start_of(const gk_model *model, int reference)
+/* row and instance of a reference; NULL when there is none in this model */
+static const gk_row *row_of(const gk_model *model, uint32_t reference, int *instance)
 {
-    switch (reference) {
-    case V_M_SLICES: return model->slices;
-    case V_M_BACKLASH: return model->backlash;
-    case V_M_DAMPING: return model->damping;
-    default: return TABLE[reference].start;
+    const uint32_t number = reference / INSTANCES;
+    *instance = (int)(reference % INSTANCES);
+    if (number < 1 || number > ROWS) return NULL; /* the table is in the order of its numbers */
+    return exists(model, &TABLE[number - 1], *instance) ? &TABLE[number - 1] : NULL;
+}
+
+static double *value_of(gk_data *data, const gk_row *row, int instance)
+{
+    switch (row->scope) {
+    case SCOPE_SHAFT: return &data->shaft[instance][row->place];
+    case SCOPE_ROTOR: return &data->rotor[instance][row->place];
+    case SCOPE_MESH: return &data->mesh[instance][row->place];
+    case SCOPE_SUPPORT: return &data->support[instance][row->place];
+    default: return &data->stage[row->place];
     }
 }
 
-static void expand(char *out, size_t size, const char *pattern, const char *shaft)
+/* starts that the stage decides */
+static double start_of(const gk_model *model, const gk_row *row, int instance)
+{
+    if (row->scope == SCOPE_STAGE && row->place == V_SLICES) return model->slices;
+    if (row->scope == SCOPE_MESH && row->place == V_BACKLASH) return model->engagement[instance].backlash;
+    if (row->scope == SCOPE_MESH && row->place == V_DAMPING) return model->engagement[instance].damping;
+    return row->start;
+}
+
+/* ---- names ----------------------------------------------------------------------------------------------------------- */
+static size_t append(char *out, size_t size, size_t n, const char *text)
+{
+    for (; *text && n + 1 < size; text++) out[n++] = *text;
+    return n;
+}
+
+static const char *instance_name(const gk_model *model, const gk_row *row, int instance)
+{
+    switch (row->scope) {
+    case SCOPE_SHAFT: return model->rotor_name[model->port[instance].rotor];
+    case SCOPE_ROTOR: return model->rotor_name[instance];
+    case SCOPE_MESH: return model->engagement[instance].name;
+    case SCOPE_SUPPORT: return model->support_name[instance];
+    default: return "";
+    }
+}
+
+static void expand(char *out, size_t size, const gk_model *model, const gk_row *row, int instance)
 {
     size_t n = 0;
-    for (; *pattern && n + 1 < size; pattern++) {
-        if (*pattern != '%')
-            out[n++] = *pattern;
-        else
-            for (const char *c = shaft; *c && n + 1 < size; c++) out[n++] = *c;
+    for (const char *c = row->name; *c; c++) {
+        const char one[2] = {*c, 0}, *name = instance_name(model, row, instance);
+        if (*c == '%')
+            n = append(out, size, n, name);
+        else if (*c == '&')
+            n = append(out, size, n, model->displacement_name[instance]);
+        else if (*c != '@')
+            n = append(out, size, n, one);
+        else if (model->engagements > 1)
+            n = append(out, size, append(out, size, n, name), ".");
     }
     out[n] = 0;
 }
 
+static void copy(char *out, size_t size, const char *text) { out[append(out, size, 0, text)] = 0; }
+
+/* ---- interface ------------------------------------------------------------------------------------------------------- */
 int gk_variable_count(const gk_model *model)
 {
     int count = 0;
-    for (int i = 0; i < GK_VARS; i++) count += exists(model, i);
+    for (int i = 0; i < ROWS; i++)
+        for (int k = 0; k < instances(model, TABLE[i].scope); k++) count += exists(model, &TABLE[i], k);
     return count;
+}
+
+/* shafts, rotors, engagements, supports one after the other, then the stage */
+static const gk_row *listed(const gk_model *model, int index, int *instance)
+{
+    static const gk_scope order[SCOPES] = {SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_SUPPORT, SCOPE_MESH, SCOPE_STAGE};
+    for (int s = 0; s < SCOPES; s++)
+        for (int k = 0; k < instances(model, order[s]); k++)
+            for (int i = 0; i < ROWS; i++)
+                if (TABLE[i].scope == order[s] && exists(model, &TABLE[i], k) && index-- == 0)
+                    return *instance = k, &TABLE[i];
+    return NULL;
 }
 
 gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
 {
-    for (int i = 0; i < GK_VARS; i++) {
-        if (!exists(model, i) || index-- > 0) continue;
-        const gk_row *row = &TABLE[i];
-        memset(info, 0, sizeof *info);
-        info->reference = (uint32_t)i;
-        info->type = row->type;
-        info->causality = row->causality;
-        expand(info->name, sizeof info->name, row->name, model->shaft[row->shaft]);
-        expand(info->unit, sizeof info->unit, row->unit, "");
-        expand(info->items, sizeof info->items, row->items, "");
-        expand(info->description, sizeof info->description, row->description, "");
-        info->start = start_of(model, i);
-        info->minimum = row->minimum;
-        info->maximum = row->maximum;
-        return GK_OK;
-    }
-    return GK_BAD_VARIABLE;
+    int instance;
+    const gk_row *row = listed(model, index, &instance);
+    if (!row) return GK_BAD_VARIABLE;
+    memset(info, 0, sizeof *info);
+    info->reference = (uint32_t)(INSTANCES * row->number + instance);
+    info->type = row->type;
+    info->causality = row->causality;
+    expand(info->name, sizeof info->name, model, row, instance);
+    copy(info->unit, sizeof info->unit, row->unit);
+    copy(info->items, sizeof info->items, row->items);
+    copy(info->description, sizeof info->description, row->description);
+    info->start = start_of(model, row, instance);
+    info->minimum = row->minimum;
+    info->maximum = row->maximum;
+    return GK_OK;
 }
 
 gk_outcome gk_defaults(const gk_model *model, gk_data *data)
@@ -93,14 +162,17 @@ gk_outcome gk_defaults(const gk_model *model, gk_data *data)
     memset(data, 0, gk_data_size(model));
     data->magic = GK_DATA_MAGIC;
     data->phase = PHASE_NEW;
-    for (int i = 0; i < GK_VARS; i++) data->value[i] = start_of(model, i);
+    for (int i = 0; i < ROWS; i++)
+        for (int k = 0; k < instances(model, TABLE[i].scope); k++)
+            *value_of(data, &TABLE[i], k) = start_of(model, &TABLE[i], k);
     return GK_OK;
 }
 
 static gk_outcome acceptable(const gk_model *model, const gk_data *data, uint32_t reference, double value)
 {
-    if (reference >= GK_VARS || !exists(model, (int)reference)) return GK_BAD_VARIABLE;
-    const gk_row *row = &TABLE[reference];
+    int instance;
+    const gk_row *row = row_of(model, reference, &instance);
+    if (!row) return GK_BAD_VARIABLE;
     if (row->causality == GK_OUTPUT) return GK_BAD_CALL;
     if (row->causality == GK_PARAMETER && data->phase != PHASE_NEW) return GK_BAD_CALL;
     if (data->phase == PHASE_FAILED) return GK_BAD_CALL;
@@ -116,7 +188,11 @@ gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *ref
         gk_outcome outcome = acceptable(model, data, references[i], values[i]);
         if (outcome) return outcome;
     }
-    for (size_t i = 0; i < count; i++) data->value[references[i]] = values[i];
+    for (size_t i = 0; i < count; i++) {
+        int instance;
+        const gk_row *row = row_of(model, references[i], &instance);
+        *value_of(data, row, instance) = values[i];
+    }
     return GK_OK;
 }
 
@@ -129,8 +205,10 @@ gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_
                        double *values)
 {
     for (size_t i = 0; i < count; i++) {
-        if (references[i] >= GK_VARS || !exists(model, (int)references[i])) return GK_BAD_VARIABLE;
-        values[i] = data->value[references[i]];
+        int instance;
+        const gk_row *row = row_of(model, references[i], &instance);
+        if (!row) return GK_BAD_VARIABLE;
+        values[i] = *value_of((gk_data *)(uintptr_t)data, row, instance);
     }
     return GK_OK;
 }
@@ -142,9 +220,9 @@ gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference
 
 gk_effects gk_effects_of(const gk_data *data)
 {
-    const double *v = data->value;
-    gk_effects on = {v[V_M_E_ELASTIC] != 0,       v[V_M_E_RESIDUAL] != 0,   v[V_M_E_LOCAL] != 0,  v[V_M_E_COAST] != 0,
-                     v[V_M_E_DAMPING] != 0,       v[V_M_E_RELIEF] != 0,     v[V_M_E_CORNER] != 0, v[V_M_E_BEARING] != 0,
-                     v[V_M_E_MODAL_DAMPING] != 0, v[V_M_E_ROLL_MOTION] != 0};
+    const double *v = data->stage;
+    const gk_effects on = {v[V_E_ELASTIC] != 0,       v[V_E_RESIDUAL] != 0,   v[V_E_LOCAL] != 0,  v[V_E_COAST] != 0,
+                           v[V_E_DAMPING] != 0,       v[V_E_RELIEF] != 0,     v[V_E_CORNER] != 0, v[V_E_BEARING] != 0,
+                           v[V_E_MODAL_DAMPING] != 0, v[V_E_ROLL_MOTION] != 0};
     return on;
 }

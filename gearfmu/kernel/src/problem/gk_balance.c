@@ -1,7 +1,7 @@
 /* The one scalar of a step that keeps its energy (docs/theory.md, eq. 12; discrete gradient after Gonzalez 1996): η =
  * α·direction on the rows that close or open, α such that the massless part's energy changes by what the forces do to
  * the gaps. */
-#include "model/gk_core.h"
+#include "problem/gk_system.h"
 
 enum { ENERGY_LIMIT = 12 };
 static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
@@ -45,7 +45,7 @@ static balance defect(const gk_system *s)
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
-            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + s->potential[i];
+            const double energy = 0.5 * s->force[i] * (s->Al[i] + s->beyond[i] + s->linear[i]) + s->potential[i];
             b.defect += energy;
             b.scale += fabs(energy);
         }
@@ -106,50 +106,101 @@ static void choose_direction(gk_system *s, int all_rows)
     }
 }
 
-/* the step is balanced but for b: the next ones make that good */
-static int leave(gk_system *s, const balance *b)
+static void add(balance *sum, balance b)
 {
-    s->owed += b->defect - s->due;
+    sum->defect += b.defect, sum->c1 += b.c1, sum->c2 += b.c2, sum->scale += b.scale, sum->rounding += b.rounding;
+}
+
+static balance defect_of_all(const gk_island *island)
+{
+    balance sum = {0};
+    for (int m = 0; m < island->count; m++) add(&sum, defect(island->member[m]));
+    return sum;
+}
+
+static int any_changed(const gk_island *island)
+{
+    for (int m = 0; m < island->count; m++)
+        if (status_changed(island->member[m])) return 1;
+    return 0;
+}
+
+/* contacts of all members for the present α */
+static void solve_members(const gk_island *island)
+{
+    if (island->sweep)
+        island->sweep(island);
+    else
+        gk_solve_contacts(island->member[0]);
+}
+
+/* Contacts alone, without the scalar: η is the dampers' */
+void gk_balance_plain(const gk_island *island)
+{
+    for (int m = 0; m < island->count; m++) gk_solve_clear(island->member[m]);
+    solve_members(island);
+}
+
+/* the step is balanced but for b: the next ones make that good; the first member keeps the account */
+static int leave(const gk_island *island, const balance *b)
+{
+    for (int m = 0; m < island->count; m++) island->member[m]->owed -= island->member[m]->due;
+    island->member[0]->owed += b->defect;
     return 1;
 }
 
-/* α by Newton on the quadratic; 0 when the limit of rounds is reached or no direction is left */
-static int find_alpha(gk_system *s, balance b)
+/* a move of α that brings the defect to 0: the root nearest to 0 of the quadratic; 0: there is none */
+static double root_of(const balance *b)
 {
-    double p[MAX_STRIDE] = {0}, dash[MAX_STRIDE] = {0};
+    const double root = sqrt(gk_max(0.0, b->c1 * b->c1 - 4.0 * b->defect * b->c2));
+    const double divisor = b->c1 + (b->c1 < 0.0 ? -root : root);
+    return fabs(divisor) > 0.0 ? -2.0 * b->defect / divisor : 0.0;
+}
+
+/* α by Newton on the quadratic; 0 when the limit of iterations is reached or no direction is left */
+static int find_alpha(const gk_island *island, balance b)
+{
+    double p[MAX_STRIDE], dash[MAX_STRIDE];
     for (int round = 0; round < ENERGY_LIMIT; round++) {
-        sensitivity(s, p, dash);
-        expand(s, p, dash, &b);
-        const double root = sqrt(gk_max(0.0, b.c1 * b.c1 - 4.0 * b.defect * b.c2)),
-                     divisor = b.c1 + (b.c1 < 0.0 ? -root : root);
-        if (!(fabs(divisor) > 0.0)) return 0;
-        const double a = -2.0 * b.defect / divisor;
-        s->alpha += a;
-        for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
-        gk_law_apply(s);
-        gk_solve_settle(s);
-        gk_solve_contacts(s);
-        b = defect(s);
-        if (!open_balance(&b, BALANCE)) return leave(s, &b);
+        for (int m = 0; m < island->count; m++) {
+            gk_system *s = island->member[m];
+            sensitivity(s, s->along, dash);
+            expand(s, s->along, dash, &b);
+        }
+        const double a = root_of(&b);
+        if (!(fabs(a) > 0.0)) return 0;
+        for (int m = 0; m < island->count; m++) {
+            gk_system *s = island->member[m];
+            memcpy(p, s->along, (size_t)s->stride * sizeof *p);
+            s->alpha += a;
+            for (int i = 0; i < s->n; i++) s->force[i] += a * p[i];
+            gk_law_apply(s);
+            gk_solve_settle(s);
+        }
+        solve_members(island);
+        b = defect_of_all(island);
+        if (!open_balance(&b, BALANCE)) return leave(island, &b);
     }
     return 0;
 }
 
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
- * massless part's energy change equal its work. */
-void gk_balance_solve(gk_system *s)
+ * quasi-static part's energy change equal its work. */
+void gk_balance_solve(const gk_island *island)
 {
+    int curved = 0;
+    for (int m = 0; m < island->count; m++) curved |= island->member[m]->curved;
     for (int all_rows = 0; all_rows < 2; all_rows++) {
-        gk_solve_plain(s);
-        const int changed = status_changed(s);
-        if (!changed && !(GK_HAS(hertz) && s->curved)) return;
-        const balance b = defect(s);
+        gk_balance_plain(island);
+        const int changed = any_changed(island);
+        if (!changed && !(GK_HAS(hertz) && curved)) return;
+        const balance b = defect_of_all(island);
         if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) {
-            leave(s, &b);
+            leave(island, &b);
             return;
         }
-        choose_direction(s, all_rows);
-        if (find_alpha(s, b)) return;
+        for (int m = 0; m < island->count; m++) choose_direction(island->member[m], all_rows);
+        if (find_alpha(island, b)) return;
     }
-    s->limit_reached = 1;
+    for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }

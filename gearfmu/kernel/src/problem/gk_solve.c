@@ -7,7 +7,7 @@
  *
  * Active-set Newton with chord steps; all violated rows flip at once, after four rounds without progress only the last
  * one (block principal pivoting, Júdice & Pires 1994). */
-#include "model/gk_core.h"
+#include "problem/gk_system.h"
 
 enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, DASHPOT_ROUNDS = 8 };
 #ifdef GK_DOUBLE_MODES
@@ -113,9 +113,11 @@ void gk_solve_settle(gk_system *s)
 
 static void residual(const gk_system *s, double *r)
 {
+    const gk_quad *outer = (const gk_quad *)s->outer, *beyond = (const gk_quad *)s->beyond;
     const gk_quad *g = (const gk_quad *)s->g, *Dz = (const gk_quad *)s->Dz, *lag = (const gk_quad *)s->lag,
                   *Al = (const gk_quad *)s->Al, *squeeze = (const gk_quad *)s->squeeze, *on = (const gk_quad *)s->on;
-    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + squeeze[q]) * on[q];
+    for (int q = 0; q < s->stride / 4; q++)
+        ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + squeeze[q] + outer[q] + beyond[q]) * on[q];
 }
 
 /* moves the active λ by x; e: what the local law bends away from its tangent. Returns whether the change still matters.
@@ -253,14 +255,13 @@ void gk_solve_contacts(gk_system *s)
     s->limit_reached = 1;
 }
 
-/* Contacts alone, without the scalar: η is the dashpots' */
-void gk_solve_plain(gk_system *s)
+/* back to α = 0: η is the dampers' */
+void gk_solve_clear(gk_system *s)
 {
     const int stale = s->alpha != 0.0;
     s->alpha = 0.0;
     memset(s->direction, 0, (size_t)s->n * sizeof *s->direction);
     if (stale) gk_solve_settle(s);
-    gk_solve_contacts(s);
 }
 
 /* stored energy of the massless part at the present λ: ½ λᵀ(A + P)λ + Σ Φ(λ) */
@@ -268,6 +269,6 @@ double gk_solve_stored(const gk_system *s)
 {
     double sum = 0.0;
     for (int i = 0; i < s->n; i++)
-        if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->linear[i]) + s->potential[i];
+        if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->beyond[i] + s->linear[i]) + s->potential[i];
     return sum;
 }

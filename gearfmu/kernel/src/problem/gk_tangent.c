@@ -2,7 +2,7 @@
  * S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its limit ±(λ0 + λ1) is
  * ±B instead, an end force at its limit ±λ1 is ±Q with late = 0. By columns of whole quads; an inactive row is an empty
  * one. Close to symmetric positive definite: no pivoting. */
-#include "model/gk_core.h"
+#include "problem/gk_system.h"
 
 /* column j of B: what the dashpot of row j does to all rows */
 GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)

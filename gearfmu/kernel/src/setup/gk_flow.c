@@ -4,7 +4,7 @@
  * coefficients bq, bv at both ends. σ = sin(ωh)/(ωh), s = σ^(−γ/2), κ = (σ^(−γ) − 1)/ω² (rigid: s = 1, κ = γh²/6): the
  * sampled system then has the exact pole, residue and static value. The scaled row sW of the derivation is carried by
  * bq, bv and κ (each times s²): state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. */
-#include "model/gk_core.h"
+#include "problem/gk_work.h"
 
 static const double EXPONENTIAL_BELOW = 1.2;
 
@@ -104,30 +104,64 @@ static void store(gk_flow *f, int i, const oscillator *o)
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
 }
 
-static void fill(const gk_setup *setup, gk_coefficients *k, int g)
+static oscillator oscillator_of(const gk_setup *setup, const gk_coefficients *k, double omega, double zeta)
+{
+    const oscillator nothing = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    if (!GK_ON(setup, modal_damping)) zeta = 0.0;
+    if (!(omega > 0.0)) return nothing;
+    if (omega * k->h >= EXPONENTIAL_BELOW) return trapezoidal(omega, zeta, k->h);
+    return setup->integrator == MIX4 ? linear_force(omega, zeta, k->h) : exponential(omega, zeta, k->h, k->gamma);
+}
+
+static void fill_gear(const gk_setup *setup, gk_coefficients *k, int g)
 {
     const gk_modal *modal = &setup->modal[g];
     int exact = 0;
     for (int i = 0; i < modal->n; i++) {
-        double omega = modal->omega[i], zeta = GK_ON(setup, modal_damping) ? modal->zeta[i] : 0.0;
-        oscillator o = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-        if (omega > 0.0 && omega * k->h >= EXPONENTIAL_BELOW)
-            o = trapezoidal(omega, zeta, k->h);
-        else if (omega > 0.0 && setup->integrator == MIX4)
-            o = linear_force(omega, zeta, k->h);
-        else if (omega > 0.0) {
-            o = exponential(omega, zeta, k->h, k->gamma);
-            if (i % modal->pairs + 1 > exact) exact = i % modal->pairs + 1;
-        }
+        const oscillator o = oscillator_of(setup, k, modal->omega[i], modal->zeta[i]);
+        if (o.kappa != 0.0 && i % modal->pairs + 1 > exact) exact = i % modal->pairs + 1;
         store(&k->flow[g], i, &o);
     }
     k->flow[g].exact = (exact + LANES - 1) / LANES * LANES;
 }
 
-/* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */
-const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma)
+/* what half a step leaves of the speed along every dashpot of the supports, an exact contraction of the invariant's
+ * speeds (docs/theory.md, 3.4): v ← v − (s²e/n)(1 − e^(−dh/2))(e·v), n = Σ s²e², d = c n */
+static void fill_dampers(const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {
-    gk_work *work = setup->work;
+    const gk_base *base = &setup->base;
+    gk_ground_flow *f = &k->ground;
+    for (int d = 0; d < model->dampers; d++) {
+        const double *e = base->damper_rows + d * base->n;
+        double mass = 0.0;
+        for (int i = 0; i < base->n; i++)
+            if (base->omega[i] > 0.0) mass += e[i] * e[i] / f->inverse_s2[i];
+        f->mass[d] = mass;
+        f->decay[d] = 1.0 - gk_exp(-0.5 * model->ground[base->set].damper[d] * mass * k->h);
+        for (int i = 0; i < base->n; i++)
+            f->pulls[d * base->n + i] = base->omega[i] > 0.0 && mass > 0.0 ? e[i] / (f->inverse_s2[i] * mass) : 0.0;
+    }
+}
+
+static void fill_ground(const gk_model *model, const gk_setup *setup, gk_coefficients *k)
+{
+    const gk_base *base = &setup->base;
+    gk_ground_flow *f = &k->ground;
+    for (int i = 0; i < base->n; i++) {
+        const oscillator o = oscillator_of(setup, k, base->omega[i], base->zeta[i]);
+        const int there = base->omega[i] > 0.0;
+        f->d11[i] = there ? o.a11 - 1.0 : 0.0, f->a12[i] = o.a12, f->a21[i] = o.a21,
+        f->d22[i] = there ? o.a22 - 1.0 : 0.0;
+        f->b0q[i] = o.b0q, f->b0v[i] = o.b0v, f->bq[i] = o.bq, f->bv[i] = o.bv;
+        f->mobility[i] = o.mobility, f->read_q[i] = o.read_q, f->read_v[i] = o.read_v;
+        f->kappa[i] = o.kappa, f->inverse_s2[i] = there ? o.inverse_s2 : 1.0;
+    }
+    fill_dampers(model, setup, k);
+}
+
+/* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */
+const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+{
     gk_coefficients *oldest = &work->cache[0];
     for (int i = 0; i < CACHE; i++) {
         gk_coefficients *k = &work->cache[i];
@@ -145,7 +179,16 @@ const gk_coefficients *gk_flow_for(const gk_setup *setup, double h, double gamma
     oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
     oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
     oldest->rigid_kappa = gamma * h * h / 6.0;
-    for (int g = 0; g < 2; g++) fill(setup, oldest, g);
+    for (int g = 0; g < model->gears; g++) fill_gear(setup, oldest, g);
+    fill_ground(model, setup, oldest);
     oldest->age = ++work->clock;
     return oldest;
+}
+
+/* coefficients in use, without making any: those of the explicit forms for h = 0 */
+const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma)
+{
+    for (int i = 0; i < CACHE; i++)
+        if (work->cache[i].age && work->cache[i].h == h && work->cache[i].gamma == gamma) return &work->cache[i];
+    return &work->explicit_rows;
 }

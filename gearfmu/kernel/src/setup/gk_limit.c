@@ -5,11 +5,12 @@
  * other h lowers γ until μ′ = ¾ (a lower γ costs more accuracy than a larger μ′); above 1/8 of the period it is
  * refused. */
 #include <stdio.h>
-#include "model/gk_core.h"
+#include "integrate/gk_integrate.h"
 
 static const double MU = 0.5, MU_MOST = 0.75; /* μ′ of the default step; of any other, by γ */
 static const double WITHIN = 0.9,
                     BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
+static const double NEAR = 50e-6; /* m: flanks that count as closed */
 enum { POSITIONS = 8, POWER_ROUNDS = 60 };
 
 /* Cholesky of a (n, n), in place, lower; 0 when not positive */
@@ -111,46 +112,67 @@ static void kappa_part(const gk_system *s, double *K)
     }
 }
 
-static double mu_at(const gk_model *model, const gk_setup *setup, gk_data *data, double h, double gamma,
-                    double position)
+/* Forms the problem of engagement e at a position (in pitches) of its gears, unloaded, all places near contact; 0 when
+ * there is none */
+int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
+                   int e, double position)
 {
-    gk_work *work = setup->work;
-    gk_system *s = &work->system;
-    double frame[RIGID] = {0}, C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
-    frame[PHIA] = 2.0 * GK_PI * position / model->gear[0].teeth;
-    frame[PHIB] = -frame[PHIA] * model->gear[0].r_b / model->gear[1].r_b;
-    if (model->kind == KIND_FLAT) frame[XB] = -model->distance, frame[PHIA] = frame[PHIB] = 0.0;
-    memcpy(work->frame, frame, sizeof frame);
+    const gk_engagement *engagement = &model->engagement[e];
+    gk_engaged *engaged = &work->engaged[e];
+    const gk_gear *A = &model->gear[engagement->gear[0]], *B = &model->gear[engagement->gear[1]];
+    const double turned = 2.0 * GK_PI * position / A->z;
+    memset(work->spin, 0, sizeof work->spin);
     memset(work->speed, 0, sizeof work->speed);
-    work->y[0] = work->zero[0], work->y[1] = work->zero[1];
-    work->places = gk_flank_find(model, setup, frame, 50e-6, work->place);
-    if (work->places < 0) return INFINITY;
-    for (int p = 0; p < work->places; p++) work->place[p].memory = -1;
-    gk_rows_form(model, setup, frame, work);
-    gk_system_form(model, setup, data, gk_flow_for(setup, h, gamma), work);
-    gk_limit_compliance(s, model->torque_max / (model->gear[0].r_b * setup->width), 1, C);
+    work->spin[A->rotor] = turned;
+    work->spin[B->rotor] = -engagement->kind * turned * A->r_b / B->r_b;
+    if (engagement->kind == MESH_FLAT) {
+        work->spin[A->rotor] = 0.0;
+        work->spin[B->rotor] = engagement->position[0][0] - engagement->position[1][0];
+    }
+    for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
+    work->ground_y = work->ground_zero;
+    gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
+    engaged->places = gk_flank_find(model, setup, &setup->mesh[e], engaged->pose, NEAR, engaged->position,
+                                    engaged->place);
+    if (engaged->places < 0) return engaged->places = 0;
+    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = -1;
+    gk_rows_form(model, setup, work, e);
+    gk_form_system(model, setup, data, k, work, e);
+    return 1;
+}
+
+static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                    const gk_coefficients *k, int e, double position)
+{
+    const gk_system *s = &work->engaged[e].system;
+    const gk_engagement *engagement = &model->engagement[e];
+    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
+    if (!gk_limit_place(model, setup, work, data, k, e, position)) return INFINITY;
+    gk_limit_compliance(s, engagement->force_max / engagement->width, 1, C);
     kappa_part(s, K);
     return gk_limit_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
 }
 
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, double h, double gamma)
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
 {
+    const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
     double worst = 0.0;
     gk_data empty;
     memset(&empty, 0, sizeof empty);
-    for (int i = 0; i < (model->kind == KIND_FLAT ? 1 : POSITIONS); i++)
-        worst = gk_max(worst, mu_at(model, setup, &empty, h, gamma, (double)i / POSITIONS));
+    for (int e = 0; e < model->engagements; e++)
+        for (int i = 0; i < (model->engagement[e].kind == MESH_FLAT ? 1 : POSITIONS); i++)
+            worst = gk_max(worst, mu_at(model, setup, work, &empty, k, e, (double)i / POSITIONS));
     return worst;
 }
 
 /* γ for which μ′ stays at its bound */
-static double gamma_for(const gk_model *model, const gk_setup *setup, double h)
+static double gamma_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
 {
-    if (gk_limit_mu(model, setup, h, 1.0) <= MU_MOST) return 1.0;
+    if (gk_limit_mu(model, setup, work, h, 1.0) <= MU_MOST) return 1.0;
     double low = 0.0, high = 1.0;
     for (int i = 0; i < 12; i++) {
         double middle = 0.5 * (low + high);
-        if (gk_limit_mu(model, setup, h, middle) <= MU_MOST)
+        if (gk_limit_mu(model, setup, work, h, middle) <= MU_MOST)
             low = middle;
         else
             high = middle;
@@ -162,39 +184,39 @@ static const double QUARTER_OCTAVE = 0.84089641525371454; /* 2^(−1/4) */
 
 /* γ of any h: exact for the internal step of the run, else the smaller of its neighbours on the scale; a pure function
  * of setup, state and h */
-double gk_limit_gamma(const gk_setup *setup, const gk_data *data, double h)
+double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h)
 {
     double at = setup->h;
     int i = 0;
-    if (setup->integrator != DG4) return 0.0;
-    if (h == data->table_h && h == setup->work->run_h) return setup->work->run_gamma;
+    if (!gk_scheme_of(setup->integrator)->corrected) return 0.0;
+    if (h == data->table_h && h == work->run_h) return work->run_gamma;
     while (i < GAMMAS - 1 && h < at * (1.0 - 1e-9)) at *= QUARTER_OCTAVE, i++;
     return i && h > at * (1.0 + 1e-9) ? gk_min(setup->gamma_at[i - 1], setup->gamma_at[i]) : setup->gamma_at[i];
 }
 
 /* γ of the internal step of the run */
-void gk_limit_run(const gk_model *model, const gk_setup *setup, const gk_data *data)
+void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
-    gk_work *work = setup->work;
-    if (setup->integrator != DG4 || work->run_h == data->table_h) return;
-    work->run_gamma = data->table_h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, data->table_h);
+    if (!gk_scheme_of(setup->integrator)->corrected || work->run_h == data->table_h) return;
+    work->run_gamma = data->table_h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, data->table_h);
     work->run_h = data->table_h;
 }
 
-gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished, char message[GK_MESSAGE])
+gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
+                           char message[GK_MESSAGE])
 {
     static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6,
                                     4e-6,  3e-6,  2.5e-6,  2e-6,  1.5e-6, 1e-6, 0.5e-6};
-    const double period = 2.0 * GK_PI / (model->speed_max * model->gear[0].teeth);
-    const int variational = setup->integrator == DG4, rungs = (int)(sizeof ladder / sizeof *ladder);
-    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup)
+    const double period = model->period_min;
+    const int corrected = gk_scheme_of(setup->integrator)->corrected, rungs = (int)(sizeof ladder / sizeof *ladder);
+    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work)
                                                        : INFINITY; /* explicit: a limit of stability */
     double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
     if (!(wished > 0.0))
         for (int i = 0; i < rungs; i++) {
             h = gk_min(ladder[i], limit);
             if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) &&
-                (!variational || gk_limit_mu(model, setup, h, 1.0) <= MU))
+                (!corrected || gk_limit_mu(model, setup, work, h, 1.0) <= MU))
                 break;
         }
     if (h > period / 8.0) {
@@ -211,8 +233,8 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, double wished
     setup->h = h;
     double at = h;
     for (int i = 0; i < GAMMAS; i++, at *= QUARTER_OCTAVE)
-        setup->gamma_at[i] = variational ? gamma_for(model, setup, at) : 0.0;
-    if (variational && setup->gamma_at[0] < 0.7)
+        setup->gamma_at[i] = corrected ? gamma_for(model, setup, work, at) : 0.0;
+    if (corrected && setup->gamma_at[0] < 0.7)
         snprintf(message, GK_MESSAGE,
                  "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; a smaller h is "
                  "more accurate",

@@ -1,6 +1,7 @@
-/* Level, effects, slices and step → gk_setup: which modes are dynamic, and their rows in lanes. */
+/* Level, effects, slices and step → gk_setup: which oscillators are dynamic, and their tables. */
+#include "problem/gk_work.h"
+#include "integrate/gk_integrate.h"
 #include <stdio.h>
-#include "model/gk_core.h"
 
 /* memory is handed out twice with the same code: first counting (base NULL), then for real */
 typedef struct bump {
@@ -15,112 +16,225 @@ static void *take(bump *b, size_t bytes)
     return p;
 }
 
+static double *doubles(bump *b, size_t count) { return take(b, count * sizeof(double)); }
+static gk_real *reals(bump *b, size_t count) { return take(b, count * sizeof(gk_real)); }
+
 static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
 
 /* number of lanes a half needs: one a pair, one a single mode */
 static int lanes_of(const gk_gear *gear, int modes)
 {
     int lanes = 0;
-    for (int k = 0; k < modes; k++) lanes += gear->part[k] != 2;
+    for (int k = 0; k < modes; k++) lanes += gear->member[k] != 2;
     return lanes;
 }
 
-static void lay_out_table(bump *b, const gk_setup *setup, const gk_gear *gear, int kinds, gk_table *table)
+static int share_rotor(const gk_model *model, const gk_engagement *a, const gk_engagement *b)
 {
-    const size_t R = (size_t)gear->rolls, A = (size_t)setup->strips, block = (A * A * (size_t)kinds + 7) / 8 * 8;
-    table->ff = take(b, 4 * OFFSETS * R * R * block * sizeof(gk_real));
-    table->fb = take(b, 2 * R * A * 4 * (size_t)kinds * sizeof(double));
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++)
+            if (model->gear[a->gear[i]].rotor == model->gear[b->gear[j]].rotor) return 1;
+    return 0;
 }
 
-static void lay_out_gear(bump *b, const gk_model *model, gk_setup *setup, int g, int modes)
+/* Engagements that share a rotor belong to one island. Where one has more than one member, their residuals meet through the
+ * ground group: by its oscillators that are not dynamic and by the supports. */
+static void find_islands(const gk_model *model, gk_setup *setup)
 {
-    const gk_gear *gear = &model->gear[g];
-    gk_modal *m = &setup->modal[g];
-    size_t n, R = (size_t)gear->rolls, A = (size_t)setup->strips;
+    int members = 0;
+    for (int e = 0; e < model->engagements; e++) setup->mesh[e].island = -1;
+    setup->islands = setup->far = 0;
+    for (int root = 0; root < model->engagements; root++) {
+        if (setup->mesh[root].island >= 0) continue;
+        setup->mesh[root].island = setup->islands;
+        members = 1;
+        for (int changed = 1; changed;) {
+            changed = 0;
+            for (int a = 0; a < model->engagements; a++)
+                for (int b = 0; b < model->engagements; b++) {
+                    if (setup->mesh[a].island != setup->islands || setup->mesh[b].island >= 0) continue;
+                    if (!share_rotor(model, &model->engagement[a], &model->engagement[b])) continue;
+                    setup->mesh[b].island = setup->islands;
+                    changed = 1, members++;
+                }
+        }
+        setup->islands++;
+        if (members > 1) setup->far = model->ground[setup->base.set].n + model->supports;
+    }
+}
+
+/* ---- layout ------------------------------------------------------------------------------------------------------- */
+static void lay_out_modal(bump *b, const gk_gear *gear, gk_modal *m, int modes)
+{
     m->count = modes;
     m->pairs = padded(lanes_of(gear, modes));
     m->n = 2 * m->pairs;
-    n = (size_t)m->n;
-    m->omega = take(b, n * sizeof(double));
-    m->zeta = take(b, n * sizeof(double));
-    m->omega2 = take(b, n * sizeof(gk_real));
-    m->rows = take(b, 2 * R * A * n * sizeof(gk_real));
-    m->bore = take(b, BORE_ROWS * n * sizeof(gk_real));
-    m->cosine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
-    m->sine = take(b, (size_t)gear->z * (size_t)m->pairs * sizeof(gk_real));
-    m->turn = take(b, 2 * (size_t)gear->z * sizeof(double));
-    m->path = take(b, 2 * R * ((A * A + 3) / 4 * 4) * sizeof(double));
-    lay_out_table(b, setup, gear, 1, &m->residual);
+    const size_t n = (size_t)m->n, turns = (size_t)gear->z * (size_t)m->pairs;
+    m->omega = doubles(b, n);
+    m->zeta = doubles(b, n);
+    m->omega2 = reals(b, n);
+    m->lane = take(b, (size_t)modes * sizeof *m->lane);
+    m->cosine = reals(b, turns);
+    m->sine = reals(b, turns);
 }
 
-static void lay_out_flow(bump *b, const gk_setup *setup, gk_coefficients *k)
+static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int count)
 {
-    for (int g = 0; g < 2; g++) {
-        size_t bytes = (size_t)setup->modal[g].n * sizeof(gk_real);
-        gk_flow *f = &k->flow[g];
-        gk_real **array[] = {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,
-                             &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
-        for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = take(b, bytes);
-    }
+    base->n = count;
+    const size_t n = (size_t)base->n;
+    base->which = take(b, n * sizeof *base->which);
+    base->slot = take(b, (size_t)model->ground[base->set].n * sizeof *base->slot);
+    base->omega = doubles(b, n);
+    base->zeta = doubles(b, n);
+    base->omega2 = doubles(b, n);
+    base->damper_rows = doubles(b, n * (size_t)model->dampers);
+    base->support_rows = doubles(b, n * (size_t)model->supports);
+    base->port_rows = doubles(b, n * (size_t)model->ports);
+    for (int g = 0; g < model->gears; g++) base->centre[g] = doubles(b, 6 * n);
+}
+
+static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, gk_side *side)
+{
+    const size_t nodes = (size_t)side->nodes + 1, strips = (size_t)setup->strips, C = (size_t)side->candidates;
+    const size_t points = nodes * C * strips;
+    side->rows = reals(b, points * (size_t)setup->modal[side->gear].n);
+    side->ground = doubles(b, points * (size_t)setup->base.n);
+    side->columns = (int)((C * strips + 3) / 4 * 4 + 4);
+    side->residual = reals(b, nodes * C * strips * (size_t)side->columns);
+    side->path = doubles(b, points * strips);
+    side->port = doubles(b, points);
+    side->support = doubles(b, points * (size_t)model->supports);
+    side->far = reals(b, points * (size_t)setup->far);
 }
 
 /* everything after the setup itself; returns the bytes used */
-static size_t lay_out(const gk_model *model, gk_setup *setup, char *base, const int modes[2])
+static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, const int *modes, int ground)
 {
     bump b = {base, 0};
-    gk_work scratch, *work = take(&b, sizeof(gk_work));
-    if (!work) work = &scratch;
-    setup->work = work;
-    int widest = 0;
-    for (int g = 0; g < 2; g++) {
-        lay_out_gear(&b, model, setup, g, modes[g]);
-        size_t n = (size_t)setup->modal[g].n;
-        work->qp[g] = take(&b, n * sizeof(gk_real));
-        work->vp[g] = take(&b, n * sizeof(gk_real));
-        work->force[g] = take(&b, n * sizeof(gk_real));
-        work->zero[g] = take(&b, n * sizeof(gk_real));
-        work->reading[g] = take(&b, n * sizeof(gk_real));
-        for (int i = 0; i < 7; i++) work->stage[g][i] = take(&b, 2 * n * sizeof(gk_real));
-        work->trial[g] = take(&b, 2 * n * sizeof(gk_real));
-        work->basis[g] = take(&b, (size_t)(MAX_PAIRS * setup->strips + BORE_ROWS) * n * sizeof(gk_real));
-        lay_out_table(&b, setup, &model->gear[g], KINDS, &work->table[g]);
-        if (setup->modal[g].n > widest) widest = setup->modal[g].n;
+    size_t at = 0;
+    for (int g = 0; g < model->gears; g++) {
+        lay_out_modal(&b, &model->gear[g], &setup->modal[g], modes[g]);
+        setup->modal[g].at = at;
+        at += 3 * (size_t)setup->modal[g].n;
     }
-    work->scaled = take(&b, 2 * (size_t)widest * sizeof(gk_real));
-    setup->flexibility = take(
-        &b, (KINDS + MAX_FUNCTIONS) *
-                (size_t)(model->gear[0].modes > model->gear[1].modes ? model->gear[0].modes : model->gear[1].modes) *
-                sizeof(double));
-    for (int i = 0; i < CACHE; i++) lay_out_flow(&b, setup, &work->cache[i]);
-    lay_out_flow(&b, setup, &work->at_rest);
-    lay_out_flow(&b, setup, &work->explicit_rows);
+    lay_out_base(&b, model, &setup->base, ground);
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++) lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
+    setup->state_size = sizeof(gk_data) + 3 * (size_t)setup->base.n * sizeof(double) + at * sizeof(gk_real);
     return b.used;
 }
 
-static const int *all_modes(const gk_model *model, int modes[2])
+static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {
-    modes[0] = model->gear[0].modes, modes[1] = model->gear[1].modes;
-    return modes;
+    for (int g = 0; g < model->gears; g++) {
+        gk_flow *f = &k->flow[g];
+        gk_real **array[] = {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,
+                             &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+        for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(b, (size_t)setup->modal[g].n);
+    }
+    gk_ground_flow *f = &k->ground;
+    double **array[] = {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,
+                        &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
+    f->pulls = doubles(b, (size_t)model->dampers * (size_t)setup->base.n);
+}
+
+static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged, int e)
+{
+    const size_t contacts = MAX_PAIRS * (size_t)setup->strips, rows = contacts + MAX_JOINTS + 4;
+    for (int w = 0; w < 2; w++) {
+        const gk_side *side = &setup->mesh[e].side[w];
+        const size_t points = (size_t)(side->candidates * setup->strips);
+        engaged->basis[w] = reals(b, contacts * (size_t)setup->modal[side->gear].n);
+        engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
+        engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 8);
+    }
+    for (int w = 0; w < 2; w++) engaged->outward[w] = doubles(b, contacts * (size_t)setup->base.n);
+    engaged->ground = doubles(b, rows * (size_t)setup->base.n);
+    engaged->matrix = doubles(b, 6 * rows * rows);
+    engaged->given_ground = doubles(b, 3 * (size_t)setup->base.n);
+    engaged->given_far = doubles(b, 2 * (size_t)setup->far);
+}
+
+static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
+{
+    bump b = {base, 0};
+    size_t widest = 0, all = 0;
+    const size_t ground = (size_t)setup->base.n;
+    for (int g = 0; g < model->gears; g++) {
+        const size_t n = (size_t)setup->modal[g].n;
+        gk_real **array[] = {&work->qp[g], &work->vp[g], &work->force[g], &work->next[g], &work->reading[g]};
+        for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(&b, n);
+        for (int i = 0; i < 7; i++) work->stage[g][i] = reals(&b, 2 * n);
+        work->trial[g] = reals(&b, 2 * n);
+        widest = n > widest ? n : widest;
+    }
+    work->turned = reals(&b, widest), work->turned_next = reals(&b, widest), work->zero = reals(&b, widest);
+    work->scaled = reals(&b, 2 * widest);
+    double **array[] = {&work->ground_q,       &work->ground_v,    &work->ground_force, &work->ground_next,
+                        &work->ground_reading, &work->ground_zero, &work->ground_start};
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(&b, ground);
+    work->ground_scaled = doubles(&b, 2 * ground);
+    for (int i = 0; i < 7; i++) work->ground_stage[i] = doubles(&b, 2 * ground);
+    work->ground_trial = doubles(&b, 2 * ground);
+    for (int i = 0; i < CACHE; i++) lay_out_flow(&b, model, setup, &work->cache[i]);
+    lay_out_flow(&b, model, setup, &work->explicit_rows);
+    work->engaged = take(&b, (size_t)model->engagements * sizeof *work->engaged);
+    for (int e = 0; e < model->engagements; e++) {
+        gk_engaged counted;
+        lay_out_engaged(&b, setup, work->engaged ? &work->engaged[e] : &counted, e);
+    }
+    for (int s = 0; s < model->sets; s++) all = (size_t)model->ground[s].n > all ? (size_t)model->ground[s].n : all;
+    work->rest_ground = doubles(&b, all);
+    work->rest_rows = doubles(&b, MAX_ROWS * all);
+    work->columns = doubles(&b, gk_side_scratch(model));
+    work->far = doubles(&b, 3 * ground + 2 * (size_t)setup->far);
+    work->port_far = doubles(&b, (size_t)(model->ports * setup->far));
+    return b.used;
+}
+
+/* the largest setup of a model: all modes, most slices */
+static size_t largest(const gk_model *model, gk_setup *setup)
+{
+    int modes[MAX_GEARS], ground = 0;
+    memset(setup, 0, sizeof *setup);
+    setup->slices = MAX_SLICES;
+    setup->strips = gk_strips_count(model, MAX_SLICES);
+    setup->on.tip_contact = 1;
+    for (int g = 0; g < model->gears; g++) modes[g] = model->gear[g].modes;
+    for (int s = 0; s < model->sets; s++)
+        if (model->ground[s].n > ground) ground = model->ground[s].n, setup->base.set = s;
+    find_islands(model, setup);
+    ground = (ground + 3) / 4 * 4 + 4 * MAX_ROTORS; /* every rotor's part is padded */
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
+    return lay_out_setup(model, setup, NULL, modes, ground);
 }
 
 size_t gk_setup_size(const gk_model *model)
 {
     gk_setup probe;
-    int modes[2];
-    memset(&probe, 0, sizeof probe);
-    probe.strips = gk_strips_count(model, MAX_SLICES);
-    return 128 + sizeof(gk_setup) + lay_out(model, &probe, NULL, all_modes(model, modes));
+    return 128 + sizeof(gk_setup) + largest(model, &probe);
+}
+
+size_t gk_work_size(const gk_model *model)
+{
+    gk_setup probe;
+    gk_work nothing;
+    largest(model, &probe);
+    return 128 + sizeof(gk_work) + lay_out_work(model, &probe, &nothing, NULL);
 }
 
 size_t gk_data_size(const gk_model *model)
 {
-    size_t n = 0;
-    for (int g = 0; g < 2; g++) n += 2 * (size_t)padded(lanes_of(&model->gear[g], model->gear[g].modes));
-    return sizeof(gk_data) + 3 * n * sizeof(gk_real);
+    gk_setup probe;
+    largest(model, &probe);
+    return probe.state_size;
 }
 
 size_t gk_state_size(const gk_setup *setup) { return setup->state_size; }
 
+/* ---- which oscillators are dynamic --------------------------------------------------------------------------------- */
 /* number of modes below the wished cut, moved to the widest relative gap within 15 %: never inside a cluster, never
  * inside a pair */
 static int modes_below(const gk_gear *gear, double cut_hz)
@@ -130,11 +244,11 @@ static int modes_below(const gk_gear *gear, double cut_hz)
     while (best < gear->modes && gear->omega[best] < cut) best++;
     if (best == gear->modes) return best;
     for (int k = 1; k < gear->modes; k++) {
-        if (gear->part[k] == 2 || gear->omega[k] < 0.85 * cut || gear->omega[k - 1] > 1.15 * cut) continue;
+        if (gear->member[k] == 2 || gear->omega[k] < 0.85 * cut || gear->omega[k - 1] > 1.15 * cut) continue;
         double gap = gear->omega[k] / gear->omega[k - 1] - 1.0;
         if (gap > widest) widest = gap, best = k;
     }
-    if (best < gear->modes && gear->part[best] == 2) best++;
+    if (best < gear->modes && gear->member[best] == 2) best++;
     return best;
 }
 
@@ -149,111 +263,226 @@ static int modes_at_level(const gk_model *model, gk_level level, int g)
     }
 }
 
-/* flank rows of one mode into its lane */
-static void fill_lane(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight, int mode, int lane)
+/* what moves rigidly is dynamic at every level; of the rest what lies below the cut */
+static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
 {
-    const int A = gear->functions;
-    for (int point = 0; point < 2 * gear->rolls; point++)
-        for (int s = 0; s < strips; s++) {
-            double sum = 0.0;
-            for (int a = 0; a < A; a++) sum += weight[s][a] * gear->rows[((size_t)point * A + a) * gear->modes + mode];
-            m->rows[((size_t)point * strips + s) * m->n + lane] = (gk_real)sum;
-        }
-    for (int i = 0; i < BORE_ROWS; i++) m->bore[i * m->n + lane] = (gk_real)gear->bore[(size_t)i * gear->modes + mode];
-    m->omega[lane] = gear->omega[mode];
-    m->omega2[lane] = (gk_real)(gear->omega[mode] * gear->omega[mode]);
-    m->zeta[lane] = gear->zeta[mode];
+    const gk_ground *ground = &model->ground[setup->base.set];
+    if (ground->rigid_share[k] > 0.5) return 1;
+    if (!setup->on.elastic || setup->level == LEVEL_RIGID) return 0;
+    if (setup->level != LEVEL_FAST && setup->level != LEVEL_STANDARD) return 1;
+    return ground->omega[k] < 2.0 * GK_PI * model->cut[setup->level == LEVEL_STANDARD];
 }
 
-/* dynamic modes into lanes */
-static void fill_modes(const gk_gear *gear, gk_modal *m, int strips, gk_strip_weights weight)
+/* the rotor whose part of the ground group an oscillator belongs to: of the first gear that reads it */
+static int rotor_of(const gk_model *model, int set, int k)
+{
+    for (int g = 0; g < model->gears; g++)
+        for (int i = 0; i < model->gear[g].ground[set].reads; i++)
+            if (model->gear[g].ground[set].list[i] == k) return model->gear[g].rotor;
+    return model->rotors - 1;
+}
+
+/* dynamic oscillators in order, rotor by rotor, each padded to quads with −1; returns their number */
+static int list_ground(const gk_model *model, const gk_setup *setup, int32_t *which)
+{
+    int n = 0;
+    for (int r = 0; r < model->rotors; r++) {
+        for (int k = 0; k < model->ground[setup->base.set].n; k++)
+            if (is_dynamic(model, setup, k) && rotor_of(model, setup->base.set, k) == r) which[n++] = k;
+        while (n % 4) which[n++] = -1;
+    }
+    return n;
+}
+
+/* ---- filling ---------------------------------------------------------------------------------------------------------- */
+static void fill_modal(const gk_gear *gear, gk_modal *m)
 {
     const int P = m->pairs, n = m->n;
+    int lane = -1;
     memset(m->omega, 0, (size_t)n * sizeof(double));
     memset(m->zeta, 0, (size_t)n * sizeof(double));
     memset(m->omega2, 0, (size_t)n * sizeof(gk_real));
-    memset(m->rows, 0, 2 * (size_t)gear->rolls * strips * n * sizeof(gk_real));
-    memset(m->bore, 0, (size_t)BORE_ROWS * n * sizeof(gk_real));
-    memset(m->cosine, 0, (size_t)gear->z * P * sizeof(gk_real));
-    memset(m->sine, 0, (size_t)gear->z * P * sizeof(gk_real));
-    for (int j = 0; j < gear->z; j++) gk_sincos(2.0 * GK_PI * j / gear->z, &m->turn[2 * j + 1], &m->turn[2 * j]);
-    int lane = -1;
+    memset(m->cosine, 0, (size_t)gear->z * (size_t)P * sizeof(gk_real));
+    memset(m->sine, 0, (size_t)gear->z * (size_t)P * sizeof(gk_real));
     for (int k = 0; k < m->count; k++) {
-        if (gear->part[k] != 2) lane++;
-        fill_lane(gear, m, strips, weight, k, gear->part[k] == 2 ? P + lane : lane);
-        if (gear->part[k] == 2) continue;
-        for (int j = 0; j < gear->z; j++) {
+        if (gear->member[k] != 2) lane++;
+        const int to = gear->member[k] == 2 ? P + lane : lane;
+        m->lane[k] = to;
+        m->omega[to] = gear->omega[k];
+        m->omega2[to] = (gk_real)(gear->omega[k] * gear->omega[k]);
+        m->zeta[to] = gear->zeta[k];
+        for (int j = 0; j < gear->z && gear->member[k] != 2; j++) {
             double sine, cosine;
             gk_sincos(2.0 * GK_PI * (double)((int64_t)gear->diameter[k] * j % gear->z) / gear->z, &sine, &cosine);
-            m->cosine[(size_t)j * P + lane] = (gk_real)cosine;
-            m->sine[(size_t)j * P + lane] = gear->part[k] == 0 ? 0 : (gk_real)sine;
+            m->cosine[(size_t)j * (size_t)P + (size_t)lane] = (gk_real)cosine;
+            m->sine[(size_t)j * (size_t)P + (size_t)lane] = gear->member[k] == 0 ? 0 : (gk_real)sine;
         }
     }
 }
 
-static void fill_links(const gk_model *model, gk_setup *setup)
+/* the dynamic columns of rows over all ground oscillators */
+static void select_rows(const gk_base *base, const double *rows, int count, int all, double *out)
 {
-    for (int g = 0; g < 2; g++) {
-        const gk_gear *gear = &model->gear[g];
-        const gk_port *port = &model->port[g];
-        const int bearing = model->kind == KIND_PAIR && GK_ON(setup, bearings);
-        for (int i = BEARING_0X + 2 * g; i <= BEARING_0Y + 2 * g; i++)
-            setup->link[i] = bearing, setup->link_c[i] = 1.0 / gear->bearing_k, setup->link_d[i] = gear->bearing_c;
-        setup->inverse_mass[3 * g] = bearing || model->kind == KIND_FLAT ? 1.0 / gear->mass : 0.0;
-        setup->inverse_mass[3 * g + 1] = bearing ? 1.0 / gear->mass : 0.0;
-        setup->inverse_mass[3 * g + 2] = model->kind == KIND_PAIR ? 1.0 / gear->inertia : 0.0;
-        setup->link[PORT_0 + g] = model->kind == KIND_PAIR;
-        setup->link_c[PORT_0 + g] = port->kind != PORT_TORQUE ? 1.0 / port->k : 0.0;
-        setup->link_d[PORT_0 + g] = port->kind != PORT_TORQUE ? port->c : 0.0;
-        setup->given_torque[g] = port->kind == PORT_TORQUE;
-        setup->link[SHAFT_0 + g] = setup->link[CLUTCH_0 + g] = port->chain;
-        setup->link_c[SHAFT_0 + g] = port->chain ? 1.0 / port->shaft_k : 0.0;
-        setup->link_d[SHAFT_0 + g] = port->shaft_c;
-        setup->link_c[CLUTCH_0 + g] = setup->link_d[CLUTCH_0 + g] = 0.0;
-        setup->inverse_mass[INERTIA_0 + g] = port->chain ? 1.0 / port->inertia : 0.0;
-        setup->inverse_mass[DISC_0 + g] = port->chain ? 1.0 / port->disc : 0.0;
-    }
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < base->n; k++)
+            out[i * base->n + k] = base->which[k] >= 0 ? rows[i * all + base->which[k]] : 0.0;
 }
 
-/* coefficients of systems in which no time passes: at rest κ = −1/ω² puts the dynamic modes into C′ too; for explicit
- * integration C′ is the massless part alone */
-static void fill_timeless(gk_setup *setup)
+/* rigid motion of a gear by the dynamic oscillators, and the part of them that it reads */
+static void fill_centre(const gk_model *model, gk_base *base, int g)
 {
-    gk_coefficients *both[2] = {&setup->work->at_rest, &setup->work->explicit_rows};
-    for (int c = 0; c < 2; c++) {
-        gk_coefficients *k = both[c];
-        k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = k->rigid_b0 = k->rigid_bq = 0.0, k->curved_read = 0,
-        k->timeless = 1;
-        for (int g = 0; g < 2; g++) {
-            const gk_modal *m = &setup->modal[g];
-            memset(setup->work->zero[g], 0, (size_t)m->n * sizeof(gk_real));
-            memset(k->flow[g].mobility, 0, (size_t)m->n * sizeof(gk_real));
-            for (int i = 0; i < m->n; i++) {
-                k->flow[g].kappa[i] = c == 0 && m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
-                k->flow[g].inverse_s2[i] = 1;
-            }
-            k->flow[g].exact = c == 0 ? m->pairs : 0;
+    const gk_gear *gear = &model->gear[g];
+    const int reads = gear->ground[base->set].reads;
+    int from = base->n, to = 0;
+    memset(base->centre[g], 0, 6 * (size_t)base->n * sizeof(double));
+    for (int k = 0; k < reads; k++) {
+        const int slot = base->slot[gear->ground[base->set].list[k]];
+        if (slot < 0) continue;
+        from = slot < from ? slot : from, to = slot >= to ? slot + 1 : to;
+        for (int c = 0; c < 6; c++) base->centre[g][c * base->n + slot] = gear->ground[base->set].centre[c * reads + k];
+    }
+    base->from[g] = from < to ? from / 4 * 4 : 0;
+    base->width[g] = from < to ? (to + 3) / 4 * 4 - base->from[g] : 0;
+}
+
+static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *which)
+{
+    gk_base *base = &setup->base;
+    const gk_ground *ground = &model->ground[base->set];
+    for (int k = 0; k < ground->n; k++) base->slot[k] = -1;
+    for (int i = 0; i < base->n; i++) {
+        base->which[i] = which[i];
+        if (which[i] >= 0) base->slot[which[i]] = i, base->count++;
+    }
+    select_rows(base, ground->omega, 1, ground->n, base->omega);
+    select_rows(base, ground->zeta, 1, ground->n, base->zeta);
+    for (int i = 0; i < base->n; i++) base->omega2[i] = base->omega[i] * base->omega[i];
+    select_rows(base, ground->damper_rows, model->dampers, ground->n, base->damper_rows);
+    select_rows(base, ground->port_rows, model->ports, ground->n, base->port_rows);
+    for (int s = 0; s < model->supports; s++) /* the force there: κ times the displacement */
+        for (int k = 0; k < base->n; k++) {
+            double sum = 0.0;
+            for (int t = 0; t < model->supports && which[k] >= 0; t++)
+                sum += ground->kappa[s * model->supports + t] * ground->support_rows[t * ground->n + which[k]];
+            base->support_rows[s * base->n + k] = sum;
         }
+    for (int g = 0; g < model->gears; g++) fill_centre(model, base, g);
+}
+
+static void add_joint(gk_setup *setup, int port, int which, int live, double k, double c)
+{
+    setup->joint[port][which] = (gk_joint){live, live && k > 0.0 ? 1.0 / k : 0.0, live ? c : 0.0};
+}
+
+/* residual of the bore angle: of the free body, less what the supports answer, plus the ground oscillators that are not
+ * dynamic */
+static double bore_residual(const gk_model *model, const gk_setup *setup, int p)
+{
+    const gk_base *base = &setup->base;
+    const gk_ground *ground = &model->ground[base->set];
+    const double *to = model->port_support + p * model->supports, *row = ground->port_rows + p * ground->n;
+    double sum = model->port_residual[p * model->ports + p];
+    if (!setup->on.residual) return 0.0;
+    for (int s = 0; s < model->supports; s++)
+        for (int t = 0; t < model->supports; t++) sum -= to[s] * ground->kappa[s * model->supports + t] * to[t];
+    for (int k = 0; k < ground->n; k++)
+        if (base->slot[k] < 0) sum += row[k] * row[k] / (ground->omega[k] * ground->omega[k]);
+    return sum;
+}
+
+static void fill_ports(const gk_model *model, gk_setup *setup)
+{
+    setup->spins = model->rotors + 2 * model->chains;
+    for (int r = 0; r < model->rotors; r++) setup->inverse_inertia[r] = 1.0 / model->inertia[r];
+    for (int p = 0; p < model->ports; p++) {
+        const gk_port *port = &model->port[p];
+        const int torque = port->kind == PORT_TORQUE;
+        setup->chained[p] = port->chain > 0;
+        setup->given_torque[p] = torque;
+        add_joint(setup, p, JOINT_PORT, 1, torque ? 0.0 : port->k, torque ? 0.0 : port->c);
+        add_joint(setup, p, JOINT_SHAFT, port->chain > 0, port->shaft_k, port->shaft_c);
+        add_joint(setup, p, JOINT_CLUTCH, port->chain > 0, 0.0, 0.0);
+        setup->clutches += port->chain > 0;
+        setup->port_own[p] = bore_residual(model, setup, p);
+        if (!port->chain) continue;
+        setup->inverse_inertia[gk_inertia_of(model, p)] = 1.0 / port->inertia;
+        setup->inverse_inertia[gk_disc_of(model, p)] = 1.0 / port->disc;
     }
 }
 
+/* ports of the rotors that this engagement is the first to engage, and the spins that its rows read */
+static void fill_spins(const gk_model *model, gk_mesh *mesh)
+{
+    const gk_engagement *e = &model->engagement[mesh->index];
+    mesh->spins = 2;
+    for (int w = 0; w < 2; w++) mesh->spin[w] = model->gear[e->gear[w]].rotor;
+    for (int p = 0; p < model->ports; p++) {
+        int first = -1;
+        for (int i = 0; i < model->engagements && first < 0; i++)
+            for (int w = 0; w < 2; w++)
+                if (model->gear[model->engagement[i].gear[w]].rotor == model->port[p].rotor) first = i;
+        if (first != mesh->index || mesh->ports == 2) continue;
+        const int slot = mesh->ports++;
+        mesh->port[slot] = p;
+        mesh->joint_spin[slot][0] = mesh->joint_spin[slot][1] = -1;
+        if (!model->port[p].chain) continue;
+        mesh->joint_spin[slot][0] = mesh->spins, mesh->spin[mesh->spins++] = gk_inertia_of(model, p);
+        mesh->joint_spin[slot][1] = mesh->spins, mesh->spin[mesh->spins++] = gk_disc_of(model, p);
+    }
+}
+
+static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *data, int e)
+{
+    gk_mesh *mesh = &setup->mesh[e];
+    const gk_engagement *engagement = &model->engagement[e];
+    const double *a = engagement->position[0], *b = engagement->position[1];
+    const double distance = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
+    fill_spins(model, mesh);
+    mesh->damping = data->mesh[e][V_DAMPING];
+    if (engagement->kind != MESH_FLAT)
+        mesh->allowance = (data->mesh[e][V_BACKLASH] - engagement->nominal_backlash) *
+                          gk_base_reach(model, engagement) / distance;
+    gk_strips_fill(model, setup, mesh);
+    gk_law_bounds(model, mesh);
+}
+
+/* coefficients of problems in which no time passes: C′ is the quasi-static part alone */
+static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    gk_coefficients *k = &work->explicit_rows;
+    const size_t ground = (size_t)setup->base.n * sizeof(double);
+    k->h = 1.0, k->gamma = k->rigid_kappa = k->rigid_mobility = k->rigid_b0 = k->rigid_bq = 0.0;
+    k->curved_read = 0, k->timeless = 1;
+    for (int g = 0; g < model->gears; g++) {
+        const size_t size = (size_t)setup->modal[g].n * sizeof(gk_real);
+        memset(k->flow[g].mobility, 0, size);
+        memset(k->flow[g].kappa, 0, size);
+        for (int i = 0; i < setup->modal[g].n; i++) k->flow[g].inverse_s2[i] = 1;
+        memset(work->zero, 0, size);
+        k->flow[g].exact = 0;
+    }
+    memset(k->ground.mobility, 0, ground);
+    memset(k->ground.kappa, 0, ground);
+    for (int i = 0; i < setup->base.n; i++) k->ground.inverse_s2[i] = 1.0;
+    memset(work->ground_zero, 0, ground);
+}
+
+/* ---- level and integrator ---------------------------------------------------------------------------------------------- */
 /* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, rk45 (dg4
  * where a clutch hangs on a port) */
 static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
 {
-    const int clutch = model->port[0].chain || model->port[1].chain;
-    setup->level = (gk_level)(int)data->value[V_M_LEVEL];
-    setup->integrator = (gk_integrator)(int)data->value[V_M_INTEGRATOR];
+    double damping = 0.0;
+    setup->level = (gk_level)(int)data->stage[V_LEVEL];
+    setup->integrator = (gk_integrator)(int)data->stage[V_INTEGRATOR];
     setup->on = gk_effects_of(data);
-    setup->slices = (int)data->value[V_M_SLICES];
+    setup->slices = (int)data->stage[V_SLICES];
     setup->strips = gk_strips_count(model, setup->slices);
-    setup->damping = data->value[V_M_DAMPING];
-    if (setup->damping == 0.0) setup->on.contact_damping = 0;
-    if (model->kind == KIND_PAIR)
-        setup->allowance = (data->value[V_M_BACKLASH] - model->nominal_backlash) *
-                           (model->gear[0].r_b + model->gear[1].r_b) / model->distance;
+    for (int e = 0; e < model->engagements; e++) damping = gk_max(damping, data->mesh[e][V_DAMPING]);
+    if (damping == 0.0) setup->on.contact_damping = 0;
+    setup->base.set = model->sets > 1 && !setup->on.bearings;
     if (setup->level == LEVEL_EXPLICIT && setup->integrator == DG4) setup->integrator = CENTRAL;
-    if ((setup->integrator == RK45 || setup->integrator == CENTRAL) && clutch) {
+    if (gk_scheme_of(setup->integrator)->is_explicit && model->chains) {
         snprintf(message, GK_MESSAGE,
                  "integrators rk45 and central (level explicit) know no clutch: use dg4, or export the stage without "
                  "the chain");
@@ -261,7 +490,7 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     }
     if (setup->level == LEVEL_PAPER) {
         setup->on.residual = 0;
-        if (setup->integrator == DG4 && !clutch) setup->integrator = RK45;
+        if (setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
         snprintf(message, GK_MESSAGE,
                  "level paper leaves the static compliance of all higher modes out: tooth stiffness is 15 to 40 %% too "
                  "high; use it for comparison only");
@@ -276,8 +505,13 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     return GK_OK;
 }
 
-gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+static char *behind(void *block, size_t size) { return (char *)(((uintptr_t)block + size + 63) / 64 * 64); }
+
+gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
+                      char message[GK_MESSAGE])
 {
+    int modes[MAX_GEARS];
+    int32_t which[MAX_GROUND + 4 * MAX_ROTORS];
     message[0] = 0;
     if (data->magic != GK_DATA_MAGIC) {
         snprintf(message, GK_MESSAGE, "gk_prepare before gk_defaults");
@@ -286,29 +520,25 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(setup, 0, sizeof *setup);
     gk_outcome outcome = choose(model, data, setup, message);
     if (outcome) return outcome;
-    const int modes[2] = {setup->on.elastic ? modes_at_level(model, setup->level, 0) : 0,
-                          setup->on.elastic ? modes_at_level(model, setup->level, 1) : 0};
-    const uintptr_t base = ((uintptr_t)setup + sizeof *setup + 63) / 64 * 64;
-    lay_out(model, setup, (char *)base, modes);
-    setup->step = gk_wide_step(1, setup->integrator);
-    gk_work *work = setup->work;
-    work->clock = 0;
-    for (int i = 0; i < CACHE; i++) work->cache[i].age = 0;
-    memset(work->cycles, 0, sizeof work->cycles);
-    setup->state_size = sizeof(gk_data);
-    gk_strips_fill(model, setup);
-    gk_law_bounds(model, setup);
-    for (int g = 0; g < 2; g++) {
-        gk_strip_weights weight;
-        gk_strips_rows(model, setup, g, weight);
-        fill_modes(&model->gear[g], &setup->modal[g], setup->strips, weight);
-        setup->state_size += 3 * (size_t)setup->modal[g].n * sizeof(gk_real);
+    for (int g = 0; g < model->gears; g++) modes[g] = setup->on.elastic ? modes_at_level(model, setup->level, g) : 0;
+    for (int e = 0; e < model->engagements; e++) {
+        setup->mesh[e].index = e;
+        for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
     }
-    gk_table_residual(model, setup);
-    work->table_h = work->table_gamma = work->run_h = work->run_gamma = 0.0;
-    fill_links(model, setup);
-    fill_timeless(setup);
-    outcome = gk_limit_choose(model, setup, data->value[V_M_H], message);
+    find_islands(model, setup);
+    lay_out_setup(model, setup, behind(setup, sizeof *setup), modes, list_ground(model, setup, which));
+    memset(work, 0, sizeof *work);
+    lay_out_work(model, setup, work, behind(work, sizeof *work));
+    setup->step = gk_wide_step(1, setup->integrator);
+    for (int g = 0; g < model->gears; g++) fill_modal(&model->gear[g], &setup->modal[g]);
+    fill_base(model, setup, which);
+    fill_ports(model, setup);
+    for (int e = 0; e < model->engagements; e++) fill_mesh(model, setup, data, e);
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);
+    for (int p = 0; p < model->ports && setup->far; p++) gk_side_port_far(model, setup, work, p);
+    fill_explicit(model, setup, work);
+    outcome = gk_limit_choose(model, setup, work, data->stage[V_H], message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
     return outcome;
 }

@@ -1,12 +1,12 @@
 /* Slices across the face width → strips, the contact rows of a place: their number, lengths and weights on the width
  * functions of the bodies. */
-#include "model/gk_core.h"
+#include "setup/gk_setup.h"
 
 /* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row
  * of twice the length. */
 static int mirrored(const gk_model *model)
 {
-    for (int a = 0; a < model->gear[0].functions; a++)
+    for (int a = 0; a < model->functions; a++)
         if (model->degree[a] % 2) return 0;
     return 1;
 }
@@ -25,11 +25,11 @@ static double legendre_integral(int degree, double x)
     return (now - minus) / (2.0 * degree + 1.0);
 }
 
-void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_strip_weights out)
+void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out)
 {
-    const double edge = setup->width / model->gear[g].width;
+    const double edge = e->width / model->gear[g].width;
     for (int s = 0; s < setup->strips; s++)
-        for (int a = 0; a < model->gear[g].functions; a++) {
+        for (int a = 0; a < model->functions; a++) {
             const double from = edge * (2.0 * s / setup->slices - 1.0),
                          to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
             const int d = model->degree[a];
@@ -37,12 +37,14 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, int g, gk_stri
         }
 }
 
-void gk_strips_fill(const gk_model *model, gk_setup *setup)
+void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
-    setup->width = gk_min(model->gear[0].width, model->gear[1].width);
-    setup->strip_term = 0.0;
+    const gk_engagement *e = &model->engagement[mesh->index];
+    mesh->strip_term = 0.0;
     for (int s = 0; s < setup->strips; s++)
-        setup->strip_width[s] = setup->width / setup->slices *
-                                (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
-    for (int g = 0; g < 2; g++) setup->strip_term += model->gear[g].local * (gk_log(4.0 * model->gear[g].strip) - 1.0);
+        mesh->strip_width[s] = e->width / setup->slices * (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
+    for (int w = 0; w < 2; w++) {
+        const gk_gear *gear = &model->gear[e->gear[w]];
+        mesh->strip_term += gear->local * (gk_log(4.0 * gear->strip) - 1.0);
+    }
 }

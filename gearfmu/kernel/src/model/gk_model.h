@@ -1,0 +1,90 @@
+/* The constant model: what a blob says, checked, as structures that point into it. */
+#ifndef GK_MODEL_H
+#define GK_MODEL_H
+#include "base/gk_blob.h"
+
+#define GK_PI 3.14159265358979323846
+enum {
+    MAX_ROTORS = 24,
+    MAX_GEARS = 16,
+    MAX_ENGAGEMENTS = 12,
+    MAX_PORTS = 16,
+    MAX_SUPPORTS = 64, /* directions */
+    MAX_SLICES = 10,
+    MAX_FUNCTIONS = 8,
+    MAX_MODES = 6000,
+    MAX_GROUND = 2000,
+    OFFSETS = 7, /* tooth offsets −3 … 3 of the residual */
+    SETS = 2,    /* of ground oscillators: as supported; with the supports held */
+    NAME_LENGTH = 32
+};
+
+/* a toothed member */
+typedef struct gk_gear {
+    double r_b, s_form, s_tip, psi_b, phase;  /* phase: angle of tooth 0 when phi = 0 */
+    double width, local, strip;               /* local = 2 (1 − ν²)/(π E); strip: half-width of the load strip */
+    double relief, relief_start;              /* δ(s) = relief (s − relief_start)²₊ */
+    double edge, corner_radius, corner_angle; /* tip edge: arc radius, polar position of its centre */
+    double z_mid, helix;                      /* axial place of mid-width; base helix angle, right-hand positive */
+    int rotor, z, modes;
+    const double *omega, *zeta, *rows, *residual, *support_residual, *port_residual;
+    const int32_t *diameter, *member;
+    const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
+    double index_most;   /* the largest of them along the flank normal, m */
+    struct {
+        int reads; /* ground oscillators that this gear reads */
+        const int32_t *list;
+        const double *centre, *rows;
+    } ground[SETS];
+} gk_gear;
+
+typedef enum gk_mesh_kind { MESH_FLAT = 0, MESH_EXTERNAL = 1, MESH_INTERNAL = -1 } gk_mesh_kind;
+
+typedef struct gk_engagement {
+    char name[NAME_LENGTH];
+    gk_mesh_kind kind;
+    int gear[2];
+    int coast_shift;       /* B's tooth of A's tooth k: −k on the drive flank, coast_shift − k on the coast flank */
+    double position[2][2]; /* x, y of both gears */
+    double backlash, nominal_backlash, damping, force_max; /* backlash j_wt: of the pair; of the teeth as they are */
+    double width;                                          /* common face width */
+    double overlap_max;                                    /* teeth that overlap by more mean nothing */
+} gk_engagement;
+
+typedef enum gk_port_kind { PORT_SPRING, PORT_TORQUE, PORT_FIXED } gk_port_kind;
+
+typedef struct gk_port {
+    gk_port_kind kind;
+    int rotor, chain; /* chain: its number among the chains + 1, 0: none */
+    double k, c, inertia, disc, shaft_k, shaft_c;
+} gk_port;
+
+/* ground oscillators of one set */
+typedef struct gk_ground {
+    int n;
+    const double *omega, *zeta, *rigid_share, *damper_rows, *damper, *support_rows, *support_compliance, *kappa,
+        *port_rows;
+} gk_ground;
+
+struct gk_model {
+    gk_blob blob;
+    const char *name;
+    int slices, rotors, gears, engagements, ports, supports, dampers, functions, rolls, sets, chains;
+    char rotor_name[MAX_ROTORS][NAME_LENGTH], support_name[MAX_SUPPORTS][NAME_LENGTH],
+        displacement_name[MAX_SUPPORTS][NAME_LENGTH];
+    double cut[2], h_max, period_min;
+    int degree[MAX_FUNCTIONS];
+    double inertia[MAX_ROTORS];
+    gk_gear gear[MAX_GEARS];
+    gk_engagement engagement[MAX_ENGAGEMENTS];
+    gk_port port[MAX_PORTS];
+    const double *port_residual, *port_support;
+    gk_ground ground[SETS];
+};
+
+/* r_bA + r_bB of an external engagement, r_bB − r_bA of an internal one */
+static inline double gk_base_reach(const gk_model *model, const gk_engagement *e)
+{
+    return model->gear[e->gear[1]].r_b + (e->kind == MESH_INTERNAL ? -1.0 : 1.0) * model->gear[e->gear[0]].r_b;
+}
+#endif

@@ -1,0 +1,119 @@
+/* The small problem of an engagement in one step: unknown forces of its contacts and joints (docs/theory.md, eq. 10).
+ * Closed contact, bilateral row, sticking clutch:
+ *     g + D z + Aλ + lag + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction
+ * D: what a force in the step does to the gaps; P + δ: compliance parallel to the row's own damper; A = Q − K:
+ * everything else that is quasi-static, Q, less the κ part. lag = Q f_d − ½K η_d: what the dampers' force at the end of
+ * the step, f_d = β η_d + tail, deflects; the κ part of its mean. */
+#ifndef GK_SYSTEM_H
+#define GK_SYSTEM_H
+#include "setup/gk_setup.h"
+
+enum {
+    MAX_JOINTS = 2 * JOINTS, /* of one engagement */
+    MAX_ROWS = MAX_CONTACTS + MAX_JOINTS,
+    MAX_STRIDE = (MAX_ROWS + 3) / 4 * 4,
+    KINDS = 3,    /* of compliance: D, −K, Q */
+    MAX_LOCAL = 6 /* spins that an engagement's rows read */
+};
+/* λ ≥ 0; any λ; given torque; velocity-level friction */
+typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
+
+typedef struct gk_local {
+    double c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high;
+} gk_local;
+typedef struct gk_approach {
+    double delta, slope, energy;
+} gk_approach; /* δ(λ), δ′, ∫ λ dδ */
+
+typedef struct gk_system {
+    int contacts, n, stride, strips, clutches; /* clutches are the last rows */
+    gk_row_kind kind[MAX_ROWS];
+    int port_of[MAX_ROWS], joint_of[MAX_ROWS]; /* −1 for contacts */
+    int place_of[MAX_CONTACTS];
+    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_STRIDE], dash0[MAX_STRIDE], end0[MAX_STRIDE], lag0[MAX_STRIDE];
+    double damping[MAX_STRIDE];                      /* 2c/h of the row's damper */
+    double bound[MAX_ROWS], slip[MAX_JOINTS];        /* clutch: |z| ≤ bound; z of a slipping one, by clutch */
+    double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
+    double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in joints */
+    gk_local local[MAX_PAIRS];                       /* law of a tooth pair, per metre */
+    double rigid[MAX_LOCAL][MAX_STRIDE];             /* derivative of the rows by each spin of the engagement */
+    double *D, *A, *Q;                               /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
+    double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
+                                         factor; what a damper's force does, D + ½A + (late − ½)Q */
+    double inverse[MAX_STRIDE]; /* of the pivots */
+    double path[MAX_PAIRS][MAX_BLOCK + 4],
+        spring[MAX_STRIDE]; /* P: strips of a tooth pair, (strips, strips); joints: 1/k */
+
+    double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE],
+        z[MAX_STRIDE];              /* λ, η_d, η = η_d + α·direction, λ + η */
+    unsigned char active[MAX_ROWS]; /* in the equations: closed contact, bilateral row, sticking clutch */
+    signed char clip[MAX_ROWS],
+        hold[MAX_ROWS]; /* damper: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting; its force at
+                                                   the end: 0 linear, ±1 at its limit ±λ1 */
+    double beta[MAX_STRIDE],
+        tail[MAX_STRIDE]; /* of a damper that acts: f_d = β η_d + what the last step leaves of it */
+    double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
+        held[MAX_STRIDE]; /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
+                             η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), f_d = late·η_d + rest + held·λ1 */
+    int dashpots;         /* any of them */
+    double direction[MAX_STRIDE], alpha;
+    double last[MAX_STRIDE]; /* forces at the end that the next prediction is made with */
+    double end[MAX_STRIDE],
+        begin[MAX_STRIDE]; /* f_d; mix4, whose forces are linear in the step: f_d at its start, which
+                                                  the prediction contains; else 0 */
+    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];               /* D z, Aλ, Q f_d − ½K η_d */
+    double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
+    double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at λ: δ, δ′, ∫ λ dδ; 0 in joints */
+    double slope[MAX_STRIDE];                                           /* δ′ in the tangent */
+    double stored0;   /* energy of the quasi-static part at the start of the step */
+    double held0;     /* energy that the dampers' force holds in Q at the start */
+    double owed, due; /* defect of energy that the steps before left; what of it this step should make good */
+    int rounds, limit_reached, curved;
+    double outer[MAX_STRIDE],
+        beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
+                                                     deflection at once */
+    double along[MAX_STRIDE];         /* dλ/dα */
+    unsigned char recalled[MAX_ROWS]; /* a contact that was there in the last step */
+} gk_system;
+
+/* engagements that share rotors, solved together */
+typedef struct gk_island gk_island;
+struct gk_island {
+    int count;
+    gk_system *member[MAX_ENGAGEMENTS];
+    void (*sweep)(const gk_island *island); /* solves all members, NULL: there is one */
+    void *context;
+};
+
+/* gk_solve.c */
+void gk_solve_contacts(gk_system *s);
+void gk_solve_clear(gk_system *s);
+void gk_solve_settle(gk_system *s);
+void gk_solve_status(gk_system *s);
+void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
+void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag);
+void gk_solve_path(const gk_system *s, const double *x, double *y);
+double gk_solve_stored(const gk_system *s);
+/* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the distance
+ * that is left */
+static inline double gk_solve_end_gap(const gk_system *s, int i)
+{
+    return s->g[i] + s->Dz[i] + s->lag[i] + s->outer[i];
+}
+static inline double gk_solve_mean(const gk_system *s, int i)
+{
+    return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]);
+} /* force of a row in the step */
+static inline double gk_solve_massless(const gk_system *s, int i) { return s->Al[i] + s->squeeze[i] + s->beyond[i]; }
+/* gk_tangent.c */
+void gk_tangent_factorise(gk_system *s);
+void gk_tangent_solve(const gk_system *s, double *x);
+/* gk_balance.c */
+void gk_balance_plain(const gk_island *island);
+void gk_balance_solve(const gk_island *island);
+/* gk_law.c */
+void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double curvature, gk_local *law);
+void gk_law_bounds(const gk_model *model, gk_mesh *mesh);
+gk_approach gk_law_at(const gk_local *law, double width, double force);
+void gk_law_apply(gk_system *s);
+#endif

@@ -1,0 +1,134 @@
+/* Scratch of a step: neither model nor state. And the functions that form the problem and take the step. */
+#ifndef GK_WORK_H
+#define GK_WORK_H
+#include "problem/gk_system.h"
+
+/* phases of a step, for the profile */
+enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
+enum { XA, YA, PHIA, XB, YB, PHIB, POSE }; /* poses of both gears of an engagement */
+
+typedef struct gk_place { /* a tooth pair on one flank that may touch, at the predicted poses */
+    gk_key key;
+    double gap, gradient[POSE];
+    double roll[2], curvature;      /* length of roll on each gear, 1/ρA + 1/ρB */
+    int tooth[2], number[2], flank; /* tooth of each gear: wrapped to 0 … z−1, and as counted */
+    int candidate[2];               /* its place in the tables of both sides */
+    int memory;                     /* its entry in the memory of the engagement, −1 if new */
+} gk_place;
+
+/* where a side stands in its table */
+typedef struct gk_position {
+    int node, tooth;   /* node below; reference tooth, wrapped */
+    int64_t reference; /* as counted */
+    double part;       /* 0 … 1 of the way to the next node */
+} gk_position;
+
+typedef struct gk_step_side { /* D and −K of one step h: squares of nodes and products of neighbours */
+    gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of −K */
+    double *
+        pulls; /* (nodes + 1, points, 8): what the ground oscillators' rows have in common with rigid motion x, y, rz of
+                       the gear and with the bore angle, in D, then in K */
+    double own[2][4][4]; /* the same of these four with each other */
+} gk_step_side;
+
+typedef struct gk_engaged { /* an engagement in a step */
+    gk_place place[MAX_PAIRS];
+    int places;
+    double pose[POSE]; /* predicted */
+    gk_position position[2];
+    gk_real *basis[2];       /* (contacts, n) rows of the contacts in the frame of the reference tooth */
+    double *ground;          /* (MAX_ROWS, n of ground): whole rows of contacts and joints, for steps without tables */
+    double *outward[2];      /* (contacts, width of the gear): what ground oscillators displace outward */
+    double *matrix;          /* D, A, Q, J, L, B */
+    double read[MAX_STRIDE]; /* what the rows read of the oscillators */
+    double *given_ground,
+        given_spin[3][MAX_LOCAL]; /* what the forces give to ground group (3, n) and spins: z, λ, dampers */
+    double *given_far;            /* (2, far): λ, dampers at the end */
+    gk_step_side table[2];
+    gk_system system;
+} gk_engaged;
+
+struct gk_work {
+    gk_coefficients cache[CACHE];
+    gk_coefficients explicit_rows; /* forces move nothing at once (gk_rk45.c) */
+    uint64_t clock;
+    /* of every gear group: predicted state, modal force of the rows, of the ground group the same in double */
+    gk_real *qp[MAX_GEARS], *vp[MAX_GEARS], *force[MAX_GEARS], *next[MAX_GEARS];
+    double *ground_q, *ground_v, *ground_force, *ground_next, *ground_reading,
+        *ground_start;           /* speeds after half a step of the supports' dashpots */
+    gk_real *reading[MAX_GEARS]; /* read_q q + read_v v where that is not q */
+    const gk_real *y[MAX_GEARS]; /* displacement that the rows read: qp, reading, or zero */
+    const double *ground_y;
+    gk_real *turned, *turned_next, *scaled,
+        *zero; /* states in the frame of a reference tooth; row times coefficients */
+    double *ground_scaled, *ground_zero;
+    gk_real *stage[MAX_GEARS][7], *trial[MAX_GEARS]; /* rk45, central: derivatives (v, a) and trial state (q, v) */
+    double *ground_stage[7], *ground_trial;
+    double stage_spin[7][2 * MAX_SPINS], trial_spin[2 * MAX_SPINS];
+    double spin[MAX_SPINS], speed[MAX_SPINS], moved[MAX_SPINS]; /* predicted; moved in the step */
+    int another;                                                /* this step is of another h or γ than the last */
+    double outer[MAX_PORTS], outer_before[MAX_PORTS], outer_speed[MAX_PORTS],
+        torque[MAX_PORTS];       /* outer ends of the ports at both ends of the step, torque at its end */
+    double table_h, table_gamma; /* step of the tables of D and K; 0: none yet */
+    double run_h, run_gamma;     /* γ of the internal step of the run */
+    gk_engaged *engaged;         /* (engagements) */
+    /* statics (gk_static.c): every oscillator is compliance */
+    double *rest_ground;    /* (all ground oscillators) their displacement */
+    double *rest_rows;      /* (MAX_ROWS, all ground oscillators) */
+    double *columns;        /* room for a node's rows and their products */
+    double *far, *port_far; /* sums of an island: (3, n of ground) and (2, far); (ports, far) rows of the bore angles */
+    uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
+};
+
+/* gk_flank.c */
+int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
+                  gk_position position[2], gk_place *place);
+/* gk_still.c */
+int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *still,
+                  const double *pose, gk_position position[2], gk_place *place);
+/* gk_side.c */
+size_t gk_side_scratch(const gk_model *model);
+void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
+void gk_side_fill(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which);
+void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *work, int port);
+void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
+/* gk_rows.c */
+void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
+                  double *pose);
+void gk_rows_form(const gk_model *model, const gk_setup *setup, gk_work *work, int e);
+void gk_rows_whole(const gk_model *model, const gk_setup *setup, gk_work *work, int e);
+void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
+                  double *read);
+void gk_rows_read_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                        const double *ground, double *read);
+void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
+                     const double *(*y)(const gk_system *));
+/* does a joint pull at the bore of its port's rotor? */
+static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int i)
+{
+    return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
+}
+void gk_rows_read_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                         const double *ground, double *read);
+void gk_rows_push_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                         const double *x, double *out);
+void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
+                      double *read);
+void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *x,
+                      double *out);
+/* gk_couple.c */
+typedef struct gk_coupled { /* an island in a step */
+    const gk_model *model;
+    const gk_setup *setup;
+    gk_work *work;
+    const gk_coefficients *k;
+    int island;
+} gk_coupled;
+gk_island gk_couple_island(gk_coupled *coupled);
+void gk_couple_recall(gk_coupled *coupled);
+/* gk_form.c */
+void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
+                    gk_work *work, int e);
+void gk_form_rates(const gk_model *model, const gk_setup *setup, gk_work *work, int e,
+                   const gk_real *const modal_speed[], const double *ground_speed, const double *speed, double *rate);
+#endif

@@ -1,0 +1,268 @@
+/* Outputs at the end of a communication step: forces, motions, energies, counters. */
+#include "run/gk_run.h"
+
+static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
+
+static double reported(const gk_system *s, int i) { return s->force[i] + 0.5 * s->eta[i]; }
+
+/* ---- forces ----------------------------------------------------------------------------------------------------------- */
+static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
+{
+    const gk_system *s = &engaged->system;
+    double side[2] = {0, 0}, *v = data->mesh[e];
+    int pairs = 0;
+    for (int p = 0; p < engaged->places; p++) {
+        int touches = 0;
+        for (int i = p * s->strips; i < (p + 1) * s->strips; i++) {
+            side[engaged->place[p].flank] += reported(s, i);
+            touches |= s->force[i] > 0.0;
+        }
+        pairs += touches;
+    }
+    v[V_FORCE_DRIVE] = side[0];
+    v[V_FORCE_COAST] = side[1];
+    v[V_MESH_FORCE] = side[0] - side[1];
+    v[V_PAIRS] = pairs;
+    v[V_CONTACT] = side[0] > 0.0 ? (side[1] > 0.0 ? 2 : 1) : side[1] > 0.0 ? -1 : 0;
+    v[V_IMPACTS] = (double)data->meshing[e].impacts;
+    v[V_OPEN_TIME] = data->meshing[e].open_time;
+}
+
+static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
+                          const gk_system *s)
+{
+    for (int i = s->contacts; i < s->n; i++) {
+        const int port = s->port_of[i], rotor = model->port[port].rotor;
+        const double force = reported(s, i), deflection = s->force[i] * setup->joint[port][s->joint_of[i]].compliance;
+        double *v = data->shaft[port], *angle = &data->rotor[rotor][V_GEAR_PHI];
+        switch (s->joint_of[i]) {
+        case JOINT_PORT:
+            if (s->kind[i] == ROW_TORQUE) {
+                *angle = data->angle[port];
+            } else {
+                v[V_TAU] = -force;
+                if (!model->port[port].chain) *angle = work->outer[port] - deflection;
+            }
+            break;
+        case JOINT_SHAFT:
+            v[V_SHAFT_TAU] = force;
+            *angle = data->x[gk_disc_of(model, port)] - deflection;
+            break;
+        default: v[V_CLUTCH_TAU] = -0.5 * s->z[i];
+        }
+    }
+}
+
+/* forces on the supports at the end of the step: through the dynamic oscillators, their dashpots, and what the contacts
+ * move directly */
+static void support_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                           double *out)
+{
+    const gk_base *base = &setup->base;
+    const int n = base->n, supports = model->supports;
+    const double *x = gk_ground_seen(data), *v = x + n, *f = v + n;
+    const gk_coefficients *k = gk_flow_known(work, data->state_h, data->state_gamma);
+    double moved[MAX_GROUND + 4];
+    for (int i = 0; i < n; i++) moved[i] = x[i] - k->ground.kappa[i] * f[i];
+    for (int s = 0; s < supports; s++) {
+        out[s] = n ? gk_dot_quads(base->support_rows + s * n, moved, n / 4) : 0.0;
+        if (s < model->dampers && n)
+            out[s] += model->ground[base->set].damper[s] * gk_dot_quads(base->damper_rows + s * n, v, n / 4);
+    }
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_engaged *engaged = &work->engaged[e];
+        const gk_system *system = &engaged->system;
+        for (int i = 0; i < system->contacts; i++)
+            for (int w = 0; w < 2; w++) {
+                const gk_side *side = &setup->mesh[e].side[w];
+                const gk_position *at = &engaged->position[w];
+                const double force = reported(system, i), points = side->candidates * setup->strips;
+                const int candidate = engaged->place[system->place_of[i]].candidate[w];
+                const double *low = side->support + ((size_t)at->node * (size_t)points +
+                                                     (size_t)(candidate * setup->strips + i % setup->strips)) *
+                                                        supports;
+                const double *high = low + (size_t)points * supports;
+                for (int s = 0; s < supports; s++) out[s] -= force * (low[s] + at->part * (high[s] - low[s]));
+            }
+    }
+}
+
+static void support_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, const double *force)
+{
+    for (int s = 0; s < model->supports; s++) {
+        data->support[s][V_FORCE] = force[s];
+        data->support[s][V_MOVED] = force[s] * model->ground[setup->base.set].support_compliance[s];
+    }
+}
+
+/* ---- motion ------------------------------------------------------------------------------------------------------------- */
+/* speed of the bore's node: spin and dynamic oscillators */
+static double bore_speed(const gk_model *model, const gk_setup *setup, const gk_data *data, int p)
+{
+    const int n = setup->base.n;
+    const double *v = gk_ground_seen(data) + n;
+    return data->v[model->port[p].rotor] + (n ? gk_dot_quads(v, setup->base.port_rows + p * n, n / 4) : 0.0);
+}
+
+void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data)
+{
+    for (int p = 0; p < model->ports; p++) data->v_bore[p] = bore_speed(model, setup, data, p);
+}
+
+static void port_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, int p, double h)
+{
+    double *v = data->shaft[p];
+    if (setup->given_torque[p]) {
+        v[V_PHI] = data->angle[p];
+        v[V_W] = bore_speed(model, setup, data, p);
+        v[V_A] = h > 0.0 ? (v[V_W] - data->v_bore[p]) / h : 0.0;
+    }
+    if (!model->port[p].chain) return;
+    const double inertia = data->v[gk_inertia_of(model, p)], disc = data->v[gk_disc_of(model, p)];
+    v[V_CLUTCH_LOCKED] = data->locked[p];
+    v[V_INERTIA_W] = inertia;
+    v[V_DISC_W] = disc;
+    v[V_CLUTCH_SLIP] = inertia - disc;
+}
+
+/* transmission error of an engagement, from the bores of its rotors */
+static double transmission_error(const gk_model *model, const gk_data *data, int e)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    const gk_gear *A = &model->gear[engagement->gear[0]], *B = &model->gear[engagement->gear[1]];
+    const double sense = engagement->kind == MESH_INTERNAL ? -1.0 : 1.0;
+    return A->r_b * data->rotor[A->rotor][V_GEAR_PHI] + sense * B->r_b * data->rotor[B->rotor][V_GEAR_PHI];
+}
+
+static void outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h)
+{
+    double *v = data->stage, force[MAX_SUPPORTS];
+    int dynamic = setup->base.count;
+    for (int r = 0; r < model->rotors; r++)
+        data->rotor[r][V_GEAR_W] = data->v[r], data->rotor[r][V_GEAR_PHI] = data->x[r];
+    for (int e = 0; e < model->engagements; e++) {
+        mesh_outputs(&work->engaged[e], data, e);
+        joint_outputs(model, setup, work, data, &work->engaged[e].system);
+    }
+    for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, h);
+    support_forces(model, setup, work, data, force);
+    support_outputs(model, setup, data, force);
+    for (int e = 0; e < model->engagements; e++) data->mesh[e][V_TE] = transmission_error(model, data, e);
+    for (int g = 0; g < model->gears; g++) dynamic += setup->modal[g].count;
+    v[V_WORK] = data->ledger.work;
+    v[V_DISSIPATED] = data->ledger.dissipated;
+    v[V_STEPS] = (double)data->steps;
+    v[V_ROUNDS] = (double)data->rounds;
+    v[V_TROUBLE] = (double)data->trouble;
+    const int lowered = h > 0.0 && gk_scheme_of(setup->integrator)->corrected &&
+                        gk_limit_gamma(setup, work, data, h) < 1.0;
+    v[V_STATUS] = data->status | (lowered ? STATUS_GAMMA : 0);
+    v[V_STEP_USED] = h;
+    v[V_NDYN] = dynamic;
+}
+
+/* ---- energy ---------------------------------------------------------------------------------------------------------------- */
+static double stored(const gk_model *model, const gk_work *work)
+{
+    double sum = 0.0;
+    for (int e = 0; e < model->engagements; e++) sum += gk_solve_stored(&work->engaged[e].system);
+    return sum;
+}
+
+/* stored energy and what the balance does not close, from the first step on; 0 when that is more than the model can mean */
+int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h, int first)
+{
+    double *v = data->stage;
+    if (gk_scheme_of(setup->integrator)->is_explicit) { /* keeps no account of works: no balance */
+        data->ledger.massless = stored(model, work);
+        v[V_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(model, setup, work, data, h)
+                                                   : gk_step_energy(model, setup, data, &work->explicit_rows);
+        return 1;
+    }
+    const double energy = gk_step_energy(model, setup, data,
+                                         gk_flow_for(model, setup, work, data->state_h, data->state_gamma));
+    if (first) data->ledger.baseline = energy - data->ledger.work + data->ledger.dissipated;
+    v[V_ENERGY] = energy;
+    v[V_RESIDUAL] = energy - data->ledger.baseline - data->ledger.work + data->ledger.dissipated;
+    const double there = energy + fabs(data->ledger.work) + data->ledger.dissipated;
+    return gk_finite(energy) && !(fabs(v[V_RESIDUAL]) > BROKEN * there + 1e-6);
+}
+
+/* ---- over a communication step -------------------------------------------------------------------------------------------- */
+void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
+{
+    outputs(model, setup, work, data, 0.0);
+    for (int p = 0; p < model->ports; p++) {
+        double *v = data->shaft[p];
+        v[V_TAU_MEAN] = v[V_TAU_NEXT] = v[V_TAU];
+    }
+    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = data->support[s][V_FORCE];
+    for (int e = 0; e < model->engagements; e++) {
+        double *v = data->mesh[e];
+        v[V_MESH_FORCE_MEAN] = v[V_MESH_FORCE];
+        v[V_FORCE_MAX] = gk_max(v[V_FORCE_DRIVE], v[V_FORCE_COAST]);
+        data->meshing[e].apart = v[V_CONTACT] == 0.0;
+    }
+    data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
+    for (int d = 0; d < setup->spins; d++)
+        data->stage[V_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
+}
+
+void gk_outputs_begin(const gk_model *model, const gk_data *data, gk_tally *tally)
+{
+    memset(tally, 0, sizeof *tally);
+    for (int s = 0; s < model->supports; s++) tally->last[s] = data->support[s][V_FORCE];
+}
+
+static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h, gk_tally *tally)
+{
+    const gk_system *s = &engaged->system;
+    gk_meshing *meshing = &data->meshing[e];
+    double side[2] = {0, 0};
+    int touches = 0;
+    for (int i = 0; i < s->contacts; i++) {
+        side[engaged->place[s->place_of[i]].flank] += gk_solve_mean(s, i);
+        touches |= s->force[i] > 0.0;
+    }
+    for (int i = s->contacts; i < s->n; i++)
+        if (s->joint_of[i] == JOINT_PORT) tally->port[s->port_of[i]] -= gk_solve_mean(s, i) * h;
+    tally->mesh[e] += (side[0] - side[1]) * h;
+    tally->highest[e] = gk_max(tally->highest[e], gk_max(side[0], side[1]));
+    if (touches) {
+        meshing->impacts += meshing->apart;
+        meshing->apart = 0;
+    } else {
+        meshing->apart = 1;
+        meshing->open_time += h;
+    }
+}
+
+/* one internal step */
+void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
+                      gk_tally *tally)
+{
+    double force[MAX_SUPPORTS];
+    for (int e = 0; e < model->engagements; e++) count_mesh(&work->engaged[e], data, e, h, tally);
+    support_forces(model, setup, work, data, force);
+    for (int s = 0; s < model->supports; s++) {
+        tally->support[s] += 0.5 * h * (tally->last[s] + force[s]);
+        tally->last[s] = force[s];
+    }
+}
+
+void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
+                    const gk_tally *tally)
+{
+    for (int p = 0; p < model->ports; p++)
+        if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
+    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = tally->support[s] / H;
+    for (int e = 0; e < model->engagements; e++) {
+        data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
+        data->mesh[e][V_FORCE_MAX] = tally->highest[e];
+    }
+    outputs(model, setup, work, data, h);
+    for (int p = 0; p < model->ports; p++) {
+        double *v = data->shaft[p];
+        v[V_TAU_NEXT] = 2.0 * v[V_TAU] - v[V_TAU_MEAN];
+    }
+}

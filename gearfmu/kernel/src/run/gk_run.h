@@ -1,0 +1,20 @@
+/* Communication steps and their outputs. */
+#ifndef GK_RUN_H
+#define GK_RUN_H
+#include "integrate/gk_integrate.h"
+
+typedef struct gk_tally { /* integrals over a communication step */
+    double mesh[MAX_ENGAGEMENTS], highest[MAX_ENGAGEMENTS], port[MAX_PORTS];
+    double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* last: forces on the supports at the end of the step before */
+} gk_tally;
+
+/* gk_outputs.c */
+void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
+void gk_outputs_begin(const gk_model *model, const gk_data *data, gk_tally *tally);
+void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data);
+void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
+                      gk_tally *tally);
+void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
+                    const gk_tally *tally);
+int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h, int first);
+#endif

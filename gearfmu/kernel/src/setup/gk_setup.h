@@ -1,0 +1,192 @@
+/* What is fixed once level, effects and step are chosen: dynamic oscillators, tables of rows and of compliance along the
+ * path of contact, coefficients of the joints. */
+#ifndef GK_SETUP_H
+#define GK_SETUP_H
+#include "base/gk_math.h"
+#include "model/gk_data.h"
+
+enum {
+    NODES = 88,          /* of a side's table in one pitch */
+    CACHE = 4,           /* coefficient sets kept */
+    GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
+    MAX_CANDIDATES = 14, /* tooth pairs that can be near contact at any position, both flanks */
+    MAX_BLOCK = MAX_SLICES * MAX_SLICES
+};
+
+typedef struct gk_effects {
+    int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping,
+        roll_motion;
+} gk_effects;
+
+/* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
+ * measured against it (benchmarks/effects_cost.py) */
+#ifndef GK_WITHOUT
+#define GK_WITHOUT nothing
+#endif
+enum {
+    EFFECT_nothing,
+    EFFECT_elastic,
+    EFFECT_modes,
+    EFFECT_residual,
+    EFFECT_hertz,
+    EFFECT_slices,
+    EFFECT_coast_flank,
+    EFFECT_contact_damping,
+    EFFECT_tip_relief,
+    EFFECT_tip_contact,
+    EFFECT_bearings,
+    EFFECT_modal_damping,
+    EFFECT_roll_motion,
+    EFFECT_pitch_errors
+};
+#define GK_EFFECT(name) EFFECT_##name
+#define GK_EFFECT_OF(name) GK_EFFECT(name)
+#define GK_HAS(effect) (GK_EFFECT_OF(GK_WITHOUT) != EFFECT_##effect)
+#define GK_ON(setup, effect) (GK_HAS(effect) && (setup)->on.effect)
+#define GK_LANES(setup, g) (GK_HAS(modes) && GK_HAS(elastic) ? (setup)->modal[g].n : 0)
+#define GK_STRIPS(of) (GK_HAS(slices) ? (of)->strips : 1)
+
+typedef struct gk_modal { /* dynamic modes of a gear group: n lanes, [first members | second members], padded with 0 */
+    int n, pairs, count;
+    size_t at;            /* where its state begins behind the ground group's */
+    double *omega, *zeta; /* (n) */
+    gk_real *omega2;
+    int32_t *lane;          /* (count) lane of every dynamic mode */
+    gk_real *cosine, *sine; /* (z, pairs) */
+} gk_modal;
+
+typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by rotor, each padded to quads */
+    int set, n, count;
+    int32_t *which; /* (n) their numbers in the model, −1: padding */
+    int32_t *slot;  /* (all ground oscillators of the set) place among the dynamic ones, −1: not dynamic */
+    double *omega, *zeta, *omega2;         /* (n), 0 in padding */
+    double *damper_rows;                   /* (dampers, n) */
+    double *support_rows;                  /* (supports, n): force on the support, kappa included */
+    double *port_rows;                     /* (ports, n) */
+    double *centre[MAX_GEARS];             /* (6, n): rigid motion of every gear at its mid-width */
+    int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
+} gk_base;
+
+/* One gear of an engagement on its side: rows and compliances of its candidates (teeth that may touch), at NODES + 1
+ * positions of the gear in one pitch, for the reference tooth 0; for another reference tooth the gear group's state is
+ * turned, not the rows. Between two nodes rows are linear. */
+typedef struct gk_side {
+    int gear, which;         /* which: 0 for A, 1 for B */
+    int nodes;               /* positions − 1 */
+    int first[2], count[2];  /* candidates of drive and coast flank: tooth offsets first, first + step … */
+    int step;                /* +1 or −1, so that candidates follow each other as the teeth of gear A do */
+    int candidates, columns; /* columns: points of all candidates, padded so that quads may be read from any of them */
+    double both;             /* sum of the lengths of roll of both flanks of one tooth */
+    double pitch;            /* base pitch */
+    gk_real *rows;           /* (nodes + 1, candidates, strips, n) */
+    double *ground;          /* (nodes + 1, points, width of the gear): what ground oscillators displace outward, beside
+                               rigid motion, at the nominal place of contact */
+    gk_real *residual; /* (nodes + 1, points, columns): C of what is not dynamic; points: strips of the candidates */
+    double *path;      /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
+    double *port;      /* (nodes + 1, candidates, strips): residual between flank and bore angle */
+    double *support;   /* (nodes + 1, candidates, strips, supports): force on supports beside the oscillators' */
+    gk_real *far; /* (nodes + 1, points, far): outward, of every ground oscillator that is not dynamic over Ω, then
+                               Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
+} gk_side;
+
+typedef struct gk_mesh { /* an engagement */
+    int index, island;   /* island: engagements that share rotors have one number */
+    gk_side side[2];
+    int ports, port[2];        /* ports whose rows stand in this engagement's system */
+    int spins, spin[6];        /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
+    int joint_spin[2][2];      /* inertia and disc of its ports among them, −1: none */
+    double allowance, damping; /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
+    double strip_width[MAX_SLICES], strip_term, square_low, square_high, log_low,
+        log_high; /* bounds of b² in the local law, and their ln */
+} gk_mesh;
+
+typedef struct gk_joint {
+    int live;
+    double compliance, damping; /* 1/k, c */
+} gk_joint;
+
+typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
+    gk_real *d11, *a12, *a21, *d22, *b0q, *b0v, *bq,
+        *bv;                             /* flow (d11 = a11 − 1, d22 = a22 − 1); response to the force at
+                                                             the start and at the end of the step */
+    gk_real *mobility, *read_q, *read_v; /* what a force at the end does to a gap; the gap reads read_q q + read_v v */
+    gk_real *kappa, *inverse_s2;
+    int exact; /* the first `exact` lanes of each half are exponential (κ ≠ 0) */
+} gk_flow;
+
+typedef struct gk_ground_flow { /* the same of the ground group */
+    double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
+    double *pulls;                                  /* (dampers, n) s²e/n of a dashpot */
+    double decay[MAX_SUPPORTS], mass[MAX_SUPPORTS]; /* 1 − e^(−dh/2), n = Σ s²e² */
+} gk_ground_flow;
+
+typedef struct gk_coefficients {
+    double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
+    int timeless;                                                     /* forces move nothing in the step: D = 0 */
+    int curved_read;                                                  /* mix4: the gap reads more than q */
+    gk_flow flow[MAX_GEARS];
+    gk_ground_flow ground;
+    uint64_t age;
+} gk_coefficients;
+
+typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                                    double h, double gamma);
+
+struct gk_setup {
+    uint64_t magic;
+    gk_level level;
+    gk_integrator integrator;
+    gk_effects on;
+    int slices;
+    int strips; /* contact rows of a tooth pair: slices, or half of them where both halves of the face width do the same */
+    int spins;
+    double h, gamma_at[GAMMAS];
+    double inverse_inertia[MAX_SPINS];
+    gk_joint joint[MAX_PORTS][JOINTS];
+    int chained[MAX_PORTS];      /* inertia, clutch and shaft lie between port and bore */
+    int given_torque[MAX_PORTS]; /* the port's row carries a given torque */
+    int clutches;
+    double port_own[MAX_PORTS]; /* residual of the bore angle */
+    gk_modal modal[MAX_GEARS];
+    gk_base base;
+    gk_mesh mesh[MAX_ENGAGEMENTS];
+    int islands, far; /* far: length of the rows through which residuals of different engagements meet, 0: none do */
+    gk_step_function *step; /* of the integrator, in the widest vectors of this processor */
+    size_t state_size;
+};
+
+#define GK_SETUP_MAGIC 0x32505445534b47ULL
+
+typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
+
+/* states in gk_data */
+static inline double *gk_ground_of(gk_data *data) { return data->oscillator; }
+static inline gk_real *gk_modal_of(const gk_setup *setup, gk_data *data, int g)
+{
+    return (gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
+}
+static inline const double *gk_ground_seen(const gk_data *data) { return data->oscillator; }
+static inline const gk_real *gk_modal_seen(const gk_setup *setup, const gk_data *data, int g)
+{
+    return (const gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
+}
+/* numbers of the spins of a port's chain */
+static inline int gk_inertia_of(const gk_model *model, int port)
+{
+    return model->rotors + 2 * model->port[port].chain - 2;
+}
+static inline int gk_disc_of(const gk_model *model, int port)
+{
+    return model->rotors + 2 * model->port[port].chain - 1;
+}
+
+/* gk_vars.c */
+gk_effects gk_effects_of(const gk_data *data);
+/* gk_flow.c */
+const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
+const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
+/* gk_strips.c */
+int gk_strips_count(const gk_model *model, int slices);
+void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
+void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out);
+#endif

@@ -1,0 +1,570 @@
+/* Tables of one gear of an engagement along the path of contact: rows of its dynamic modes, what its ground oscillators
+ * read, and compliance of what is not dynamic (docs/theory.md, eq. 2), for all teeth that may touch, at NODES + 1
+ * positions in one pitch. Teeth of one flank are whole base pitches apart, so one position decides all lengths of roll.
+ * A row between two nodes is linear; what a step makes of rows (D and K) then is quadratic, and is tabulated so that it
+ * is exactly the bilinear form of the interpolated rows. */
+#include "integrate/gk_integrate.h"
+
+static const double MARGIN = 0.15, CORNER = 0.5; /* base pitches beyond the ends of the flanks: play; tip corners */
+
+/* ---- which teeth ----------------------------------------------------------------------------------------------- */
+/* lengths of roll of this side between which the other side has a flank, corners included */
+static void span(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int which, double ends[2])
+{
+    const gk_gear *own = &model->gear[e->gear[which]], *other = &model->gear[e->gear[1 - which]];
+    const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
+    const double R = gk_base_reach(model, e), L = sqrt(x * x + y * y - R * R);
+    const double pitch = own->r_b * 2.0 * GK_PI / own->z, beyond = (setup->on.tip_contact ? CORNER : 0.0) + MARGIN;
+    if (e->kind == MESH_EXTERNAL) {
+        ends[0] = L - other->s_tip, ends[1] = own->s_tip;
+    } else if (which == 0) { /* the planet in the ring: s_B = L + s_A */
+        ends[0] = other->s_tip - L, ends[1] = own->s_tip;
+    } else {
+        ends[0] = own->s_tip, ends[1] = L + other->s_tip;
+    }
+    ends[0] -= beyond * pitch, ends[1] += beyond * pitch;
+}
+
+static double roll_at(const gk_side *side, int flank, double position, int offset)
+{
+    const double roll = (position + offset) * side->pitch;
+    return flank ? side->both - roll : roll;
+}
+
+void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_side *side, int which)
+{
+    const gk_engagement *e = &model->engagement[index];
+    const gk_gear *gear = &model->gear[e->gear[which]];
+    memset(side, 0, sizeof *side);
+    side->gear = e->gear[which], side->which = which;
+    side->nodes = 1, side->candidates = side->count[0] = 1;
+    side->step = which == 1 && e->kind == MESH_EXTERNAL ? -1 : 1;
+    side->pitch = 1.0;
+    if (e->kind == MESH_FLAT) return;
+    const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
+    const double a = sqrt(x * x + y * y), R = gk_base_reach(model, e);
+    double ends[2];
+    side->nodes = NODES;
+    side->pitch = gear->r_b * 2.0 * GK_PI / gear->z;
+    side->both = 2.0 * gear->r_b * (gear->psi_b + gk_acos(R / a));
+    span(model, setup, e, which, ends);
+    side->candidates = 0;
+    for (int flank = 0; flank < 2; flank++) {
+        side->count[flank] = 0;
+        for (int k = -gear->z; k <= gear->z && side->candidates < MAX_CANDIDATES; k++) {
+            const int offset = side->step * k;
+            const double begin = roll_at(side, flank, 0.0, offset), end = roll_at(side, flank, 1.0, offset);
+            if (gk_max(begin, end) < ends[0] || gk_min(begin, end) > ends[1]) continue;
+            if (!side->count[flank]) side->first[flank] = offset;
+            side->count[flank]++, side->candidates++;
+        }
+    }
+}
+
+/* ---- one node ---------------------------------------------------------------------------------------------------- */
+typedef struct place { /* a candidate's strip at a node */
+    int flank, offset, index;
+    double weight[4], nominal, roll; /* length of roll on the line of action; where contact is */
+} place;
+
+typedef struct node { /* what a node's tables are made from */
+    const gk_model *model;
+    const gk_setup *setup;
+    const gk_engagement *e;
+    const gk_gear *gear;
+    const gk_side *side;
+    int points; /* candidates × strips */
+    place at[MAX_CANDIDATES];
+    gk_strip_weights weight;
+    double *rows;        /* (points, modes): all stored modes, tooth offset included */
+    double *ground;      /* (points, reads): outward, rigid motion included, of every ground oscillator */
+    double *rigid;       /* (points, reads): the part of it that is rigid motion */
+    double *support;     /* (points, supports): C_fs */
+    double *port;        /* (points) */
+    double *flexibility; /* (modes) 1/ω² of the dynamic ones */
+    int port_of;         /* port of this gear's rotor, −1: none */
+} node;
+
+static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
+
+size_t gk_side_scratch(const gk_model *model)
+{
+    size_t modes = 0, reads = 0;
+    for (int g = 0; g < model->gears; g++) {
+        modes = modes > (size_t)model->gear[g].modes ? modes : (size_t)model->gear[g].modes;
+        for (int s = 0; s < model->sets; s++)
+            reads = reads > (size_t)model->gear[g].ground[s].reads ? reads : (size_t)model->gear[g].ground[s].reads;
+    }
+    const size_t of_node = points_of(model) * (modes + 2 * reads + (size_t)model->supports + 1) + modes;
+    const size_t of_step = 4 * points_of(model) * (modes + LANES);
+    return of_node > of_step ? of_node : of_step;
+}
+
+static void grid(const gk_model *model, const gk_gear *gear, place *p)
+{ /* cubic convolution (Keys 1981, a = −½): exact for parabolas; quadratic extrapolation gives the points at the ends */
+    const double low = gk_min(gear->s_form, gear->s_tip), high = gk_max(gear->s_form, gear->s_tip);
+    const double share = (gk_clamp(p->roll, low, high) - gear->s_form) / (gear->s_tip - gear->s_form);
+    const double u = share * (model->rolls - 1);
+    const int cell = (int)u < model->rolls - 2 ? (int)u : model->rolls - 2;
+    const double x = u - cell, x2 = x * x, x3 = x2 * x;
+    const double k[4] = {-0.5 * x + x2 - 0.5 * x3, 1.0 - 2.5 * x2 + 1.5 * x3, 0.5 * x + 2.0 * x2 - 1.5 * x3,
+                         -0.5 * x2 + 0.5 * x3};
+    double *w = p->weight;
+    p->index = (int)gk_clamp(cell - 1, 0, model->rolls - 4);
+    for (int i = 0; i < 4; i++) w[i] = k[i];
+    if (cell == 0) { /* f(−1) = 3 f0 − 3 f1 + f2 */
+        w[0] = k[1] + 3.0 * k[0], w[1] = k[2] - 3.0 * k[0], w[2] = k[3] + k[0], w[3] = 0.0;
+    } else if (cell == model->rolls - 2) {
+        w[3] = k[2] + 3.0 * k[3], w[2] = k[1] - 3.0 * k[3], w[1] = k[0] + k[3], w[0] = 0.0;
+    }
+}
+
+/* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
+static void blend(const node *n, const double *table, const place *p, int strip, int width, double *out)
+{
+    const int A = n->model->functions;
+    const double *t = table + (size_t)((p->flank * n->model->rolls + p->index) * A) * width;
+    for (int k = 0; k < width; k++) out[k] = 0.0;
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < A; a++, t += width) {
+            const double w = p->weight[i] * n->weight[strip][a];
+            for (int k = 0; k < width; k++) out[k] += w * t[k];
+        }
+}
+
+static void turn_row(const gk_gear *gear, int offset, double *row)
+{
+    for (int k = 0; k < gear->modes; k++) {
+        double sine, cosine;
+        const int64_t turned = (int64_t)gear->diameter[k] * offset % gear->z;
+        gk_sincos(2.0 * GK_PI * (double)turned / gear->z, &sine, &cosine);
+        if (gear->member[k] == 1) {
+            const double a = row[k], b = row[k + 1];
+            row[k] = a * cosine - b * sine;
+            row[k + 1] = a * sine + b * cosine;
+            k++;
+        } else {
+            row[k] *= cosine;
+        }
+    }
+}
+
+/* direction of the tooth and of its outward normal in ground axes, at the nominal place of contact */
+static void directions(const node *n, const place *p, double *angle, double *nx, double *ny)
+{
+    const gk_engagement *e = n->e;
+    const double dx = e->position[1][0] - e->position[0][0], dy = e->position[1][1] - e->position[0][1];
+    const double R = gk_base_reach(n->model, e), sg = p->flank ? -1.0 : 1.0;
+    double sine, cosine, t = gk_atan2(dy, dx);
+    if (e->kind == MESH_INTERNAL) t = gk_atan2(-dy, -dx);
+    t -= sg * gk_acos(R / sqrt(dx * dx + dy * dy));
+    gk_sincos(t, &sine, &cosine);
+    const double out = n->side->which == 0 ? sg : -sg;
+    *nx = -out * sine, *ny = out * cosine;
+    const double base = e->kind == MESH_EXTERNAL && n->side->which == 1 ? t + GK_PI : t;
+    *angle = base + sg * (p->nominal / n->gear->r_b - n->gear->psi_b);
+}
+
+/* what the ground oscillators of the gear move at a point, outward; C_fs there */
+static void ground_point(const node *n, const place *p, int strip, double *row, double *rigid, double *support)
+{
+    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
+    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
+    double angle, nx, ny, trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
+    directions(n, p, &angle, &nx, &ny);
+    gk_sincos(angle, &trig[2], &trig[1]);
+    const int ring = n->e->kind == MESH_INTERNAL && n->side->which == 1;
+    const double *centre = n->gear->ground[set].centre, arm = (p->flank == ring ? 1.0 : -1.0) * n->gear->r_b;
+    for (int k = 0; k < reads; k++)
+        row[k] = rigid[k] = nx * centre[k] + ny * centre[reads + k] + arm * centre[5 * reads + k];
+    for (int s = 0; s < supports; s++) support[s] = 0.0;
+    for (int c = 0; c < 3; c++) {
+        blend(n, n->gear->ground[set].rows + c * size * reads, p, strip, reads, part);
+        for (int k = 0; k < reads; k++) row[k] += trig[c] * part[k];
+        blend(n, n->gear->support_residual + c * size * supports, p, strip, supports, part);
+        for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
+    }
+}
+
+/* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
+ * action (docs/theory.md, eq. 6, with the gap closed) */
+static double corner_roll(const node *n, const place *p)
+{
+    const gk_engagement *e = n->e;
+    const gk_gear *tip = &n->model->gear[e->gear[1 - n->side->which]];
+    const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
+    const double a = sqrt(x * x + y * y), R = gk_base_reach(n->model, e), roll = sqrt(a * a - R * R) - p->nominal;
+    if (e->kind != MESH_EXTERNAL || !n->setup->on.tip_contact || roll <= tip->s_tip) return p->nominal;
+    const double sg = p->flank ? -1.0 : 1.0, angle = sg * (roll / tip->r_b - gk_acos(R / a) - tip->corner_angle);
+    double sine, cosine;
+    gk_sincos(angle, &sine, &cosine);
+    const double dx = tip->corner_radius * cosine - a, dy = tip->corner_radius * sine;
+    const double l2 = dx * dx + dy * dy - n->gear->r_b * n->gear->r_b;
+    return l2 > 0.0 ? sqrt(l2) - tip->edge : 0.0;
+}
+
+static void gather_node(node *n, double position)
+{
+    const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
+    double ports[MAX_PORTS];
+    for (int c = 0; c < n->side->candidates; c++) {
+        place *p = &n->at[c];
+        p->flank = c >= n->side->count[0];
+        p->offset = n->side->first[p->flank] + n->side->step * (p->flank ? c - n->side->count[0] : c);
+        p->nominal = n->e->kind == MESH_FLAT ? n->gear->s_form : roll_at(n->side, p->flank, position, p->offset);
+        p->roll = corner_roll(n, p);
+        grid(n->model, n->gear, p);
+        for (int s = 0; s < strips; s++) {
+            const int i = c * strips + s;
+            blend(n, n->gear->rows, p, s, modes, n->rows + (size_t)i * modes);
+            if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
+            blend(n, n->gear->port_residual, p, s, n->model->ports, ports);
+            n->port[i] = n->port_of >= 0 ? ports[n->port_of] : 0.0;
+            if (n->e->kind != MESH_FLAT)
+                ground_point(n, p, s, n->ground + (size_t)i * n->gear->ground[set].reads,
+                             n->rigid + (size_t)i * n->gear->ground[set].reads,
+                             n->support + (size_t)i * n->model->supports);
+        }
+    }
+}
+
+/* ---- compliance of what is not dynamic --------------------------------------------------------------------------- */
+static double dot(const double *a, const double *b, int n)
+{
+    double lane[4] = {0, 0, 0, 0};
+    int k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
+    for (; k < n; k++) lane[0] += a[k] * b[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+
+/* Σ a_k b_k/ω² over modes below `dynamic` */
+static double carried(const node *n, int i, int j, int dynamic)
+{
+    const double *a = n->rows + (size_t)i * n->gear->modes, *b = n->rows + (size_t)j * n->gear->modes;
+    double lane[4] = {0, 0, 0, 0};
+    for (int k = 0; k < dynamic; k++) lane[k % 4] += a[k] * b[k] * n->flexibility[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+
+/* stored compliance of the free body between two candidates, (strips, strips); 0 when they are too far apart for the
+ * table: what stored modes carry is all there is then */
+static int tabulated(const node *n, const place *p, const place *q, double *out)
+{
+    const int A = n->model->functions, R = n->model->rolls, offset = q->offset - p->offset, strips = n->setup->strips;
+    double cell[MAX_FUNCTIONS * MAX_FUNCTIONS] = {0};
+    for (int c = 0; c < strips * strips; c++) out[c] = 0.0;
+    if (offset < -(OFFSETS / 2) || offset > OFFSETS / 2) return 0;
+    const double *table = n->gear->residual + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + OFFSETS / 2) *
+                                                  (size_t)(R * R * A * A);
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) {
+            const double w = p->weight[i] * q->weight[j], *t = table + ((p->index + i) * R + q->index + j) * A * A;
+            for (int c = 0; c < A * A; c++) cell[c] += w * t[c];
+        }
+    for (int s = 0; s < strips; s++)
+        for (int t = 0; t < strips; t++)
+            for (int a = 0; a < A; a++) out[s * strips + t] += n->weight[s][a] * dot(cell + a * A, n->weight[t], A);
+    return 1;
+}
+
+/* −C_fs κ C_sf + Σ W Wᵀ/Ω² over the ground oscillators that are not dynamic, between two points */
+static double through_ground(const node *n, int i, int j, const double *still)
+{
+    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
+    const double *kappa = n->model->ground[set].kappa, *a = n->support + (size_t)i * supports;
+    const double *x = n->ground + (size_t)i * reads, *y = n->ground + (size_t)j * reads;
+    double sum = 0.0;
+    for (int s = 0; s < supports; s++)
+        if (a[s] != 0.0) sum -= a[s] * dot(kappa + s * supports, n->support + (size_t)j * supports, supports);
+    for (int k = 0; k < reads; k++) sum += x[k] * y[k] * still[k];
+    return sum;
+}
+
+/* 1/Ω² of the ground oscillators that the gear reads and that are not dynamic, 0 of the others */
+static void flexibility_of_still(const node *n, double *still)
+{
+    const gk_base *base = &n->setup->base;
+    const int32_t *list = n->gear->ground[base->set].list;
+    for (int k = 0; k < n->gear->ground[base->set].reads; k++) {
+        const double omega = n->model->ground[base->set].omega[list[k]];
+        still[k] = base->slot[list[k]] >= 0 ? 0.0 : 1.0 / (omega * omega);
+    }
+}
+
+/* the residual between two candidates, and of a tooth with itself what no stored mode carries: what its damper is
+ * parallel to */
+static void store_block(const node *n, int at, const double *still, int p, int q)
+{
+    const gk_side *side = n->side;
+    const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
+    gk_real *table = side->residual + (size_t)at * n->points * side->columns;
+    double cell[MAX_BLOCK];
+    const int near = tabulated(n, &n->at[p], &n->at[q], cell);
+    for (int c = 0; c < square; c++) {
+        const int i = p * strips + c / strips, j = q * strips + c % strips;
+        const double stored = carried(n, i, j, n->gear->modes);
+        if (p == q) side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
+        const double all = near ? cell[c] : stored;
+        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, i, j, still);
+        const gk_real value = (gk_real)(all - carried(n, i, j, dynamic) + ground);
+        table[(size_t)i * side->columns + j] = table[(size_t)j * side->columns + i] = value;
+    }
+}
+
+static void store_residual(const node *n, int at, const double *still)
+{
+    for (int p = 0; p < n->side->candidates; p++)
+        for (int q = p; q < n->side->candidates; q++) store_block(n, at, still, p, q);
+}
+
+/* flank to bore angle and to supports, beside what dynamic oscillators carry */
+static void store_joints(const node *n, int at, const double *still)
+{
+    const gk_side *side = n->side;
+    const gk_base *base = &n->setup->base;
+    const int points = n->points, supports = n->model->supports, reads = n->gear->ground[base->set].reads;
+    const int32_t *list = n->gear->ground[base->set].list;
+    const gk_ground *ground = &n->model->ground[base->set];
+    double moved[MAX_SUPPORTS];
+    for (int i = 0; i < points; i++) {
+        const double *row = n->ground + (size_t)i * reads, *fs = n->support + (size_t)i * supports;
+        double turned = n->port[i];
+        for (int s = 0; s < supports; s++) moved[s] = fs[s];
+        for (int k = 0; k < reads; k++) {
+            const double w = row[k] * still[k];
+            if (w == 0.0) continue;
+            for (int s = 0; s < supports; s++) moved[s] += w * ground->support_rows[s * ground->n + list[k]];
+            if (n->port_of >= 0) turned += w * ground->port_rows[n->port_of * ground->n + list[k]];
+        }
+        for (int s = 0; s < supports; s++) {
+            const double *kappa = ground->kappa + s * supports;
+            side->support[((size_t)at * points + i) * supports + s] = dot(kappa, moved, supports);
+            if (n->port_of >= 0) turned -= fs[s] * dot(kappa, n->model->port_support + n->port_of * supports, supports);
+        }
+        side->port[(size_t)at * points + i] = turned;
+    }
+}
+
+static void store_rows(const node *n, int at)
+{
+    const gk_side *side = n->side;
+    const gk_modal *m = &n->setup->modal[side->gear];
+    for (int i = 0; i < n->points; i++) {
+        gk_real *to = side->rows + ((size_t)at * n->points + i) * m->n;
+        memset(to, 0, (size_t)m->n * sizeof *to);
+        for (int k = 0; k < m->count; k++) to[m->lane[k]] = (gk_real)n->rows[(size_t)i * n->gear->modes + k];
+    }
+}
+
+/* rows of the dynamic ground oscillators without the rigid motion, which the gap reads */
+static void store_ground(const node *n, int at)
+{
+    const gk_side *side = n->side;
+    const gk_base *base = &n->setup->base;
+    const int reads = n->gear->ground[base->set].reads, from = base->from[side->gear], width = base->width[side->gear];
+    const int32_t *list = n->gear->ground[base->set].list;
+    for (int i = 0; i < n->points; i++) {
+        double *to = side->ground + ((size_t)at * n->points + i) * width;
+        const double *row = n->ground + (size_t)i * reads, *rigid = n->rigid + (size_t)i * reads;
+        memset(to, 0, (size_t)width * sizeof *to);
+        for (int k = 0; k < reads; k++)
+            if (base->slot[list[k]] >= 0) to[base->slot[list[k]] - from] = row[k] - rigid[k];
+    }
+}
+
+/* Lᵀ x of the supports, κ = L Lᵀ (Cholesky, lower; a support that does not act has an empty row) */
+static void press_supports(const gk_model *model, int set, const double *x, double *out)
+{
+    const int n = model->supports;
+    double L[MAX_SUPPORTS * MAX_SUPPORTS];
+    memcpy(L, model->ground[set].kappa, (size_t)(n * n) * sizeof *L);
+    gk_limit_cholesky(L, n);
+    for (int j = 0; j < n; j++) {
+        out[j] = 0.0;
+        for (int i = j; i < n; i++) out[j] += L[i * n + j] * x[i];
+    }
+}
+
+/* rows through which other engagements of the island meet this one's residual */
+static void store_far(const node *n, int at, const double *still)
+{
+    const gk_side *side = n->side;
+    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, all = n->model->ground[set].n;
+    const int32_t *list = n->gear->ground[set].list;
+    double pressed[MAX_SUPPORTS];
+    for (int i = 0; i < n->points; i++) {
+        gk_real *to = side->far + ((size_t)at * n->points + i) * n->setup->far;
+        memset(to, 0, (size_t)n->setup->far * sizeof *to);
+        for (int k = 0; k < reads; k++) to[list[k]] = (gk_real)(n->ground[(size_t)i * reads + k] * sqrt(still[k]));
+        press_supports(n->model, set, n->support + (size_t)i * n->model->supports, pressed);
+        for (int s = 0; s < n->model->supports; s++) to[all + s] = (gk_real)pressed[s];
+    }
+}
+
+/* the same of a bore's angle */
+void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *work, int port)
+{
+    const gk_base *base = &setup->base;
+    const gk_ground *ground = &model->ground[base->set];
+    double *to = work->port_far + (size_t)port * setup->far;
+    for (int k = 0; k < ground->n; k++)
+        to[k] = base->slot[k] >= 0 || !setup->on.residual ? 0.0
+                                                          : ground->port_rows[port * ground->n + k] / ground->omega[k];
+    press_supports(model, base->set, model->port_support + port * model->supports, to + ground->n);
+    for (int s = 0; s < model->supports && !setup->on.residual; s++) to[ground->n + s] = 0.0;
+}
+
+/* ---- all of them -------------------------------------------------------------------------------------------------- */
+static node begin_node(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
+{
+    node n = {
+        .model = model, .setup = setup, .e = &model->engagement[e], .gear = &model->gear[side->gear], .side = side};
+    const size_t most = points_of(model), reads = (size_t)n.gear->ground[setup->base.set].reads;
+    n.points = side->candidates * setup->strips;
+    n.rows = room, room += most * (size_t)n.gear->modes;
+    n.ground = room, room += most * reads;
+    n.rigid = room, room += most * reads;
+    n.support = room, room += most * (size_t)model->supports;
+    n.port = room, room += most;
+    n.flexibility = room;
+    n.port_of = -1;
+    for (int p = 0; p < model->ports; p++)
+        if (model->port[p].rotor == n.gear->rotor) n.port_of = p;
+    for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
+    gk_strips_rows(model, setup, n.e, side->gear, n.weight);
+    return n;
+}
+
+/* tables of a side that the level decides */
+void gk_side_fill(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which)
+{
+    const gk_side *side = &setup->mesh[e].side[which];
+    node n = begin_node(model, setup, work->columns, e, side);
+    double still[MAX_GROUND];
+    const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
+    flexibility_of_still(&n, still);
+    for (int at = 0; at <= side->nodes; at++) {
+        gather_node(&n, (double)at / side->nodes);
+        store_rows(&n, at);
+        if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
+        if (setup->on.residual) store_residual(&n, at, still);
+        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, still);
+        if (setup->far && setup->on.residual) store_far(&n, at, still);
+    }
+    if (!setup->on.elastic || n.e->kind == MESH_FLAT)
+        memset(side->ground, 0, nodes * points * (size_t)setup->base.width[side->gear] * sizeof *side->ground);
+    if (!setup->on.residual) {
+        memset(side->residual, 0, nodes * points * (size_t)side->columns * sizeof(gk_real));
+        memset(side->path, 0, nodes * points * (size_t)setup->strips * sizeof *side->path);
+    }
+    if (!setup->on.residual) memset(side->far, 0, nodes * points * (size_t)setup->far * sizeof *side->far);
+    if (!setup->on.residual || n.e->kind == MESH_FLAT) {
+        memset(side->port, 0, nodes * points * sizeof *side->port);
+        memset(side->support, 0, nodes * points * (size_t)model->supports * sizeof *side->support);
+    }
+}
+
+/* Σ a b over modes between all points: rows of one node, and mixed with those of the next (NULL: none) */
+static void store_products(const gk_side *side, const gk_real *scaled, const gk_real *rows, const gk_real *next_scaled,
+                           const gk_real *next, int n, int points, double sign, gk_real *out)
+{
+    const size_t columns = (size_t)side->columns;
+    for (int i = 0; i < points; i++)
+        for (int j = i; j < points; j++) {
+            const size_t a = (size_t)i * n, b = (size_t)j * n, here = (size_t)i * 4 * columns + j,
+                         mirrored = (size_t)j * 4 * columns + i;
+            double mixed = 0.0;
+            if (next) mixed = gk_dot(scaled + a, next + b, n) + gk_dot(next_scaled + a, rows + b, n);
+            out[here] = out[mirrored] = (gk_real)(sign * gk_dot(scaled + a, rows + b, n));
+            out[here + columns] = out[mirrored + columns] = (gk_real)(sign * mixed);
+        }
+}
+
+static void scale_rows(const gk_real *rows, const gk_real *by, int points, int n, gk_real *out)
+{
+    for (int i = 0; i < points; i++)
+        for (int k = 0; k < n; k++) out[(size_t)i * n + k] = rows[(size_t)i * n + k] * by[k];
+}
+
+/* Σ over the gear's part of the ground group of two rows, each oscillator weighed */
+static double weighed(const double *a, const double *b, const double *by, int n)
+{
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) sum += a[i] * b[i] * by[i];
+    return sum;
+}
+
+/* rigid motion x, y, rz of the gear and the angle of its bore, per oscillator of the gear's part */
+static void common_rows(const gk_model *model, const gk_setup *setup, const gk_side *side, const double *rows[4])
+{
+    static const double nothing[MAX_GROUND + 4 * MAX_ROTORS];
+    const gk_base *base = &setup->base;
+    const double *centre = base->centre[side->gear] + base->from[side->gear];
+    rows[0] = centre, rows[1] = centre + base->n, rows[2] = centre + 5 * base->n, rows[3] = nothing;
+    for (int p = 0; p < model->ports; p++)
+        if (model->port[p].rotor == model->gear[side->gear].rotor)
+            rows[3] = base->port_rows + p * base->n + base->from[side->gear];
+}
+
+/* adds the ground group to the products of a node: rows with rows, and rows with what the gap reads as rigid motion */
+static void add_ground_products(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
+                                gk_step_side *table, const gk_side *side, int at)
+{
+    const int from = setup->base.from[side->gear], width = setup->base.width[side->gear];
+    const int points = side->candidates * setup->strips;
+    const size_t columns = (size_t)side->columns, size = (size_t)points * 4 * columns;
+    const double *rows = side->ground + (size_t)at * points * width, *common[4];
+    const double *next = at < side->nodes ? rows + points * width : NULL;
+    gk_real *out = table->moves + (size_t)at * size;
+    common_rows(model, setup, side, common);
+    for (int kind = 0; kind < 2; kind++) {
+        const double *by = (kind ? k->ground.kappa : k->ground.mobility) + from, sign = kind ? -1.0 : 1.0;
+        for (int i = 0; i < points; i++) {
+            const double *a = rows + i * width;
+            gk_real *to = out + ((size_t)i * 4 + 2 * (size_t)kind) * columns;
+            for (int j = 0; j < points; j++) {
+                const double *b = rows + j * width;
+                to[j] += (gk_real)(sign * weighed(a, b, by, width));
+                if (next)
+                    to[columns + j] += (gk_real)(sign * (weighed(a, next + j * width, by, width) +
+                                                         weighed(next + i * width, b, by, width)));
+            }
+            for (int c = 0; c < 4; c++)
+                table->pulls[((size_t)at * points + i) * 8 + 4 * kind + c] = weighed(a, common[c], by, width);
+        }
+        for (int c = 0; c < 4; c++)
+            for (int d = 0; d < 4; d++) table->own[kind][c][d] = weighed(common[c], common[d], by, width);
+    }
+}
+
+/* D and −K of a step on both sides of an engagement */
+static void fill_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e,
+                      int which)
+{
+    const gk_side *side = &setup->mesh[e].side[which];
+    const int n = GK_LANES(setup, side->gear);
+    const size_t points = (size_t)(side->candidates * setup->strips), size = points * 4 * (size_t)side->columns;
+    const gk_real *const by[2] = {k->flow[side->gear].mobility, k->flow[side->gear].kappa};
+    gk_real *scaled = (gk_real *)work->columns, *next_scaled = scaled + points * (size_t)n;
+    for (int at = 0; at <= side->nodes; at++) {
+        const gk_real *rows = side->rows + (size_t)at * points * n, *next = at < side->nodes ? rows + points * n : NULL;
+        for (int kind = 0; kind < 2; kind++) {
+            gk_real *out = work->engaged[e].table[which].moves + (size_t)at * size +
+                           2 * (size_t)kind * (size_t)side->columns;
+            scale_rows(rows, by[kind], (int)points, n, scaled);
+            if (next) scale_rows(next, by[kind], (int)points, n, next_scaled);
+            store_products(side, scaled, rows, next_scaled, next, n, (int)points, kind ? -1.0 : 1.0, out);
+        }
+        add_ground_products(model, setup, k, &work->engaged[e].table[which], side, at);
+    }
+}
+
+void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k)
+{
+    for (int e = 0; e < model->engagements; e++)
+        for (int which = 0; which < 2; which++) fill_step(model, setup, work, k, e, which);
+    work->table_h = k->h;
+    work->table_gamma = k->gamma;
+}

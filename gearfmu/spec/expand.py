@@ -1,0 +1,45 @@
+"""Builders: a pair file in the terms of any stage."""
+
+from __future__ import annotations
+
+from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, PlacedPort, RotorSpec, ShaftBody, SupportSpec
+from gearfmu.spec.stage import StageSpec
+
+
+def expand_pair(spec: StageSpec) -> GeneralStage:
+    """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
+    the origin, wheel on +x."""
+    pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
+    angles = {key: getattr(pair, key) for key in ("normal_module", "pressure_angle", "helix_angle")}
+    pinion, wheel = spec.gears
+    bodies: dict[str, GearBody | ShaftBody] = {}
+    for gear in spec.gears:
+        known = {name: getattr(gear, name) for name in GearSpec.model_fields} | {"bearing": None}
+        bodies[gear.name] = GearBody(**known, **angles)
+    return GeneralStage(
+        name=spec.name,
+        description=spec.description,
+        source=spec.source,
+        slices=spec.contact.slices,
+        bodies=bodies,
+        rotors={g.name: RotorSpec(axis=axis, bodies={g.name: 0.0}) for g, axis in zip(spec.gears, axes, strict=True)},
+        engagements=(
+            EngagementSpec(
+                name="mesh",
+                gears=(pinion.name, wheel.name),
+                backlash=pair.backlash,
+                damping=spec.contact.damping,
+                torque_max=spec.torque_max,
+                speed_max=spec.speed_max,
+            ),
+        ),
+        supports=tuple(
+            SupportSpec(
+                name=gear.name, body=gear.name, radial=gear.bearing.stiffness, damping_ratio=gear.bearing.damping_ratio
+            )
+            for gear in spec.gears
+        ),
+        ports={g.name: PlacedPort(**dict(spec.ports[g.name]), body=g.name) for g in spec.gears},
+        levels=spec.levels,
+    )

@@ -1,0 +1,196 @@
+"""A stage of any kind: bodies, rotors on parallel axes, engagements, supports and ports.
+
+All axes are parallel to z. A place on an axis is its z in the stage; a gear's own place is its mid-width, a shaft's its
+beginning.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
+from gearfmu.spec.gear import Bearing, GearSpec, Length, Material, Ratio, Size
+from gearfmu.spec.ports import Frequency, LevelSpec, PortSpec
+
+Place = Annotated[float, Quantity("m")]
+Spring = Annotated[float, Quantity("N/m", above=0, words=("rigid",))]
+TiltSpring = Annotated[float, Quantity("N*m/rad", above=0, words=("rigid",))]
+
+
+class GearBody(GearSpec):
+    """A toothed body: a GearSpec with its basic rack's module and angles; what holds it stands in `supports`."""
+
+    kind: Literal["gear"] = Field(default="gear", description="kind of body")
+    normal_module: Length = Field(description="normal module m_n")
+    pressure_angle: Annotated[float, Quantity("rad", above=0.17, below=0.62)] = Field(
+        description="normal pressure angle of the basic rack"
+    )
+    helix_angle: Annotated[float, Quantity("rad", at_least=0, at_most=0)] = Field(
+        default=0.0, description="helix angle; only spur gears so far"
+    )
+    bearing: Bearing | None = Field(default=None, description="not here: write [[supports]]")  # type: ignore[assignment]
+
+    @field_validator("bearing")
+    @classmethod
+    def _held_elsewhere(cls, value: Any) -> Any:
+        if value is not None:
+            raise refuse("a body of a general stage has no bearing of its own: write it under [[supports]]")
+        return value
+
+
+class ShaftSection(Spec):
+    """A cylinder of a shaft."""
+
+    length: Length = Field(description="length along the axis")
+    outer_diameter: Length = Field(description="outer diameter")
+    bore_diameter: Size = Field(default=0.0, description="diameter of the bore; 0: solid")
+
+    @model_validator(mode="after")
+    def _hollow(self) -> ShaftSection:
+        if self.bore_diameter >= self.outer_diameter:
+            raise refuse("the bore is not smaller than the outer diameter: make it smaller")
+        return self
+
+
+class ShaftBody(Spec):
+    """A shaft: a Timoshenko beam of cylinders, from its place in +z."""
+
+    name: Name = Field(description="name of the shaft")
+    kind: Literal["shaft"] = Field(description="kind of body")
+    sections: Annotated[tuple[ShaftSection, ...], Field(min_length=1)] = Field(description="cylinders, in order")
+    material: Material = Field(description="material")
+    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    stored_to: Frequency = Field(default=150e3, description="modes below are stored, the others are static")
+
+    @property
+    def length(self) -> float:
+        """m."""
+        return sum(section.length for section in self.sections)
+
+
+class RotorSpec(Spec):
+    """Bodies that turn together about one axis."""
+
+    axis: tuple[Place, Place] = Field(description="x and y of the axis")
+    bodies: Annotated[dict[Name, Place], Field(min_length=1)] = Field(
+        description="place of every body along the axis: mid-width of a gear, beginning of a shaft"
+    )
+
+
+class EngagementSpec(Spec):
+    """Two gears in mesh."""
+
+    name: Name = Field(description="name of the mesh")
+    gears: tuple[Name, Name] = Field(description="gear A, gear B")
+    backlash: Size = Field(
+        description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
+    )
+    damping: Annotated[float, Quantity("N*s/m^2", at_least=0)] = Field(
+        description="contact damping per metre of face width"
+    )
+    torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest torque on gear A")
+    speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
+
+
+class SupportSpec(Spec):
+    """A spring between a body and the ground, or two bodies: a bearing, a seat. Directions without stiffness are
+    free."""
+
+    name: Name = Field(description="name of the support")
+    body: Name = Field(description="body that is held")
+    to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
+    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+    radial: Spring | None = Field(default=None, description="stiffness along x and y")
+    axial: Spring | None = Field(default=None, description="stiffness along the axis")
+    tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
+    torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
+    damping_ratio: Ratio = Field(
+        default=0.03, description="damping ratio D: c = 2 D sqrt(k m), m: mass of the rotor, or its moment of inertia"
+    )
+
+    @model_validator(mode="after")
+    def _holds(self) -> SupportSpec:
+        if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion)):
+            raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
+        if self.to is None and self.torsion is not None:
+            raise refuse("a support on the ground cannot hold the rotor's spin: take torsion away, or write a port")
+        return self
+
+
+class PlacedPort(PortSpec):
+    """A port and where it meets its rotor."""
+
+    body: Name = Field(description="body whose node is the port")
+    at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+
+
+class GeneralStage(Spec):
+    """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file."""
+
+    name: Name = Field(description="name of the stage, also of its FMU")
+    description: Text = Field(default="", description="one line about the stage")
+    source: Path
+    kind: Literal["general"] = Field(default="general", description="kind of stage")
+    slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
+    bodies: dict[Name, Annotated[GearBody | ShaftBody, Field(discriminator="kind")]] = Field(
+        description="bodies by name"
+    )
+    rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
+    engagements: Annotated[tuple[EngagementSpec, ...], Field(min_length=1)] = Field(description="meshes")
+    supports: tuple[SupportSpec, ...] = Field(default=(), description="bearings and seats")
+    ports: dict[Name, PlacedPort] = Field(description="ports by name")
+    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+
+    @field_validator("bodies", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        return {
+            name: {"kind": "gear"} | body | {"name": name} if isinstance(body, dict) else body
+            for name, body in value.items()
+        }
+
+    @property
+    def gears(self) -> tuple[GearBody, ...]:
+        """Toothed bodies in the order of the file: the kernel's gear numbers."""
+        return tuple(body for body in self.bodies.values() if isinstance(body, GearBody))
+
+    @property
+    def planar(self) -> bool:
+        """Whether nothing tilts or moves along the axis: every rotor one spur gear, held radially at its mid-width."""
+        alone = all(isinstance(body, GearBody) and body.helix_angle == 0 for body in self.bodies.values())
+        alone = alone and all(len(rotor.bodies) == 1 for rotor in self.rotors.values())
+        places = {name: place for rotor in self.rotors.values() for name, place in rotor.bodies.items()}
+        return alone and all(
+            s.axial is None and s.tilt is None and s.to is None and s.at in (None, places[s.body])
+            for s in self.supports
+        )
+
+    def rotor_of(self, body: str) -> str:
+        """Name of the rotor that a body belongs to."""
+        return next(name for name, rotor in self.rotors.items() if body in rotor.bodies)
+
+    def place(self, body: str, at: float | None) -> float:
+        """Place of a node on a body: as said, or the body's own."""
+        return self.rotors[self.rotor_of(body)].bodies[body] if at is None else at
+
+
+def gear_as_pair(stage: GeneralStage, name: str) -> Any:
+    """What `body_inputs(…, 0)` reads of a stage, for one gear: the same gear has the same body, whatever stage it is
+    in."""
+    gear = stage.bodies[name]
+    assert isinstance(gear, GearBody)
+    return _GearAlone(stage.source, gear)
+
+
+class _GearAlone:
+    """One gear as a stage of kind external_pair shows it."""
+
+    kind = "external_pair"
+
+    def __init__(self, source: Path, gear: GearBody) -> None:
+        self.source, self.gears, self.pair = source, (gear,), gear

@@ -1,0 +1,187 @@
+"""Can a general stage be put together? Names that must exist, places on shafts, axes, and every mesh as a pair. Nothing
+here stops at the first problem."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+
+from gearfmu.errors import Problem
+from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.spec.checks import geometry_problems, millimetres
+from gearfmu.spec.gear import PairSpec
+from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, ShaftBody
+
+Found = Iterator[tuple[str, str, str]]
+_SAME_RACK = ("normal_module", "pressure_angle", "helix_angle")
+
+
+def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
+    """Everything that is wrong with a stage whose single fields can be read."""
+    found = [*_rotors(stage), *_names(stage)]
+    problems = [Problem(file, *entry) for entry in found]
+    if problems:
+        return problems
+    problems = [Problem(file, *entry) for entry in (*_places(stage), *_held(stage))]
+    for engagement in stage.engagements:
+        problems += _mesh(file, stage, engagement)
+    return list(dict.fromkeys(problems))
+
+
+def _rotors(stage: GeneralStage) -> Found:
+    """Every body in exactly one rotor, and bodies that exist."""
+    counts = Counter(name for rotor in stage.rotors.values() for name in rotor.bodies)
+    for name, rotor in stage.rotors.items():
+        for body in rotor.bodies:
+            if body not in stage.bodies:
+                yield f"rotors.{name}.bodies.{body}", body, _unknown_body(stage)
+    for body in stage.bodies:
+        if counts[body] != 1:
+            remedy = "a body belongs to one rotor: name it in the bodies of one [rotors.…]"
+            yield f"bodies.{body}", f"in {counts[body]} rotors", remedy
+
+
+def _names(stage: GeneralStage) -> Found:
+    """What engagements, supports and ports name."""
+    gears = {gear.name for gear in stage.gears}
+    for mesh in stage.engagements:
+        for gear in mesh.gears:
+            if gear not in gears:
+                yield f"engagements.{mesh.name}.gears", gear, f"no such gear: one of {', '.join(sorted(gears))}"
+    for support in stage.supports:
+        for field, body in (("body", support.body), ("to", support.to)):
+            if body is not None and body not in stage.bodies:
+                yield f"supports.{support.name}.{field}", body, _unknown_body(stage)
+    for name, port in stage.ports.items():
+        if port.body not in stage.bodies:
+            yield f"ports.{name}.body", port.body, _unknown_body(stage)
+    for group, items, longest in (
+        ("engagements", stage.engagements, 31),
+        ("supports", stage.supports, 20),
+    ):
+        for item in items:
+            if len(item.name) > longest:
+                yield f"{group}.{item.name}.name", item.name, f"at most {longest} characters: shorten it"
+    for name in (name for name in stage.rotors if len(name) > 31):
+        yield f"rotors.{name}", name, "at most 31 characters: shorten it"
+    for group, items in (("engagements", stage.engagements), ("supports", stage.supports)):
+        for name, count in Counter(item.name for item in items).items():
+            if count > 1:
+                yield f"{group}.{name}.name", name, "used twice: give every one its own name"
+
+
+def _places(stage: GeneralStage) -> Found:
+    """Nodes lie on their bodies: at a gear's mid-width, on a shaft's length."""
+    nodes = [(f"supports.{s.name}.at", body, s.at) for s in stage.supports for body in (s.body, s.to) if body]
+    nodes += [(f"ports.{name}.at", port.body, port.at) for name, port in stage.ports.items()]
+    for field, name, at in nodes:
+        body, origin = stage.bodies[name], stage.place(name, None)
+        if isinstance(body, ShaftBody):
+            at = _on_shaft(stage, field, at)
+            if at is None:
+                yield field, "", f"{name} is a shaft: say where along it, {_range(origin, origin + body.length)}"
+            elif not origin - 1e-9 <= at <= origin + body.length + 1e-9:
+                yield field, millimetres(at), f"not on the shaft {name}: {_range(origin, origin + body.length)}"
+        elif at is not None and not math.isclose(at, origin, abs_tol=1e-9):
+            yield (
+                field,
+                millimetres(at),
+                f"{name} is a gear and held at its mid-width, {millimetres(origin)}: leave it away",
+            )
+
+
+def _on_shaft(stage: GeneralStage, field: str, at: float | None) -> float | None:
+    """Place of a node on a shaft; where a gear sits on one, the gear's place counts."""
+    if at is not None or not field.startswith("supports."):
+        return at
+    support = next(s for s in stage.supports if field == f"supports.{s.name}.at")
+    gears = [name for name in (support.body, support.to) if name and isinstance(stage.bodies[name], GearBody)]
+    return stage.place(gears[0], None) if gears else None
+
+
+def _held(stage: GeneralStage) -> Found:
+    """What is held to what: bodies of one rotor with torsion, bodies of two without."""
+    for support in stage.supports:
+        if support.to is None:
+            continue
+        same = stage.rotor_of(support.body) == stage.rotor_of(support.to)
+        if not same:
+            remedy = "a spring between bodies of two rotors is not built yet: hold them on the ground, or in one rotor"
+            yield f"supports.{support.name}.to", support.to, remedy
+    for name, rotor in stage.rotors.items():
+        if len(rotor.bodies) > 1:
+            joined = _joined(stage, list(rotor.bodies))
+            for body in sorted(set(rotor.bodies) - joined):
+                remedy = f"turns loosely in the rotor {name}: give a support between it and the others with torsion"
+                yield f"rotors.{name}.bodies.{body}", body, remedy
+
+
+def _joined(stage: GeneralStage, bodies: list[str]) -> set[str]:
+    """Those of `bodies` that springs against twist connect to the first."""
+    links = [(s.body, s.to) for s in stage.supports if s.to is not None and s.torsion is not None]
+    joined, size = {bodies[0]}, 0
+    while size != len(joined):
+        size = len(joined)
+        joined |= {b for a, b in (*links, *((b, a) for a, b in links)) if a in joined and b in bodies}
+    return joined
+
+
+def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]:
+    """One engagement as the pair that it is; fields under their names here."""
+    a, b = (stage.bodies[name] for name in mesh.gears)
+    assert isinstance(a, GearBody) and isinstance(b, GearBody)
+    field = f"engagements.{mesh.name}"
+    if stage.rotor_of(a.name) == stage.rotor_of(b.name):
+        return [Problem(file, f"{field}.gears", ", ".join(mesh.gears), "two gears of one rotor: name gears of two")]
+    differ = [key for key in _SAME_RACK if not math.isclose(getattr(a, key), getattr(b, key), abs_tol=1e-12)]
+    if differ:
+        remedy = f"{a.name} and {b.name} differ in it: gears in mesh share the basic rack"
+        return [Problem(file, f"bodies.{b.name}.{key}", f"{getattr(b, key):g}", remedy) for key in differ]
+    places = [stage.place(gear.name, None) for gear in (a, b)]
+    found = []
+    if abs(places[0] - places[1]) > 1e-9:
+        apart = millimetres(abs(places[0] - places[1]))
+        remedy = f"{a.name} and {b.name} lie {apart} apart along the axis: give both one place"
+        found.append(Problem(file, f"{field}.gears", ", ".join(mesh.gears), remedy))
+    pair = PairSpec(
+        center_distance=centre_distance(stage, mesh), normal_module=a.normal_module, pressure_angle=a.pressure_angle,
+        backlash=mesh.backlash,
+    )  # fmt: skip
+    axis = f"rotors.{stage.rotor_of(b.name)}.axis"
+    names = {"pair.center_distance": axis, "pair.backlash": f"{field}.backlash"}
+    for problem in geometry_problems(file, pair, (a, b), mesh.torque_max):
+        name = names.get(problem.field, problem.field.replace("gears.", "bodies.", 1).replace("pair.", f"{field}.", 1))
+        found.append(replace(problem, field=name))
+    return found
+
+
+def with_relief_rolls(stage: GeneralStage) -> GeneralStage:
+    """The same stage with "outer_single_contact" turned into a roll, that of a gear's first engagement."""
+    bodies = dict(stage.bodies)
+    for mesh in reversed(stage.engagements):
+        for index, name in enumerate(mesh.gears):
+            gear = stage.bodies[name]
+            if not isinstance(gear, GearBody) or gear.tip_relief is None:
+                continue
+            if isinstance(gear.tip_relief.start_roll, str):  # "outer_single_contact"
+                shapes = [GearGeometry.of(stage.bodies[other], stage.bodies[other]) for other in mesh.gears]
+                pair = PairGeometry((shapes[0], shapes[1]), centre_distance(stage, mesh), mesh.backlash)
+                relief = gear.tip_relief.model_copy(update={"start_roll": pair.outer_single_contact(index)})
+                bodies[name] = gear.model_copy(update={"tip_relief": relief})
+    return stage.model_copy(update={"bodies": bodies})
+
+
+def centre_distance(stage: GeneralStage, mesh: EngagementSpec) -> float:
+    """Distance (m) of the axes of an engagement."""
+    (x, y), (u, v) = (stage.rotors[stage.rotor_of(gear)].axis for gear in mesh.gears)
+    return math.hypot(u - x, v - y)
+
+
+def _unknown_body(stage: GeneralStage) -> str:
+    return f"no such body: one of {', '.join(sorted(stage.bodies))}"
+
+
+def _range(low: float, high: float) -> str:
+    return f"from {millimetres(low)} to {millimetres(high)}"

@@ -1,0 +1,57 @@
+"""What a stage file says about the shape of flanks across the face width and about axes that are not parallel.
+
+Both belong to the stage and shape no body: the finite elements have nominal flanks on nominal axes. Depths are normal
+to the transverse involute, like those of a tip relief.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from gearfmu.spec.base import Quantity, Spec
+
+Depth = Annotated[float, Quantity("m", at_least=0)]
+Length = Annotated[float, Quantity("m", above=0)]
+Deviation = Annotated[float, Quantity("m")]
+
+
+class EndRelief(Spec):
+    """Material taken off towards both ends of the face width, quadratic over the length."""
+
+    amount: Depth = Field(description="end relief at either end of the face width, normal to the involute")
+    length: Length = Field(description="length from either end over which it fades to nothing")
+
+
+class LeadSpec(Spec):
+    """Flank modifications across the face width, on both flanks of every tooth (ISO 21771)."""
+
+    slope: Deviation = Field(
+        default=0.0,
+        description="helix slope f_Hbeta over the whole face width, normal to the involute; positive: both flanks are "
+        "turned like a right-hand helix (of a left-handed gear ISO 1328-1 counts it the other way)",
+    )
+    crowning: Depth = Field(
+        default=0.0, description="lead crowning C_beta: depth at both ends of the face width, none at its middle"
+    )
+    end_relief: EndRelief | None = Field(default=None, description="end relief; none when the table is absent")
+
+
+class Misalignment(Spec):
+    """Parallelism errors of the axes of the unloaded pair (ISO/TR 10064-3), of the wheel's axis seen from the pinion's.
+
+    In the frame of the stage: pinion's axis z, wheel on +x; errors count from the end at −z to that at +z.
+    """
+
+    out_of_plane: Deviation = Field(
+        default=0.0,
+        description="f_SigmaBeta, deviation out of the common plane of the axes over the span; positive: at its +z end "
+        "the wheel's axis lies further towards +y",
+    )
+    in_plane: Deviation = Field(
+        default=0.0,
+        description="f_SigmaDelta, deviation in the common plane over the span; positive: the centre distance grows "
+        "towards +z",
+    )
+    span: Length = Field(description="length L along the axes over which both are measured (bearing span)")

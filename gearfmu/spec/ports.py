@@ -1,0 +1,65 @@
+"""What a stage says besides its gears: tooth contact, ports and cut frequencies of the levels (SI floats)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from gearfmu.spec.base import Count, Quantity, Spec, refuse
+
+Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
+Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
+Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
+Frequency = Annotated[float, Quantity("Hz", above=0)]
+
+
+class ContactSpec(Spec):
+    """Tooth contact."""
+
+    slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
+    damping: Annotated[float, Quantity("N*s/m^2", at_least=0)] = Field(
+        description="contact damping per metre of face width"
+    )
+    law: Literal["line"] = Field(default="line", description="contact law")
+
+
+class ChainSpec(Spec):
+    """Inertia, clutch and shaft compiled into a port."""
+
+    inertia: Inertia = Field(description="inertia on the outer side of the clutch, behind the port spring")
+    disc_inertia: Inertia = Field(description="inertia of the clutch disc")
+    shaft_k: Stiffness = Field(description="stiffness of the shaft between disc and bore")
+    shaft_c: Damping = Field(description="damping of that shaft")
+
+
+class PortSpec(Spec):
+    """How a shaft meets the outside. k and c of a port that is no spring are kept for an export that makes it one."""
+
+    kind: Literal["spring", "torque", "fixed"] = Field(
+        default="spring", description="spring: motion in, torque out; torque: torque in, motion out; fixed"
+    )
+    k: Stiffness | None = Field(default=None, description="stiffness of the port spring")
+    c: Damping | None = Field(default=None, description="damping of the port spring")
+    chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
+
+    @model_validator(mode="after")
+    def _complete(self) -> PortSpec:
+        if self.kind == "spring" and (self.k is None or self.c is None):
+            raise refuse('a spring port needs k and c: add them, e.g. k = "20e3 N*m/rad", c = "0.1 N*m*s/rad"')
+        if self.kind != "spring" and self.chain is not None:
+            raise refuse('a chain hangs on a port spring: write kind = "spring" or leave the chain away')
+        return self
+
+
+class LevelSpec(Spec):
+    """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
+
+    fast_cut: Frequency = Field(default=50e3, description="cut frequency of level fast")
+    standard_cut: Frequency = Field(default=120e3, description="cut frequency of level standard")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LevelSpec:
+        if self.fast_cut > self.standard_cut:
+            raise refuse("fast_cut must not lie above standard_cut")
+        return self

@@ -1,0 +1,203 @@
+"""A stage and its reduced bodies → the general model blob: every array of gearfmu/kernel/src/model/gk_fields.inc, by
+name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import ModelError
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.stage import StageSpec
+from gearfmu.stage.blob import write_blob
+from gearfmu.stage.fields import gear_numbers, order_sections
+from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount
+from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
+from gearfmu.stage.meshes import stage_sections, tooth_phases
+from gearfmu.stage.model import SHARPEST_EDGE, StageModel, _index_numbers, _mismatches, _port_numbers
+from gearfmu.stage.tables import ROLLS
+
+GENERAL_VERSION = 2
+
+
+def assemble_general(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
+    """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; rolls: of the even grid along
+    a flank.
+
+    ModelError when a body does not belong to its gear.
+    """
+    sections = order_sections(general_sections(spec, bodies, rolls))
+    hashes = tuple(body.input_hash for body in bodies)
+    return StageModel(spec, write_blob(sections), hashes)  # type: ignore[arg-type]
+
+
+def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> dict[str, Any]:
+    """Every section of the blob of `assemble_general`, by name."""
+    stage = expand_pair(spec) if isinstance(spec, StageSpec) else spec
+    shapes = [GearGeometry.of(gear, gear) for gear in stage.gears]
+    problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in _mismatches(*entry)]
+    if problems:
+        raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
+    layout = stage_layout(stage, bodies, rolls)
+    groups = mount_sets(layout)
+    degrees = width_degrees(stage, bodies)
+    sections = stage_sections(stage) | _port_sections(stage, groups[0])
+    sections |= {
+        "counts": np.array(
+            [GENERAL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),
+             len(stage.ports), len(layout.support_names()), groups[0].damper.size, degrees.size, rolls, len(groups)],
+            np.int32,
+        ),
+        "support_names": "|".join(layout.support_names()),
+        "displacement_names": "|".join(layout.displacement_names()),
+        "degrees": degrees.astype(np.int32),
+        "inertia": np.array([layout.inertia(r) for r in range(len(layout.rotors))]),
+    }  # fmt: skip
+    phases = tooth_phases(stage)
+    for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
+        place = stage.place(gear.name, None)
+        sections[f"gear{i}"] = _gear_numbers(gear, shape, phases[gear.name], place)
+        sections |= _index_numbers(i, gear, shape)
+        sections |= _gear_sections(stage, i, bodies[i], groups)
+    for s, group in enumerate(groups):
+        sections |= set_sections(s, group, port_nodes(stage))
+    return sections
+
+
+def mount_sets(layout: Layout) -> list[Group]:
+    """The group as supported, and with the supports on the ground infinitely stiff, where the bodies yield there."""
+    held = replace(layout, supports=[support.hold() for support in layout.supports])
+    try:
+        return [mount(layout), mount(held)]
+    except RigidSupportError:
+        return [mount(layout)]
+
+
+def _port_sections(stage: GeneralStage, group: Group) -> dict[str, Any]:
+    """Kinds, numbers and static compliances of the ports, in the order of the stage."""
+    rotors = list(stage.rotors)
+    numbers = [_port_numbers(port) for port in stage.ports.values()]
+    kinds = [
+        [rotors.index(stage.rotor_of(port.body)), *own[:2]]
+        for port, own in zip(stage.ports.values(), numbers, strict=True)
+    ]
+    return port_compliances(group, port_nodes(stage)) | {
+        "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
+        "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
+    }
+
+
+def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Static compliance of the ports' bore angles among each other and to the supports."""
+    residual = np.zeros((len(nodes), len(nodes)))
+    for i, (body, node) in enumerate(nodes):
+        for j, (other, there) in enumerate(nodes):
+            if body == other:
+                residual[i, j] = group.layout.bodies[body].residual[6 * node + SPIN, 6 * there + SPIN]
+    return {
+        "port_residual": residual,
+        "port_support": np.array([group.node_supports(*node, SPIN) for node in nodes]).reshape(
+            len(nodes), len(group.support_rows)
+        ),
+    }
+
+
+def _gear_sections(stage: GeneralStage, index: int, body: Any, groups: Sequence[Group]) -> dict[str, Any]:
+    """Sections of gear `index`, of its scope and in every set of ground oscillators."""
+    flank = groups[0].layout.bodies[index].flank
+    assert flank is not None
+    name, chosen = stage.gears[index].name, flank.chosen
+    meshes = sum(name in mesh.gears for mesh in stage.engagements)
+    tables = flank_sections(index, groups, port_nodes(stage))
+    rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
+    return tables | {
+        f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
+        f"omega{index}": 2 * np.pi * body.frequency[chosen],
+        f"zeta{index}": body.damping_ratio[chosen],
+        f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
+        f"member{index}": body.part[chosen].astype(np.int32),
+    }
+
+
+def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """What the flanks of gear `index` read: of its gear group and in every set of ground oscillators. nodes: (body,
+    node) of every port."""
+    layout = groups[0].layout
+    flank = layout.bodies[index].flank
+    assert flank is not None
+    port = np.zeros((*flank.node.shape[1:4], len(nodes)))
+    port[..., [p for p, (own, _) in enumerate(nodes) if own == index]] = flank.node[0][..., SPIN, None]
+    family = families(layout)[index]
+    reads = [np.flatnonzero(group.owner == family) for group in groups]
+    assert len({read.size for read in reads}) == 1
+    found = {
+        f"rows{index}": flank.turning,
+        f"residual{index}": flank.residual,
+        f"support_residual{index}": groups[0].flank_supports(index),
+        f"port_residual{index}": port,
+    }
+    for s, (group, read) in enumerate(zip(groups, reads, strict=True)):
+        found |= {
+            f"ground_list{index}_{s}": read.astype(np.int32),
+            f"centre{index}_{s}": group.rigid(index)[:, read],
+            f"ground_rows{index}_{s}": group.flank_rows(index)[..., read],
+        }
+    return found
+
+
+def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
+    """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
+    return {
+        f"omega_ground{number}": group.omega,
+        f"zeta_ground{number}": group.zeta,
+        f"rigid_share{number}": group.rigid_share,
+        f"damper_rows{number}": group.damper_rows,
+        f"damper{number}": group.damper,
+        f"support_rows{number}": group.support_rows,
+        f"support_compliance{number}": np.diag(group.support_compliance),
+        f"kappa{number}": group.kappa,
+        f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
+            len(nodes), group.omega.size
+        ),
+    }
+
+
+def port_nodes(stage: GeneralStage) -> list[tuple[int, int]]:
+    """(body, node) of every port, in the order of the stage."""
+    nodes = stage_nodes(stage)
+    return [nodes.find(stage, port.body, port.at) for port in stage.ports.values()]
+
+
+def _gear_numbers(gear: GearSpec, shape: GearGeometry, phase: float, place: float) -> np.ndarray:
+    """The section "gear" of a gear."""
+    material, relief, edge = gear.material, gear.tip_relief, max(gear.tip_edge_radius, SHARPEST_EDGE)
+    start = float(relief.start_roll) if relief else shape.s_a
+    curve = relief.amount / (shape.s_a - start) ** 2 if relief else 0.0
+    inner = shape.s_tip - edge
+    local = 2 * (1 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
+    return gear_numbers(
+        {
+            "r_b": shape.r_b,
+            "s_form": shape.s_form,
+            "s_tip": shape.s_tip,
+            "psi_b": shape.psi_b,
+            "phase": phase,
+            "face_width": gear.face_width,
+            "local": local,
+            "strip_half_width": gear.body.strip_half_width,
+            "relief": curve,
+            "relief_start": start,
+            "tip_edge": edge,
+            "corner_radius": math.hypot(shape.r_b, inner),
+            "corner_angle": shape.s_tip / shape.r_b - math.atan2(inner, shape.r_b),
+            "z_mid": place,
+            "helix": 0.0,
+        }
+    )

@@ -1,0 +1,131 @@
+"""GeneralStage and reduced gears → the layout of its ground group: free bodies, rotors, springs between nodes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.general import GearBody, GeneralStage, ShaftBody, SupportSpec
+from gearfmu.stage.free import FreeBody, free_gear, free_shaft
+from gearfmu.stage.groups import Layout, Support
+from gearfmu.stage.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
+
+SAME_PLACE = 1e-9  # m
+STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
+SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites it
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Where bodies are held and driven. numbers: name of a body → its number, gears first in the order of the stage;
+    places: name of a shaft → places (K,) m of its nodes in the stage, ascending."""
+
+    numbers: dict[str, int]
+    places: dict[str, list[float]]
+
+    def find(self, stage: GeneralStage, body: str, at: float | None) -> tuple[int, int]:
+        """(body, node) at a place; a gear has one node, its bore."""
+        if body not in self.places:
+            return self.numbers[body], 0
+        wanted = stage.place(body, at)
+        return self.numbers[body], int(np.argmin(np.abs(np.array(self.places[body]) - wanted)))
+
+
+def stage_nodes(stage: GeneralStage) -> Nodes:
+    """The nodes of all bodies: those that supports and ports name."""
+    shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
+    ordered = [*(gear.name for gear in stage.gears), *(shaft.name for shaft in shafts)]
+    places: dict[str, list[float]] = {}
+    for shaft in shafts:
+        wanted = [place_of(stage, s) for s in stage.supports if shaft.name in (s.body, s.to)]
+        wanted += [stage.place(shaft.name, port.at) for port in stage.ports.values() if port.body == shaft.name]
+        places[shaft.name] = _distinct(wanted)
+    return Nodes({name: i for i, name in enumerate(ordered)}, places)
+
+
+def place_of(stage: GeneralStage, support: SupportSpec) -> float:
+    """Place of a support along the axis: as said, or where its gear lies."""
+    if support.at is not None:
+        return support.at
+    names = [name for name in (support.body, support.to) if name]
+    gears = [name for name in names if isinstance(stage.bodies[name], GearBody)]
+    return stage.place((gears or names)[0], None)
+
+
+def width_degrees(stage: GeneralStage, bodies: Sequence[Any]) -> np.ndarray:
+    """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width."""
+    count = min(body.width_functions for body in bodies)
+    return symmetric_functions(count) if stage.planar else np.arange(min(count, MOST_FUNCTIONS))
+
+
+def stage_layout(stage: GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> Layout:
+    """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts."""
+    nodes, degrees = stage_nodes(stage), width_degrees(stage, bodies)
+    free = [_gear(stage, gear, body, degrees, rolls) for gear, body in zip(stage.gears, bodies, strict=True)]
+    shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
+    free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
+    rotors = [tuple(nodes.numbers[name] for name in rotor.bodies) for rotor in stage.rotors.values()]
+    bare = Layout(free, rotors, [], stage.planar)
+    supports = [_support(stage, nodes, bare, support) for support in stage.supports]
+    return Layout(free, rotors, supports, stage.planar)
+
+
+def _gear(stage: GeneralStage, gear: GearBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
+    shape = GearGeometry.of(gear, gear)
+    chosen = excited_modes(body, degrees) if stage.planar else _all_modes(body, degrees)
+    return free_gear(body, chosen, degrees, resampling(body.roll, shape.s_form, shape.s_tip, rolls))
+
+
+def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
+    """Modes that flanks or bore see, pairs whole."""
+    rows = np.abs(body.flank_rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
+    bore = (np.abs(body.bore_rows) / np.abs(body.bore_rows).max(axis=1, keepdims=True)).max(axis=0)
+    seen = (rows > SEEN) | (bore > SEEN)
+    second = np.flatnonzero(body.part == 2)
+    seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
+    return np.flatnonzero(seen)
+
+
+def _shaft(stage: GeneralStage, shaft: ShaftBody, places: Sequence[float]) -> FreeBody:
+    m, origin = shaft.material, stage.place(shaft.name, None)
+    sections = [Section(s.length, s.outer_diameter, s.bore_diameter) for s in shaft.sections]
+    steel = Steel(m.youngs_modulus, m.poisson_ratio, m.density)
+    beam = reduce_shaft(Shaft(sections, steel, [place - origin for place in places]), shaft.stored_to)
+    return free_shaft(shaft.name, beam, shaft.modal_damping)
+
+
+def _support(stage: GeneralStage, nodes: Nodes, layout: Layout, support: SupportSpec) -> Support:
+    at, directions, compliance, damping = place_of(stage, support), [], [], []
+    first = nodes.find(stage, support.body, at)
+    for field, own in STIFFNESS.items():
+        stiffness = getattr(support, field)
+        if stiffness is None:
+            continue
+        rigid = stiffness == "rigid"
+        for direction in own:
+            mass = layout.mass(first[0], direction)
+            directions.append(direction)
+            compliance.append(0.0 if rigid else 1 / stiffness)
+            damping.append(0.0 if rigid else 2 * support.damping_ratio * math.sqrt(stiffness * mass))
+    return Support(
+        name=f"{'bearing' if support.to is None else 'seat'}.{support.name}",
+        first=first,
+        second=None if support.to is None else nodes.find(stage, support.to, at),
+        directions=tuple(directions),
+        compliance=np.diag(compliance),
+        damping=np.array(damping),
+    )
+
+
+def _distinct(places: Sequence[float]) -> list[float]:
+    result: list[float] = []
+    for place in sorted(places):
+        if not result or place - result[-1] > SAME_PLACE:
+            result.append(place)
+    return result

@@ -1,0 +1,82 @@
+"""The engagements of a stage for the model blob: positions, backlash, limits, and how the teeth stand at φ = 0."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import ModelError
+from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage
+from gearfmu.stage.model import H_MAX, _coast_shift
+
+EXTERNAL = 1
+SAME_ANGLE = 1e-9  # rad
+
+
+def mesh_geometry(stage: GeneralStage, mesh: EngagementSpec) -> PairGeometry:
+    """The engagement as a pair by itself, A at the origin and B on +x."""
+    a, b = mesh_axes(stage, mesh)
+    return PairGeometry((_shape(stage, mesh.gears[0]), _shape(stage, mesh.gears[1])), math.dist(a, b), mesh.backlash)
+
+
+def mesh_axes(stage: GeneralStage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Positions (x, y) m of A and B."""
+    a, b = (stage.rotors[stage.rotor_of(name)].axis for name in mesh.gears)
+    return a, b
+
+
+def tooth_phases(stage: GeneralStage) -> dict[str, float]:
+    """Angle (rad) of tooth 0 of every gear at φ = 0: in every engagement the drive flanks of tooth 0 of both gears
+    touch.
+
+    A gear that no engagement before has placed has its tooth 0 on +x. With γ the direction from A to B, rolling both
+    gears by equal lengths r_bA dα = −r_bB dβ from the pair by itself gives φ_B = γ + φ_B⁰ − (φ_A − γ) r_bA/r_bB.
+    ModelError where a gear with several engagements cannot have all of them so: its axes do not fit its teeth.
+    """
+    phases: dict[str, float] = {}
+    for mesh in stage.engagements:
+        pair = mesh_geometry(stage, mesh)
+        (x, y), (u, v) = mesh_axes(stage, mesh)
+        gamma, ratio = math.atan2(v - y, u - x), pair.gears[0].r_b / pair.gears[1].r_b
+        a, b = mesh.gears
+        if b in phases and a not in phases:
+            phases[a] = gamma - (phases[b] - gamma - pair.wheel_phase) / ratio
+        first = phases.setdefault(a, 0.0)
+        fitting = gamma + pair.wheel_phase - (first - gamma) * ratio
+        pitch = 2 * math.pi / pair.gears[1].z
+        off = math.remainder(phases.setdefault(b, fitting) - fitting, pitch)
+        if abs(off) > SAME_ANGLE:
+            raise ModelError(
+                f"engagement '{mesh.name}': with {a} and {b} where their other engagements put them, flanks "
+                f"miss each other by {1e3 * off * pair.gears[1].r_b:.3g} mm: move an axis"
+            )
+    return {gear.name: phases.get(gear.name, 0.0) for gear in stage.gears}
+
+
+def stage_sections(stage: GeneralStage) -> dict[str, Any]:
+    """Sections of names, limits and engagements."""
+    gears = [gear.name for gear in stage.gears]
+    engaged, numbers, periods = [], [], []
+    for mesh in stage.engagements:
+        pair, (a, b) = mesh_geometry(stage, mesh), mesh_axes(stage, mesh)
+        engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), EXTERNAL, _coast_shift(pair)])
+        force = mesh.torque_max / pair.gears[0].r_b
+        numbers.append([*a, *b, mesh.backlash, pair.nominal_backlash, mesh.damping, force])
+        periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
+    return {
+        "name": stage.name,
+        "rotor_names": "|".join(stage.rotors),
+        "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
+        "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
+        "engaged": np.array(engaged, np.int32),
+        "engagement": np.array(numbers),
+    }
+
+
+def _shape(stage: GeneralStage, name: str) -> GearGeometry:
+    gear = stage.bodies[name]
+    assert isinstance(gear, GearBody)
+    return GearGeometry.of(gear, gear)

@@ -1,0 +1,160 @@
+"""Bodies of a helical pair: files with their optional groups, hands, kept tooth offsets, and the verbs that take
+them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gearfmu import cli
+from gearfmu.body import inspect_file, load_body, load_stage_bodies, reduce_stage
+from gearfmu.body.layout import GROUPS, entries_of
+from gearfmu.body.parts import drawn_counts, kept_offsets
+from gearfmu.body.reduce import body_path
+from gearfmu.body.reduced import value_of
+from gearfmu.body.store import save_body
+from gearfmu.errors import BodyError, SpecError
+from gearfmu.geometry import PairGeometry
+from gearfmu.spec.stage import load_stage, require_spur
+
+ROOT = Path(__file__).resolve().parents[2]
+COUNTS = "modes = 31\nroll_points = 5\nwidth_functions = 3\n"
+MESH = "flank = 3\nthickness = 1\nroot = 2\nrim = 1\nwidth = 2\n"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> SimpleNamespace:
+    """The shipped helical pair on the coarsest mesh, reduced."""
+    path = tmp_path_factory.mktemp("helical") / "stage.toml"
+    base = f'base = "{ROOT / "reduced_models" / "helical_demo" / "stage.toml"}"\nname = "tiny"\n'
+    gears = "".join(f"[gears.{g}.body]\n{COUNTS}[gears.{g}.body.mesh]\n{MESH}" for g in ("pinion", "wheel"))
+    path.write_text(base + gears, encoding="utf-8")
+    spec = load_stage(path)
+    return SimpleNamespace(path=path, spec=spec, bodies=reduce_stage(spec))
+
+
+def test_a_helical_body_reads_back_as_it_was_written(made: SimpleNamespace) -> None:
+    for index, body in enumerate(made.bodies):
+        again = load_body(body_path(made.spec, index))
+        assert body.groups == again.groups == ("helix", "tangent")
+        for entry in entries_of(body.groups):
+            assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
+    assert [b.name for b in load_stage_bodies(made.spec)] == ["pinion", "wheel"]
+
+
+def test_pinion_and_wheel_are_of_opposite_hand(made: SimpleNamespace) -> None:
+    angles = [body.base_helix_angle for body in made.bodies]
+    assert angles[0] == -angles[1] == pytest.approx(math.asin(math.sin(math.radians(20)) * math.cos(math.radians(20))))
+    for body in made.bodies:
+        assert np.all(body.parity == 0)
+        assert body.tangent.rows.shape == body.flank_rows.shape
+        own = body.static_ff[:, :, 0].shape
+        assert body.tangent.static_tt.shape == body.tangent.static_nt.shape == own
+
+
+def test_normal_and_profile_tables_of_a_tooth_are_positive_together(made: SimpleNamespace) -> None:
+    """C of the own tooth with both directions is symmetric and positive semidefinite, also without all stored modes."""
+
+    def block(table: np.ndarray) -> np.ndarray:
+        side, rolls, functions = table.shape[0], table.shape[2], table.shape[4]
+        size = side * rolls * functions
+        return table.transpose(0, 2, 4, 1, 3, 5).reshape(size, size)
+
+    for body in made.bodies:
+        t = body.tangent
+        nn, nt, tt = block(body.static_ff[:, :, 0]), block(t.static_nt), block(t.static_tt)
+        whole = np.block([[nn, nt], [nt.T, tt]])
+        rows = np.vstack([r.reshape(len(nn), -1) for r in (body.flank_rows, t.rows)])
+        for modes in (0, 30):
+            left = whole - (rows[:, :modes] / (2 * np.pi * body.frequency[:modes]) ** 2) @ rows[:, :modes].T
+            assert np.abs(left - left.T).max() < 1e-12 * np.abs(whole).max()
+            assert np.linalg.eigvalsh(left).min() > -1e-10 * np.abs(whole).max()
+
+
+def test_kept_offsets_fit_the_file_and_reach_what_the_kernel_reads() -> None:
+    """3.5 MB before compression, at least −3 … 3, all of them where they fit, a spur gear always all."""
+    for teeth, rolls, functions, expected in ((37, 22, 6, 11), (37, 28, 7, 7), (9, 22, 6, 9), (12, 4, 2, 12)):
+        table = np.broadcast_to(np.zeros(1), (2, 2, teeth, rolls, rolls, functions, functions))
+        assert kept_offsets(table, True).shape[2] == expected
+        assert kept_offsets(table, False).shape[2] == teeth
+
+
+def test_a_body_with_few_offsets_reads_back_by_its_offset(made: SimpleNamespace, tmp_path: Path) -> None:
+    body, path = made.bodies[1], tmp_path / "few.h5"
+    few = np.concatenate([body.static_ff[:, :, :5], body.static_ff[:, :, -4:]], axis=2)
+    save_body(replace(body, static_ff=few), path)
+    again = load_body(path)
+    assert again.static_ff.shape[2] == 9
+    for offset in range(-4, 5):
+        assert np.array_equal(again.static_ff[:, :, offset % 9], body.static_ff[:, :, offset % body.teeth])
+    assert inspect_file(path)["facts"]["tooth_offsets"] == "−4 to 4"
+    with pytest.raises(BodyError, match="tooth offsets"):
+        replace(body, static_ff=body.static_ff[:, :, :6])
+
+
+def test_files_of_spur_gears_made_before_are_read_and_not_stale() -> None:
+    for body in load_stage_bodies(load_stage("fzg_c")):
+        assert (body.groups, body.tangent, body.base_helix_angle) == ((), None, 0.0)
+    assert set(GROUPS) == {"rim", "helix", "tangent"}
+
+
+def test_the_drawn_surface_follows_the_helix(made: SimpleNamespace) -> None:
+    """Points of the drawn tip circle at the ends of the face width are turned by ± b/2·twist."""
+    for body, shape, gear in zip(made.bodies, PairGeometry.of(made.spec).gears, made.spec.gears, strict=True):
+        assert drawn_counts(shape, gear.face_width).width > 1
+        points, pitch = np.asarray(body.display.points, float), 2 * np.pi / body.teeth
+        radius, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+        for end in (-0.5, 0.0, 0.5):
+            z = end * gear.face_width
+            layers = np.unique(np.round(points[:, 2], 7))
+            near = layers[np.abs(layers - z).argmin()]
+            top = (radius > 0.9999 * shape.r_a) & (np.abs(points[:, 2] - near) < 1e-6)
+            turn = np.exp(1j * (angle[top] - shape.twist * near) * body.teeth).mean()
+            assert abs(np.angle(turn)) < 1e-3 * body.teeth * pitch
+
+
+def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    code = cli.outcome([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path: Path, capsys) -> None:
+    code, out, _ = call("mesh", made.path, "--gear", "wheel", "--out", tmp_path, capsys=capsys)
+    assert code == 0 and "scaled_jacobian_min" in out
+    code, out, _ = call("reduce", made.path, capsys=capsys)
+    assert code == 0 and "2 bodies" in out
+    code, out, _ = call("inspect", body_path(made.spec, 1), "--json", capsys=capsys)
+    assert code == 0 and json.loads(out)["facts"]["base_helix_angle_deg"] == pytest.approx(-18.7472, abs=1e-3)
+    code, out, _ = call("inspect", made.path, "--json", capsys=capsys)
+    derived = json.loads(out)["derived"]
+    assert code == 0 and derived["overlap_ratio"] == pytest.approx(1.016, abs=1e-3)
+    assert derived["total_contact_ratio"] == pytest.approx(derived["contact_ratio"] + derived["overlap_ratio"])
+    code, out, _ = call("modes", made.path, "--body", "pinion", "--count", 4, "--out", tmp_path, capsys=capsys)
+    assert code == 0 and "torsion" in out or "lobes" in out
+    code, out, _ = call(
+        "frf", made.path, "pinion", "--methods", "modal", "--size", 20, "--lines", 8, "--scale", 1, "--out", tmp_path,
+        capsys=capsys,
+    )  # fmt: skip
+    assert code == 0 and "modal" in out
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [["te", "--torque", "50 N*m"], ["simulate", "--torque", "50 N*m", "--speed", "900 rpm"], ["export"], ["modes"]],
+)
+def test_verbs_that_need_motion_in_time_refuse(verb: list[str], made: SimpleNamespace, capsys) -> None:
+    code, _, err = call(verb[0], made.path, *verb[1:], capsys=capsys)
+    assert code != 0 and "pair.helix_angle = 20 deg" in err and "motion in time is not built yet" in err
+
+
+def test_the_refusal_names_the_field(made: SimpleNamespace) -> None:
+    with pytest.raises(SpecError, match=r"pair\.helix_angle"):
+        require_spur(made.spec)
+    require_spur(load_stage("fzg_c"))

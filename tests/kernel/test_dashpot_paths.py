@@ -1,0 +1,61 @@
+"""What a contact's dashpot takes: c b times the square of the rate of its own path, which is the local law and a share
+of the tooth's residual (theory, 2.5)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from small_model import BASE, FIXED, LENGTH, PSI, ROLLS, WORKING, own_residual, pair_blob
+
+from gearfmu.kernel import Kernel
+from gearfmu.stage.blob import read_blob, write_blob
+
+STEP, FREQUENCY, CYCLES = 1e-5, 200.0, 3  # s, Hz: far below the lowest resonance
+DAMPING, RESIDUAL = 2e4, 4e-9  # N·s/m² over the face width; m/N of one tooth beyond its modes
+WIDTH, STRIP, YIELD, TORQUE_MAX = 14e-3, 1e-3, 2 * (1 - 0.3**2) / (math.pi * 206e9), 600.0
+QUIET = {"level": 0, "slices": 1} | {
+    f"effect.{name}": 0.0 for name in ("hertz", "bearings", "modal_damping", "tip_contact")
+}
+
+
+@pytest.fixture(scope="module")
+def blob() -> bytes:
+    """The small pair, its wheel held by a stiff port without loss; the residual of a flank is the same all over."""
+    sections = dict(read_blob(pair_blob(("torque", "fixed"))))
+    sections["port1"] = np.array([FIXED, 0.0, 1e9, 0.0, 0.05, 2e-3, 8e3, 0.5])
+    for g in (0, 1):
+        static = np.array(sections[f"c_ff{g}"], float).reshape(2, 2, 7, ROLLS, ROLLS, 2, 2)
+        for flank in (0, 1):
+            static[flank, flank, 3] -= own_residual()
+            static[flank, flank, 3, :, :, 0, 0] += RESIDUAL
+        sections[f"c_ff{g}"] = static
+    return write_blob(sections)
+
+
+def secant(roll: float) -> float:
+    """Linear local law of both bodies at torque_max, m/N."""
+    load, beta = TORQUE_MAX / BASE[0] / WIDTH, 4 * YIELD / (1 / roll + 1 / (LENGTH - roll))
+    return 2 * YIELD * (math.log(4 * STRIP) - 1 - 0.5 * math.log(beta * load)) / WIDTH
+
+
+@pytest.mark.parametrize("backlash, share", [(1e-4, 0.95), (-4e-5, 0.75)])
+def test_loss_is_that_of_the_contacts_own_path(blob: bytes, backlash: float, share: float) -> None:
+    """Torque that swings slowly on one tooth pair, and on a tooth that is jammed: 95 % of the residual belongs to a
+    contact whose tooth touches with one flank, 75 % where the other flank touches too."""
+    kernel = Kernel(blob, {**QUIET, "backlash": backlash, "contact_damping": DAMPING})
+    kernel.set("pinion.tau", 30.0)
+    kernel.initialize()
+    forces, pairs = [], set()
+    for i in range(round(CYCLES / FREQUENCY / STEP)):
+        kernel.set("pinion.tau", 30.0 + 10.0 * (1 - math.cos(2 * math.pi * FREQUENCY * (i + 0.5) * STEP)))
+        kernel.step(i * STEP, STEP)
+        forces.append([kernel.get("mesh.force_drive"), kernel.get("mesh.force_coast")])
+        pairs.add(kernel.get("mesh.pairs"))
+    lost, rates = kernel.get("energy.dissipated"), np.diff(forces, axis=0) / STEP
+    path = 2 * share * RESIDUAL + secant(BASE[0] * (PSI[0] + WORKING))
+    by_hand = DAMPING * WIDTH * path**2 * (rates**2).sum() * STEP
+    print(f"{pairs} pairs, {forces[-1]} N, lost {lost:.4e} J, by hand {by_hand:.4e} J, {lost / by_hand - 1:+.2%}")
+    assert pairs == ({1.0} if backlash > 0 else {2.0})
+    assert lost == pytest.approx(by_hand, rel=2e-3)

@@ -1,0 +1,145 @@
+"""Guards around the internal step: what makes each bit of solver.status, steps that are halved, the energy guard."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from small_model import BASE, INERTIA, LENGTH, PSI, TEETH, WORKING, pair_blob
+
+from gearfmu.errors import SimulationError
+from gearfmu.kernel import Kernel
+from gearfmu.stage.blob import read_blob, write_blob
+
+STEP = 2e-5  # s, communication step: three internal ones
+QUARTER = math.pi / 2 / TEETH[0]  # rad of the pinion: a quarter of a pitch, what one step may turn it
+BEYOND_THE_LAW, FALLBACK, ROUNDS = 1, 2, 4
+BAD_CALL, DIVERGED, ENERGY = 4, 8, 10
+WIDTH, STRIP, YIELD = 14e-3, 1e-3, 2 * (1 - 0.3**2) / (math.pi * 206e9)  # of the small pair: m, m, 1/Pa
+
+
+def spinning(speed: float, **parameters: float) -> Kernel:
+    """Both gears turn freely at the speed (rad/s) of the pinion, and do not touch."""
+    kernel = Kernel(pair_blob(("torque", "torque")), parameters)
+    kernel.set("pinion.w_start", speed)
+    kernel.set("wheel.w_start", -speed * TEETH[0] / TEETH[1])
+    kernel.initialize()
+    return kernel
+
+
+def status(kernel: Kernel) -> int:
+    return int(kernel.get("solver.status"))
+
+
+@pytest.mark.parametrize("hertz", [1.0, 0.0])
+def test_bit_1_says_that_the_patch_is_wider_than_the_local_law_reaches(hertz: float) -> None:
+    """The law ends where the Hertz half-width is two thirds of the strip's: F = L (strip/1.5)²/β (theory, 2.4)."""
+    roll = BASE[0] * (PSI[0] + WORKING)
+    beta = 4 * YIELD / (1 / roll + 1 / (LENGTH - roll))
+    limit = WIDTH * (STRIP / 1.5) ** 2 / beta
+    for force, beyond in ((0.9 * limit, False), (3.5 * limit, True)):  # three pairs share the larger one
+        kernel = Kernel(pair_blob(("torque", "fixed")), {"effect.hertz": hertz, "slices": 1})
+        kernel.set("pinion.tau", force * BASE[0])
+        kernel.initialize()
+        kernel.step(0.0, 1e-6)
+        assert kernel.get("mesh.force") == pytest.approx(force, rel=0.1) and kernel.get("mesh.pairs") <= 3
+        assert status(kernel) == (BEYOND_THE_LAW if beyond and hertz else 0)
+
+
+def test_bit_2_says_that_the_fallback_was_tried() -> None:
+    """So fast that even an eighth of a step turns the gears by more than a quarter of a pitch, with whatever scheme:
+    the run stops with a name; after shorter steps the bit is seen."""
+    kernel = spinning(8.5 * QUARTER / 10e-6, h=10e-6)
+    assert kernel.try_step(0.0, 10e-6) == DIVERGED and kernel.time == 0.0
+    assert kernel.try_step(0.0, 1e-7) == 0
+    assert status(kernel) == FALLBACK and kernel.get("solver.trouble") == 4  # the step, its half, quarter and eighth
+
+
+def test_bit_4_says_that_rounds_ran_out() -> None:
+    """Without tip corners a loaded pair vanishes at the end of its flank, and no force closes that step's balance; mix4
+    asks for no balance."""
+    found = {
+        (scheme, speed, torque): _without_corners(scheme, speed, torque)
+        for scheme in (0, 1)
+        for speed in (20.0, 100.0, 200.0)
+        for torque in (300.0, 600.0)
+    }
+    assert all(bool(bits & ROUNDS) == (scheme == 0) for (scheme, *_), bits in found.items()), found
+
+
+def _without_corners(scheme: int, speed: float, torque: float) -> int:
+    kernel = Kernel(pair_blob(("torque", "torque")), {"effect.tip_contact": 0, "level": 0, "integrator": scheme})
+    kernel.set("pinion.w_start", speed)
+    kernel.set("wheel.w_start", -speed * TEETH[0] / TEETH[1])
+    kernel.set("pinion.tau", torque)
+    kernel.set("wheel.tau", torque * TEETH[1] / TEETH[0])
+    kernel.initialize()
+    for i in range(400):
+        kernel.step(i * STEP, STEP)
+    return status(kernel)
+
+
+@pytest.mark.parametrize("turned, halves", [(0.9, 1), (1.1, 2), (1.9, 2), (2.1, 4), (3.9, 4), (4.1, 8), (6.0, 8)])
+def test_a_step_that_would_turn_the_gears_too_far_is_halved_until_it_does_not(turned: float, halves: int) -> None:
+    """`turned` quarters of a pitch in one internal step, from the first on. A free gear's motion is exact with any
+    step: φ = ωt, and no energy is lost."""
+    kernel = spinning(turned * QUARTER / (STEP / 3))
+    for i in range(20):
+        kernel.step(i * STEP, STEP)
+    angle = turned * QUARTER * 60
+    assert kernel.get("solver.steps") == 60 * halves and kernel.get("solver.trouble") == 60 * (halves - 1)
+    assert kernel.get("pinion.phi") == pytest.approx(angle, rel=1e-13) and status(kernel) == 0
+    assert abs(kernel.get("energy.residual")) < 1e-13 * kernel.get("energy.stored")
+
+
+def test_halving_begins_when_the_speed_is_reached() -> None:
+    """Torques that turn both gears faster and faster without contact: half of the run at full steps, half at halves;
+    the speed is ω + αt but for what the bodies swing, and the work of the torques is the gain of energy."""
+    steps, internal = 20, STEP / 3
+    limit = QUARTER / internal
+    angular = 0.2 * limit / (steps * STEP)
+    kernel = Kernel(pair_blob(("torque", "torque")))
+    for shaft, ratio, inertia in (("pinion", 1.0, INERTIA[0]), ("wheel", -TEETH[0] / TEETH[1], INERTIA[1])):
+        kernel.set(f"{shaft}.w_start", 0.9 * limit * ratio)
+        kernel.set(f"{shaft}.tau", angular * inertia * ratio)
+    kernel.initialize()
+    for i in range(steps):
+        kernel.step(i * STEP, STEP)
+    time = steps * STEP
+    assert kernel.get("mesh.force_max") == 0.0
+    assert 25 <= kernel.get("solver.trouble") <= 35 and kernel.get("solver.steps") == 60 + kernel.get("solver.trouble")
+    assert kernel.get("pinion.gear.w") == pytest.approx(0.9 * limit + angular * time, rel=2e-4)
+    assert abs(kernel.get("energy.residual")) < 1e-6 * kernel.get("energy.work")
+
+
+def heavier(blob: bytes, factor: float) -> bytes:
+    """The same pair with `factor` times the moments of inertia."""
+    sections = dict(read_blob(blob))
+    for g in (0, 1):
+        gear = np.array(sections[f"gear{g}"], float)
+        gear[7] *= factor
+        sections[f"gear{g}"] = gear
+    return write_blob(sections)
+
+
+@pytest.mark.parametrize("factor, broken", [(1.0, False), (1.8, False), (3.0, True), (0.4, True)])
+def test_energy_guard_stops_a_run_that_gains_or_loses_half_of_all_energy(factor: float, broken: bool) -> None:
+    """A state that goes on in gears of other inertia: the balance misses (1 − 1/factor) of the energy that there is.
+    The failed run takes no further step, only a restored state."""
+    kernel, blob = spinning(200.0), pair_blob(("torque", "torque"))
+    for i in range(5):
+        kernel.step(i * STEP, STEP)
+    other = Kernel(heavier(blob, factor))
+    other.initialize()
+    own = other.save()
+    other.restore(kernel.save())
+    assert other.try_step(5 * STEP, STEP) == (ENERGY if broken else 0)
+    missing = other.get("energy.residual") / other.get("energy.stored")
+    assert missing == pytest.approx(1 - 1 / factor, abs=1e-3)
+    if broken:
+        assert other.time == 5 * STEP and other.try_step(5 * STEP, STEP) == BAD_CALL
+        with pytest.raises(SimulationError):
+            other.step(5 * STEP, STEP)
+        other.restore(own)
+        assert other.try_step(0.0, STEP) == 0

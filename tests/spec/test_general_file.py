@@ -1,0 +1,108 @@
+"""Stage files of kind general: what is right is read, what is wrong is refused with a remedy, all at once; pair files
+expand into the same terms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gearfmu.errors import SpecError
+from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.general import gear_as_pair
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.stage import load_pair, load_stage
+
+TEXT = find_stage("two_stage").read_text(encoding="utf-8")
+
+
+def problems(folder: Path, *changes: tuple[str, str]) -> dict[str, str]:
+    """Field → remedy of everything that is wrong."""
+    text = TEXT
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path = folder / "stage.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        load_stage(path)
+    assert all(problem.file == str(path) for problem in error.value.problems)
+    return {problem.field: problem.remedy for problem in error.value.problems}
+
+
+def test_the_two_stage_train_is_read():
+    stage = load_stage("two_stage")
+    assert stage.kind == "general" and not stage.planar
+    assert [gear.teeth for gear in stage.gears] == [25, 61, 19, 73]
+    assert stage.rotor_of("pinion2") == "intermediate" and stage.place("pinion2", None) == pytest.approx(0.09)
+    assert isinstance(stage.bodies["wheel2"].tip_relief.start_roll, float)
+    assert sum(support.to is None for support in stage.supports) == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "says"),
+    [
+        (
+            ('gears = ["pinion1", "wheel1"]', 'gears = ["pinion1", "whel1"]'),
+            "engagements.stage1.gears",
+            "one of pinion1",
+        ),
+        (('gears = ["pinion2", "wheel2"]', 'gears = ["pinion2", "wheel1"]'), "engagements.stage2.gears", "one rotor"),
+        (
+            ('body = "output_shaft"\nat = "170 mm"', 'body = "output_shaft"\nat = "190 mm"'),
+            "ports.output.at",
+            "to 170 mm",
+        ),
+        (('body = "output_shaft"\nat = "170 mm"', 'body = "output_shaft"'), "ports.output.at", "say where"),
+        (('torsion = "rigid"', ""), "rotors.input.bodies.input_shaft", "with torsion"),
+        (('pinion2 = "90 mm", ', ""), "bodies.pinion2", "one [rotors.…]"),
+        (('pinion2 = "90 mm", ', 'pinion2 = "80 mm", '), "engagements.stage2.gears", "10 mm apart"),
+        (('axis = ["96.75 mm", "0 mm"]', 'axis = ["92 mm", "0 mm"]'), "rotors.intermediate.axis", ""),
+        (('torque_max = "300 N*m"', 'torque_max = "3000 N*m"'), "bodies.pinion1.body.strip_half_width", "1.5 Hertz"),
+        (('name = "input_left"', 'name = "input_right"'), "supports.input_right.name", "used twice"),
+        (
+            ('normal_module = "3.0 mm"', 'normal_module = "2.75 mm"'),
+            "bodies.wheel2.normal_module",
+            "share the basic rack",
+        ),
+        (('to = "input_shaft"', 'to = "output_shaft"'), "supports.pinion1.to", "two rotors"),
+        (('kind = "gear"', 'kind = "gera"'), "bodies.pinion1", "gear"),
+        (('radial = "2.5e8 N/m"', 'radial = "2.5e8 N*m"'), "supports.input_left.radial", "N/m"),
+        (
+            ('"30 mm", bore_diameter = "0 mm" }', '"30 mm", bore = "0 mm" }'),
+            "bodies.input_shaft.sections[0].bore",
+            "bore_diameter",
+        ),
+        (("modal_damping = 0.005", "modal_dampin = 0.005"), "bodies.input_shaft.modal_dampin", '"modal_damping"'),
+        (("teeth = 25", "teeth = 4"), "bodies.pinion1.teeth", "6"),
+    ],
+)
+def test_what_is_wrong_is_named_with_a_remedy(tmp_path, change, field, says):
+    found = problems(tmp_path, change)
+    near = {key: text for key, text in found.items() if key.startswith(field)}
+    assert near and any(says in text for text in near.values()), found
+
+
+def test_all_problems_come_at_once(tmp_path):
+    found = problems(tmp_path, ('"wheel1"]', '"wheel9"]'), ('body = "output_shaft"\nat = "170 mm"', 'body = "shaft"'))
+    assert {"engagements.stage1.gears", "ports.output.body"} <= set(found)
+
+
+@pytest.mark.parametrize("name", ["fzg_c", "fzg_c/stage_relief"])
+def test_a_pair_expands_into_two_rotors_and_keeps_its_bodies(name):
+    pair = load_pair(name)
+    stage = expand_pair(pair)
+    assert stage.planar and list(stage.rotors) == list(stage.ports) == ["pinion", "wheel"]
+    assert stage.rotors["wheel"].axis == (pair.pair.center_distance, 0.0)
+    for index, gear in enumerate(pair.gears):
+        same = body_inputs(gear_as_pair(stage, gear.name), 0)
+        assert body_hash(same) == body_hash(body_inputs(pair, index))
+        assert stage.bodies[gear.name].tip_relief == gear.tip_relief
+        assert stage.ports[gear.name].k == pair.ports[gear.name].k
+
+
+def test_a_gear_that_is_held_elsewhere_has_no_bearing(tmp_path):
+    table = '[bodies.pinion1.bearing]\nstiffness = "1e8 N/m"\n\n[bodies.pinion1.material]'
+    found = problems(tmp_path, ("[bodies.pinion1.material]", table))
+    assert any("[[supports]]" in text for text in found.values())

@@ -1,0 +1,226 @@
+"""Ground groups in space: shafts, seats, bearings with tilt, several gears on one rotor, against systems put together
+another way."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import scipy.linalg as sl
+
+from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, reduce_shaft, rod_matrices
+from gearfmu.stage.free import FreeBody, free_gear, free_shaft, read_tables
+from gearfmu.stage.groups import Layout, Support, mount, node_directions
+from gearfmu.stage.tables import OFFSETS, resampling
+
+STEEL = Steel(206e9, 0.3, 7850.0)
+SHAFTS = [
+    Shaft([Section(0.05, 0.03), Section(0.12, 0.04, 0.01), Section(0.03, 0.03)], STEEL, [0.01, 0.08, 0.19]),
+    Shaft([Section(0.09, 0.035), Section(0.11, 0.045)], STEEL, [0.01, 0.05, 0.14, 0.19]),
+]
+DISCS = [(0, 1, 0.9, 4e-4, 7e-4), (1, 1, 1.6, 1.0e-3, 1.9e-3), (1, 2, 0.5, 2e-4, 3.5e-4)]  # shaft, node, mass, I, J
+BEARINGS = [(0, 0), (0, 2), (1, 0), (1, 3)]
+BEARING = np.array([3e8, 2e8, 1e8, 4e4, 6e4])
+MESH = ((0, 1), 2.5e8, (0.03, 0.06))  # discs, stiffness along u_y and rotations, base radii
+ALL = (0, 1, 2, 3, 4, 5)
+
+
+def disc(name, mass, across, polar):
+    """A rigid body: no modes, no residual."""
+    inertia = np.diag([mass, mass, mass, across, across, polar])
+    return FreeBody(name, inertia, np.zeros(0), np.zeros(0), np.zeros(1), np.zeros((1, 6, 0)), np.zeros((6, 6)))
+
+
+def seat(name, first, second):
+    return Support(name, first, second, ALL, np.zeros((6, 6)), np.zeros(6))
+
+
+def bearing(name, first, stiffness=BEARING):
+    return Support(name, first, None, (0, 1, 2, 3, 4), np.diag(1 / stiffness), np.full(5, 1.0))
+
+
+def train(cut):
+    bodies = [free_shaft(f"shaft{i}", reduce_shaft(shaft, cut), 0.01) for i, shaft in enumerate(SHAFTS)]
+    bodies += [disc(f"disc{i}", *numbers) for i, (_, _, *numbers) in enumerate(DISCS)]
+    supports = [seat(f"seat{i}", (2 + i, 0), (s, node)) for i, (s, node, *_) in enumerate(DISCS)]
+    supports += [bearing(f"bearing{i}", end) for i, end in enumerate(BEARINGS)]
+    return Layout(bodies, [(0, 2), (1, 3, 4)], supports, planar=False)
+
+
+def train_by_elements():
+    """K, M of the same two shafts, unknowns of every finite-element node; discs and springs on the diagonal; and the
+    mesh's row."""
+    stiffness, mass, where, start = [], [], {}, 0
+    for s, shaft in enumerate(SHAFTS):
+        ends = shaft.ends(shaft.length / 12)
+        planes = [bending_matrices(shaft, ends)] * 2 + [rod_matrices(shaft, ends, turning) for turning in (True, False)]
+        for (k, m), names in zip(planes, ((0, 4), (1, 3), (5,), (2,)), strict=True):
+            stiffness.append(k)
+            mass.append(m)
+            for n, place in enumerate(shaft.places):
+                at = len(names) * ORDER * int(np.abs(ends - place).argmin())
+                where |= {(s, n, d): start + at + i for i, d in enumerate(names)}
+            start += len(k)
+    k, m = sl.block_diag(*stiffness), sl.block_diag(*mass)
+    for s, node in BEARINGS:
+        for d, value in enumerate(BEARING):
+            k[where[s, node, d], where[s, node, d]] += value
+    for s, node, heavy, across, polar in DISCS:
+        for d, value in enumerate([heavy, heavy, heavy, across, across, polar]):
+            m[where[s, node, d], where[s, node, d]] += value
+    row = np.zeros(len(k))
+    for sign, number, radius in zip((1, -1), MESH[0], MESH[2], strict=True):
+        s, node = DISCS[number][:2]
+        row[where[s, node, 1]], row[where[s, node, 5]] = sign, radius
+    return k, m, row
+
+
+def test_a_train_of_two_shafts_has_the_frequencies_of_its_finite_elements():
+    """Free spins, oscillators and a mesh spring between two discs: all frequencies up to 6 kHz, as of the assembled
+    beams."""
+    k, m, row = train_by_elements()
+    want = np.sqrt(np.maximum(sl.eigh(k + MESH[1] * np.outer(row, row), m, eigvals_only=True), 0)) / 2 / np.pi
+    for cut in (30e3, 120e3):
+        layout = train(cut)
+        group = mount(layout)
+        spins = np.zeros(2)
+        mesh_row = np.zeros(group.omega.size)
+        for sign, number, radius in zip((1, -1), MESH[0], MESH[2], strict=True):
+            rigid = group.rigid(2 + number)
+            mesh_row += sign * rigid[1] + radius * rigid[5]
+            spins[DISCS[number][0]] = radius
+        gap = np.concatenate([spins, mesh_row])
+        inertia = [layout.inertia(0), layout.inertia(1)]
+        dynamic = np.diag([0, 0, *group.omega**2]) + MESH[1] * np.outer(gap, gap)
+        squared = sl.eigh(dynamic, np.diag([*inertia, *np.ones(group.omega.size)]), eigvals_only=True)
+        have = np.sqrt(np.maximum(squared, 0)) / 2 / np.pi
+        seen = want[want < 6e3].size
+        assert want[0] < 0.5 and have[0] < 0.5 and want[1] > 20  # one free rotation of the train
+        error = np.abs(have[1:seen] / want[1:seen] - 1)
+        print(f"two-shaft train, shafts to {cut / 1e3:g} kHz: {seen - 1} frequencies, largest error {error.max():.1e}")
+        assert error.max() < {30e3: 1e-3, 120e3: 3e-5}[cut]
+
+
+def test_spins_carry_the_whole_inertia_and_no_oscillator_turns_the_rotor():
+    """Σ J r_z over a rotor's bodies is 0 in every oscillator: the spin is orthogonal to them, in the mass metric."""
+    layout = train(60e3)
+    group = mount(layout)
+    for rotor in layout.rotors:
+        momentum = sum(layout.bodies[b].mass[5, 5] * group.rigid(b)[5] for b in rotor)
+        scale = sum(layout.bodies[b].mass[5, 5] * np.abs(group.rigid(b)[5]) for b in rotor)
+        assert np.abs(momentum).max() < 1e-9 * scale.max()
+    raw_mass = np.zeros((group.at[-1].stop,) * 2)
+    for b, at in enumerate(group.at):
+        freedoms = list(layout.freedoms(b))
+        raw_mass[at, at] = np.eye(at.stop - at.start)
+        own = slice(at.start, at.start + len(freedoms))
+        raw_mass[own, own] = layout.bodies[b].mass[np.ix_(freedoms, freedoms)]
+    assert np.allclose(group.shapes.T @ raw_mass @ group.shapes, np.eye(group.omega.size), atol=1e-9)
+
+
+def turn6(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.kron(np.eye(2), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+
+
+def load_rows(shape, body, load, psi):
+    """(6,) rigid row of a load on a flank of an untilted gear, tooth at psi: normal, moment about the origin."""
+    _, flank, roll, degree = load
+    sign = (1, -1)[flank]
+    s = np.linspace(shape.s_form, shape.s_tip, 12)[roll]
+    t = psi + sign * (shape.psi_b - s / shape.r_b)
+    n = sign * np.array([-np.sin(t), np.cos(t), 0.0])
+    along = body.face_width / 6 * (degree == 1)
+    about = np.array([-n[1], n[0], 0.0]) * along + np.array([0, 0, sign * shape.r_b]) * (degree == 0)
+    return np.concatenate([n * (degree == 0), about])
+
+
+def unreduced(layout, loads, rigid_of_load, compliance):
+    """Displacement at loads, and forces on the supports, of bodies with supports as unknown forces and every rotor's
+    spin held in the mass metric; loads on body 1."""
+    n, bodies = len(loads), len(layout.bodies)
+    c_ll, c_ln = compliance
+    support_rigid = np.hstack(
+        [node_directions(layout, b) @ np.vstack([body.rigid_rows(k) for k in range(len(body.place))])
+         for b, body in enumerate(layout.bodies)]
+    )  # fmt: skip
+    yields = sl.block_diag(*[s.compliance for s in layout.supports])
+    for b, body in enumerate(layout.bodies):
+        rows = body.rows.reshape(6 * len(body.place), body.omega.size)
+        static = body.residual + rows / body.omega**2 @ rows.T
+        yields = yields + node_directions(layout, b) @ static @ node_directions(layout, b).T
+    spins = np.zeros((6 * bodies, len(layout.rotors)))
+    for r, rotor in enumerate(layout.rotors):
+        for b in rotor:
+            spins[6 * b : 6 * b + 6, r] = layout.bodies[b].mass[5]
+    rigid = np.zeros((n, 6 * bodies))
+    rigid[:, 6:12] = rigid_of_load
+    c_ls = c_ln @ node_directions(layout, 1).T
+    s, r = len(yields), len(layout.rotors)
+    system = np.block(
+        [[np.zeros((6 * bodies, 6 * bodies)), support_rigid.T, spins], [support_rigid, yields, np.zeros((s, r))],
+         [spins.T, np.zeros((r, s + r))]]
+    )  # fmt: skip
+    scale = 1 / np.sqrt(np.abs(system).max(axis=1))
+    right = -np.vstack([rigid.T, c_ls.T, np.zeros((r, n))])
+    found = scale[:, None] * np.linalg.solve(scale[:, None] * system * scale, scale[:, None] * right)
+    x, force = found[: 6 * bodies], found[6 * bodies : 6 * bodies + s]
+    return rigid @ x + c_ll + c_ls @ force, -force
+
+
+LOADS = [(0, 0, 3, 0), (0, 0, 8, 1), (1, 0, 9, 0), (-1, 1, 2, 2), (2, 1, 5, 1)]
+
+
+@pytest.mark.parametrize(("held", "angle"), [(False, 0.0), (False, 1.1), (True, 4.0)])
+def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair, held, angle):
+    """Statics in space: gear of finite elements, rigid seat, stepped shaft, two bearings with tilt, disc on the same
+    shaft."""
+    body, shape, rolls, step = bodies[0], pair.gears[0], 12, 2 * np.pi / 16
+    grid, degrees = resampling(body.roll, shape.s_form, shape.s_tip, rolls), np.arange(5)
+    gear = free_gear(body, np.arange(body.modes), degrees, grid)
+    shaft = free_shaft("shaft", reduce_shaft(SHAFTS[1], 60e3), 0.01)
+    supports = [seat("seat.gear", (1, 0), (0, 1)), seat("seat.disc", (2, 0), (0, 2))]
+    supports += [bearing("b1", (0, 0)), bearing("b2", (0, 3))]
+    layout = Layout([shaft, gear, disc("disc", *DISCS[2][2:])], [(0, 1, 2)], supports, planar=False)
+    if held:
+        layout = Layout(layout.bodies, layout.rotors, [s.hold() for s in supports], planar=False)
+    group, flank = mount(layout), gear.flank
+    rigid = np.array([load_rows(shape, body, load, angle + load[0] * step) for load in LOADS])
+    c_ll = np.zeros((len(LOADS), len(LOADS)))
+    c_ln, e, c_fs, residual = np.zeros((len(LOADS), 6)), [], [], np.zeros_like(c_ll)
+    rows, to_supports = group.flank_rows(1), group.flank_supports(1)
+    for i, (j, f, p, a) in enumerate(LOADS):
+        e.append(read_tables(rows[:, f, p, a], angle + j * step))
+        c_fs.append(read_tables(to_supports[:, f, p, a], angle + j * step))
+        c_ln[i] = turn6(angle + j * step) @ (grid[p] @ body.static_fb[f, :, a])
+        for k, (m, g, q, b) in enumerate(LOADS):
+            c_ll[i, k] = grid[p] @ body.static_ff[f, g, (m - j) % 16, :, :, a, b] @ grid[q]
+            residual[i, k] = flank.residual[f, g, OFFSETS.index(m - j), p, q, a, b]
+    want, want_force = unreduced(layout, LOADS, rigid, (c_ll, c_ln))
+    w, c_fs = rigid @ group.rigid(1) + np.array(e), np.array(c_fs)
+    q = w.T / group.omega[:, None] ** 2
+    have = residual - c_fs @ group.kappa @ c_fs.T + w @ q
+    force = group.kappa @ (group.support_rows @ q + c_fs.T)
+    scale = np.sqrt(np.diag(want))
+    error = np.abs((have - want) / np.outer(scale, scale)).max()
+    force_error = np.abs(force - want_force).max() / np.abs(want_force).max()
+    print(f"gear on shaft, held {held}, angle {angle}: displacement {error:.1e}, forces {force_error:.1e}")
+    print(f"  lowest {group.omega[0] / 6.2832:.0f} Hz, highest {group.omega[-1] / 6.2832:.2e} Hz")
+    assert error < 1e-8 and force_error < 1e-8
+
+
+def test_supports_that_leave_a_motion_free_leave_it_at_zero_frequency():
+    """Bearings without axial stiffness: one free mass a rotor, exactly at rest."""
+    layout = train(60e3)
+    radial = [
+        s if s.second is not None else Support(s.name, s.first, None, (0, 1), np.eye(2) / 3e8, np.zeros(2))
+        for s in layout.supports
+    ]
+    group = mount(Layout(layout.bodies, layout.rotors, radial, planar=False))
+    floating = group.omega == 0
+    assert floating.sum() == 2 and group.omega[2] > 2 * np.pi * 20
+    assert all(a <= b for a, b in pairwise(group.omega))
+    moved = group.rigid(0)[2, floating]
+    mass = sum(layout.bodies[b].mass[2, 2] for b in layout.rotors[0])
+    assert np.abs(moved).max() == pytest.approx(1 / np.sqrt(mass), rel=1e-6)
