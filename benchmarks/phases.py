@@ -40,7 +40,7 @@ def quiet(blocks: list[tuple[float, dict[str, int]]]) -> dict[str, float]:
 
 
 def lanes(model: StageModel, cut: float) -> int:
-    """Lanes of modal state of both gear groups: a pair of modes is one lane of each half, halves are padded to LANES / 2."""
+    """Lanes of modal state of both gear groups: a pair is one lane of each half, halves are padded to LANES / 2."""
     total, sections = 0, read_blob(model.blob)
     for gear in (0, 1):
         part = sections[f"member{gear}"][sections[f"omega{gear}"] < 2 * math.pi * cut]

@@ -84,7 +84,7 @@ def _numbers(stage: str) -> dict[str, str]:
     from gearfmu.stage.effects import torque_on_flanks_alone
 
     model = model_of(stage)
-    spec, pair = model.spec, PairGeometry.of(model.spec)
+    spec, pair = model.pair, PairGeometry.of(model.pair)
     stored, modes = _modes(model)
     alone = torque_on_flanks_alone(model)
     reliefs = [1e6 * gear.tip_relief.amount if gear.tip_relief else 0.0 for gear in spec.gears]

@@ -80,7 +80,7 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
 
 def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected."""
-    shafts, choice = shafts_of(source.model.spec), scene.stage
+    shafts, choice = shafts_of(source.model.pair), scene.stage
     parameters = {
         "level": choice.level,
         "integrator": choice.integrator,

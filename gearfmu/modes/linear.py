@@ -26,7 +26,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.model import FIXED_K
+from gearfmu.stage.assembly import FIXED_K
 from gearfmu.stage.tables import BORE, excited_modes, resampling, symmetric_functions
 from gearfmu.stage.te import statics_of
 
@@ -67,9 +67,9 @@ def linearised(
 ) -> Linearised:
     """Equation (29) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
     statics; made here when None."""
-    contacts = loaded_contacts(model.spec, kernel or statics_of(model), torque, position)
-    gears = [_gear(model.spec, bodies, index, position, contacts) for index in (0, 1)]
-    return _coupled(model.spec, gears, contacts)
+    contacts = loaded_contacts(model.pair, kernel or statics_of(model), torque, position)
+    gears = [_gear(model.pair, bodies, index, position, contacts) for index in (0, 1)]
+    return _coupled(model.pair, gears, contacts)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.stage.general import assemble_general as assemble
+from gearfmu.stage.assembly import assemble
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.simulate import Steady, simulate
 from gearfmu.stage.te import TeResult, loaded_te

@@ -242,7 +242,7 @@ def costs() -> dict[str, Cost]:
 def torque_on_flanks_alone(model: StageModel, positions: int = 24) -> float:
     """Largest torque (N·m, at most torque_max) at which flanks carry alone at these positions of a pitch, statically:
     up to it tip corners may be off. To 1 %."""
-    pitch = 2 * math.pi / model.spec.gears[1].teeth
+    pitch = 2 * math.pi / model.pair.gears[1].teeth
     kernels = [model.kernel(**{"level": 0.0, "effect.tip_contact": on}) for on in (1.0, 0.0)]
     for kernel in kernels:
         kernel.prepare()
@@ -254,10 +254,10 @@ def torque_on_flanks_alone(model: StageModel, positions: int = 24) -> float:
                 return False
         return True
 
-    low, high = 0.0, model.spec.torque_max
+    low, high = 0.0, model.pair.torque_max
     if alone(high):
         return high
-    while high - low > 0.01 * high and high > 1e-3 * model.spec.torque_max:
+    while high - low > 0.01 * high and high > 1e-3 * model.pair.torque_max:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if alone(middle) else (low, middle)
     return low

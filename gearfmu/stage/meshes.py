@@ -10,9 +10,9 @@ import numpy as np
 from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage
-from gearfmu.stage.model import H_MAX, _coast_shift
 
 EXTERNAL = 1
+H_MAX = 7.5e-6  # s: largest default step
 SAME_ANGLE = 1e-9  # rad
 
 
@@ -80,3 +80,17 @@ def _shape(stage: GeneralStage, name: str) -> GearGeometry:
     gear = stage.bodies[name]
     assert isinstance(gear, GearBody)
     return GearGeometry.of(gear, gear)
+
+
+def _coast_shift(geometry: PairGeometry) -> int:
+    """The wheel's tooth number that faces the coast flank of the pinion's tooth 0: the one whose gap is the nominal
+    backlash."""
+    a, b = geometry.gears
+    t = geometry.alpha_wt
+    gaps = {
+        shift: geometry.length
+        + a.r_b * (-a.psi_b - t)
+        + b.r_b * (geometry.wheel_phase + shift * 2 * math.pi / b.z - b.psi_b - t - math.pi)
+        for shift in (-1, 0, 1)
+    }
+    return min(gaps, key=lambda shift: abs(gaps[shift]))

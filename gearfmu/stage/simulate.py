@@ -38,14 +38,14 @@ class Steady:
         """Angle of the pinion (rad) that the mesh takes up under the torque, mean over a pitch."""
         kernel = self.model.kernel(level=0.0)
         kernel.prepare()
-        pitch = 2 * np.pi / self.model.spec.gears[1].teeth
+        pitch = 2 * np.pi / self.model.pair.gears[1].teeth
         mean = np.mean(
             [kernel.transmission(-pitch * i / WINDING_POSITIONS, self.torque).te for i in range(WINDING_POSITIONS)]
         )
-        return float(mean / PairGeometry.of(self.model.spec).gears[0].r_b)
+        return float(mean / PairGeometry.of(self.model.pair).gears[0].r_b)
 
     def __call__(self, time: float) -> Mapping[str, float]:
-        spec = self.model.spec
+        spec = self.model.pair
         values = {}
         for gear, sign in zip(spec.gears, (1, -1), strict=True):
             ratio = spec.gears[0].teeth / gear.teeth

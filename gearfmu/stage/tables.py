@@ -3,7 +3,6 @@ width functions that the stage can excite."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -63,26 +62,3 @@ def excited_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
     second = np.flatnonzero(body.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     return np.flatnonzero(seen)
-
-
-def body_sections(index: int, body: Any, to_grid: np.ndarray, degrees: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Blob sections of gear `index` that come from its body (shapes: gearfmu/kernel/src/model/gk_model.c); to_grid:
-    of `resampling`."""
-    modes = excited_modes(body, degrees)
-    rows = blend(to_grid, body.flank_rows[:, :, degrees][..., modes], 1)
-    static = body.static_ff[..., degrees, :][..., degrees]
-    static = np.stack([static[:, :, offset % static.shape[2]] for offset in OFFSETS], axis=2)
-    static = blend(to_grid, blend(to_grid, static, 3), 4)
-    flank_bore = blend(to_grid, body.static_fb[:, :, degrees][..., BORE], 1)
-    return {
-        f"size{index}": np.array([modes.size, len(to_grid), degrees.size], np.int32),
-        f"omega{index}": 2 * np.pi * body.frequency[modes],
-        f"zeta{index}": body.damping_ratio[modes],
-        f"diameter{index}": body.nodal_diameter[modes].astype(np.int32),
-        f"part{index}": body.part[modes].astype(np.int32),
-        f"rows{index}": rows,
-        f"bore{index}": body.bore_rows[np.ix_(np.array(BORE), modes)],
-        f"c_ff{index}": static,
-        f"c_fb{index}": flank_bore,
-        f"c_bb{index}": body.static_bb[np.ix_(BORE, BORE)],
-    }

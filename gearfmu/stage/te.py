@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.stage.model import StageModel
 
@@ -44,17 +45,15 @@ def loaded_te(
     """
     held = {"effect.bearings": 0.0} if rigid_bearings else {}
     kernel = statics_of(model, **held, **parameters)
-    pitch = 2 * math.pi / model.spec.gears[1].teeth
-    base_radius = (
-        model.spec.pair.normal_module * model.spec.gears[0].teeth / 2 * math.cos(model.spec.pair.pressure_angle)
-    )
+    pitch = 2 * math.pi / model.pair.gears[1].teeth
+    base_radius = PairGeometry.of(model.pair).gears[0].r_b
     position = np.arange(positions) / positions
     te, stiffness, shares = (
         np.empty((len(torques), positions)),
         np.empty((len(torques), positions)),
         np.zeros((len(torques), positions, SHARES)),
     )
-    least = LEAST * model.spec.torque_max
+    least = LEAST * model.pair.torque_max
     for i, torque in enumerate(torques):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         for j, part in enumerate(position):

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gearfmu.stage.assembly import MODEL_VERSION
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.fields import gear_numbers, order_sections
-from gearfmu.stage.general import GENERAL_VERSION
 
 GRID = 4  # rolls of the tables: all equal
 OFFSETS, OWN = 7, 3
@@ -50,7 +50,7 @@ def flat_blob(name: str, bodies: Sequence[FlatBody], contact: FlatContact) -> by
     x_right − x_left − outward displacements, in every slice. What spins elsewhere moves along x here."""
     functions = len(contact.degrees)
     sections: dict = {
-        "counts": np.array([GENERAL_VERSION, contact.slices, 2, 2, 1, 2, 0, 0, functions, GRID, 1], np.int32),
+        "counts": np.array([MODEL_VERSION, contact.slices, 2, 2, 1, 2, 0, 0, functions, GRID, 1], np.int32),
         "name": name,
         "rotor_names": "left|right",
         "engagement_names": "mesh",

@@ -377,8 +377,7 @@ static void open_direct(direct *d, void *library, const char *resources)
     *(void **)&work_size = lookup(library, "gk_work_size");
     d->model = block(model_size());
     need(open(d->model, bytes, (size_t)size, message) == GK_OK, "gk_model_open");
-    d->setup = block(setup_size(d->model)), d->data = block(data_size(d->model)),
-    d->work = block(work_size(d->model));
+    d->setup = block(setup_size(d->model)), d->data = block(data_size(d->model)), d->work = block(work_size(d->model));
     need(defaults(d->model, d->data) == GK_OK, "gk_defaults");
     need(prepare(d->model, d->data, d->setup, d->work, message) == GK_OK, "gk_prepare");
     need(initialize(d->model, d->setup, d->work, d->data, 0) == GK_OK, "gk_initialize");

@@ -55,6 +55,7 @@ def body(gear, shape) -> SimpleNamespace:
         name=gear.name,
         input_hash=f"{z:064x}",
         teeth=z,
+        width_functions=FUNCTIONS,
         r_b=shape.r_b,
         face_width=gear.face_width,
         strip_half_width=gear.body.strip_half_width,

@@ -16,7 +16,6 @@ from gearfmu.body.reduce import expected_hash, reduce_gear, reduce_stage
 from gearfmu.fem import solids
 from gearfmu.femesh import write_vtu
 from gearfmu.stage import Steady, assemble, loaded_te, simulate
-from gearfmu.stage.te import on_rigid_bearings
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 TABLES = ("static_ff", "static_fb", "static_bb", "inertia")
@@ -178,7 +177,7 @@ def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path) -> None:
     bodies = reduce_stage(spec)
     wheel = bodies[1]
     models = [assemble(spec, bodies), assemble(own, [reduce_gear(own, 0), wheel])]
-    results = [loaded_te(on_rigid_bearings(model), [302.0], 6).te for model in models]
+    results = [loaded_te(model, [302.0], 6, rigid_bearings=True).te for model in models]
     assert np.abs(results[0] / results[1] - 1).max() < 1e-6
     runs = [simulate(model, Steady(model, 100.0, 302.0), 0.012, 1e-4, {"level": 1}) for model in models]
     assert np.abs(runs[0]["mesh.te"] - runs[1]["mesh.te"]).max() < 1e-6 * np.abs(runs[1]["mesh.te"]).max()

@@ -56,7 +56,8 @@ static const char *not_finite(const gk_model *model, const gk_data *data)
 }
 
 /* a damaged state is refused, or steps on without harm; what it then says is as good as the state was */
-static void step_from_damage(const gk_model *model, const gk_setup *setup, gk_work *work, const void *saved, size_t size)
+static void step_from_damage(const gk_model *model, const gk_setup *setup, gk_work *work, const void *saved,
+                             size_t size)
 {
     gk_data *data = memory(gk_data_size(model));
     unsigned char *bytes = (unsigned char *)data;

@@ -13,10 +13,10 @@ from types import SimpleNamespace
 import numpy as np
 from exact_bars import Bar
 
+from gearfmu.stage.assembly import MODEL_VERSION, flank_sections, port_compliances, set_sections
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.fields import gear_numbers, order_sections
 from gearfmu.stage.free import FreeBody, free_gear
-from gearfmu.stage.general import GENERAL_VERSION, flank_sections, port_compliances, set_sections
 from gearfmu.stage.groups import Group, Layout, Support, mount
 from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
@@ -48,7 +48,7 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     groups = _groups([free_gear(body, np.arange(len(FREQUENCY)), np.arange(2), np.eye(ROLLS)) for body in bodies])
     layout, last = groups[0].layout, (2e4, 5.0, 0.05, 2e-3, 8e3, 0.5)
     sections = {
-        "counts": np.array([GENERAL_VERSION, 3, 2, 2, 1, 2, 4, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
+        "counts": np.array([MODEL_VERSION, 3, 2, 2, 1, 2, 4, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
         "name": "small_pair",
         "rotor_names": "|".join(NAMES),
         "engagement_names": "mesh",

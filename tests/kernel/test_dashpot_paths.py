@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from small_model import BASE, FIXED, LENGTH, PSI, ROLLS, WORKING, own_residual, pair_blob
+from small_model import BASE, LENGTH, PSI, ROLLS, WORKING, own_residual, pair_blob
 
 from gearfmu.kernel import Kernel
 from gearfmu.stage.blob import read_blob, write_blob
@@ -24,13 +24,14 @@ QUIET = {"level": 0, "slices": 1} | {
 def blob() -> bytes:
     """The small pair, its wheel held by a stiff port without loss; the residual of a flank is the same all over."""
     sections = dict(read_blob(pair_blob(("torque", "fixed"))))
-    sections["port1"] = np.array([FIXED, 0.0, 1e9, 0.0, 0.05, 2e-3, 8e3, 0.5])
+    sections["ports"] = np.array(sections["ports"], float).reshape(2, -1)
+    sections["ports"][1, :2] = 1e9, 0.0  # k, c
     for g in (0, 1):
-        static = np.array(sections[f"c_ff{g}"], float).reshape(2, 2, 7, ROLLS, ROLLS, 2, 2)
+        static = np.array(sections[f"residual{g}"], float).reshape(2, 2, 7, ROLLS, ROLLS, 2, 2)
         for flank in (0, 1):
             static[flank, flank, 3] -= own_residual()
             static[flank, flank, 3, :, :, 0, 0] += RESIDUAL
-        sections[f"c_ff{g}"] = static
+        sections[f"residual{g}"] = static
     return write_blob(sections)
 
 

@@ -20,7 +20,6 @@ import pytest
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.te import on_rigid_bearings
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLES = ROOT / "benchmarks" / "calculix"
@@ -31,7 +30,7 @@ LINE_LOAD = 1e3 * GOLDEN["line_load_N_per_mm"]  # N/m
 
 def test_pair_stiffness_at_the_pitch_point(plain: StageModel, pair: PairGeometry) -> None:
     """One pair, 300 N/mm, neighbours off, bores averaged: the kernel on the reduced bodies against CalculiX."""
-    kernel = on_rigid_bearings(plain).kernel(**{"level": 0.0, "effect.tip_contact": 0.0})
+    kernel = plain.kernel(**{"level": 0.0, "effect.bearings": 0.0, "effect.tip_contact": 0.0})
     kernel.prepare()
     pinion, wheel = pair.gears
     turn = pair.path["C"] / pinion.r_b - pinion.psi_b - pair.alpha_wt

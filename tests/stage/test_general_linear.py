@@ -13,9 +13,9 @@ import pytest
 import scipy.linalg as sl
 
 from gearfmu.modes.linear import Contact, _contact_dashpots, _coupled, _gear, _tangents, slice_weights
+from gearfmu.stage.assembly import general_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.free import read_tables
-from gearfmu.stage.general import general_sections
 from gearfmu.stage.tables import OFFSETS
 
 ROLLS = 48

@@ -14,8 +14,8 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.expand import expand_pair
 from gearfmu.spec.general import EngagementSpec, GeneralStage, PlacedPort, RotorSpec, SupportSpec
+from gearfmu.stage.assembly import general_sections
 from gearfmu.stage.fields import order_sections
-from gearfmu.stage.general import general_sections
 from gearfmu.stage.groups import mount
 from gearfmu.stage.layout import stage_layout
 from gearfmu.stage.meshes import mesh_geometry, tooth_phases

@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import brentq
 
 from gearfmu.spec.expand import expand_pair
+from gearfmu.stage.assembly import assemble, general_sections
 from gearfmu.stage.blob import read_blob
 from gearfmu.stage.free import read_tables, turn_tables
-from gearfmu.stage.general import assemble_general, general_sections
 from gearfmu.stage.groups import SPIN, mount
 from gearfmu.stage.layout import stage_layout
 from gearfmu.stage.tables import OFFSETS, blend, resampling, symmetric_functions
@@ -209,8 +209,8 @@ def test_a_force_that_stands_in_space_moves_the_hub_alike_whichever_tooth_it_mee
 
 def test_sections_hold_the_groups(spec, bodies, layout):
     """Names, shapes and types by the kernel's table; equal inputs, equal bytes; rows and lists from the groups."""
-    model = assemble_general(spec, bodies)
-    assert model.hash == assemble_general(spec, bodies).hash
+    model = assemble(spec, bodies)
+    assert model.hash == assemble(spec, bodies).hash
     sections, blob = general_sections(spec, bodies), read_blob(model.blob)
     assert next(iter(blob)) == "counts" and np.array_equal(blob["counts"], sections["counts"])
     group = mount(layout)

@@ -23,7 +23,6 @@ from gearfmu.reduction.sector import SectorBody
 from gearfmu.spec.gear import GearSpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel
-from gearfmu.stage.te import on_rigid_bearings
 
 LINE_LOAD = 300e3  # N/m
 
@@ -106,7 +105,7 @@ def test_formula_is_the_standards(spec: StageSpec) -> None:
 def test_secant_from_the_transmission_error(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:
     """One pair carries 300 N/mm at the pitch point, axes of the averaged bores held."""
     width = spec.gears[0].face_width
-    kernel = on_rigid_bearings(plain).kernel(**{"level": 0.0, "effect.tip_contact": 0.0})
+    kernel = plain.kernel(**{"level": 0.0, "effect.bearings": 0.0, "effect.tip_contact": 0.0})
     kernel.prepare()
     turn = (
         pair.path["C"] / pair.gears[0].r_b - pair.gears[0].psi_b - pair.alpha_wt

@@ -3,7 +3,6 @@ name."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,21 +12,24 @@ import numpy as np
 from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry
 from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.gear import GearSpec
 from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
-from gearfmu.stage.fields import gear_numbers, order_sections
+from gearfmu.stage.fields import order_sections
 from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases
-from gearfmu.stage.model import SHARPEST_EDGE, StageModel, _index_numbers, _mismatches, _port_numbers
+from gearfmu.stage.model import StageModel
 from gearfmu.stage.tables import ROLLS
+from gearfmu.stage.teeth import gear_section, index_section, mismatches
 
-GENERAL_VERSION = 2
+MODEL_VERSION = 2
+PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
+FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
 
-def assemble_general(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
+def assemble(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
     """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; rolls: of the even grid along
     a flank.
 
@@ -35,14 +37,14 @@ def assemble_general(spec: StageSpec | GeneralStage, bodies: Sequence[Any], roll
     """
     sections = order_sections(general_sections(spec, bodies, rolls))
     hashes = tuple(body.input_hash for body in bodies)
-    return StageModel(spec, write_blob(sections), hashes)  # type: ignore[arg-type]
+    return StageModel(spec, write_blob(sections), hashes)
 
 
 def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> dict[str, Any]:
-    """Every section of the blob of `assemble_general`, by name."""
+    """Every section of the blob of `assemble`, by name."""
     stage = expand_pair(spec) if isinstance(spec, StageSpec) else spec
     shapes = [GearGeometry.of(gear, gear) for gear in stage.gears]
-    problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in _mismatches(*entry)]
+    problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
     layout = stage_layout(stage, bodies, rolls)
@@ -51,7 +53,7 @@ def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], roll
     sections = stage_sections(stage) | _port_sections(stage, groups[0])
     sections |= {
         "counts": np.array(
-            [GENERAL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),
+            [MODEL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),
              len(stage.ports), len(layout.support_names()), groups[0].damper.size, degrees.size, rolls, len(groups)],
             np.int32,
         ),
@@ -63,8 +65,8 @@ def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], roll
     phases = tooth_phases(stage)
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         place = stage.place(gear.name, None)
-        sections[f"gear{i}"] = _gear_numbers(gear, shape, phases[gear.name], place)
-        sections |= _index_numbers(i, gear, shape)
+        sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
+        sections |= index_section(i, gear, shape)
         sections |= _gear_sections(stage, i, bodies[i], groups)
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, port_nodes(stage))
@@ -92,6 +94,15 @@ def _port_sections(stage: GeneralStage, group: Group) -> dict[str, Any]:
         "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
         "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
     }
+
+
+def _port_numbers(port: PortSpec) -> np.ndarray:
+    chain = port.chain
+    k = port.k if port.k is not None else FIXED_K if port.kind == "fixed" else 1.0
+    numbers = [PORT_KINDS[port.kind], float(chain is not None), k, port.c or 0.0]
+    return np.array(
+        numbers + ([chain.inertia, chain.disc_inertia, chain.shaft_k, chain.shaft_c] if chain else [1.0, 1.0, 1.0, 0.0])
+    )
 
 
 def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
@@ -173,31 +184,3 @@ def port_nodes(stage: GeneralStage) -> list[tuple[int, int]]:
     """(body, node) of every port, in the order of the stage."""
     nodes = stage_nodes(stage)
     return [nodes.find(stage, port.body, port.at) for port in stage.ports.values()]
-
-
-def _gear_numbers(gear: GearSpec, shape: GearGeometry, phase: float, place: float) -> np.ndarray:
-    """The section "gear" of a gear."""
-    material, relief, edge = gear.material, gear.tip_relief, max(gear.tip_edge_radius, SHARPEST_EDGE)
-    start = float(relief.start_roll) if relief else shape.s_a
-    curve = relief.amount / (shape.s_a - start) ** 2 if relief else 0.0
-    inner = shape.s_tip - edge
-    local = 2 * (1 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
-    return gear_numbers(
-        {
-            "r_b": shape.r_b,
-            "s_form": shape.s_form,
-            "s_tip": shape.s_tip,
-            "psi_b": shape.psi_b,
-            "phase": phase,
-            "face_width": gear.face_width,
-            "local": local,
-            "strip_half_width": gear.body.strip_half_width,
-            "relief": curve,
-            "relief_start": start,
-            "tip_edge": edge,
-            "corner_radius": math.hypot(shape.r_b, inner),
-            "corner_angle": shape.s_tip / shape.r_b - math.atan2(inner, shape.r_b),
-            "z_mid": place,
-            "helix": 0.0,
-        }
-    )

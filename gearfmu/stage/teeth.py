@@ -1,0 +1,71 @@
+"""What the model blob says of a gear's teeth, and whether a reduced body is that gear's own."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.gear import GearSpec
+from gearfmu.stage.fields import gear_numbers
+
+SHARPEST_EDGE = 1e-6
+
+
+def gear_section(gear: GearSpec, shape: GearGeometry, phase: float, place: float) -> np.ndarray:
+    """The section "gear" of a gear."""
+    material, relief, edge = gear.material, gear.tip_relief, max(gear.tip_edge_radius, SHARPEST_EDGE)
+    start = float(relief.start_roll) if relief else shape.s_a
+    curve = relief.amount / (shape.s_a - start) ** 2 if relief else 0.0
+    inner = shape.s_tip - edge
+    local = 2 * (1 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
+    return gear_numbers(
+        {
+            "r_b": shape.r_b,
+            "s_form": shape.s_form,
+            "s_tip": shape.s_tip,
+            "psi_b": shape.psi_b,
+            "phase": phase,
+            "face_width": gear.face_width,
+            "local": local,
+            "strip_half_width": gear.body.strip_half_width,
+            "relief": curve,
+            "relief_start": start,
+            "tip_edge": edge,
+            "corner_radius": math.hypot(shape.r_b, inner),
+            "corner_angle": shape.s_tip / shape.r_b - math.atan2(inner, shape.r_b),
+            "z_mid": place,
+            "helix": 0.0,
+        }
+    )
+
+
+def index_section(index: int, gear: GearSpec, shape: GearGeometry) -> dict[str, np.ndarray]:
+    """Angles (2 flanks, z) rad by which the teeth are out of their places; no section when all are in place."""
+    if not any(gear.index_deviation.values()):
+        return {}
+    angles = np.zeros((2, gear.teeth))
+    angles[:, list(gear.index_deviation)] = np.array(list(gear.index_deviation.values())) / shape.r
+    return {f"index{index}": angles}
+
+
+def mismatches(gear: GearSpec, shape: GearGeometry, body: Any) -> list[str]:
+    pairs = {
+        "teeth": (gear.teeth, body.teeth),
+        "base radius": (shape.r_b, body.r_b),
+        "face width": (gear.face_width, body.face_width),
+        "load strip": (gear.body.strip_half_width, body.strip_half_width),
+    }
+    found = [
+        f"body of {gear.name}: {what} {have:g} instead of {want:g}"
+        for what, (want, have) in pairs.items()
+        if not math.isclose(want, have, rel_tol=1e-9)
+    ]
+    if not shape.s_form - 1e-9 <= body.roll.min() <= body.roll.max() <= shape.s_tip + 1e-9:
+        found.append(
+            f"body of {gear.name}: its rolls {body.roll.min():g} … {body.roll.max():g} m "
+            f"leave the flank {shape.s_form:g} … {shape.s_tip:g} m"
+        )
+    return found
