@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> StageModel:
     """The StageModel of STAGE, with other kinds of port where `port_kinds` (shaft → kind) says so."""
-    spec, bodies = bodies_for_motion(stage)
+    spec, bodies = bodies_of(stage)
     from gearfmu.stage import assemble
 
     return assemble(with_ports(spec, port_kinds or {}), bodies)
@@ -32,15 +32,6 @@ def bodies_of(stage: str) -> tuple[StageSpec, list[Any]]:
 
     with progress_bar("reducing") as progress:
         return spec, reduce_stage(spec, progress=by_text(progress))
-
-
-def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
-    """`bodies_of` for a verb that needs a model of the stage: a SpecError, before anything is reduced, for a stage that
-    has none yet."""
-    from gearfmu.spec.stage import load_pair, require_spur
-
-    require_spur(load_pair(stage))
-    return bodies_of(stage)
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:

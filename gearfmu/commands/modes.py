@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
+from gearfmu.commands.models import bodies_of, by_text
 from gearfmu.commands.shared import Quantity, progress_bar
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float
 
 
 def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
-    spec, bodies = bodies_for_motion(stage)
+    spec, bodies = bodies_of(stage)
     from gearfmu.modes.linear import stage_modes
     from gearfmu.report.campbell import RPM, campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble

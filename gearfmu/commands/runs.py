@@ -94,9 +94,9 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
     from gearfmu import cosim
-    from gearfmu.commands.models import bodies_for_motion
+    from gearfmu.commands.models import bodies_of
 
-    bodies_for_motion(scene.stage.name)
+    bodies_of(scene.stage.name)
     with progress_bar(scene.name) as progress:
         trace = cosim.run(scene, out, progress=progress, **options)
     return finish(trace, out, scene.stage.name)

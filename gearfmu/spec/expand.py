@@ -11,12 +11,12 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
     """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
     the origin, wheel on +x."""
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
-    angles = {key: getattr(pair, key) for key in ("normal_module", "pressure_angle", "helix_angle")}
+    angles = {"normal_module": pair.normal_module, "pressure_angle": pair.pressure_angle}
     pinion, wheel = spec.gears
     bodies: dict[str, GearBody | ShaftBody] = {}
-    for gear in spec.gears:
+    for gear, hand in zip(spec.gears, (1, -1), strict=True):
         known = {name: getattr(gear, name) for name in GearSpec.model_fields} | {"bearing": None}
-        bodies[gear.name] = GearBody(**known, **angles)
+        bodies[gear.name] = GearBody(**known, **angles, helix_angle=hand * pair.helix_angle + 0.0)
     return GeneralStage(
         name=spec.name,
         description=spec.description,
@@ -32,11 +32,17 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
                 damping=spec.contact.damping,
                 torque_max=spec.torque_max,
                 speed_max=spec.speed_max,
+                misalignment=pair.misalignment,
             ),
         ),
         supports=tuple(
             SupportSpec(
-                name=gear.name, body=gear.name, radial=gear.bearing.stiffness, damping_ratio=gear.bearing.damping_ratio
+                name=gear.name,
+                body=gear.name,
+                radial=gear.bearing.stiffness,
+                axial=gear.bearing.axial,
+                tilt=gear.bearing.tilt,
+                damping_ratio=gear.bearing.damping_ratio,
             )
             for gear in spec.gears
         ),

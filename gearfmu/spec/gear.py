@@ -33,6 +33,9 @@ def _in_range(angle: float) -> float:
     return angle
 
 
+HelixAngle = Annotated[float, Quantity("rad"), AfterValidator(_in_range)]
+
+
 class PairSpec(Spec):
     """The pair as a whole. Module, pressure angle, profile shift and basic rack are those of the normal section."""
 
@@ -41,7 +44,7 @@ class PairSpec(Spec):
     pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
         description="normal pressure angle of the basic rack"
     )
-    helix_angle: Annotated[float, Quantity("rad"), AfterValidator(_in_range)] = Field(
+    helix_angle: HelixAngle = Field(
         default=0.0,
         description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the pinion is right-handed "
         "and the wheel left-handed",
@@ -71,9 +74,15 @@ class Material(Spec):
 
 
 class Bearing(Spec):
-    """Isotropic radial bearing between the bore node and the ground."""
+    """Bearing between the bore node and the ground, the same in every direction across the axis."""
 
     stiffness: Annotated[float, Quantity("N/m", above=0)] = Field(description="radial stiffness")
+    axial: Annotated[float, Quantity("N/m", above=0)] | None = Field(
+        default=None, description="axial stiffness; without it the gear does not move along its axis (spur gears only)"
+    )
+    tilt: Annotated[float, Quantity("N*m/rad", above=0)] | None = Field(
+        default=None, description="stiffness against tilting; without it the gear does not tilt (spur gears only)"
+    )
     damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
 
 

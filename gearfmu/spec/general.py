@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
-from gearfmu.spec.gear import Bearing, GearSpec, Length, Material, Ratio, Size
+from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size
+from gearfmu.spec.lead import Misalignment
 from gearfmu.spec.ports import Frequency, LevelSpec, PortSpec
 
 Place = Annotated[float, Quantity("m")]
@@ -28,8 +29,10 @@ class GearBody(GearSpec):
     pressure_angle: Annotated[float, Quantity("rad", above=0.17, below=0.62)] = Field(
         description="normal pressure angle of the basic rack"
     )
-    helix_angle: Annotated[float, Quantity("rad", at_least=0, at_most=0)] = Field(
-        default=0.0, description="helix angle; only spur gears so far"
+    helix_angle: HelixAngle = Field(
+        default=0.0,
+        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed gear, whose "
+        "mate is left-handed",
     )
     bearing: Bearing | None = Field(default=None, description="not here: write [[supports]]")  # type: ignore[assignment]
 
@@ -93,6 +96,9 @@ class EngagementSpec(Spec):
     )
     torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest torque on gear A")
     speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
+    misalignment: Misalignment | None = Field(
+        default=None, description="parallelism errors of the axes, of B's seen from A's; parallel when the table is absent"
+    )
 
 
 class SupportSpec(Spec):
@@ -168,6 +174,13 @@ class GeneralStage(Spec):
         return alone and all(
             s.axial is None and s.tilt is None and s.to is None and s.at in (None, places[s.body])
             for s in self.supports
+        )
+
+    @property
+    def even(self) -> bool:
+        """Whether everything is symmetric about mid-width: planar, without lead modifications and misalignment."""
+        return self.planar and all(gear.lead is None for gear in self.gears) and all(
+            mesh.misalignment is None for mesh in self.engagements
         )
 
     def rotor_of(self, body: str) -> str:

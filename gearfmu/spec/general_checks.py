@@ -15,7 +15,7 @@ from gearfmu.spec.gear import PairSpec
 from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, ShaftBody
 
 Found = Iterator[tuple[str, str, str]]
-_SAME_RACK = ("normal_module", "pressure_angle", "helix_angle")
+_SAME_RACK = ("normal_module", "pressure_angle")
 
 
 def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
@@ -139,6 +139,9 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
     if differ:
         remedy = f"{a.name} and {b.name} differ in it: gears in mesh share the basic rack"
         return [Problem(file, f"bodies.{b.name}.{key}", f"{getattr(b, key):g}", remedy) for key in differ]
+    if not math.isclose(a.helix_angle, -b.helix_angle, abs_tol=1e-12):
+        remedy = f"gears in mesh have opposite hands: write {math.degrees(-a.helix_angle):g} deg, as {a.name} asks"
+        return [Problem(file, f"bodies.{b.name}.helix_angle", f"{math.degrees(b.helix_angle):g} deg", remedy)]
     places = [stage.place(gear.name, None) for gear in (a, b)]
     found = []
     if abs(places[0] - places[1]) > 1e-9:
@@ -147,7 +150,7 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
         found.append(Problem(file, f"{field}.gears", ", ".join(mesh.gears), remedy))
     pair = PairSpec(
         center_distance=centre_distance(stage, mesh), normal_module=a.normal_module, pressure_angle=a.pressure_angle,
-        backlash=mesh.backlash,
+        backlash=mesh.backlash, helix_angle=a.helix_angle,
     )  # fmt: skip
     axis = f"rotors.{stage.rotor_of(b.name)}.axis"
     names = {"pair.center_distance": axis, "pair.backlash": f"{field}.backlash"}
@@ -166,7 +169,7 @@ def with_relief_rolls(stage: GeneralStage) -> GeneralStage:
             if not isinstance(gear, GearBody) or gear.tip_relief is None:
                 continue
             if isinstance(gear.tip_relief.start_roll, str):  # "outer_single_contact"
-                shapes = [GearGeometry.of(stage.bodies[other], stage.bodies[other]) for other in mesh.gears]
+                shapes = [GearGeometry.of(stage.bodies[other], stage.bodies[other], 1) for other in mesh.gears]
                 pair = PairGeometry((shapes[0], shapes[1]), centre_distance(stage, mesh), mesh.backlash)
                 relief = gear.tip_relief.model_copy(update={"start_roll": pair.outer_single_contact(index)})
                 bodies[name] = gear.model_copy(update={"tip_relief": relief})

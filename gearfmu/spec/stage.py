@@ -95,17 +95,6 @@ def require_pair(spec: Any) -> None:
         raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
 
 
-def require_spur(spec: StageSpec) -> None:
-    """SpecError for a helical pair: it has bodies, but no contact and FMU yet."""
-    if spec.pair.helix_angle:
-        remedy = (
-            "helical pairs can be meshed, reduced and inspected so far (mesh, reduce, inspect, modes --body, frf); "
-            "their motion in time is not built yet: name a stage of helix angle 0 deg, such as fzg_c"
-        )
-        angle = f"{math.degrees(spec.pair.helix_angle):g} deg"
-        raise SpecError([Problem(str(spec.source), "pair.helix_angle", angle, remedy)])
-
-
 def _load_pair(layers: Layers) -> StageSpec:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
@@ -113,12 +102,28 @@ def _load_pair(layers: Layers) -> StageSpec:
     problems += found
     if spec is not None:
         problems += geometry_problems(str(path), spec.pair, spec.gears, spec.torque_max)
+        problems += _bearing_problems(str(path), spec)
     else:
         problems += _geometry_of_what_can_be_read(layers)
     problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
     return _with_relief_rolls(_with_import_paths(spec, layers))
+
+
+def _bearing_problems(file: str, spec: StageSpec) -> list[Problem]:
+    """Gears that move along their axes and tilt are held there; both gears of a pair move alike."""
+    names = [(gear, field) for gear in spec.gears for field in ("axial", "tilt")]
+    given = [(gear, field) for gear, field in names if getattr(gear.bearing, field) is not None]
+    if not given and spec.pair.helix_angle == 0:
+        return []
+    why = "a helical gear" if spec.pair.helix_angle else "a gear whose mate or other direction is held so"
+    example = {"axial": '"1e8 N/m"', "tilt": '"5e4 N*m/rad"'}
+    return [
+        Problem(file, f"gears.{gear.name}.bearing.{field}", "missing", f"{why} needs it: write {field} = {example[field]}")
+        for gear, field in names
+        if (gear, field) not in given
+    ]
 
 
 def _load_set(layers: Layers) -> PlanetarySpec:

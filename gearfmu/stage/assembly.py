@@ -22,7 +22,7 @@ from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.tables import ROLLS
-from gearfmu.stage.teeth import gear_section, index_section, mismatches
+from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
 
 MODEL_VERSION = 2
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
@@ -43,7 +43,7 @@ def assemble(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int =
 def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
     stage = expand_pair(spec) if isinstance(spec, StageSpec) else spec
-    shapes = [GearGeometry.of(gear, gear) for gear in stage.gears]
+    shapes = [GearGeometry.of(gear, gear, 1) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
@@ -66,7 +66,7 @@ def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], roll
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         place = stage.place(gear.name, None)
         sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
-        sections |= index_section(i, gear, shape)
+        sections |= index_section(i, gear, shape) | lead_section(i, gear)
         sections |= _gear_sections(stage, i, bodies[i], groups)
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, port_nodes(stage))

@@ -61,7 +61,7 @@ def place_of(stage: GeneralStage, support: SupportSpec) -> float:
 def width_degrees(stage: GeneralStage, bodies: Sequence[Any]) -> np.ndarray:
     """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width."""
     count = min(body.width_functions for body in bodies)
-    return symmetric_functions(count) if stage.planar else np.arange(min(count, MOST_FUNCTIONS))
+    return symmetric_functions(count) if stage.even else np.arange(min(count, MOST_FUNCTIONS))
 
 
 def stage_layout(stage: GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> Layout:
@@ -77,8 +77,8 @@ def stage_layout(stage: GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS)
 
 
 def _gear(stage: GeneralStage, gear: GearBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
-    shape = GearGeometry.of(gear, gear)
-    chosen = excited_modes(body, degrees) if stage.planar else _all_modes(body, degrees)
+    shape = GearGeometry.of(gear, gear, 1)
+    chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
     return free_gear(body, chosen, degrees, resampling(body.roll, shape.s_form, shape.s_tip, rolls))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -63,8 +64,8 @@ def stage_sections(stage: GeneralStage) -> dict[str, Any]:
     for mesh in stage.engagements:
         pair, (a, b) = mesh_geometry(stage, mesh), mesh_axes(stage, mesh)
         engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), EXTERNAL, _coast_shift(pair)])
-        force = mesh.torque_max / pair.gears[0].r_b
-        numbers.append([*a, *b, mesh.backlash, pair.nominal_backlash, mesh.damping, force])
+        force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
+        numbers.append([*a, *b, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
         periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
     return {
         "name": stage.name,
@@ -76,10 +77,21 @@ def stage_sections(stage: GeneralStage) -> dict[str, Any]:
     }
 
 
+def _tilt(mesh: EngagementSpec, a: Sequence[float], b: Sequence[float]) -> tuple[float, float]:
+    """Angles (rad) about x and y of B's axis against A's: f_Sigma delta along the line of the centres, f_Sigma beta
+    across it, both over the span (ISO/TR 10064-3)."""
+    if mesh.misalignment is None:
+        return 0.0, 0.0
+    along, across = (f / mesh.misalignment.span for f in (mesh.misalignment.in_plane, mesh.misalignment.out_of_plane))
+    gamma = math.atan2(b[1] - a[1], b[0] - a[0])
+    x, y = along * math.cos(gamma) - across * math.sin(gamma), along * math.sin(gamma) + across * math.cos(gamma)
+    return -y, x  # the axis e_z + (x, y) is e_z turned by (-y, x)
+
+
 def _shape(stage: GeneralStage, name: str) -> GearGeometry:
     gear = stage.bodies[name]
     assert isinstance(gear, GearBody)
-    return GearGeometry.of(gear, gear)
+    return GearGeometry.of(gear, gear, 1)
 
 
 def _coast_shift(geometry: PairGeometry) -> int:

@@ -12,6 +12,7 @@ from gearfmu.spec.gear import GearSpec
 from gearfmu.stage.fields import gear_numbers
 
 SHARPEST_EDGE = 1e-6
+LEADS = 33  # places across the face width where a lead is given
 
 
 def gear_section(gear: GearSpec, shape: GearGeometry, phase: float, place: float) -> np.ndarray:
@@ -37,7 +38,7 @@ def gear_section(gear: GearSpec, shape: GearGeometry, phase: float, place: float
             "corner_radius": math.hypot(shape.r_b, inner),
             "corner_angle": shape.s_tip / shape.r_b - math.atan2(inner, shape.r_b),
             "z_mid": place,
-            "helix": 0.0,
+            "helix": shape.beta_b,
         }
     )
 
@@ -49,6 +50,20 @@ def index_section(index: int, gear: GearSpec, shape: GearGeometry) -> dict[str, 
     angles = np.zeros((2, gear.teeth))
     angles[:, list(gear.index_deviation)] = np.array(list(gear.index_deviation.values())) / shape.r
     return {f"index{index}": angles}
+
+
+def lead_section(index: int, gear: GearSpec) -> dict[str, np.ndarray]:
+    """Depth (2 flanks, LEADS) m across the face width, in the transverse section; no section without modifications."""
+    if gear.lead is None:
+        return {}
+    x = np.linspace(-1, 1, LEADS)
+    depth = gear.lead.crowning * x**2
+    if gear.lead.end_relief is not None:
+        relief = gear.lead.end_relief
+        into = np.clip(1 - (1 - np.abs(x)) * gear.face_width / 2 / relief.length, 0, None)
+        depth = depth + relief.amount * into**2
+    turned = gear.lead.slope * x / 2
+    return {f"lead{index}": np.stack([depth - turned, depth + turned])}
 
 
 def mismatches(gear: GearSpec, shape: GearGeometry, body: Any) -> list[str]:

@@ -60,7 +60,7 @@ def flat_blob(name: str, bodies: Sequence[FlatBody], contact: FlatContact) -> by
         "degrees": np.array(contact.degrees, np.int32),
         "inertia": np.array([body.mass for body in bodies]),
         "engaged": np.array([[0, 1, FLAT, 0]], np.int32),
-        "engagement": np.array([[0.0, 0.0, contact.gap, 0.0, 0.0, 0.0, contact.damping, LOAD]]),
+        "engagement": np.array([[0.0, 0.0, contact.gap, 0.0, 0.0, 0.0, contact.damping, LOAD, 0.0, 0.0]]),
         "port_kinds": np.array([[0, TORQUE, 0], [1, TORQUE, 0]], np.int32),
         "ports": np.array([[1.0, 0.0, 1.0, 1.0, 1.0, 0.0]] * 2),
         "port_residual": np.zeros((2, 2)),

@@ -58,7 +58,7 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
         "degrees": np.array(DEGREES, np.int32),
         "inertia": np.array(INERTIA),
         "engaged": np.array([[0, 1, EXTERNAL, _coast_shift()]], np.int32),
-        "engagement": np.array([[0.0, 0.0, DISTANCE, 0.0, 1e-4, 0.0, 2e4, 600.0 / BASE[0]]]),
+        "engagement": np.array([[0.0, 0.0, DISTANCE, 0.0, 1e-4, 0.0, 2e4, 600.0 / BASE[0], 0.0, 0.0]]),
         "port_kinds": np.array([[g, *PORTS[port]] for g, port in enumerate(ports)], np.int32),
         "ports": np.array([last, last]),
     } | port_compliances(groups[0], NODES)

@@ -12,6 +12,7 @@
 typedef struct pair { /* the gears of an engagement at their poses */
     const gk_setup *setup;
     const gk_engagement *e;
+    const gk_mesh *mesh;
     const gk_gear *gear[2];
     const double *pose;
     double allowance;
@@ -26,7 +27,7 @@ typedef struct line {              /* line of action of one side */
 static pair pair_of(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
-    return (pair){setup, e, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
+    return (pair){setup, e, mesh, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
 }
 
 static int internal(const pair *q) { return q->e->kind == MESH_INTERNAL; }
@@ -73,7 +74,7 @@ static double relief(const gk_gear *gear, int on, double s, double *slope)
 }
 
 /* add the derivative of c·s, s = sg r_b (β − t), to a place's gradient; gear 0 or 1 */
-static void add_roll(gk_place *p, const line *l, const gk_gear *gear, int which, double c)
+static void add_roll(gk_point *p, const line *l, const gk_gear *gear, int which, double c)
 {
     const double k = c * l->sg * gear->r_b;
     p->gradient[which ? PHIB : PHIA] += k;
@@ -83,14 +84,14 @@ static void add_roll(gk_place *p, const line *l, const gk_gear *gear, int which,
     p->gradient[YB] -= k * l->dt_y;
 }
 
-static void flank_contact(const pair *q, const line *l, double g, gk_place *p)
+static void flank_contact(const pair *q, const line *l, double g, gk_point *p)
 {
     const double sense = internal(q) ? -1.0 : 1.0;
     p->gap = g;
     p->curvature = 1.0 / gk_max(p->roll[0], 1e-4) + sense / gk_max(p->roll[1], 1e-4);
-    const double gradient[POSE] = {-l->nx, -l->ny, -l->sg * q->gear[0]->r_b,
-                                   l->nx,  l->ny,  -sense * l->sg * q->gear[1]->r_b};
-    memcpy(p->gradient, gradient, sizeof gradient);
+    memset(p->gradient, 0, sizeof p->gradient);
+    p->gradient[XA] = -l->nx, p->gradient[YA] = -l->ny, p->gradient[PHIA] = -l->sg * q->gear[0]->r_b;
+    p->gradient[XB] = l->nx, p->gradient[YB] = l->ny, p->gradient[PHIB] = -sense * l->sg * q->gear[1]->r_b;
     for (int i = 0; i < 2; i++) {
         double slope, depth = relief(q->gear[i], GK_ON(q->setup, tip_relief), p->roll[i], &slope);
         p->gap += depth;
@@ -101,7 +102,7 @@ static void flank_contact(const pair *q, const line *l, double g, gk_place *p)
 /* Eq. 6: tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l =
  * line of action. Returns 0 when the edge's centre lies inside the base circle of o: no involute there. All formulas
  * for c = 0; for c = 1 the roles and the direction of n swap, which the signs below say. */
-static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_place *p)
+static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_point *p)
 {
     const int o = 1 - c, on = GK_ON(q->setup, tip_relief);
     const gk_gear *tip = q->gear[c], *other = q->gear[o];
@@ -126,22 +127,22 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
     double fade = 1.0 / (1.0 + over / tip->edge);
     p->gap = length - s - tip->edge + relief_c + slope_c * over * fade + relief_o;
     memset(p->gradient, 0, sizeof p->gradient);
-    p->gradient[3 * c] = mx;
-    p->gradient[3 * c + 1] = my;
-    p->gradient[3 * c + 2] = mx * -ry + my * rx;
-    p->gradient[3 * o] = -mx;
-    p->gradient[3 * o + 1] = -my;
-    p->gradient[3 * o + 2] = -l->sg * other->r_b;
+    p->gradient[SPACE * c] = mx;
+    p->gradient[SPACE * c + 1] = my;
+    p->gradient[SPACE * c + 2] = mx * -ry + my * rx;
+    p->gradient[SPACE * o] = -mx;
+    p->gradient[SPACE * o + 1] = -my;
+    p->gradient[SPACE * o + 2] = -l->sg * other->r_b;
     if (slope_c != 0.0) add_roll(p, l, tip, c, slope_c * fade * fade);
     if (slope_o != 0.0) { /* ∂s = sg r_b (∂φ_o − ∂t′), ∂t′ = ∂arg D − sg (r_b/(length r²)) D·∂D */
         double k = slope_o * l->sg * other->r_b, radial = -l->sg * other->r_b / (length * r2);
         double tx = -k * (-dy / r2 + radial * dx), ty = -k * (dx / r2 + radial * dy);
-        p->gradient[3 * c] += tx;
-        p->gradient[3 * c + 1] += ty;
-        p->gradient[3 * c + 2] += tx * -ry + ty * rx;
-        p->gradient[3 * o] -= tx;
-        p->gradient[3 * o + 1] -= ty;
-        p->gradient[3 * o + 2] += k;
+        p->gradient[SPACE * c] += tx;
+        p->gradient[SPACE * c + 1] += ty;
+        p->gradient[SPACE * c + 2] += tx * -ry + ty * rx;
+        p->gradient[SPACE * o] -= tx;
+        p->gradient[SPACE * o + 1] -= ty;
+        p->gradient[SPACE * o + 2] += k;
     }
     p->roll[c] = tip->s_tip;
     p->roll[o] = s;
@@ -154,7 +155,7 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
 
 /* Teeth out of their places (index deviation, ISO 1328-1): flank, roll and base angle turn with the tooth. Returns what
  * the gap loses. */
-static double misplace(const pair *q, double sg, gk_place *p, double beta[2])
+static double misplace(const pair *q, double sg, const gk_place *p, double beta[2], double rolls[2])
 {
     double closer = 0.0;
     for (int i = 0; i < 2; i++) {
@@ -162,7 +163,7 @@ static double misplace(const pair *q, double sg, gk_place *p, double beta[2])
         if (!gear->index) continue;
         const double angle = gear->index[p->flank * gear->z + p->tooth[i]], roll = sg * gear->r_b * angle;
         beta[i] += angle;
-        p->roll[i] += roll;
+        rolls[i] += roll;
         closer += i && internal(q) ? -roll : roll;
     }
     return closer;
@@ -182,7 +183,7 @@ static flank_side side_of(const pair *q, int flank)
     for (int i = 0; i < 2; i++) {
         const gk_gear *gear = q->gear[i];
         s.pitch[i] = 2.0 * GK_PI / gear->z;
-        s.base[i] = q->pose[3 * i + 2] + gear->phase + sg * gear->psi_b + (i ? s.shift * s.pitch[1] : 0.0);
+        s.base[i] = q->pose[SPACE * i + PHIA] + gear->phase + sg * gear->psi_b + (i ? s.shift * s.pitch[1] : 0.0);
         s.roll[i] = gear->r_b * sg * (s.base[i] - s.l.t - (i && !internal(q) ? GK_PI : 0.0));
     }
     s.p_b = q->gear[0]->r_b * s.pitch[0];
@@ -195,8 +196,9 @@ static flank_side side_of(const pair *q, int flank)
 /* the teeth k of A that may touch: their rolls lie between the other gear's end and their own; 0: nonsense */
 static int teeth(const pair *q, const flank_side *s, double ends[2])
 {
-    const double first = (internal(q) ? q->gear[1]->s_tip - s->l.L : s->l.L - q->gear[1]->s_tip) - s->beyond;
-    const double last = q->gear[0]->s_tip + s->beyond;
+    const double beyond = s->beyond + 0.5 * q->e->width * fabs(q->mesh->helix[0]);
+    const double first = (internal(q) ? q->gear[1]->s_tip - s->l.L : s->l.L - q->gear[1]->s_tip) - beyond;
+    const double last = q->gear[0]->s_tip + beyond;
     ends[0] = s->sg > 0 ? (first - s->roll[0]) / s->p_b : (s->roll[0] - last) / s->p_b;
     ends[1] = s->sg > 0 ? (last - s->roll[0]) / s->p_b : (s->roll[0] - first) / s->p_b;
     return ends[0] > -1e8 && ends[1] < 1e8;
@@ -234,29 +236,116 @@ static int in_tables(const gk_mesh *mesh, const gk_position position[2], gk_plac
     return 1;
 }
 
+/* The transverse section of a tooth pair where its base angles are β and its rolls are in p; 0 where the flanks have
+ * ended. A loaded pair reaches past the end by its deflection. */
+static int section(const pair *q, const flank_side *s, const double beta[2], double closer, gk_point *p)
+{
+    const int tip_b = internal(q) ? p->roll[1] < q->gear[1]->s_tip : p->roll[1] > q->gear[1]->s_tip;
+    const int corner = p->roll[0] > q->gear[0]->s_tip ? 0 : tip_b ? 1 : -1;
+    if (corner >= 0 && (internal(q) || !GK_ON(q->setup, tip_contact))) return 0;
+    if (corner < 0) {
+        flank_contact(q, &s->l, s->gap - closer, p);
+        return 1;
+    }
+    if (!corner_contact(q, &s->l, corner, beta, p)) return 0;
+    p->gap += s->allowance;
+    return 1;
+}
+
+/* ---- slices of helical or tilted teeth ------------------------------------------------------------------------------ */
+static const double LEAN = 0.2e-3;                   /* m: what tilts may close of a gap */
+static const double LEAST_SHARE = 0.02, OPEN = 1e-3; /* of a strip that has left its flanks; m */
+
+/* Where a strip touches: the middle of its part that lies on both flanks, or its end next to them. A roll at z is s + sg z
+ * tan β_b, β_b of its own gear. */
+static double covered(const pair *q, const flank_side *s, const double roll[2], int strip, double *share)
+{
+    const double half = 0.5 * q->e->width / q->setup->slices, middle = q->mesh->strip_middle[strip];
+    double from = middle - half, to = middle + half;
+    for (int w = 0; w < 2; w++) {
+        const double slope = s->sg * q->mesh->helix[w];
+        if (slope == 0.0) continue;
+        const double end = (q->gear[w]->s_tip - roll[w]) / slope;
+        if ((slope > 0.0) == (w == 0 || !internal(q)))
+            to = gk_min(to, end);
+        else
+            from = gk_max(from, end);
+    }
+    *share = gk_max((to - from) / (2.0 * half), LEAST_SHARE);
+    return gk_clamp(0.5 * (from + to), middle - half, middle + half);
+}
+
+/* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves along its
+ * axis or tilts about its mid-width moves the point of contact along it. */
+static void lean(const pair *q, const line *l, double z, gk_point *p)
+{
+    const gk_mesh *mesh = q->mesh;
+    const double nx = mesh->cosine * l->nx, ny = mesh->cosine * l->ny, nz = -l->sg * mesh->sine;
+    p->gap *= mesh->cosine;
+    p->curvature *= mesh->cosine;
+    for (int w = 0; w < 2; w++) {
+        const double side = w && !internal(q) ? -1.0 : 1.0, sense = w ? 1.0 : -1.0;
+        const double x = side * (q->gear[w]->r_b * l->cosine + p->roll[w] * l->nx);
+        const double y = side * (q->gear[w]->r_b * l->sine + p->roll[w] * l->ny);
+        double *gradient = p->gradient + SPACE * w;
+        const double *pose = q->pose + SPACE * w, *tilt = q->e->tilt;
+        for (int c = 0; c < PLANE; c++) gradient[c] *= mesh->cosine;
+        gradient[ZA] = sense * nz;
+        gradient[RXA] = sense * (y * nz - z * ny);
+        gradient[RYA] = sense * (z * nx - x * nz);
+        for (int c = PLANE; c < SPACE; c++) p->gap += gradient[c] * (pose[c] + (w && c > ZA ? tilt[c - RXA] : 0.0));
+    }
+}
+
+/* every strip by itself; 0 when none comes within `reach` */
+static int strips_of(const pair *q, const flank_side *s, const double beta[2], const double roll[2], double closer,
+                     double reach, gk_place *place)
+{
+    place->gap = OPEN;
+    for (int i = 0; i < GK_STRIPS(q->setup); i++) {
+        gk_point *p = &place->point[i];
+        const double z = covered(q, s, roll, i, &p->share);
+        double here[2];
+        for (int w = 0; w < 2; w++) {
+            p->roll[w] = roll[w] + s->sg * z * q->mesh->helix[w];
+            here[w] = beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
+        }
+        const int there = section(q, s, here, closer, p);
+        if (!there) flank_contact(q, &s->l, s->gap - closer + OPEN, p);
+        p->gap += q->mesh->lead[s->flank][i];
+        lean(q, &s->l, z, p);
+        place->gap = gk_min(place->gap, p->gap);
+    }
+    return place->gap < reach;
+}
+
 /* one tooth pair; 0 when it does not come within `reach` */
 static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, gk_place *p)
 {
     double beta[2] = {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]};
+    double roll[2] = {s->roll[0] + s->sg * k * s->p_b, s->roll[1] + s->step * s->sg * k * s->p_b};
     p->key.flank = p->flank = s->flank;
     p->key.tooth = k;
-    p->roll[0] = s->roll[0] + s->sg * k * s->p_b;
-    p->roll[1] = s->roll[1] + s->step * s->sg * k * s->p_b;
     p->number[0] = k, p->number[1] = s->shift + s->step * k;
     for (int i = 0; i < 2; i++) p->tooth[i] = modulo(p->number[i], q->gear[i]->z);
-    const double closer = q->gear[0]->index || q->gear[1]->index ? misplace(q, s->sg, p, beta) : 0.0;
-    const int tip_b = internal(q) ? p->roll[1] < q->gear[1]->s_tip : p->roll[1] > q->gear[1]->s_tip;
-    const int corner = p->roll[0] > q->gear[0]->s_tip ? 0 : tip_b ? 1 : -1;
-    if (corner >= 0 && (internal(q) || !GK_ON(q->setup, tip_contact)))
-        return 0; /* a loaded pair reaches past the end by its
-                                                                                    deflection */
-    if (corner < 0)
-        flank_contact(q, &s->l, s->gap - closer, p);
-    else if (!corner_contact(q, &s->l, corner, beta, p))
-        return 0;
-    else
-        p->gap += s->allowance;
+    const double closer = q->gear[0]->index || q->gear[1]->index ? misplace(q, s->sg, p, beta, roll) : 0.0;
+    if (q->setup->spatial) return strips_of(q, s, beta, roll, closer, reach, p);
+    p->point[0].share = 1.0;
+    p->point[0].roll[0] = roll[0], p->point[0].roll[1] = roll[1];
+    if (!section(q, s, beta, closer, &p->point[0])) return 0;
+    p->gap = p->point[0].gap;
     return p->gap < reach;
+}
+
+/* moves the gaps of a place along their gradients */
+void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE])
+{
+    place->gap = INFINITY;
+    for (int i = 0; i < (setup->spatial ? GK_STRIPS(setup) : 1); i++) {
+        gk_point *p = &place->point[i];
+        for (int d = 0; d < POSE; d++) p->gap += p->gradient[d] * delta[d];
+        place->gap = gk_min(place->gap, p->gap);
+    }
 }
 
 static int find_side(const pair *q, const gk_mesh *mesh, const flank_side *s, double reach,
@@ -265,7 +354,8 @@ static int find_side(const pair *q, const gk_mesh *mesh, const flank_side *s, do
     const double misplaced = GK_HAS(pitch_errors) ? q->gear[0]->index_most + q->gear[1]->index_most : 0.0;
     double ends[2];
     int found = 0;
-    if (!(s->gap - misplaced < reach)) return 0; /* the whole side is open: it costs this one comparison */
+    const double leaning = q->setup->spatial ? LEAN : 0.0;
+    if (!(s->gap - misplaced - leaning < reach)) return 0; /* the whole side is open: it costs this one comparison */
     if (!teeth(q, s, ends)) return -1;
     for (int k = (int)gk_floor(ends[0]) + 1; k <= (int)gk_floor(ends[1]) && found < room; k++)
         if (tooth_pair(q, s, k, reach, &place[found]) && in_tables(mesh, position, &place[found])) found++;
@@ -277,9 +367,11 @@ static int find_flat(const pair *q, double reach, gk_position position[2], gk_pl
     memset(p, 0, sizeof *p);
     memset(position, 0, 2 * sizeof *position);
     p->gap = q->e->position[1][0] - q->e->position[0][0] + q->pose[PHIB] - q->pose[PHIA];
-    p->gradient[PHIA] = -1.0;
-    p->gradient[PHIB] = 1.0;
-    p->curvature = 1.0;
+    for (int i = 0; i < (q->setup->spatial ? GK_STRIPS(q->setup) : 1); i++) {
+        gk_point *at = &p->point[i];
+        at->gap = p->gap, at->curvature = at->share = 1.0;
+        at->gradient[PHIA] = -1.0, at->gradient[PHIB] = 1.0;
+    }
     return p->gap < reach;
 }
 

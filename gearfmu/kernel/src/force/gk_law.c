@@ -103,4 +103,14 @@ GK_INLINE void apply(gk_system *s, const int strips)
 }
 
 /* the law of every contact at its present λ */
-void gk_law_apply(gk_system *s) { GK_STRIPPED(GK_STRIPS(s), apply, s) }
+void gk_law_apply(gk_system *s)
+{
+    if (!s->own_laws) {
+        GK_STRIPPED(GK_STRIPS(s), apply, s)
+        return;
+    }
+    for (int i = 0; i < s->contacts; i++) {
+        const gk_approach at = gk_law_at(&s->local[i], s->width[i], s->force[i]);
+        s->delta[i] = at.delta, s->yield[i] = at.slope, s->potential[i] = at.energy;
+    }
+}

@@ -4,7 +4,7 @@
  * minus the outward displacement of both gears plus the gap's gradient times their rigid motion. */
 #include "problem/gk_work.h"
 
-static const int RIGID_ROW[3] = {0, 1, 5}; /* x, y, rz among the rows of a gear's rigid motion */
+static const int RIGID_ROW[SPACE] = {0, 1, 5, 2, 3, 4}; /* of a pose among the rows of a gear's rigid motion */
 
 /* rigid motion of both gears of an engagement by displacements (or speeds) of the ground group */
 static void read_rigid(const gk_model *model, const gk_setup *setup, int e, const double *ground, double rigid[POSE])
@@ -12,8 +12,9 @@ static void read_rigid(const gk_model *model, const gk_setup *setup, int e, cons
     const gk_base *base = &setup->base;
     for (int w = 0; w < 2; w++) {
         const int g = model->engagement[e].gear[w], from = base->from[g], quads = base->width[g] / 4;
-        for (int c = 0; c < 3; c++)
-            rigid[3 * w + c] = gk_dot_quads(base->centre[g] + RIGID_ROW[c] * base->n + from, ground + from, quads);
+        for (int c = 0; c < gk_directions(setup); c++)
+            rigid[SPACE * w + c] = gk_dot_quads(base->centre[g] + RIGID_ROW[c] * base->n + from, ground + from, quads);
+        for (int c = gk_directions(setup); c < SPACE; c++) rigid[SPACE * w + c] = 0.0;
     }
 }
 
@@ -22,7 +23,7 @@ void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const dou
                   double *pose)
 {
     read_rigid(model, setup, e, ground, pose);
-    for (int w = 0; w < 2; w++) pose[3 * w + 2] += spin[model->gear[model->engagement[e].gear[w]].rotor];
+    for (int w = 0; w < 2; w++) pose[SPACE * w + PHIA] += spin[model->gear[model->engagement[e].gear[w]].rotor];
 }
 
 static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *work, gk_real *out)
@@ -81,11 +82,11 @@ void gk_rows_whole(const gk_model *model, const gk_setup *setup, gk_work *work, 
             if (gk_rows_at_bore(setup, s, i)) memcpy(row, base->port_rows + s->port_of[i] * base->n, size);
             continue;
         }
-        const gk_place *place = &engaged->place[s->place_of[i]];
+        const double *gradient = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s))->gradient;
         for (int w = 0; w < 2; w++) {
             const int g = model->engagement[e].gear[w], from = base->from[g], width = base->width[g];
-            for (int c = 0; c < 3; c++)
-                gk_axpy(place->gradient[3 * w + c], base->centre[g] + RIGID_ROW[c] * base->n, row, from / 4,
+            for (int c = 0; c < gk_directions(setup); c++)
+                gk_axpy(gradient[SPACE * w + c], base->centre[g] + RIGID_ROW[c] * base->n, row, from / 4,
                         (from + width) / 4);
             gk_axpy(-1.0, engaged->outward[w] + (size_t)i * width, row + from, 0, width / 4);
         }
@@ -210,10 +211,14 @@ void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_wor
 void gk_rows_read_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
                         const double *ground, double *read)
 {
+    const gk_system *s = &engaged->system;
     double rigid[POSE];
     read_rigid(model, setup, e, ground, rigid);
-    for (int i = 0; i < engaged->system.contacts; i++)
-        for (int d = 0; d < POSE; d++) read[i] += engaged->place[engaged->system.place_of[i]].gradient[d] * rigid[d];
+    for (int i = 0; i < s->contacts; i++) {
+        const double *gradient = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s))->gradient;
+        for (int w = 0; w < 2; w++)
+            for (int c = 0; c < gk_directions(setup); c++) read[i] += gradient[SPACE * w + c] * rigid[SPACE * w + c];
+    }
 }
 
 /* Σ rows·x and Σ rows·y of a gear group, in the frame of the reference tooth */
@@ -251,17 +256,19 @@ void gk_rows_push_ground(const gk_model *model, const gk_setup *setup, const gk_
     const gk_system *s = &work->system;
     double rigid[POSE] = {0};
     for (int i = 0; i < s->contacts; i++) {
-        const gk_place *place = &work->place[s->place_of[i]];
+        const double *gradient = gk_point_of(setup, &work->place[s->place_of[i]], i % GK_STRIPS(s))->gradient;
         if (x[i] == 0.0) continue;
-        for (int d = 0; d < POSE; d++) rigid[d] += x[i] * place->gradient[d];
+        for (int d = 0; d < POSE; d++) rigid[d] += x[i] * gradient[d];
         for (int w = 0; w < 2; w++) {
             const int g = model->engagement[e].gear[w], width = base->width[g];
             gk_axpy(-x[i], work->outward[w] + (size_t)i * width, out + base->from[g], 0, width / 4);
         }
     }
-    for (int d = 0; d < POSE; d++) {
-        const int g = model->engagement[e].gear[d / 3], from = base->from[g];
-        gk_axpy(rigid[d], base->centre[g] + RIGID_ROW[d % 3] * base->n, out, from / 4, (from + base->width[g]) / 4);
+    for (int w = 0; w < 2; w++) {
+        const int g = model->engagement[e].gear[w], from = base->from[g];
+        for (int c = 0; c < gk_directions(setup); c++)
+            gk_axpy(rigid[SPACE * w + c], base->centre[g] + RIGID_ROW[c] * base->n, out, from / 4,
+                    (from + base->width[g]) / 4);
     }
     for (int i = s->contacts; i < s->n; i++)
         if (x[i] != 0.0 && gk_rows_at_bore(setup, s, i))

@@ -12,7 +12,8 @@ int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *m
                   const double *pose, gk_position position[2], gk_place *place)
 {
     const int found = gk_flank_find(model, setup, mesh, still, STILL_REACH, position, place);
-    for (int p = 0; p < found; p++)
-        for (int d = 0; d < POSE; d++) place[p].gap += place[p].gradient[d] * (pose[d] - still[d]);
+    double moved[POSE];
+    for (int d = 0; d < POSE; d++) moved[d] = pose[d] - still[d];
+    for (int p = 0; p < found; p++) gk_flank_move(setup, &place[p], moved);
     return found;
 }

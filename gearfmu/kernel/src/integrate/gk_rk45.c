@@ -23,8 +23,7 @@ void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system 
     for (int pass = 0; pass < 2; pass++) {
         gk_solve_path(s, y, path);
         for (int i = 0; i < s->n; i++) {
-            const double of_strip = GK_ON(setup, contact_damping) ? mesh->damping * mesh->strip_width[i % s->strips]
-                                                                  : 0.0;
+            const double of_strip = GK_ON(setup, contact_damping) ? mesh->damping * mesh->cosine * s->width[i] : 0.0;
             const double c = !s->active[i]               ? 0.0
                              : s->kind[i] == ROW_CONTACT ? of_strip
                                                          : setup->joint[s->port_of[i]][s->joint_of[i]].damping;

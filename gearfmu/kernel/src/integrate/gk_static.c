@@ -146,18 +146,20 @@ static int form(rest *r, int e)
 {
     gk_work *work = r->work;
     gk_engaged *engaged = &work->engaged[e];
-    double here[POSE], spun[POSE];
+    double here[POSE], spun[POSE], moved[POSE];
     gk_rows_pose(r->model, &r->setup, e, work->spin, work->ground_zero, spun);
     gk_rows_pose(r->model, &r->setup, e, work->spin, work->rest_ground, engaged->pose);
     gk_rows_pose(r->model, &r->setup, e, r->data->x, work->rest_ground, here);
+    for (int d = 0; d < POSE;
+         d++) /* given torques move the pose, not the place; rigid motion by the oscillators is part of
+                                      the compliance */
+        moved[d] = spun[d] - here[d];
     engaged->places = gk_flank_find(r->model, &r->setup, &r->setup.mesh[e], here, SEE, engaged->position,
                                     engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++) {
         gk_place *place = &engaged->place[p];
-        for (int d = 0; d < POSE; d++) /* given torques move the pose, not the place; rigid motion by the oscillators is
-                                          part of the compliance */
-            place->gap += place->gradient[d] * (spun[d] - here[d]);
+        gk_flank_move(&r->setup, place, moved);
         place->memory = gk_step_remembered(&r->data->meshing[e], place->key);
     }
     gk_rows_form(r->model, &r->setup, work, e);

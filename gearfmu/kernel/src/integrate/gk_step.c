@@ -455,8 +455,7 @@ static void remember_engagement(const gk_setup *setup, const gk_engaged *engaged
         m->dash[strip] = s->dash[i];
         m->end[strip] = s->end[i];
         deepest = gk_max(deepest, -engaged->place[s->place_of[i]].gap);
-        if (GK_ON(setup, hertz) && s->force[i] > s->local[s->place_of[i]].high * s->width[i])
-            data->status |= STATUS_LAW;
+        if (GK_ON(setup, hertz) && s->force[i] > gk_law_of(s, i)->high * s->width[i]) data->status |= STATUS_LAW;
     }
     for (int i = s->contacts; i < s->n; i++)
         data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){

@@ -20,6 +20,7 @@
 #define gk_flow_for gk_flow_for_avx2
 #define gk_flow_known gk_flow_known_avx2
 #define gk_flank_find gk_flank_find_avx2
+#define gk_flank_move gk_flank_move_avx2
 #define gk_still_find gk_still_find_avx2
 #define gk_rows_pose gk_rows_pose_avx2
 #define gk_rows_form gk_rows_form_avx2

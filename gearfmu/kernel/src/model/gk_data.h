@@ -13,6 +13,9 @@ enum {
     MAX_SPINS = MAX_ROTORS + 2 * MAX_PORTS
 };
 enum { JOINT_PORT, JOINT_SHAFT, JOINT_CLUTCH };
+/* pose of a gear: in the plane, and what only spatial models know */
+enum { PLANE = 3, SPACE = 6, POSE = 2 * SPACE };
+enum { XA, YA, PHIA, ZA, RXA, RYA, XB, YB, PHIB, ZB, RXB, RYB };
 
 typedef enum { LEVEL_RIGID, LEVEL_FAST, LEVEL_STANDARD, LEVEL_FULL, LEVEL_PAPER, LEVEL_EXPLICIT } gk_level;
 typedef enum { DG4, MIX4, EM, RK45, CENTRAL } gk_integrator;
@@ -36,7 +39,8 @@ typedef struct gk_memory { /* what a tooth pair remembers from the last step */
 } gk_memory;
 
 typedef struct gk_meshing { /* an engagement */
-    double still[6];  /* poses of both gears at the start: where all is taken that depends on position when roll_motion
+    double
+        still[POSE];  /* poses of both gears at the start: where all is taken that depends on position when roll_motion
                          is off */
     double reach;     /* how far to look for contacts */
     double open_time; /* without any contact */

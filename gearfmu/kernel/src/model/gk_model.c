@@ -197,6 +197,28 @@ static void read_index(reader *r, gk_gear *g)
     }
 }
 
+static void read_lead(reader *r, gk_gear *g)
+{
+    g->lead = take(r, F_GEAR_lead);
+    for (int k = 0; g->lead && k < 2 * LEADS; k++) demand(r, between(g->lead[k], -1e-3, 1e-3), "leads");
+}
+
+/* whether anything moves along the axis, tilts, or differs over the face width but evenly */
+static int is_spatial(const gk_model *m)
+{
+    for (int e = 0; e < m->engagements; e++)
+        if (m->engagement[e].tilt[0] != 0.0 || m->engagement[e].tilt[1] != 0.0) return 1;
+    for (int i = 0; i < m->gears; i++) {
+        const gk_gear *g = &m->gear[i];
+        if (g->helix != 0.0 || g->lead) return 1;
+        for (int set = 0; set < m->sets; set++)
+            for (int c = 2; c < 5; c++) /* z, rx, ry */
+                for (int k = 0; k < g->ground[set].reads; k++)
+                    if (g->ground[set].centre[c * g->ground[set].reads + k] != 0.0) return 1;
+    }
+    return 0;
+}
+
 static void read_gear(reader *r, gk_model *m, int i)
 {
     gk_gear *g = &m->gear[i];
@@ -219,6 +241,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     if (!r->outcome) check_modes(r, g);
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
+    if (!r->outcome) read_lead(r, g);
 }
 
 static void read_ground(reader *r, gk_model *m, int set)
@@ -261,17 +284,20 @@ static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, c
     e->gear[0] = who[0], e->gear[1] = who[1], e->kind = (gk_mesh_kind)who[2], e->coast_shift = who[3];
     memcpy(e->position, v, sizeof e->position);
     e->backlash = v[4], e->nominal_backlash = v[5], e->damping = v[6], e->force_max = v[7];
+    e->tilt[0] = v[8], e->tilt[1] = v[9];
     demand(r,
            between(v[0], -100, 100) && between(v[1], -100, 100) && between(v[2], -100, 100) &&
                between(v[3], -100, 100) && between(e->backlash, -1e-3, 1e-2) &&
                between(e->nominal_backlash, -1e-2, 1e-2) && between(e->damping, 0, 1e9) &&
-               between(e->force_max, 1e-9, 1e12),
+               between(e->force_max, 1e-9, 1e12) && between(v[8], -0.01, 0.01) && between(v[9], -0.01, 0.01),
            "engagements");
     const gk_gear *A = &m->gear[e->gear[0]], *B = &m->gear[e->gear[1]];
     const double reach = e->kind == MESH_INTERNAL ? B->r_b - A->r_b : A->r_b + B->r_b;
     if (e->kind != MESH_FLAT && !(squared_distance(e) > 1.0002 * reach * reach))
         refuse(r, "centre distance", "is smaller than the base radii allow");
     if (A->rotor == B->rotor) refuse(r, "engagements", "join gears of one rotor");
+    if (e->kind != MESH_FLAT && !(fabs(A->helix + e->kind * B->helix) < 1e-6))
+        refuse(r, "helix angles", "do not fit each other");
     e->width = gk_min(A->width, B->width);
     e->overlap_max = e->kind == MESH_FLAT ? 1.0 : 0.25 * fabs(A->s_tip - A->s_form);
 }
@@ -284,7 +310,7 @@ static void read_engagements(reader *r, gk_model *m)
     read_names(r, F_MODEL_engagement_names, m->engagements, names);
     for (int i = 0; i < m->engagements && !r->outcome; i++) {
         memcpy(m->engagement[i].name, names[i], NAME_LENGTH);
-        read_engagement(r, m, i, who + 4 * i, v + 8 * i);
+        read_engagement(r, m, i, who + 4 * i, v + 10 * i);
     }
 }
 
@@ -304,6 +330,7 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     for (int i = 0; i < model->sets && !r.outcome; i++) read_ground(&r, model, i);
     for (int i = 0; i < model->gears && !r.outcome; i++) read_gear(&r, model, i);
     if (!r.outcome) read_engagements(&r, model);
+    if (!r.outcome) model->spatial = is_spatial(model);
     return r.outcome;
 }
 

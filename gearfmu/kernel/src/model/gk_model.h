@@ -12,6 +12,7 @@ enum {
     MAX_SUPPORTS = 64, /* directions */
     MAX_SLICES = 10,
     MAX_FUNCTIONS = 8,
+    LEADS = 33, /* places across the face width where a lead is given */
     MAX_MODES = 6000,
     MAX_GROUND = 2000,
     OFFSETS = 7, /* tooth offsets −3 … 3 of the residual */
@@ -29,6 +30,7 @@ typedef struct gk_gear {
     int rotor, z, modes;
     const double *omega, *zeta, *rows, *residual, *support_residual, *port_residual;
     const int32_t *diameter, *member;
+    const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
     double index_most;   /* the largest of them along the flank normal, m */
     struct {
@@ -48,6 +50,7 @@ typedef struct gk_engagement {
     double position[2][2]; /* x, y of both gears */
     double backlash, nominal_backlash, damping, force_max; /* backlash j_wt: of the pair; of the teeth as they are */
     double width;                                          /* common face width */
+    double tilt[2];                                        /* of B's axis against A's, about x and y */
     double overlap_max;                                    /* teeth that overlap by more mean nothing */
 } gk_engagement;
 
@@ -72,6 +75,7 @@ struct gk_model {
     int slices, rotors, gears, engagements, ports, supports, dampers, functions, rolls, sets, chains;
     char rotor_name[MAX_ROTORS][NAME_LENGTH], support_name[MAX_SUPPORTS][NAME_LENGTH],
         displacement_name[MAX_SUPPORTS][NAME_LENGTH];
+    int spatial; /* something moves along the axis or tilts, or the teeth are not the same all over the width */
     double cut[2], h_max, period_min;
     int degree[MAX_FUNCTIONS];
     double inertia[MAX_ROTORS];

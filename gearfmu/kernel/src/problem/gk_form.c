@@ -17,6 +17,8 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
     for (int p = 0; p < engaged->places; p++)
         for (int i = 0; i < GK_STRIPS(s); i++, s->n++) {
             const gk_place *place = &engaged->place[p];
+            const gk_point *point = gk_point_of(setup, place, i);
+            const double width = mesh->strip_width[i] * point->share;
             const gk_memory *memory = place->memory < 0 ? NULL : &meshing->memory[place->memory];
             s->kind[s->n] = ROW_CONTACT;
             s->port_of[s->n] = s->joint_of[s->n] = -1;
@@ -24,12 +26,13 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->force0[s->n] = memory ? memory->force[i] : 0.0;
             s->end0[s->n] = memory ? memory->end[i] : 0.0;
             s->dash0[s->n] = memory ? memory->dash[i] : 0.0;
-            s->damping[s->n] = GK_ON(setup, contact_damping) ? 2.0 * mesh->damping * mesh->strip_width[i] / h : 0.0;
+            s->damping[s->n] = GK_ON(setup, contact_damping) ? 2.0 * mesh->damping * width / h : 0.0;
             s->bound[s->n] = 0.0;
-            s->weight[s->n] = mesh->strip_width[i] * setup->slices / model->engagement[e].width;
-            s->width[s->n] = mesh->strip_width[i];
-            s->per_width[s->n] = 1.0 / mesh->strip_width[i];
-            if (i == 0) gk_law_set(model, setup, mesh, place->curvature, &s->local[p]);
+            s->weight[s->n] = width * setup->slices / model->engagement[e].width;
+            s->width[s->n] = width / mesh->cosine;
+            s->per_width[s->n] = mesh->cosine / width;
+            if (s->own_laws || i == 0)
+                gk_law_set(model, setup, mesh, point->curvature, &s->local[s->own_laws ? s->n : p]);
         }
     s->contacts = s->n;
 }
@@ -58,6 +61,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
     gk_system *s = &work->engaged[e].system;
     s->strips = setup->strips;
     s->n = s->clutches = 0;
+    s->own_laws = setup->spatial;
     list_contacts(model, setup, data, h, work, e);
     for (int joint = 0; joint < JOINTS; joint++) /* clutches last */
         for (int p = 0; p < mesh->ports; p++)
@@ -224,34 +228,41 @@ static void add_ground(const gk_model *model, const gk_setup *setup, gk_work *wo
 
 /* The same of one side from tables: with W = −u + gΦ (u outward, g gradient, Φ rigid motion) what u alone makes is in the
  * tables of the contacts; the rest is −h gᵀ − g hᵀ, h = uMΦᵀ − ½ gΦMΦᵀ */
-typedef struct pulled {                                                /* of the contacts on one side */
-    double g[3][MAX_STRIDE], h[2][3][MAX_STRIDE], port[2][MAX_STRIDE]; /* 2: in D, in K */
-    int turns;                                                         /* the gear's rigid motion has rz */
+typedef struct pulled {                                                        /* of the contacts on one side */
+    double g[SPACE][MAX_STRIDE], h[2][SPACE][MAX_STRIDE], port[2][MAX_STRIDE]; /* 2: in D, in K */
+    int count, of[SPACE];                                                      /* motions that the gear has */
 } pulled;
 
-static void pull(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, pulled *p)
+GK_INLINE void pull(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, pulled *p,
+                    const int directions)
 {
     const gk_system *s = &engaged->system;
     const gk_position *at = &engaged->position[side->which];
     const gk_step_side *table = &engaged->table[side->which];
     const int strips = GK_STRIPS(setup), points = side->candidates * strips;
-    p->turns = table->own[0][2][2] != 0.0;
-    for (int c = 0; c < 3; c++) {
+    const int common = directions == SPACE ? COMMON : COMMON / 2;
+    p->count = 0;
+    for (int c = 0; c < directions; c++) {
+        if (table->own[0][c][c] != 0.0 || c < PHIA) p->of[p->count++] = c;
         p->g[c][s->stride - 1] = p->h[0][c][s->stride - 1] = p->h[1][c][s->stride - 1] = 0.0;
         for (int i = s->contacts; i < s->stride; i++) p->g[c][i] = p->h[0][c][i] = p->h[1][c][i] = 0.0;
     }
     for (int i = 0; i < s->contacts; i++) {
         const gk_place *place = &engaged->place[s->place_of[i]];
-        const double *g = place->gradient + 3 * side->which;
+        const double *g = gk_point_of(setup, place, i % strips)->gradient + SPACE * side->which;
         const size_t row = (size_t)at->node * points + (size_t)(place->candidate[side->which] * strips + i % strips);
-        const gk_quad *low = (const gk_quad *)table->pulls + 2 * row, *high = low + 2 * points;
-        for (int c = 0; c < 3; c++) p->g[c][i] = g[c];
+        for (int c = 0; c < directions; c++) p->g[c][i] = g[c];
         for (int kind = 0; kind < 2; kind++) {
-            const gk_quad u = low[kind] + at->part * (high[kind] - low[kind]);
-            const double (*own)[4] = table->own[kind];
-            for (int c = 0; c < 3; c++)
-                p->h[kind][c][i] = u[c] - 0.5 * (g[0] * own[c][0] + g[1] * own[c][1] + g[2] * own[c][2]);
-            p->port[kind][i] = g[0] * own[3][0] + g[1] * own[3][1] + g[2] * own[3][2] - u[3];
+            const double *low = table->pulls + (2 * row + (size_t)kind) * common, *high = low + 2 * points * common;
+            for (int c = 0; c <= directions; c++) {
+                const double u = low[c] + at->part * (high[c] - low[c]);
+                double own = 0.0;
+                for (int d = 0; d < directions; d++) own += g[d] * table->own[kind][c][d];
+                if (c < directions)
+                    p->h[kind][c][i] = u - 0.5 * own;
+                else
+                    p->port[kind][i] = own - u;
+            }
         }
     }
 }
@@ -260,7 +271,8 @@ GK_INLINE void add_pulled(gk_system *s, const pulled *p, const int quads)
 {
     for (int i = 0; i < s->contacts; i++) {
         gk_quad *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
-        for (int c = 0; c < 2 + p->turns; c++) {
+        for (int m = 0; m < p->count; m++) {
+            const int c = p->of[m];
             const gk_quad *g = (const gk_quad *)p->g[c], *h = (const gk_quad *)p->h[0][c],
                           *k = (const gk_quad *)p->h[1][c];
             const double own = p->g[c][i], moved = p->h[0][c][i], yielded = p->h[1][c][i];
@@ -272,11 +284,15 @@ GK_INLINE void add_pulled(gk_system *s, const pulled *p, const int quads)
 static void add_ground_tables(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
 {
     gk_system *s = &engaged->system;
+    const int port = gk_directions(setup); /* among what is common */
     pulled p;
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
         if (!setup->base.width[side->gear]) continue;
-        pull(setup, engaged, side, &p);
+        if (setup->spatial)
+            pull(setup, engaged, side, &p, SPACE);
+        else
+            pull(setup, engaged, side, &p, PLANE);
         GK_SIZED(s->stride / 4, add_pulled, s, &p)
         for (int r = s->contacts; r < s->n; r++) {
             if (!gk_rows_at_bore(setup, s, r) || model->port[s->port_of[r]].rotor != model->gear[side->gear].rotor)
@@ -286,7 +302,7 @@ static void add_ground_tables(const gk_model *model, const gk_setup *setup, gk_e
                 s->D[at + i] += p.port[0][i], s->D[i * s->stride + r] += p.port[0][i];
                 s->A[at + i] -= p.port[1][i], s->A[i * s->stride + r] -= p.port[1][i];
             }
-            s->D[at + r] += engaged->table[w].own[0][3][3], s->A[at + r] -= engaged->table[w].own[1][3][3];
+            s->D[at + r] += engaged->table[w].own[0][port][port], s->A[at + r] -= engaged->table[w].own[1][port][port];
         }
     }
 }
@@ -302,13 +318,14 @@ GK_INLINE void spin_row(const double *inverse, const gk_system *s, int spins, in
     }
 }
 
-/* A ← A + Q; D takes mobility·R, A gives κ·R; strips of a tooth pair share one row of R */
-GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spins, gk_system *s, const int quads)
+/* A ← A + Q; D takes mobility·R, A gives κ·R; shared: strips of a tooth pair with the same row of R */
+GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spins, int shared, gk_system *s,
+                        const int quads)
 {
     gk_quad sum[MAX_STRIDE / 4], *D = (gk_quad *)s->D, *A = (gk_quad *)s->A;
     const gk_quad *Q = (const gk_quad *)s->Q;
     for (int first = 0, next; first < s->n; first = next) {
-        next = first + (first < s->contacts ? GK_STRIPS(s) : 1);
+        next = first + (first < s->contacts ? shared : 1);
         spin_row(inverse, s, spins, first, sum, quads);
         for (int i = first; i < next; i++, D += quads, A += quads, Q += quads)
             for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] += Q[q] - k->rigid_kappa * sum[q];
@@ -321,7 +338,7 @@ static void add_spins(const gk_setup *setup, const gk_coefficients *k, gk_system
     const gk_mesh *mesh = &setup->mesh[e];
     double inverse[MAX_LOCAL];
     for (int l = 0; l < mesh->spins; l++) inverse[l] = setup->inverse_inertia[mesh->spin[l]];
-    GK_SIZED(s->stride / 4, add_rows, k, inverse, mesh->spins, s)
+    GK_SIZED(s->stride / 4, add_rows, k, inverse, mesh->spins, setup->spatial ? 1 : GK_STRIPS(s), s)
     for (int i = s->contacts; i < s->n; i++)
         if (s->kind[i] == ROW_CLUTCH)
             for (int j = 0; j < s->n; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
@@ -355,7 +372,7 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
     gk_rows_read(setup, work, e, work->y, work->ground_y, engaged->read);
     memcpy(s->g, engaged->read, (size_t)s->n * sizeof *s->g);
     for (int i = 0; i < s->contacts; i++) {
-        const gk_place *p = &engaged->place[s->place_of[i]];
+        const gk_point *p = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s));
         s->g[i] += p->gap;
         s->rigid[0][i] = p->gradient[PHIA], s->rigid[1][i] = p->gradient[PHIB];
     }

@@ -35,9 +35,10 @@ typedef struct gk_system {
     double bound[MAX_ROWS], slip[MAX_JOINTS];        /* clutch: |z| ≤ bound; z of a slipping one, by clutch */
     double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
     double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in joints */
-    gk_local local[MAX_PAIRS];                       /* law of a tooth pair, per metre */
-    double rigid[MAX_LOCAL][MAX_STRIDE];             /* derivative of the rows by each spin of the engagement */
-    double *D, *A, *Q;                               /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
+    int own_laws;                 /* every strip has a law of its own, else the strips of a tooth pair share one */
+    gk_local local[MAX_CONTACTS]; /* laws of the contacts, per metre */
+    double rigid[MAX_LOCAL][MAX_STRIDE]; /* derivative of the rows by each spin of the engagement */
+    double *D, *A, *Q;                   /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
     double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
                                          factor; what a damper's force does, D + ½A + (late − ½)Q */
     double inverse[MAX_STRIDE]; /* of the pivots */
@@ -111,6 +112,12 @@ void gk_tangent_solve(const gk_system *s, double *x);
 /* gk_balance.c */
 void gk_balance_plain(const gk_island *island);
 void gk_balance_solve(const gk_island *island);
+/* law of a contact */
+static inline const gk_local *gk_law_of(const gk_system *s, int i)
+{
+    return &s->local[s->own_laws ? i : s->place_of[i]];
+}
+
 /* gk_law.c */
 void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double curvature, gk_local *law);
 void gk_law_bounds(const gk_model *model, gk_mesh *mesh);

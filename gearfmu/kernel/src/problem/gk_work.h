@@ -4,17 +4,27 @@
 #include "problem/gk_system.h"
 
 /* phases of a step, for the profile */
+enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to quads */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
-enum { XA, YA, PHIA, XB, YB, PHIB, POSE }; /* poses of both gears of an engagement */
+typedef struct gk_point { /* of a strip */
+    double gap, gradient[POSE];
+    double roll[2], curvature; /* length of roll on each gear, 1/ρA + 1/ρB in the normal section */
+    double share;              /* of the strip's length that lies on both flanks */
+} gk_point;
 
 typedef struct gk_place { /* a tooth pair on one flank that may touch, at the predicted poses */
     gk_key key;
-    double gap, gradient[POSE];
-    double roll[2], curvature;      /* length of roll on each gear, 1/ρA + 1/ρB */
+    double gap;                     /* the smallest of its points' */
+    gk_point point[MAX_SLICES];     /* of every strip; one for all where the model is planar */
     int tooth[2], number[2], flank; /* tooth of each gear: wrapped to 0 … z−1, and as counted */
     int candidate[2];               /* its place in the tables of both sides */
     int memory;                     /* its entry in the memory of the engagement, −1 if new */
 } gk_place;
+
+static inline const gk_point *gk_point_of(const gk_setup *setup, const gk_place *place, int strip)
+{
+    return &place->point[setup->spatial ? strip : 0];
+}
 
 /* where a side stands in its table */
 typedef struct gk_position {
@@ -23,12 +33,14 @@ typedef struct gk_position {
     double part;       /* 0 … 1 of the way to the next node */
 } gk_position;
 
+/* of them that a model knows */
+static inline int gk_common(const gk_setup *setup) { return setup->spatial ? COMMON : COMMON / 2; }
+
 typedef struct gk_step_side { /* D and −K of one step h: squares of nodes and products of neighbours */
     gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of −K */
-    double *
-        pulls; /* (nodes + 1, points, 8): what the ground oscillators' rows have in common with rigid motion x, y, rz of
-                       the gear and with the bore angle, in D, then in K */
-    double own[2][4][4]; /* the same of these four with each other */
+    double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
+                      motion of the gear, then with the bore angle: in D, in K */
+    double own[2][COMMON][COMMON]; /* the same of these with each other */
 } gk_step_side;
 
 typedef struct gk_engaged { /* an engagement in a step */
@@ -81,6 +93,7 @@ struct gk_work {
 };
 
 /* gk_flank.c */
+void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
                   gk_position position[2], gk_place *place);
 /* gk_still.c */

@@ -91,7 +91,8 @@ void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *
         double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
         memcpy(S, s->path[p], (size_t)(strips * strips) * sizeof *S);
         for (int a = 0; a < strips; a++)
-            S[a * strips + a] += gk_law_at(&s->local[p], s->width[first + a], full * s->width[first + a]).slope;
+            S[a * strips + a] +=
+                gk_law_at(gk_law_of(s, first + a), s->width[first + a], full * s->width[first + a]).slope;
         if (dashpots)
             yielding(S, s->damping + first, strips, X);
         else

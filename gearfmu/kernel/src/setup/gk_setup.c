@@ -147,7 +147,7 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
         const size_t points = (size_t)(side->candidates * setup->strips);
         engaged->basis[w] = reals(b, contacts * (size_t)setup->modal[side->gear].n);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
-        engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 8);
+        engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
     }
     for (int w = 0; w < 2; w++) engaged->outward[w] = doubles(b, contacts * (size_t)setup->base.n);
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
@@ -477,6 +477,7 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
     setup->integrator = (gk_integrator)(int)data->stage[V_INTEGRATOR];
     setup->on = gk_effects_of(data);
     setup->slices = (int)data->stage[V_SLICES];
+    setup->spatial = model->spatial;
     setup->strips = gk_strips_count(model, setup->slices);
     for (int e = 0; e < model->engagements; e++) damping = gk_max(damping, data->mesh[e][V_DAMPING]);
     if (damping == 0.0) setup->on.contact_damping = 0;

@@ -9,7 +9,7 @@ enum {
     NODES = 88,          /* of a side's table in one pitch */
     CACHE = 4,           /* coefficient sets kept */
     GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
-    MAX_CANDIDATES = 14, /* tooth pairs that can be near contact at any position, both flanks */
+    MAX_CANDIDATES = 24, /* tooth pairs that can be near contact at any position, both flanks */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES
 };
 
@@ -92,11 +92,13 @@ typedef struct gk_side {
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
     gk_side side[2];
-    int ports, port[2];        /* ports whose rows stand in this engagement's system */
-    int spins, spin[6];        /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
-    int joint_spin[2][2];      /* inertia and disc of its ports among them, −1: none */
-    double allowance, damping; /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
-    double strip_width[MAX_SLICES], strip_term, square_low, square_high, log_low,
+    int ports, port[2];            /* ports whose rows stand in this engagement's system */
+    int spins, spin[6];            /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
+    int joint_spin[2][2];          /* inertia and disc of its ports among them, −1: none */
+    double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
+    double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
+    double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
+    double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
         log_high; /* bounds of b² in the local law, and their ln */
 } gk_mesh;
 
@@ -138,6 +140,7 @@ struct gk_setup {
     gk_integrator integrator;
     gk_effects on;
     int slices;
+    int spatial; /* axial motion and tilt count, every strip has a gap of its own; else the strips of a tooth pair share it */
     int strips; /* contact rows of a tooth pair: slices, or half of them where both halves of the face width do the same */
     int spins;
     double h, gamma_at[GAMMAS];
@@ -188,5 +191,6 @@ const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma
 /* gk_strips.c */
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
+static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out);
 #endif

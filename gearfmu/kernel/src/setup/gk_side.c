@@ -7,6 +7,13 @@
 
 static const double MARGIN = 0.15, CORNER = 0.5; /* base pitches beyond the ends of the flanks: play; tip corners */
 
+static double tan_of(double angle)
+{
+    double sine, cosine;
+    gk_sincos(angle, &sine, &cosine);
+    return sine / cosine;
+}
+
 /* ---- which teeth ----------------------------------------------------------------------------------------------- */
 /* lengths of roll of this side between which the other side has a flank, corners included */
 static void span(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int which, double ends[2])
@@ -15,6 +22,7 @@ static void span(const gk_model *model, const gk_setup *setup, const gk_engageme
     const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
     const double R = gk_base_reach(model, e), L = sqrt(x * x + y * y - R * R);
     const double pitch = own->r_b * 2.0 * GK_PI / own->z, beyond = (setup->on.tip_contact ? CORNER : 0.0) + MARGIN;
+    const double lean = 0.5 * e->width * fabs(tan_of(own->helix)); /* the ends of the face width are ahead and behind */
     if (e->kind == MESH_EXTERNAL) {
         ends[0] = L - other->s_tip, ends[1] = own->s_tip;
     } else if (which == 0) { /* the planet in the ring: s_B = L + s_A */
@@ -22,7 +30,7 @@ static void span(const gk_model *model, const gk_setup *setup, const gk_engageme
     } else {
         ends[0] = own->s_tip, ends[1] = L + other->s_tip;
     }
-    ends[0] -= beyond * pitch, ends[1] += beyond * pitch;
+    ends[0] -= beyond * pitch + lean, ends[1] += beyond * pitch + lean;
 }
 
 static double roll_at(const gk_side *side, int flank, double position, int offset)
@@ -64,7 +72,8 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
 /* ---- one node ---------------------------------------------------------------------------------------------------- */
 typedef struct place { /* a candidate's strip at a node */
     int flank, offset, index;
-    double weight[4], nominal, roll; /* length of roll on the line of action; where contact is */
+    double weight[4], middle, nominal,
+        roll; /* length of roll on the line of action at mid-width, here; where contact is */
 } place;
 
 typedef struct node { /* what a node's tables are made from */
@@ -73,8 +82,8 @@ typedef struct node { /* what a node's tables are made from */
     const gk_engagement *e;
     const gk_gear *gear;
     const gk_side *side;
-    int points; /* candidates × strips */
-    place at[MAX_CANDIDATES];
+    int points;                            /* candidates × strips */
+    place at[MAX_CANDIDATES * MAX_SLICES]; /* points */
     gk_strip_weights weight;
     double *rows;        /* (points, modes): all stored modes, tooth offset included */
     double *ground;      /* (points, reads): outward, rigid motion included, of every ground oscillator */
@@ -149,20 +158,34 @@ static void turn_row(const gk_gear *gear, int offset, double *row)
     }
 }
 
-/* direction of the tooth and of its outward normal in ground axes, at the nominal place of contact */
-static void directions(const node *n, const place *p, double *angle, double *nx, double *ny)
+typedef struct direction { /* in ground axes, at the nominal place of contact */
+    double angle;          /* of the tooth */
+    double n[3], arm[3];   /* outward normal; point of contact from the gear's centre × normal */
+} direction;
+
+static direction direction_of(const node *n, const place *p, int strip)
 {
     const gk_engagement *e = n->e;
     const double dx = e->position[1][0] - e->position[0][0], dy = e->position[1][1] - e->position[0][1];
-    const double R = gk_base_reach(n->model, e), sg = p->flank ? -1.0 : 1.0;
-    double sine, cosine, t = gk_atan2(dy, dx);
+    const double R = gk_base_reach(n->model, e), sg = p->flank ? -1.0 : 1.0, second = n->side->which == 1 ? -1.0 : 1.0;
+    const int ring = e->kind == MESH_INTERNAL && n->side->which == 1;
+    const double facing = e->kind == MESH_EXTERNAL ? second : 1.0, hollow = ring ? -1.0 : 1.0;
+    direction d;
+    double sine, cosine, helix_sine, helix_cosine, t = gk_atan2(dy, dx);
     if (e->kind == MESH_INTERNAL) t = gk_atan2(-dy, -dx);
     t -= sg * gk_acos(R / sqrt(dx * dx + dy * dy));
     gk_sincos(t, &sine, &cosine);
-    const double out = n->side->which == 0 ? sg : -sg;
-    *nx = -out * sine, *ny = out * cosine;
-    const double base = e->kind == MESH_EXTERNAL && n->side->which == 1 ? t + GK_PI : t;
-    *angle = base + sg * (p->nominal / n->gear->r_b - n->gear->psi_b);
+    gk_sincos(n->gear->helix, &helix_sine, &helix_cosine);
+    const double nx = -second * sg * sine, ny = second * sg * cosine, r_b = n->gear->r_b;
+    d.angle = (facing < 0.0 ? t + GK_PI : t) + sg * (p->middle / r_b - n->gear->psi_b);
+    d.n[0] = helix_cosine * nx, d.n[1] = helix_cosine * ny, d.n[2] = -hollow * sg * helix_sine;
+    const double x = facing * r_b * cosine + hollow * p->nominal * nx,
+                 y = facing * r_b * sine + hollow * p->nominal * ny;
+    const double z = n->setup->mesh[e - n->model->engagement].strip_middle[strip];
+    d.arm[0] = y * d.n[2] - z * d.n[1];
+    d.arm[1] = z * d.n[0] - x * d.n[2];
+    d.arm[2] = helix_cosine * hollow * sg * r_b;
+    return d;
 }
 
 /* what the ground oscillators of the gear move at a point, outward; C_fs there */
@@ -170,13 +193,16 @@ static void ground_point(const node *n, const place *p, int strip, double *row, 
 {
     const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
     const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
-    double angle, nx, ny, trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
-    directions(n, p, &angle, &nx, &ny);
-    gk_sincos(angle, &trig[2], &trig[1]);
-    const int ring = n->e->kind == MESH_INTERNAL && n->side->which == 1;
-    const double *centre = n->gear->ground[set].centre, arm = (p->flank == ring ? 1.0 : -1.0) * n->gear->r_b;
-    for (int k = 0; k < reads; k++)
-        row[k] = rigid[k] = nx * centre[k] + ny * centre[reads + k] + arm * centre[5 * reads + k];
+    const direction d = direction_of(n, p, strip);
+    const double *centre = n->gear->ground[set].centre,
+                 along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
+    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
+    gk_sincos(d.angle, &trig[2], &trig[1]);
+    for (int k = 0; k < reads; k++) {
+        rigid[k] = 0.0;
+        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
+        row[k] = rigid[k];
+    }
     for (int s = 0; s < supports; s++) support[s] = 0.0;
     for (int c = 0; c < 3; c++) {
         blend(n, n->gear->ground[set].rows + c * size * reads, p, strip, reads, part);
@@ -206,25 +232,25 @@ static double corner_roll(const node *n, const place *p)
 static void gather_node(node *n, double position)
 {
     const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
+    const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
     double ports[MAX_PORTS];
-    for (int c = 0; c < n->side->candidates; c++) {
-        place *p = &n->at[c];
+    for (int i = 0; i < n->points; i++) {
+        place *p = &n->at[i];
+        const int c = i / strips, strip = i % strips;
         p->flank = c >= n->side->count[0];
         p->offset = n->side->first[p->flank] + n->side->step * (p->flank ? c - n->side->count[0] : c);
-        p->nominal = n->e->kind == MESH_FLAT ? n->gear->s_form : roll_at(n->side, p->flank, position, p->offset);
+        p->middle = n->e->kind == MESH_FLAT ? n->gear->s_form : roll_at(n->side, p->flank, position, p->offset);
+        p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * mesh->strip_middle[strip] * tan_of(n->gear->helix);
         p->roll = corner_roll(n, p);
         grid(n->model, n->gear, p);
-        for (int s = 0; s < strips; s++) {
-            const int i = c * strips + s;
-            blend(n, n->gear->rows, p, s, modes, n->rows + (size_t)i * modes);
-            if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
-            blend(n, n->gear->port_residual, p, s, n->model->ports, ports);
-            n->port[i] = n->port_of >= 0 ? ports[n->port_of] : 0.0;
-            if (n->e->kind != MESH_FLAT)
-                ground_point(n, p, s, n->ground + (size_t)i * n->gear->ground[set].reads,
-                             n->rigid + (size_t)i * n->gear->ground[set].reads,
-                             n->support + (size_t)i * n->model->supports);
-        }
+        blend(n, n->gear->rows, p, strip, modes, n->rows + (size_t)i * modes);
+        if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
+        blend(n, n->gear->port_residual, p, strip, n->model->ports, ports);
+        n->port[i] = n->port_of >= 0 ? ports[n->port_of] : 0.0;
+        if (n->e->kind != MESH_FLAT)
+            ground_point(n, p, strip, n->ground + (size_t)i * n->gear->ground[set].reads,
+                         n->rigid + (size_t)i * n->gear->ground[set].reads,
+                         n->support + (size_t)i * n->model->supports);
     }
 }
 
@@ -248,24 +274,35 @@ static double carried(const node *n, int i, int j, int dynamic)
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 
-/* stored compliance of the free body between two candidates, (strips, strips); 0 when they are too far apart for the
- * table: what stored modes carry is all there is then */
-static int tabulated(const node *n, const place *p, const place *q, double *out)
+/* stored compliance of the free body between two points, by width function, (functions, functions) */
+static void tabulate(const node *n, const place *p, const place *q, double *cell)
 {
-    const int A = n->model->functions, R = n->model->rolls, offset = q->offset - p->offset, strips = n->setup->strips;
-    double cell[MAX_FUNCTIONS * MAX_FUNCTIONS] = {0};
-    for (int c = 0; c < strips * strips; c++) out[c] = 0.0;
-    if (offset < -(OFFSETS / 2) || offset > OFFSETS / 2) return 0;
+    const int A = n->model->functions, R = n->model->rolls, offset = q->offset - p->offset;
     const double *table = n->gear->residual + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + OFFSETS / 2) *
                                                   (size_t)(R * R * A * A);
+    for (int c = 0; c < A * A; c++) cell[c] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++) {
             const double w = p->weight[i] * q->weight[j], *t = table + ((p->index + i) * R + q->index + j) * A * A;
             for (int c = 0; c < A * A; c++) cell[c] += w * t[c];
         }
+}
+
+/* the same between two candidates, (strips, strips); 0 when they are too far apart for the table: what stored modes carry
+ * is all there is then */
+static int tabulated(const node *n, int first, int second, double *out)
+{
+    const int A = n->model->functions, strips = n->setup->strips;
+    const int offset = n->at[second * strips].offset - n->at[first * strips].offset;
+    double cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
+    for (int c = 0; c < strips * strips; c++) out[c] = 0.0;
+    if (offset < -(OFFSETS / 2) || offset > OFFSETS / 2) return 0;
     for (int s = 0; s < strips; s++)
-        for (int t = 0; t < strips; t++)
+        for (int t = 0; t < strips; t++) {
+            if (n->setup->spatial || s + t == 0) /* else all strips have the same rolls */
+                tabulate(n, &n->at[first * strips + s], &n->at[second * strips + t], cell);
             for (int a = 0; a < A; a++) out[s * strips + t] += n->weight[s][a] * dot(cell + a * A, n->weight[t], A);
+        }
     return 1;
 }
 
@@ -301,7 +338,7 @@ static void store_block(const node *n, int at, const double *still, int p, int q
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
     gk_real *table = side->residual + (size_t)at * n->points * side->columns;
     double cell[MAX_BLOCK];
-    const int near = tabulated(n, &n->at[p], &n->at[q], cell);
+    const int near = tabulated(n, p, q, cell);
     for (int c = 0; c < square; c++) {
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const double stored = carried(n, i, j, n->gear->modes);
@@ -496,16 +533,21 @@ static double weighed(const double *a, const double *b, const double *by, int n)
     return sum;
 }
 
-/* rigid motion x, y, rz of the gear and the angle of its bore, per oscillator of the gear's part */
-static void common_rows(const gk_model *model, const gk_setup *setup, const gk_side *side, const double *rows[4])
+/* what gaps and bores read of the gear, per oscillator of its part: rigid motion as in a pose, then the angle of its bore;
+ * returns how many */
+static int common_rows(const gk_model *model, const gk_setup *setup, const gk_side *side, const double *rows[COMMON])
 {
     static const double nothing[MAX_GROUND + 4 * MAX_ROTORS];
+    static const int row[SPACE] = {0, 1, 5, 2, 3, 4};
     const gk_base *base = &setup->base;
     const double *centre = base->centre[side->gear] + base->from[side->gear];
-    rows[0] = centre, rows[1] = centre + base->n, rows[2] = centre + 5 * base->n, rows[3] = nothing;
+    const int directions = gk_directions(setup);
+    for (int c = 0; c < directions; c++) rows[c] = centre + row[c] * base->n;
+    rows[directions] = nothing;
     for (int p = 0; p < model->ports; p++)
         if (model->port[p].rotor == model->gear[side->gear].rotor)
-            rows[3] = base->port_rows + p * base->n + base->from[side->gear];
+            rows[directions] = base->port_rows + p * base->n + base->from[side->gear];
+    return directions + 1;
 }
 
 /* adds the ground group to the products of a node: rows with rows, and rows with what the gap reads as rigid motion */
@@ -515,10 +557,10 @@ static void add_ground_products(const gk_model *model, const gk_setup *setup, co
     const int from = setup->base.from[side->gear], width = setup->base.width[side->gear];
     const int points = side->candidates * setup->strips;
     const size_t columns = (size_t)side->columns, size = (size_t)points * 4 * columns;
-    const double *rows = side->ground + (size_t)at * points * width, *common[4];
+    const double *rows = side->ground + (size_t)at * points * width, *common[COMMON];
     const double *next = at < side->nodes ? rows + points * width : NULL;
     gk_real *out = table->moves + (size_t)at * size;
-    common_rows(model, setup, side, common);
+    const int count = common_rows(model, setup, side, common), padded = gk_common(setup);
     for (int kind = 0; kind < 2; kind++) {
         const double *by = (kind ? k->ground.kappa : k->ground.mobility) + from, sign = kind ? -1.0 : 1.0;
         for (int i = 0; i < points; i++) {
@@ -531,11 +573,11 @@ static void add_ground_products(const gk_model *model, const gk_setup *setup, co
                     to[columns + j] += (gk_real)(sign * (weighed(a, next + j * width, by, width) +
                                                          weighed(next + i * width, b, by, width)));
             }
-            for (int c = 0; c < 4; c++)
-                table->pulls[((size_t)at * points + i) * 8 + 4 * kind + c] = weighed(a, common[c], by, width);
+            for (int c = 0; c < count; c++)
+                table->pulls[(((size_t)at * points + i) * 2 + kind) * padded + c] = weighed(a, common[c], by, width);
         }
-        for (int c = 0; c < 4; c++)
-            for (int d = 0; d < 4; d++) table->own[kind][c][d] = weighed(common[c], common[d], by, width);
+        for (int c = 0; c < count; c++)
+            for (int d = 0; d < count; d++) table->own[kind][c][d] = weighed(common[c], common[d], by, width);
     }
 }
 

@@ -8,10 +8,17 @@ static int mirrored(const gk_model *model)
 {
     for (int a = 0; a < model->functions; a++)
         if (model->degree[a] % 2) return 0;
-    return 1;
+    return !model->spatial;
 }
 
 int gk_strips_count(const gk_model *model, int slices) { return mirrored(model) ? (slices + 1) / 2 : slices; }
+
+static double tan_of(double angle)
+{
+    double sine, cosine;
+    gk_sincos(angle, &sine, &cosine);
+    return sine / cosine;
+}
 
 /* strip ← width functions: (2a + 1) × mean of P_a over the strip; strips share the common face width */
 static double legendre_integral(int degree, double x)
@@ -37,14 +44,39 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engag
         }
 }
 
+/* mean of a gear's lead over −1 … 1 of its half-width, from … to */
+static double lead_over(const gk_gear *gear, int flank, double from, double to)
+{
+    enum { SAMPLES = 16 };
+    double sum = 0.0;
+    if (!gear->lead) return 0.0;
+    for (int i = 0; i < SAMPLES; i++) {
+        const double x = from + (to - from) * (i + 0.5) / SAMPLES,
+                     u = gk_clamp(0.5 * (x + 1.0), 0.0, 1.0) * (LEADS - 1);
+        const int at = (int)u < LEADS - 1 ? (int)u : LEADS - 2;
+        const double *depth = gear->lead + flank * LEADS + at;
+        sum += depth[0] + (u - at) * (depth[1] - depth[0]);
+    }
+    return sum / SAMPLES;
+}
+
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
     mesh->strip_term = 0.0;
+    gk_sincos(model->gear[e->gear[0]].helix, &mesh->sine, &mesh->cosine);
     for (int s = 0; s < setup->strips; s++)
         mesh->strip_width[s] = e->width / setup->slices * (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
+    for (int s = 0; s < setup->strips; s++) mesh->strip_middle[s] = e->width * ((s + 0.5) / setup->slices - 0.5);
+    memset(mesh->lead, 0, sizeof mesh->lead);
     for (int w = 0; w < 2; w++) {
         const gk_gear *gear = &model->gear[e->gear[w]];
+        const double edge = e->width / gear->width;
+        for (int flank = 0; flank < 2; flank++)
+            for (int s = 0; s < setup->strips; s++)
+                mesh->lead[flank][s] += lead_over(gear, flank, edge * (2.0 * s / setup->slices - 1.0),
+                                                  edge * (2.0 * (s + 1) / setup->slices - 1.0));
+        mesh->helix[w] = tan_of(gear->helix);
         mesh->strip_term += gear->local * (gk_log(4.0 * gear->strip) - 1.0);
     }
 }
