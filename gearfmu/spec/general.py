@@ -97,7 +97,8 @@ class EngagementSpec(Spec):
     torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest torque on gear A")
     speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
     misalignment: Misalignment | None = Field(
-        default=None, description="parallelism errors of the axes, of B's seen from A's; parallel when the table is absent"
+        default=None,
+        description="parallelism errors of the axes, of B's seen from A's; parallel when the table is absent",
     )
 
 
@@ -179,8 +180,10 @@ class GeneralStage(Spec):
     @property
     def even(self) -> bool:
         """Whether everything is symmetric about mid-width: planar, without lead modifications and misalignment."""
-        return self.planar and all(gear.lead is None for gear in self.gears) and all(
-            mesh.misalignment is None for mesh in self.engagements
+        return (
+            self.planar
+            and all(gear.lead is None for gear in self.gears)
+            and all(mesh.misalignment is None for mesh in self.engagements)
         )
 
     def rotor_of(self, body: str) -> str:

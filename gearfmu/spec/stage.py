@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -120,7 +119,9 @@ def _bearing_problems(file: str, spec: StageSpec) -> list[Problem]:
     why = "a helical gear" if spec.pair.helix_angle else "a gear whose mate or other direction is held so"
     example = {"axial": '"1e8 N/m"', "tilt": '"5e4 N*m/rad"'}
     return [
-        Problem(file, f"gears.{gear.name}.bearing.{field}", "missing", f"{why} needs it: write {field} = {example[field]}")
+        Problem(
+            file, f"gears.{gear.name}.bearing.{field}", "missing", f"{why} needs it: write {field} = {example[field]}"
+        )
         for gear, field in names
         if (gear, field) not in given
     ]

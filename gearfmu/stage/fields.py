@@ -44,7 +44,18 @@ GEAR_NUMBERS = (
     "z_mid",
     "helix",
 )
-ENGAGEMENT_NUMBERS = ("x_a", "y_a", "x_b", "y_b", "backlash", "nominal_backlash", "damping", "force_max", "tilt_x", "tilt_y")
+ENGAGEMENT_NUMBERS = (
+    "x_a",
+    "y_a",
+    "x_b",
+    "y_b",
+    "backlash",
+    "nominal_backlash",
+    "damping",
+    "force_max",
+    "tilt_x",
+    "tilt_y",
+)
 _LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "([^"]*)", "([^"]*)"\)$', re.MULTILINE)
 _KINDS = {"I32": "iub", "F64": "f", "TEXT": "U"}
 

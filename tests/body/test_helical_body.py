@@ -19,9 +19,9 @@ from gearfmu.body.parts import drawn_counts, kept_offsets
 from gearfmu.body.reduce import body_path
 from gearfmu.body.reduced import value_of
 from gearfmu.body.store import save_body
-from gearfmu.errors import BodyError, SpecError
+from gearfmu.errors import BodyError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.stage import load_stage, require_spur
+from gearfmu.spec.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
 COUNTS = "modes = 31\nroll_points = 5\nwidth_functions = 3\n"
@@ -143,18 +143,3 @@ def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path
         capsys=capsys,
     )  # fmt: skip
     assert code == 0 and "modal" in out
-
-
-@pytest.mark.parametrize(
-    "verb",
-    [["te", "--torque", "50 N*m"], ["simulate", "--torque", "50 N*m", "--speed", "900 rpm"], ["export"], ["modes"]],
-)
-def test_verbs_that_need_motion_in_time_refuse(verb: list[str], made: SimpleNamespace, capsys) -> None:
-    code, _, err = call(verb[0], made.path, *verb[1:], capsys=capsys)
-    assert code != 0 and "pair.helix_angle = 20 deg" in err and "motion in time is not built yet" in err
-
-
-def test_the_refusal_names_the_field(made: SimpleNamespace) -> None:
-    with pytest.raises(SpecError, match=r"pair\.helix_angle"):
-        require_spur(made.spec)
-    require_spur(load_stage("fzg_c"))

@@ -276,24 +276,28 @@ static double covered(const pair *q, const flank_side *s, const double roll[2], 
 }
 
 /* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves along its
- * axis or tilts about its mid-width moves the point of contact along it. */
+ * axis or tilts about its mid-width moves the point of contact along it. Both gears have the point halfway between their
+ * flanks, so that contact forces are in balance with their moments. */
 static void lean(const pair *q, const line *l, double z, gk_point *p)
 {
     const gk_mesh *mesh = q->mesh;
     const double nx = mesh->cosine * l->nx, ny = mesh->cosine * l->ny, nz = -l->sg * mesh->sine;
+    const double halfway = 0.5 * (internal(q) ? p->roll[1] - p->roll[0] - l->L : l->L - p->roll[0] - p->roll[1]);
     p->gap *= mesh->cosine;
     p->curvature *= mesh->cosine;
     for (int w = 0; w < 2; w++) {
-        const double side = w && !internal(q) ? -1.0 : 1.0, sense = w ? 1.0 : -1.0;
-        const double x = side * (q->gear[w]->r_b * l->cosine + p->roll[w] * l->nx);
-        const double y = side * (q->gear[w]->r_b * l->sine + p->roll[w] * l->ny);
+        const int ring = w && internal(q);
+        const double side = w && !ring ? -1.0 : 1.0, sense = w ? 1.0 : -1.0;
+        const double roll = p->roll[w] + (ring ? -halfway : halfway), *pose = q->pose + SPACE * w;
+        const double x = side * (q->gear[w]->r_b * l->cosine + roll * l->nx), up = z - pose[ZA];
+        const double y = side * (q->gear[w]->r_b * l->sine + roll * l->ny);
         double *gradient = p->gradient + SPACE * w;
-        const double *pose = q->pose + SPACE * w, *tilt = q->e->tilt;
         for (int c = 0; c < PLANE; c++) gradient[c] *= mesh->cosine;
         gradient[ZA] = sense * nz;
-        gradient[RXA] = sense * (y * nz - z * ny);
-        gradient[RYA] = sense * (z * nx - x * nz);
-        for (int c = PLANE; c < SPACE; c++) p->gap += gradient[c] * (pose[c] + (w && c > ZA ? tilt[c - RXA] : 0.0));
+        gradient[RXA] = sense * (y * nz - up * ny);
+        gradient[RYA] = sense * (up * nx - x * nz);
+        for (int c = PLANE; c < SPACE; c++)
+            p->gap += gradient[c] * (pose[c] + (w && c > ZA ? q->e->tilt[c - RXA] : 0.0));
     }
 }
 

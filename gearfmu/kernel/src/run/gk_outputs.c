@@ -84,6 +84,10 @@ static void support_forces(const gk_model *model, const gk_setup *setup, const g
                 const double *high = low + (size_t)points * supports;
                 for (int s = 0; s < supports; s++) out[s] -= force * (low[s] + at->part * (high[s] - low[s]));
             }
+        for (int i = system->contacts; i < system->n; i++)
+            if (gk_rows_at_bore(setup, system, i))
+                for (int s = 0; s < supports; s++)
+                    out[s] += reported(system, i) * setup->port_support[system->port_of[i]][s];
     }
 }
 

@@ -390,6 +390,25 @@ static double bore_residual(const gk_model *model, const gk_setup *setup, int p)
     return sum;
 }
 
+/* what a moment at the port does at once to the forces on the supports */
+static void fill_port_support(const gk_model *model, gk_setup *setup, int p)
+{
+    const gk_ground *ground = &model->ground[setup->base.set];
+    const double *row = ground->port_rows + p * ground->n;
+    double moved[MAX_SUPPORTS];
+    for (int s = 0; s < model->supports; s++) {
+        moved[s] = setup->on.residual ? model->port_support[p * model->supports + s] : 0.0;
+        for (int k = 0; k < ground->n && setup->on.residual; k++)
+            if (setup->base.slot[k] < 0)
+                moved[s] += ground->support_rows[s * ground->n + k] * row[k] / (ground->omega[k] * ground->omega[k]);
+    }
+    for (int s = 0; s < model->supports; s++) {
+        setup->port_support[p][s] = 0.0;
+        for (int t = 0; t < model->supports; t++)
+            setup->port_support[p][s] += ground->kappa[s * model->supports + t] * moved[t];
+    }
+}
+
 static void fill_ports(const gk_model *model, gk_setup *setup)
 {
     setup->spins = model->rotors + 2 * model->chains;
@@ -404,6 +423,7 @@ static void fill_ports(const gk_model *model, gk_setup *setup)
         add_joint(setup, p, JOINT_CLUTCH, port->chain > 0, 0.0, 0.0);
         setup->clutches += port->chain > 0;
         setup->port_own[p] = bore_residual(model, setup, p);
+        fill_port_support(model, setup, p);
         if (!port->chain) continue;
         setup->inverse_inertia[gk_inertia_of(model, p)] = 1.0 / port->inertia;
         setup->inverse_inertia[gk_disc_of(model, p)] = 1.0 / port->disc;
