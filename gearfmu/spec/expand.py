@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gearfmu.spec.gear import GearSpec
 from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, PlacedPort, RotorSpec, ShaftBody, SupportSpec
 from gearfmu.spec.stage import StageSpec
@@ -11,7 +13,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
     """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
     the origin, wheel on +x."""
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
-    angles = {"normal_module": pair.normal_module, "pressure_angle": pair.pressure_angle}
+    angles: dict[str, Any] = {"normal_module": pair.normal_module, "pressure_angle": pair.pressure_angle}
     pinion, wheel = spec.gears
     bodies: dict[str, GearBody | ShaftBody] = {}
     for gear, hand in zip(spec.gears, (1, -1), strict=True):

@@ -98,7 +98,7 @@ class EngagementSpec(Spec):
     speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
     misalignment: Misalignment | None = Field(
         default=None,
-        description="parallelism errors of the axes, of B's seen from A's; parallel when the table is absent",
+        description="parallelism errors of the axes, B's seen from A's; parallel when the table is absent",
     )
 
 

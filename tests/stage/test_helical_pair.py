@@ -4,17 +4,21 @@ leads and misaligned axes."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import ReducedBody, load_stage_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
+from gearfmu.spec.lead import LeadSpec, Misalignment
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
+from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.fields import change_gear
 
 TORQUE, SPEED = 150.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
 HELD = {"pinion": PortSpec(kind="torque"), "wheel": PortSpec(kind="fixed")}
@@ -89,3 +93,143 @@ def steady(model: StageModel, torque: float = TORQUE, **parameters: float) -> di
     period = 2 * math.pi / 23 / SPEED
     trace = simulate(model, Steady(model, SPEED, torque), 10 * period, period / 60, {"level": 1.0} | parameters)
     return {name: trace[name][240:] for name in trace.channels}
+
+
+def mirrored(body: ReducedBody) -> ReducedBody:
+    """The body seen in the plane of mid-width: z, tilts and odd width functions change their signs, and the hand."""
+    odd = (-1.0) ** np.arange(body.width_functions)
+    motion = np.array([1, 1, -1, -1, -1, 1])
+    return replace(
+        body,
+        input_hash=body.input_hash[::-1],
+        flank_rows=body.flank_rows * odd[:, None],
+        bore_rows=body.bore_rows * motion[:, None],
+        static_ff=body.static_ff * odd[:, None] * odd,
+        static_fb=body.static_fb * odd[:, None] * motion,
+        static_bb=body.static_bb * np.outer(motion, motion),
+        inertia=body.inertia * np.outer(motion[3:], motion[3:]),
+        base_helix_angle=-body.base_helix_angle,
+        tangent=None,
+    )
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_a_pair_of_the_other_hand_is_the_mirror_image(demo: SimpleNamespace, level: float) -> None:
+    """Same transmission error and forces in the plane, axial forces and tilts with the other sign, at rest and in
+    motion."""
+    other = plain(demo.spec, helix_angle=-demo.spec.pair.helix_angle)
+    models = [assemble(plain(demo.spec), demo.bodies), assemble(other, [mirrored(body) for body in demo.bodies])]
+    kernels = [at_rest(model, TORQUE, level=level) for model in models]
+    for kernel in kernels:
+        kernel.set("pinion.tau", 1.1 * TORQUE)
+        for i in range(50):
+            kernel.step(i * 2e-5, 2e-5)
+    signs = {f"{kind}.{shaft}.{axis}": sign for kind in ("bearing",) for shaft in SHAFTS
+             for axis, sign in (("fx", 1), ("fy", 1), ("fz", -1), ("mx", -1), ("my", -1))}  # fmt: skip
+    signs |= {"mesh.te": 1, "mesh.force": 1, "pinion.phi": 1}
+    for name, sign in signs.items():
+        own, seen = (kernel.get(name) for kernel in kernels)
+        scale = max(abs(kernels[0].get("mesh.force")), 1.0) if name.startswith("bearing") else abs(own)
+        assert seen == pytest.approx(sign * own, abs=3e-6 * scale), name
+
+
+def with_bearings(spec: StageSpec) -> StageSpec:
+    """A spur pair whose gears may move along their axes and tilt."""
+    held = {"axial": 1e8, "tilt": 1e5}
+    gears = tuple(g.model_copy(update={"bearing": g.bearing.model_copy(update=held)}) for g in spec.gears)
+    return spec.model_copy(update={"gears": gears, "ports": HELD})
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_spur_gears_that_may_tilt_are_those_that_may_not(
+    relief_spec: StageSpec, bodies: list[ReducedBody], level: float
+) -> None:
+    """Nothing tilts a symmetric pair: strips with their own gaps give what halved strips give."""
+    planar = assemble(relief_spec.model_copy(update={"ports": HELD}), bodies)
+    spatial = assemble(with_bearings(relief_spec), bodies)
+    results = []
+    for model in (planar, spatial):
+        kernel = model.kernel(level=level)
+        kernel.set("pinion.tau", TORQUE)
+        kernel.initialize()
+        for i in range(40):
+            kernel.step(i * 2e-5, 2e-5)
+        results.append([kernel.get(n) for n in ("mesh.te", "mesh.force", "bearing.pinion.fx", "bearing.wheel.fy")])
+    print(results)
+    assert results[1] == pytest.approx(results[0], rel=1e-6)
+
+
+def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """The same bodies on flanks of 1e-10 rad: the rows of the kernel go over continuously."""
+    spur = assemble(with_bearings(relief_spec), bodies)
+    blobs = dict(read_blob(spur.blob))
+    for g, hand in enumerate((1, -1)):
+        blobs[f"gear{g}"] = change_gear(np.array(blobs[f"gear{g}"], float), helix=hand * 1e-10)
+    found = []
+    for blob in (spur.blob, write_blob(blobs)):
+        kernel = Kernel(blob, {"level": 0.0})
+        kernel.prepare()
+        found.append([kernel.transmission(-0.05 * i, TORQUE).te for i in range(12)])
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+
+
+def slices_at_rest(model: StageModel, torque: float) -> np.ndarray:
+    """Force of every slice, all tooth pairs together, N."""
+    kernel = model.kernel(**{"level": 0.0, "slices": 10.0, "effect.tip_contact": 0.0})
+    kernel.prepare()
+    forces = kernel.transmission(0.0, torque).forces
+    return np.sum([of_pair for (flank, _), of_pair in forces.items() if flank == 0], axis=0)
+
+
+@pytest.mark.parametrize("change", ["slope", "out_of_plane", "in_plane"])
+def test_lead_and_misalignment_load_one_end(relief_spec: StageSpec, bodies: list[ReducedBody], change: str) -> None:
+    """A helix slope of f over the face width opens one end of the flanks as much as axes out of parallel that are
+    turned about the direction across the line of action; the other end carries more."""
+    spec = with_bearings(relief_spec)
+    width, f = spec.gears[0].face_width, 20e-6
+    alpha = PairGeometry.of(spec).alpha_wt
+
+    def slope(value: float) -> StageSpec:
+        gears = (spec.gears[0].model_copy(update={"lead": LeadSpec(slope=value)}), spec.gears[1])
+        return spec.model_copy(update={"gears": gears})
+
+    def misaligned(**errors: float) -> StageSpec:
+        pair = spec.pair.model_copy(update={"misalignment": Misalignment(span=width, **errors)})
+        return spec.model_copy(update={"pair": pair})
+
+    even = slices_at_rest(assemble(spec, bodies), TORQUE)
+    turned = slices_at_rest(assemble(slope(f), bodies), TORQUE)
+    assert np.allclose(even, even[::-1], rtol=1e-6)
+    assert turned.sum() == pytest.approx(even.sum(), rel=1e-3)
+    assert turned[-1] > 1.2 * even[-1] and turned[0] < 0.8 * even[0]
+    if change == "slope":
+        assert np.allclose(slices_at_rest(assemble(slope(-f), bodies), TORQUE), turned[::-1], rtol=1e-6)
+        return
+    share = math.cos(alpha) if change == "out_of_plane" else math.sin(alpha)
+    found = [slices_at_rest(assemble(misaligned(**{change: sign * f / share}), bodies), TORQUE) for sign in (1, -1)]
+    print(np.round(turned), np.round(found[0]), np.round(found[1]))
+    assert min(np.abs(f - turned).max() for f in found) < 2e-3 * even.sum()
+
+
+@pytest.mark.parametrize("slices", [5.0, 7.0, 10.0])
+def test_transmission_error_is_smooth_without_a_filter(
+    demo: SimpleNamespace, involute: StageModel, slices: float
+) -> None:
+    te = loaded_te(involute, [TORQUE], 64, slices=slices).te[0]
+    harmonics = 2 * np.abs(np.fft.rfft(te)) / te.size
+    print(
+        f"mean {1e6 * te.mean():.2f}, peak to peak {1e6 * np.ptp(te):.3f}, above 12 {1e6 * harmonics[13:].max():.4f} µm"
+    )
+    assert harmonics[13:].max() < 0.05e-6
+
+
+def test_energy_is_kept_in_motion(demo: SimpleNamespace) -> None:
+    """Half a pitch per 10 steps, relief and crowning as shipped, 5 ms; the balance of the undamped pair closes."""
+    model = assemble(demo.spec, demo.bodies)
+    run = steady(model, **{"effect.contact_damping": 0.0, "effect.modal_damping": 0.0})
+    stored, left = run["energy.stored"], run["energy.residual"]
+    print(f"stored {stored[-1]:.3f} J, left {np.abs(left).max():.2e} J")
+    assert np.abs(left).max() < 1e-4 * stored.max()
+    assert run["mesh.force_mean"].mean() == pytest.approx(
+        TORQUE / (demo.pair.gears[0].r_b * math.cos(demo.pair.gears[0].beta_b)), rel=5e-3
+    )
