@@ -21,6 +21,7 @@ import scipy.linalg as sl
 from numpy.polynomial.legendre import Legendre
 
 from gearfmu.body import ReducedBody
+from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.ports import PortSpec
@@ -55,7 +56,7 @@ def stage_modes(
 ) -> StageModes:
     """The `count` lowest natural frequencies at positions i/N of one pitch under `torque` (N·m on the pinion, > 0).
 
-    SimulationError(no_equilibrium) where the pair finds none.
+    SimulationError(no_equilibrium) where the pair finds none, ModelError for a helical pair.
     """
     position, kernel = np.arange(positions) / positions, statics_of(model)
     found = [linearised(model, bodies, torque, part, kernel).modes(count) for part in position]
@@ -67,6 +68,8 @@ def linearised(
 ) -> Linearised:
     """Equation (29) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
     statics; made here when None."""
+    if model.pair.pair.helix_angle:
+        raise ModelError(f"{model.name} is helical: the linearised stage knows spur pairs; modes --body takes any gear")
     contacts = loaded_contacts(model.pair, kernel or statics_of(model), torque, position)
     gears = [_gear(model.pair, bodies, index, position, contacts) for index in (0, 1)]
     return _coupled(model.pair, gears, contacts)
