@@ -167,7 +167,7 @@ def test_monotone_across_the_joints(probes: Probes) -> None:
 
 
 def test_coefficients_in_the_source_are_those_of_the_generator() -> None:
-    text = "".join((source_folder() / name).read_text() for name in ("gk_math.h", "gk_math.c"))
+    text = "".join((source_folder() / name).read_text() for name in ("base/gk_math.h", "base/gk_math.c"))
     arrays = {k.name: minimax.coefficients(k) for k in minimax.KERNELS} | {"PIO2": minimax.pio2_parts()}
     for name, expected in arrays.items():
         found = re.search(rf"static const double (?:GK_)?{name}\[\d*\] = \{{([^}}]*)\}}", text)
