@@ -38,9 +38,11 @@ def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bo
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices."""
     from gearfmu.commands.models import bodies_for_motion
     from gearfmu.spec.scene import load_scene
+    from gearfmu.spec.stage import load_pair
 
     specs = [load_scene(scene) for scene in scenes]
     for spec in specs:
+        load_pair(spec.stage.name)
         bodies_for_motion(spec.stage.name)
     for table in dict.fromkeys(tables):
         if table == "errors":

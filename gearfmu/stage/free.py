@@ -129,7 +129,7 @@ def _flank_residual(
 ) -> np.ndarray:
     """C_static of the free body less what its ground modes carry, by tooth offset; their rows turn with the offset."""
     static = body.static_ff[..., degrees, :][..., degrees]
-    static = np.stack([static[:, :, offset % body.teeth] for offset in OFFSETS], axis=2)
+    static = np.stack([static[:, :, offset] for offset in OFFSETS], axis=2)
     static = blend(to_grid, blend(to_grid, static, 3), 4)
     here = read_tables(patterns, 0.0) / omega**2
     carried = np.stack([_between_flanks(here, there) for there in patterns])
