@@ -49,7 +49,7 @@ def steady_run(
         H=drive["step"],
         settle=drive["settle"],
         scene="constant speed and load",
-        meshes=mesh_teeth(model.stage),
+        meshes={mesh: list(known) for mesh, known in mesh_teeth(model.stage).items()},
         torque=drive["torque"],
         speed=drive["speed"],
     )

@@ -43,7 +43,7 @@ def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
         "settle": scene.settle,
         "unit": "kernel" if source.fmu_path is None else "fmu",
         "chain_in_fmu": bool(scene.passenger_car and scene.passenger_car.chain_in_fmu),
-        "meshes": mesh_teeth(source.model.stage),
+        "meshes": {mesh: list(known) for mesh, known in mesh_teeth(source.model.stage).items()},
     }
 
 

@@ -326,6 +326,7 @@ static int search(rest *r)
             balance_rotation(r, solved = 1);
         }
         if (moved * (MOBILITY / mobility) <= rest_limit(r)) return 1;
+        if (moved * (MOBILITY / mobility) > SEE) begin(r); /* out of sight of all flanks: from the start again */
     }
     return 0;
 }
