@@ -19,6 +19,8 @@ from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.turning import shafts_of, turns
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.te import statics_of
 
 FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
@@ -76,8 +78,8 @@ def side_by_side(pair: GeneralStage) -> GeneralStage:
 
 
 def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, relieved) -> None:
-    """Bit for bit, at different loads and speeds: pairs that nothing connects do not know of each other. Only what the
-    bearings show is a sum in another order."""
+    """Pairs that nothing connects do not know of each other, at different loads and speeds: the same to rounding. Sums
+    over all oscillators of the ground are in another order, and the search for rest goes on until both rest."""
     both = assemble(side_by_side(expand_pair(relief_spec)), [*bodies, *bodies])
     first, second = Steady(relieved, 200.0, 300.0), Steady(relieved, 90.0, 40.0)
     together = run(both, {"": first, "b_": second})
@@ -86,10 +88,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
         for name in own:
             head, _, rest = name.partition(".")
             found = together[f"bearing.{prefix}{rest}" if head == "bearing" else prefix + name]
-            if head == "bearing" or rest in ("gear.x", "gear.y"):  # sums over the oscillators of both pairs
-                assert np.abs(found - alone[name]).max() <= 1e-12 * np.abs(alone[name]).max(), name
-            else:
-                assert found.tobytes() == alone[name].tobytes(), name
+            assert np.abs(found - alone[name]).max() <= 1e-6 * np.abs(alone[name]).max(), name
         assert np.ptp(alone["mesh.force"]) > 10
 
 
@@ -132,18 +131,20 @@ def at_rest(model: StageModel, **parameters: float) -> dict[str, float]:
 
 
 def test_torque_comes_through_a_train_by_its_ratio(two_stage) -> None:
-    """Without relief and tip corners normals are lines of action, and the ratio of torques at rest is that of the
-    teeth. A relief is a slope of the flank: by it, a part of a per cent, the ratio of the moment differs."""
-    ratio = two_stage.shafts.ratio
-    assert ratio == pytest.approx(61 / 25 * 73 / 19)
-    plain = at_rest(two_stage, **{"effect.tip_relief": 0.0, "effect.tip_contact": 0.0})
-    assert -plain["output.tau"] / plain["input.tau"] == pytest.approx(ratio, rel=1e-6)
-    assert plain["stage1.force"] == pytest.approx(-plain["input.tau"] / 0.0264289, rel=1e-4)
-    relieved = at_rest(two_stage)
-    assert -relieved["output.tau"] / relieved["input.tau"] == pytest.approx(ratio, rel=0.01)
+    """Without relief and tip corners normals are lines of action, and meshes carry what the teeth's ratio says. A
+    relief is a slope of the flank: by it, a part of a per cent, the ratio of the torques at rest differs."""
+    stage, shafts = two_stage.stage, two_stage.shafts
+    assert shafts.ratio == pytest.approx(61 / 25 * 73 / 19)
+    kernel = statics_of(two_stage, **{"effect.tip_relief": 0.0, "effect.tip_contact": 0.0})
+    for number, (mesh, torque) in enumerate(zip(stage.engagements, (TORQUE, TORQUE * 61 / 25), strict=True)):
+        forces = kernel.transmission(0.0, TORQUE, number).forces
+        carried = sum(sum(slices) for slices in forces.values())
+        assert carried == pytest.approx(torque / mesh_geometry(stage, mesh).gears[0].r_b, rel=1e-5), mesh.name
+    found = at_rest(two_stage)
+    assert -found["output.tau"] / found["input.tau"] == pytest.approx(shafts.ratio, rel=0.01)
     for direction in "xy":
-        bearings = [v for n, v in plain.items() if n.startswith("bearing.input") and n.endswith(f".f{direction}")]
-        assert sum(bearings) == pytest.approx(plain[f"seat.pinion1.f{direction}"], rel=1e-6, abs=1e-3)
+        bearings = [v for n, v in found.items() if n.startswith("bearing.input") and n.endswith(f".f{direction}")]
+        assert sum(bearings) == pytest.approx(found[f"seat.pinion1.f{direction}"], rel=1e-4)
 
 
 def test_a_train_turns_at_its_ratio_and_carries_its_torque(two_stage) -> None:
