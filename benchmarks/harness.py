@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu import fmu
-from gearfmu.cosim.drivetrain import build, shafts_of, stage_joints, stage_signals, stage_start
+from gearfmu.cosim.drivetrain import build, stage_joints, stage_signals, stage_start
 from gearfmu.cosim.fmu_unit import FmuUnit
 from gearfmu.cosim.masters import Cut, master
 from gearfmu.cosim.ports import KEYS
@@ -88,10 +88,10 @@ def run(chosen: Any, recorder: Recorder, timed: Clocked) -> tuple[float, float, 
 def measure(source: Source, recorded: str) -> dict[str, object]:
     """One row: times in µs."""
     scene = load_scene("clutch_closure")
-    shafts = shafts_of(source.model.spec)
+    shafts = source.model.shafts
     stage = source.unit({"level": "rigid", "slices": 1} | stage_start(scene, shafts))
     timed, drive = Clocked(stage), PyUnit(build(scene, shafts))
-    chosen = master("gs_mean", Cut(timed, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts)))
+    chosen = master("gs_mean", Cut(timed, drive, (shafts.input, shafts.output), stage_signals(scene, shafts)))
     recorder = Recorder(timed, drive, RECORDED[recorded], STEPS, stage_joints(scene, shafts))
     chosen.begin(0.0)
     whole, inside, outside = run(chosen, recorder, timed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from gearfmu.body.general import load_general_bodies, reduce_general
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
@@ -18,12 +17,10 @@ __all__ = [
     "body_path",
     "inspect_file",
     "load_body",
-    "load_general_bodies",
     "load_interface_body",
     "load_set_bodies",
     "load_stage_bodies",
     "mounted",
-    "reduce_general",
     "reduce_set",
     "reduce_stage",
 ]

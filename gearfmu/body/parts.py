@@ -22,7 +22,7 @@ DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading
 PICTURE_MODES = 12
 _PICTURE_LOADS = 5
 _DRAWN_TWIST = 0.08  # rad: largest turn of the section within a drawn layer
-_TABLE_BYTES = 3.5e6  # of static_ff of a helical gear before compression
+_TABLE_BYTES = 3.5e6  # of static_ff before compression, unless all tooth offsets are needed
 _FEWEST_OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
 
 
@@ -63,15 +63,12 @@ def drawn_counts(geometry: Any, face_width: float) -> MeshSpec:
     return DRAWN.model_copy(update={"width": layers})
 
 
-def kept_offsets(static_ff: np.ndarray, helical: bool) -> np.ndarray:
-    """The table (2, 2, z, …) of all tooth offsets, or of a helical gear those of −K … K only (2, 2, 2K + 1, …): as many
-    as fit into `_TABLE_BYTES` in the file, which holds 0 … K, and never fewer than the kernel reads.
-
-    A spur gear's table is half zeros (even and odd width functions) and compresses to that; a helical one's is not.
-    """
+def kept_offsets(static_ff: np.ndarray, whole: bool) -> np.ndarray:
+    """The table (2, 2, z, …) of all tooth offsets, or those of −K … K only (2, 2, 2K + 1, …): as many as fit into
+    `_TABLE_BYTES` in the file, which holds 0 … K, and never fewer than the kernel reads. whole: all are needed."""
     teeth, each = static_ff.shape[2], 8 * static_ff[:, :, 0].size
     most = max(_FEWEST_OFFSETS, int(_TABLE_BYTES // each) - 1)
-    if not helical or 2 * most + 1 >= teeth:
+    if whole or 2 * most + 1 >= teeth:
         return static_ff
     return np.concatenate([static_ff[:, :, : most + 1], static_ff[:, :, -most:]], axis=2)
 

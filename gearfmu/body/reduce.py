@@ -28,7 +28,7 @@ from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report, sector_mesh
-from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -36,6 +36,7 @@ from gearfmu.reduction.modal import elastic_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import static_tables
 from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.general import GeneralStage, gear_as_pair
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import StageSpec, require_pair
 
@@ -43,6 +44,7 @@ FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
 
 Progress = Callable[[str, float], None]
 Geometry = GearGeometry | InternalGearGeometry
+Stage = StageSpec | GeneralStage
 
 
 def expected_hash(spec: StageSpec, gear_index: int) -> str:
@@ -56,14 +58,14 @@ def body_path(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] |
     return home / f"{spec.gears[gear_index].name}.h5"
 
 
-def load_stage_bodies(spec: StageSpec, folder: str | os.PathLike[str] | None = None) -> list[ReducedBody]:
-    """The stored bodies of a pair, one per gear. Raises BodyError when one is missing, damaged or stale."""
-    require_pair(spec)
+def load_stage_bodies(spec: Stage, folder: str | os.PathLike[str] | None = None) -> list[ReducedBody]:
+    """The stored bodies of a stage, in the order of its gears. Raises BodyError when one is missing, damaged or
+    stale."""
     bodies = []
-    for index in range(len(spec.gears)):
-        path = body_path(spec, index, folder)
+    for own, index in _gears(spec):
+        path = body_path(own, index, folder)
         body = load_body(path)
-        if body.input_hash != expected_hash(spec, index):
+        if body.input_hash != expected_hash(own, index):
             raise BodyError(
                 f"{path}: stale: made from other numbers, or by another version, than {spec.source} asks for now; "
                 "make it again with 'gearfmu reduce STAGE'"
@@ -73,32 +75,41 @@ def load_stage_bodies(spec: StageSpec, folder: str | os.PathLike[str] | None = N
 
 
 def reduce_stage(
-    spec: StageSpec,
+    spec: Stage,
     out_dir: str | os.PathLike[str] | None = None,
     force: bool = False,
     progress: Progress | None = None,
 ) -> list[ReducedBody]:
-    """Reduce every gear of a pair and store it; a stored body whose input hash matches is read instead.
+    """Reduce every gear of a stage and store it; a stored body whose input hash matches is read instead. Shafts need no
+    file.
 
     out_dir : folder of the .h5 files, that of the stage file when None. force : reduce in any case.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
-    require_pair(spec)
     bodies = []
-    for index in range(len(spec.gears)):
-        path = body_path(spec, index, out_dir)
-        body = None if force else _stored(path, expected_hash(spec, index))
+    for own, index in _gears(spec):
+        path = body_path(own, index, out_dir)
+        body = None if force else _stored(path, expected_hash(own, index))
         if body is None:
-            body = reduce_gear(spec, index, progress)
+            body = reduce_gear(own, index, progress)
             save_body(body, path)
         bodies.append(body)
     return bodies
 
 
+def _gears(spec: Stage) -> list[tuple[Any, int]]:
+    """Every gear as (pair it stands in, its number there): of a general stage each for itself, whatever it meshes
+    with."""
+    if isinstance(spec, GeneralStage):
+        return [(gear_as_pair(spec, gear.name), 0) for gear in spec.gears]
+    require_pair(spec)
+    return [(spec, index) for index in range(len(spec.gears))]
+
+
 def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = None) -> ReducedBody:
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
-    geometry = PairGeometry.of(spec).gears[gear_index]
+    geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
     try:
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
@@ -141,7 +152,7 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
         strip_half_width=gear.body.strip_half_width,
-        static_ff=kept_offsets(statics.static_ff, bool(geometry.beta)),
+        static_ff=kept_offsets(statics.static_ff, whole=getattr(gear, "mounts", None) is not None),
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=made.frf,

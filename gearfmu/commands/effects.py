@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import click
@@ -78,33 +79,46 @@ def _cost(cost: Any) -> str:
 
 
 def _numbers(stage: str) -> dict[str, str]:
-    """What a stage has of each effect, by its name."""
+    """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file."""
     from gearfmu.commands.models import model_of
-    from gearfmu.geometry import PairGeometry
     from gearfmu.stage.effects import torque_on_flanks_alone
+    from gearfmu.stage.meshes import mesh_geometry
 
     model = model_of(stage)
-    spec, pair = model.pair, PairGeometry.of(model.pair)
+    spec = model.stage
+    meshes, gears = spec.engagements, spec.gears
     stored, modes = _modes(model)
-    alone = torque_on_flanks_alone(model)
-    reliefs = [1e6 * gear.tip_relief.amount if gear.tip_relief else 0.0 for gear in spec.gears]
-    misplaced = [1e6 * max(map(abs, gear.index_deviation.values()), default=0.0) for gear in spec.gears]
+    widths = [min(g.face_width for g in gears if g.name in mesh.gears) for mesh in meshes]
+    alone = [torque_on_flanks_alone(model, mesh.name) for mesh in meshes]
+    reliefs = [1e6 * gear.tip_relief.amount if gear.tip_relief else 0.0 for gear in gears]
+    misplaced = [1e6 * max(map(abs, gear.index_deviation.values()), default=0.0) for gear in gears]
     return {
         "elastic": f"{stored} stored modes",
         "modes": modes,
         "residual": "of what is not dynamic",
-        "hertz": f"local law up to {spec.torque_max:g} N·m",
-        "slices": f"{spec.contact.slices} over {1e3 * min(g.face_width for g in spec.gears):g} mm",
-        "coast_flank": f"{1e6 * pair.normal_backlash:.1f} µm of backlash along the normal",
-        "contact_damping": f"{spec.contact.damping:g} N·s/m per metre of face width",
-        "tip_relief": " and ".join(f"{amount:g} µm" for amount in reliefs) + _idle(not any(reliefs)),
-        "tip_contact": " and ".join(f"{1e3 * g.tip_edge_radius:g} mm" for g in spec.gears)
-        + f" edge radius; flanks carry alone up to {alone:.3g} N·m",
-        "bearings": " and ".join(f"{g.bearing.stiffness:g} N/m" for g in spec.gears),
-        "modal_damping": " and ".join(f"{g.modal_damping:g}" for g in spec.gears) + " of critical",
+        "hertz": f"local law up to {_listed(f'{mesh.torque_max:g} N·m' for mesh in meshes)}",
+        "slices": f"{spec.slices} over {_listed(f'{1e3 * width:g} mm' for width in widths)}",
+        "coast_flank": _listed(f"{1e6 * mesh_geometry(spec, mesh).normal_backlash:.1f} µm" for mesh in meshes)
+        + " of backlash along the normal",
+        "contact_damping": _listed(f"{mesh.damping:g} N·s/m" for mesh in meshes) + " per metre of face width",
+        "tip_relief": _listed(f"{amount:g} µm" for amount in reliefs) + _idle(not any(reliefs)),
+        "tip_contact": _listed(f"{1e3 * g.tip_edge_radius:g} mm" for g in gears)
+        + f" edge radius; flanks carry alone up to {_listed(f'{torque:.3g} N·m' for torque in alone)}",
+        "bearings": _listed(_stiffness(support.radial) for support in spec.supports if support.to is None),
+        "modal_damping": _listed(f"{g.modal_damping:g}" for g in gears) + " of critical",
         "roll_motion": "on",
-        "pitch_errors": "up to " + " and ".join(f"{a:g} µm" for a in misplaced) + _idle(not any(misplaced)),
+        "pitch_errors": "up to " + _listed(f"{a:g} µm" for a in misplaced) + _idle(not any(misplaced)),
     }
+
+
+def _listed(texts: Iterable[str]) -> str:
+    """ "a", "a and b", "a, b and c"."""
+    *first, last = texts
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _stiffness(radial: float | str | None) -> str:
+    return f"{radial:g} N/m" if isinstance(radial, float) else radial or "free"
 
 
 def _idle(idle: bool) -> str:

@@ -10,28 +10,36 @@ import click
 from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
-    from gearfmu.spec.stage import StageSpec
     from gearfmu.stage import StageModel
 
 
 def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> StageModel:
-    """The StageModel of STAGE, with other kinds of port where `port_kinds` (shaft → kind) says so."""
-    spec, bodies = bodies_of(stage)
+    """The StageModel of STAGE, with other kinds of port where `port_kinds` (port → kind) says so."""
+    spec, bodies = bodies_for_motion(stage)
     from gearfmu.stage import assemble
 
-    return assemble(with_ports(spec, port_kinds or {}), bodies)
+    return assemble(of_other_kinds(spec, port_kinds or {}), bodies)
 
 
-def bodies_of(stage: str) -> tuple[StageSpec, list[Any]]:
-    """StageSpec and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first, with a
-    progress bar."""
-    from gearfmu.spec.stage import load_pair
+def bodies_of(stage: str) -> tuple[Any, list[Any]]:
+    """StageSpec or GeneralStage and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first,
+    with a progress bar."""
+    from gearfmu.spec.stage import load_stage
 
-    spec = load_pair(stage)
+    spec = load_stage(stage)
     from gearfmu.body import reduce_stage
 
     with progress_bar("reducing") as progress:
         return spec, reduce_stage(spec, progress=by_text(progress))
+
+
+def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
+    """`bodies_of` for a verb that needs a model of the stage: a SpecError, before anything is reduced, for a stage that
+    has none yet."""
+    from gearfmu.spec.stage import load_stage, require_motion
+
+    require_motion(load_stage(stage))
+    return bodies_of(stage)
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
@@ -39,20 +47,23 @@ def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
     return None if progress is None else lambda text, share: progress(share, text)
 
 
-def with_ports(spec: StageSpec, kinds: Mapping[str, str]) -> StageSpec:
-    """The StageSpec with the ports' kinds replaced; a usage error for a shaft it does not have or a spring without k
-    and c."""
+def of_other_kinds(spec: Any, kinds: Mapping[str, str]) -> Any:
+    """The stage with the ports' kinds replaced; a usage error for a port it does not have or a spring without k and
+    c."""
+    from gearfmu.spec.turning import with_ports
+
     unknown = set(kinds) - set(spec.ports)
     if unknown:
         raise click.BadParameter(
             f"no shaft '{min(unknown)}'; the stage has {', '.join(spec.ports)}", param_hint="--port"
         )
-    ports = dict(spec.ports)
-    for shaft, kind in kinds.items():
-        if kind == "spring" and ports[shaft].k is None:
+    changed = {}
+    for name, kind in kinds.items():
+        port = spec.ports[name]
+        if kind == "spring" and port.k is None:
             raise click.BadParameter(
-                f"{shaft}=spring needs k and c in [ports.{shaft}] of {spec.source}", param_hint="--port"
+                f"{name}=spring needs k and c in [ports.{name}] of {spec.source}", param_hint="--port"
             )
-        chain = ports[shaft].chain if kind == "spring" else None
-        ports[shaft] = ports[shaft].model_copy(update={"kind": kind, "chain": chain})
-    return spec.model_copy(update={"ports": ports})
+        chain = port.chain if kind == "spring" else None
+        changed[name] = port.model_copy(update={"kind": kind, "chain": chain})
+    return with_ports(spec, changed)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gearfmu.commands.models import bodies_of, by_text
+from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
 from gearfmu.commands.shared import Quantity, progress_bar
 
 if TYPE_CHECKING:
@@ -46,7 +46,10 @@ def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float
 
 
 def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
-    spec, bodies = bodies_of(stage)
+    from gearfmu.spec.stage import load_pair
+
+    load_pair(stage)
+    spec, bodies = bodies_for_motion(stage)
     from gearfmu.modes.linear import stage_modes
     from gearfmu.report.campbell import RPM, campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
@@ -111,10 +114,12 @@ def _shapes(stage: str, name: str, count: int, mounted: bool) -> BodyModes:
     _check(name, names)
     _, bodies = bodies_of(stage)
     from gearfmu.modes.gear import gear_modes
+    from gearfmu.spec.general import gear_as_pair
 
     index = names.index(name)
     with progress_bar("shapes") as progress:
-        return gear_modes(spec, index, bodies[index], count, by_text(progress))
+        own = (gear_as_pair(spec, name), 0) if spec.kind == "general" else (spec, index)
+        return gear_modes(*own, bodies[index], count, by_text(progress))
 
 
 def _of_set(spec: Any, name: str, count: int, mounted: bool) -> BodyModes:

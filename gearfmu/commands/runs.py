@@ -26,18 +26,21 @@ OUT = click.Path(path_type=Path, file_okay=False)
     "--fmu", "fmu_path", type=click.Path(path_type=Path), help="An FMU exported earlier; exported anew when not given."
 )
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
-def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool) -> int:
+@click.option("--stage", help="Another STAGE than the scene's.")
+def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool, stage: str | None) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
     from gearfmu.spec.scene import load_scene
 
     spec = load_scene(scene)
+    if stage is not None:
+        spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
     return run_scene(spec, out or Path("out") / spec.name, unit=unit, fmu_path=fmu_path, verify=verify)
 
 
 @click.command()
 @click.argument("stage")
-@click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the pinion, "302 N*m".')
-@click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the pinion, "2000 rpm".')
+@click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
+@click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
 @click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
 @click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
 @click.option(
@@ -56,7 +59,7 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
 )
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:
-    """Run STAGE alone: both shafts' outer ends turn at constant speed, wound up by the torque."""
+    """Run STAGE alone: the outer ends of input and output turn at constant speed, wound up by the torque."""
     from gearfmu.commands.models import model_of
     from gearfmu.commands.standalone import parameters, steady_run
 
@@ -78,7 +81,7 @@ def demo(out: Path) -> int:
 
 @click.command()
 @click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
-@click.option("--stage", help="STAGE of the run, for the picture of the deformed pair.")
+@click.option("--stage", help="STAGE of the run, for the picture of the deformed gears.")
 @click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
 def report(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
@@ -94,9 +97,9 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
     from gearfmu import cosim
-    from gearfmu.commands.models import bodies_of
+    from gearfmu.commands.models import bodies_for_motion
 
-    bodies_of(scene.stage.name)
+    bodies_for_motion(scene.stage.name)
     with progress_bar(scene.name) as progress:
         trace = cosim.run(scene, out, progress=progress, **options)
     return finish(trace, out, scene.stage.name)
@@ -119,7 +122,7 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
 
 
 def write_report(trace: Any, out: Path, stage: str | None) -> Path:
-    """The report page of `trace` in `out`; with the deformed pair where the stage and its bodies can be read."""
+    """The report page of `trace` in `out`; with the deformed gears where the stage and its bodies can be read."""
     from gearfmu import report as room
     from gearfmu.body import load_stage_bodies
     from gearfmu.errors import GearfmuError

@@ -26,7 +26,7 @@ def new(name: str, like: str) -> None:
 
 @click.command()
 @click.argument("stage")
-@click.option("--gear", "only", metavar="NAME", help="Only this body (pinion, wheel; sun, planet, ring, carrier).")
+@click.option("--gear", "only", metavar="NAME", help="Only this body: a gear's name, or the carrier.")
 @click.option(
     "--scale", type=click.FloatRange(0.2, 4), default=1.0, show_default=True, help="Factor on all element counts."
 )
@@ -61,11 +61,11 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
     """Reduce the bodies of STAGE to <body>.h5; a body whose input hash matches is left as it is."""
     import time
 
-    from gearfmu.body import reduce_general, reduce_set, reduce_stage
+    from gearfmu.body import reduce_set, reduce_stage
     from gearfmu.spec.stage import load_stage
 
     spec, started = load_stage(stage), time.perf_counter()
-    reduce_all: Any = {"planetary_set": reduce_set, "general": reduce_general}.get(spec.kind, reduce_stage)
+    reduce_all: Any = reduce_set if spec.kind == "planetary_set" else reduce_stage
     with progress_bar("reducing") as progress:
         bodies = reduce_all(spec, out, force, by_text(progress))
     for body in bodies:
@@ -127,7 +127,7 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     if spec.kind == "planetary_set":
         geometry = set_geometry(spec, name)
     else:
-        geometry = pair_geometry(spec, name) if spec.kind == "external_pair" else GearGeometry.of(body, body)
+        geometry = pair_geometry(spec, name) if spec.kind == "external_pair" else GearGeometry.of(body, body, 1)
     if getattr(body, "imported", None):
         return imported_sector_mesh(body, geometry), ()
     return sector_mesh(geometry, body.face_width, counts), (geometry.r_b, body.body.strip_half_width)

@@ -31,9 +31,11 @@ def steady_run(
     model: StageModel, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None
 ) -> Trace:
     """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
+    from gearfmu.spec.turning import mesh_teeth
     from gearfmu.stage import Steady, simulate
 
-    soft = [name for name, port in model.spec.ports.items() if port.kind != "spring" or port.chain is not None]
+    driven = {name: model.stage.ports[name] for name in (model.shafts.input, model.shafts.output)}
+    soft = [name for name, port in driven.items() if port.kind != "spring" or port.chain is not None]
     if soft:
         raise click.UsageError(
             f"'simulate' turns spring ports without a chain; {', '.join(soft)} of {model.spec.source} is another: "
@@ -47,7 +49,7 @@ def steady_run(
         H=drive["step"],
         settle=drive["settle"],
         scene="constant speed and load",
-        teeth={gear.name: gear.teeth for gear in model.spec.gears},
+        meshes={mesh: list(known) for mesh, known in mesh_teeth(model.stage).items()},
         torque=drive["torque"],
         speed=drive["speed"],
     )

@@ -36,12 +36,14 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes, for table errors.")
 def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bool, jobs: int) -> None:
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices."""
-    from gearfmu.commands.models import bodies_of
+    from gearfmu.commands.models import bodies_for_motion
     from gearfmu.spec.scene import load_scene
+    from gearfmu.spec.stage import load_pair
 
     specs = [load_scene(scene) for scene in scenes]
     for spec in specs:
-        bodies_of(spec.stage.name)
+        load_pair(spec.stage.name)
+        bodies_for_motion(spec.stage.name)
     for table in dict.fromkeys(tables):
         if table == "errors":
             for spec in specs:

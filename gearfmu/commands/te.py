@@ -20,7 +20,7 @@ from gearfmu.commands.shared import Quantity
     multiple=True,
     required=True,
     type=Quantity("N*m"),
-    help='Torque on the pinion, "302 N*m"; "0 N*m" for the unloaded pair; may repeat.',
+    help='Torque on the input, "302 N*m"; "0 N*m" for the unloaded stage; may repeat.',
 )
 @click.option(
     "--positions",
@@ -35,27 +35,39 @@ from gearfmu.commands.shared import Quantity
     type=click.Path(path_type=Path),
     default=Path("te.csv"),
     show_default=True,
-    help="Table; the plot has the same name.",
+    help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
 )
 def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, out: Path) -> None:
-    """Loaded transmission error of STAGE over one pitch, wheel held: te_um = 1e6·(r_b1 φ_1 + r_b2 φ_2)."""
+    """Loaded transmission error of STAGE over one pitch, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of every mesh.
+
+    The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.trace import write_columns
 
-    result = loaded_te(model, torques=list(torques), positions=positions, rigid_bearings=rigid_bearings)
-    held = result if rigid_bearings else loaded_te(model, list(torques), positions, rigid_bearings=True)
-    write_columns(out, te_columns(result))
-    picture = out.with_suffix(".png")
-    write_plot(result, picture)
+    meshes = [mesh.name for mesh in model.stage.engagements]
+    for mesh in meshes:
+        result = loaded_te(model, list(torques), positions, rigid_bearings, mesh)
+        held = result if rigid_bearings else loaded_te(model, list(torques), positions, True, mesh)
+        path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
+        write_columns(path, te_columns(result))
+        picture = path.with_suffix(".png")
+        write_plot(result, picture)
+        if len(meshes) > 1:
+            click.echo(mesh)
+        _tell(result, held)
+        click.echo(f"{path}, {picture}")
+
+
+def _tell(result: Any, held: Any) -> None:
+    """One line a torque; held: the same with rigid bearings."""
     for torque, row, mesh, stiffness in zip(result.torque, result.te, held.stiffness, result.stiffness, strict=True):
-        with_bearings = "" if rigid_bearings else f", with the bearings {1e-6 * stiffness.mean():.1f} N/µm"
+        with_bearings = "" if held is result else f", with the bearings {1e-6 * stiffness.mean():.1f} N/µm"
         click.echo(
             f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
             f"mesh stiffness (bores held) {1e-6 * mesh.mean():.1f} N/µm{with_bearings}"
         )
-    click.echo(f"{out}, {picture}")
 
 
 def te_columns(result: Any) -> dict[str, np.ndarray]:

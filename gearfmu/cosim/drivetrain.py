@@ -1,39 +1,24 @@
 """Drivetrains as networks around a stage, and the stage's ports that belong to them.
 
-Angles and speeds behind the wheel gear are those of the output shaft: negative while the pinion turns positively.
+Pinion and wheel stand for the stage's input and output, whatever is between them. Angles and speeds behind the output
+are those of the output shaft: of a single pair, negative while the pinion turns positively.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from gearfmu.cosim.network import Clutch, Driven, Inertia, Network, Source, Spring
 from gearfmu.cosim.signals import Constant, Ramp, Signal
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
 from gearfmu.spec.ports import ChainSpec, PortSpec
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.turning import Shafts
 
 ROLLING_SPEED = 0.1  # m/s over which rolling resistance builds up: no force at standstill
 SLOWEST_TYRE = 1.0  # m/s: speed below which the tyre's damper no longer stiffens
 JOINED = 1e6  # N·m: capacity that keeps the clutch of the wheel's chain closed, so that both its inertias are one
-
-
-@dataclass(frozen=True)
-class Shafts:
-    """Names of the stage's two shafts and its ratio (teeth of the wheel over teeth of the pinion)."""
-
-    pinion: str
-    wheel: str
-    ratio: float
-
-
-def shafts_of(spec: StageSpec) -> Shafts:
-    """Names and ratio of the stage's shafts."""
-    pinion, wheel = spec.gears
-    return Shafts(pinion.name, wheel.name, wheel.teeth / pinion.teeth)
 
 
 def build(scene: SceneSpec, shafts: Shafts) -> Network:
@@ -49,18 +34,17 @@ def stage_ports(scene: SceneSpec, shafts: Shafts) -> dict[str, PortSpec]:
     stage."""
     if scene.test_rig:
         rig = scene.test_rig
-        pinion = PortSpec(kind="spring", k=rig.pinion_shaft_stiffness, c=rig.pinion_shaft_damping)
         return {
-            shafts.pinion: pinion,
-            shafts.wheel: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
+            shafts.input: PortSpec(kind="spring", k=rig.pinion_shaft_stiffness, c=rig.pinion_shaft_damping),
+            shafts.output: PortSpec(kind="spring", k=rig.wheel_shaft_stiffness, c=rig.wheel_shaft_damping),
         }
     car = scene.passenger_car
     assert car is not None, "a scene has one of the two"
     if car.chain_in_fmu:
-        return {shafts.pinion: _clutch_chain(car), shafts.wheel: _final_drive_chain(car)}
+        return {shafts.input: _clutch_chain(car), shafts.output: _final_drive_chain(car)}
     return {
-        shafts.pinion: PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping),
-        shafts.wheel: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
+        shafts.input: PortSpec(kind="spring", k=car.input_shaft_stiffness, c=car.input_shaft_damping),
+        shafts.output: PortSpec(kind="spring", k=car.output_shaft_stiffness, c=car.output_shaft_damping),
     }
 
 
@@ -97,7 +81,7 @@ def capacity(scene: SceneSpec) -> Signal:
 def stage_signals(scene: SceneSpec, shafts: Shafts) -> tuple[tuple[str, Signal], ...]:
     """Inputs of the stage that follow from the scene alone."""
     in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
-    return ((f"{shafts.pinion}.clutch.capacity", capacity(scene)),) if in_stage else ()
+    return ((f"{shafts.input}.clutch.capacity", capacity(scene)),) if in_stage else ()
 
 
 def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
@@ -106,16 +90,16 @@ def stage_start(scene: SceneSpec, shafts: Shafts) -> dict[str, float]:
     if scene.passenger_car is None or not scene.passenger_car.chain_in_fmu:
         return {}
     return {
-        f"{shafts.pinion}.disc.w_start": scene.start.pinion_speed,
-        f"{shafts.wheel}.disc.w_start": _wheel_speed(scene, shafts),
-        f"{shafts.wheel}.clutch.capacity": JOINED,
+        f"{shafts.input}.disc.w_start": scene.start.pinion_speed,
+        f"{shafts.output}.disc.w_start": _wheel_speed(scene, shafts),
+        f"{shafts.output}.clutch.capacity": JOINED,
     }
 
 
 def stage_joints(scene: SceneSpec, shafts: Shafts) -> tuple[str, ...]:
     """Patterns of stage outputs that say nothing: of the clutch that only joins two inertias."""
     in_stage = scene.passenger_car is not None and scene.passenger_car.chain_in_fmu
-    return (f"{shafts.wheel}.clutch.*", f"{shafts.wheel}.disc.*") if in_stage else ()
+    return (f"{shafts.output}.clutch.*", f"{shafts.output}.disc.*") if in_stage else ()
 
 
 def engine_torque(car: PassengerCar) -> Callable[[float, float, float], float]:
@@ -149,7 +133,7 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
     nodes, tyres = _vehicle(scene, car, shafts)
     sources = (Source("combustion", "engine", engine_torque(car)), Source("road", "vehicle", road_load(car)))
     if car.chain_in_fmu:
-        ports = {shafts.pinion: "engine", shafts.wheel: "wheels"}
+        ports = {shafts.input: "engine", shafts.output: "wheels"}
         return Network((engine, *nodes), (tyres,), (), sources, torque_ports=ports)
     assert scene.clutch is not None, "a car outside the stage has its clutch outside"
     secondary, disc, final_drive = (
@@ -162,7 +146,7 @@ def _car(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> Network:
         (_dual_mass_flywheel(car), _half_shafts(car), tyres),
         (Clutch("clutch", "secondary", "disc", capacity(scene), scene.clutch.peak),),
         sources,
-        torque_ports={shafts.pinion: "disc", shafts.wheel: "final_drive"},
+        torque_ports={shafts.input: "disc", shafts.output: "final_drive"},
     )
 
 
@@ -181,7 +165,7 @@ def _referred(car: PassengerCar) -> float:
 
 
 def _wheel_speed(scene: SceneSpec, shafts: Shafts) -> float:
-    return -scene.start.pinion_speed / shafts.ratio
+    return scene.start.pinion_speed / shafts.ratio
 
 
 def _vehicle(scene: SceneSpec, car: PassengerCar, shafts: Shafts) -> tuple[tuple[Inertia, ...], Spring]:
@@ -199,8 +183,8 @@ def _rig(scene: SceneSpec, rig: TestRig, shafts: Shafts) -> Network:
     twisted by the mean torque."""
     w = scene.start.pinion_speed
     twist = rig.torque / rig.pinion_shaft_stiffness + rig.torque * shafts.ratio**2 / rig.wheel_shaft_stiffness
-    nodes = (Inertia("drive", rig.drive_inertia, phi=twist, w=w), Driven("brake", w=-w / shafts.ratio))
+    nodes = (Inertia("drive", rig.drive_inertia, phi=twist, w=w), Driven("brake", w=w / shafts.ratio))
     mean = rig.torque + rig.speed_droop * w
     droop = Spring("droop", {"drive": 1.0}, 0.0, rig.speed_droop)
     source = Source("motor", "drive", lambda time, phi, w: mean)
-    return Network(nodes, (droop,), (), (source,), torque_ports={shafts.pinion: "drive", shafts.wheel: "brake"})
+    return Network(nodes, (droop,), (), (source,), torque_ports={shafts.input: "drive", shafts.output: "brake"})

@@ -12,15 +12,18 @@ from gearfmu import fmu
 from gearfmu.body import load_stage_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
-from gearfmu.cosim.drivetrain import build, shafts_of, stage_joints, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
-from gearfmu.errors import CouplingError
+from gearfmu.errors import CouplingError, Problem, SpecError
 from gearfmu.files import write_text
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.scene import SceneSpec, load_scene
-from gearfmu.spec.stage import load_stage
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.spec.turning import shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.trace import Trace
 
@@ -65,8 +68,20 @@ def run(
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     spec = load_stage(scene.stage.name)
-    bodies = load_stage_bodies(spec)
-    return assemble(spec.model_copy(update={"ports": stage_ports(scene, shafts_of(spec))}), bodies)
+    return assemble(in_drivetrain(scene, spec), load_stage_bodies(spec))
+
+
+def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
+    """The stage with the ports that the scene's drivetrain needs. SpecError where more than its input and output would
+    have to be driven."""
+    shafts = shafts_of(as_general(spec))
+    for name, port in spec.ports.items():
+        if name not in (shafts.input, shafts.output) and port.kind == "spring":
+            remedy = (
+                f"a scene drives {shafts.input} and {shafts.output} only: make this port one of kind torque or fixed"
+            )
+            raise SpecError([Problem(str(spec.source), f"ports.{name}.kind", '"spring"', remedy)])
+    return with_ports(spec, stage_ports(scene, shafts))
 
 
 @contextmanager
@@ -80,7 +95,7 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
 
 def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected."""
-    shafts, choice = shafts_of(source.model.pair), scene.stage
+    shafts, choice = source.model.shafts, scene.stage
     parameters = {
         "level": choice.level,
         "integrator": choice.integrator,
@@ -92,7 +107,7 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
     stage = source.unit(parameters)
     try:
         drive = PyUnit(build(scene, shafts), scene.coupling.micro_step or None)
-        cut = Cut(stage, drive, (shafts.pinion, shafts.wheel), stage_signals(scene, shafts), wiring)
+        cut = Cut(stage, drive, (shafts.input, shafts.output), stage_signals(scene, shafts), wiring)
         coupling, omit = scene.coupling, stage_joints(scene, shafts)
         return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
     finally:

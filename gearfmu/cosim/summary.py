@@ -12,6 +12,7 @@ from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.turning import mesh_teeth
 
 TORQUES = (
     "{}.shaft.tau",
@@ -42,7 +43,7 @@ def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
         "settle": scene.settle,
         "unit": "kernel" if source.fmu_path is None else "fmu",
         "chain_in_fmu": bool(scene.passenger_car and scene.passenger_car.chain_in_fmu),
-        "teeth": {gear.name: gear.teeth for gear in source.model.spec.gears},
+        "meshes": {mesh: list(known) for mesh, known in mesh_teeth(source.model.stage).items()},
     }
 
 
@@ -62,8 +63,8 @@ def _price(result: Result) -> dict[str, Any]:
 
 
 def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:
-    pinion, errors = source.model.spec.gears[0].name, errors or {}
-    torque = next((name for name in (text.format(pinion) for text in TORQUES) if name in errors), None)
+    port, errors = source.model.shafts.input, errors or {}
+    torque = next((name for name in (text.format(port) for text in TORQUES) if name in errors), None)
     return {
         "coupling_error": errors[torque].relative if torque else None,
         "coupling_error_rms_Nm": errors[torque].rms if torque else None,
@@ -75,7 +76,7 @@ def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | 
 
 
 def _origin(scene: SceneSpec, source: Source) -> dict[str, Any]:
-    names = [gear.name for gear in source.model.spec.gears]
+    names = [gear.name for gear in source.model.stage.gears]
     hashes = {f"body {name}": text for name, text in zip(names, source.model.body_hashes, strict=True)}
     hashes |= {"scene": scene.hash, "model": source.model.hash}
     if source.fmu_path is not None:

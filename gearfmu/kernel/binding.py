@@ -69,7 +69,7 @@ _SIGNATURES = {
     "gk_time": (c_double, [c_void_p]),
     "gk_te": (
         c_int,
-        [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, POINTER(c_double), POINTER(c_int)],
+        [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, c_int, POINTER(c_double), POINTER(c_int)],
     ),
     "gk_profile": (c_int, [c_void_p, c_int, POINTER(c_char_p), POINTER(c_uint64)]),
     "gk_state_size": (c_size_t, [c_void_p]),

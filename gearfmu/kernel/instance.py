@@ -32,10 +32,11 @@ class Variable:
 
 @dataclass(frozen=True)
 class TeState:
-    """Quasi-static transmission at one position: te (m); forces (N) of the slices, keyed (flank 0 drive 1 coast,
-    tooth number of the pinion)."""
+    """Quasi-static transmission at one position: te (m) of an engagement; phi (rad): angle of the first port's bore;
+    forces (N) of the engagement's slices, keyed (flank 0 drive 1 coast, tooth number of gear A)."""
 
     te: float
+    phi: float
     forces: dict[tuple[int, int], tuple[float, ...]]
 
 
@@ -177,19 +178,16 @@ class Kernel:
             )
         ctypes.memmove(self._data, state, len(state))
 
-    def transmission(self, phi_wheel: float, torque: float, keep: bool = False) -> TeState:
-        """Quasi-static equilibrium with the wheel's bore held at phi_wheel (rad) and `torque` (N·m) on the pinion's
-        bore; after `prepare`."""
-        out = (ctypes.c_double * (1 + PLACES * (2 + SLICES)))()
+    def transmission(self, phi_out: float, torque: float, mesh: int = 0, keep: bool = False) -> TeState:
+        """Quasi-static equilibrium with the second port's bore held at phi_out (rad) and `torque` (N·m) on the first
+        port's bore, seen at engagement number `mesh`; after `prepare`."""
+        out = (ctypes.c_double * (2 + PLACES * (2 + SLICES)))()
         count = ctypes.c_int()
-        self._check(
-            self._lib.gk_te(
-                self._model, self._setup, self._work, self._data, phi_wheel, torque, int(keep), out, ctypes.byref(count)
-            )
-        )
-        slices = int(self.get("slices"))
-        rows = [out[1 + i * (2 + slices) : 1 + (i + 1) * (2 + slices)] for i in range(count.value)]
-        return TeState(out[0], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
+        known = (self._model, self._setup, self._work, self._data, phi_out, torque, mesh)
+        self._check(self._lib.gk_te(*known, int(keep), out, ctypes.byref(count)))
+        width = 2 + int(self.get("slices"))
+        rows = [out[2 + i * width : 2 + (i + 1) * width] for i in range(count.value)]
+        return TeState(out[0], out[1], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
 
     def profile(self) -> dict[str, int]:
         """Processor cycles by phase of the step since `prepare`; zeros unless the library was built with

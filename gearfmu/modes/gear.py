@@ -10,7 +10,7 @@ from gearfmu.body import ReducedBody
 from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import gear_sector
-from gearfmu.geometry import PairGeometry
+from gearfmu.geometry import GearGeometry
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.spec.stage import StageSpec
@@ -27,7 +27,7 @@ def gear_modes(
     another program version).
     """
     gear = spec.gears[gear_index]
-    geometry = PairGeometry.of(spec).gears[gear_index]
+    geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
     if gear.imported is None:
         mesh = gear_sector(geometry, gear.face_width, gear.body.mesh)
     else:

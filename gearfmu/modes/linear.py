@@ -174,7 +174,7 @@ def _static(
     total[count:, count:] = body.static_bb[bore]
     for i, (tooth, place) in enumerate(places):
         for j, (other, there) in enumerate(places):
-            block = body.static_ff[DRIVE, DRIVE, (other - tooth) % body.teeth][..., degrees, :][..., degrees]
+            block = body.static_ff[DRIVE, DRIVE, other - tooth][..., degrees, :][..., degrees]
             total[i, j] = np.einsum("r,s,a,b,rsab->", place, there, weights[i], weights[j], block)
         x, y, turn = np.einsum("r,a,rak->k", place, weights[i], body.static_fb[DRIVE][:, degrees])[list(BORE)]
         theta = 2 * np.pi * tooth / body.teeth

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels,
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
 from gearfmu.report.results import key_results, strict
-from gearfmu.report.signals import SETTLED, angle_of_mesh, teeth, window_of_interest
+from gearfmu.report.signals import SETTLED, mesh_angles, meshes, window_of_interest
+from gearfmu.spec.expand import as_general
 from gearfmu.stage.trace import Trace, write_columns
 
 NVH = ("spectrum", "orders", "spectrogram")
@@ -33,7 +35,7 @@ def write(
 
     trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
     summary : fields of docs/file-formats.md; what is missing is shown as "not given".
-    spec : StageSpec, for tooth numbers; bodies : its two ReducedBody objects, for the picture of the deformed pair.
+    spec : the stage, for tooth numbers; bodies : its ReducedBody objects, for the picture of the deformed gears.
     Raises OSError when the folder cannot be written.
     """
     folder = Path(out_dir)
@@ -48,19 +50,19 @@ def write(
 
 def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[Plot], list[str]]:
     """Every plot the trace allows, and in words why others are not there."""
-    angle = angle_of_mesh(trace, teeth(trace, spec))
-    window = window_of_interest(trace)
-    makers: list[Callable[[], Plot | None]] = [
-        lambda: plots.torque_and_slip(trace),
-        lambda: plots.speeds(trace),
-        lambda: plots.mesh_force_and_error(trace),
-        lambda: plots.mesh_force_and_error(trace, detail_window(trace, angle)),
-        lambda: plots.bearing_forces(trace),
-        lambda: picture.deformed_pair(trace, spec, bodies) if spec is not None and bodies else None,
-        lambda: plots_nvh.force_spectrum(trace, window, angle),
-        lambda: plots_nvh.order_cuts(trace, angle),
-        lambda: plots_nvh.force_spectrogram(trace, angle),
-    ]
+    angles, window = mesh_angles(trace, spec), window_of_interest(trace)
+    makers: list[Callable[[], Plot | None]] = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
+    for mesh in meshes(trace):
+        makers += [
+            partial(plots.mesh_force_and_error, trace, mesh),
+            partial(plots.mesh_force_and_error, trace, mesh, detail_window(trace, mesh, angles.get(mesh))),
+        ]
+    makers.append(lambda: plots.bearing_forces(trace))
+    if spec is not None and bodies:
+        makers += [partial(picture.deformed_pair, trace, as_general(spec), mesh, bodies) for mesh in meshes(trace)]
+    makers.append(lambda: plots_nvh.force_spectrum(trace, window, angles))
+    makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
+    makers.append(lambda: plots_nvh.force_spectrogram(trace, angles))
     made, missing = [], []
     for maker in makers:
         try:
@@ -70,16 +72,16 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
             continue
         if plot is not None:
             made.append(plot)
-    if angle is None:
+    if not angles:
         missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
     return made, list(dict.fromkeys(missing))
 
 
-def detail_window(trace: Trace, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
-    """About `periods` mesh periods (s) around the largest mesh force, or a twentieth of the run where the mesh angle
-    is missing."""
+def detail_window(trace: Trace, mesh: str, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
+    """About `periods` mesh periods (s) around the largest force of an engagement, or a twentieth of the run where its
+    mesh angle is missing."""
     start, end = float(trace.time[0]), float(trace.time[-1])
-    force = np.abs(trace["mesh.force"]) if "mesh.force" in trace else np.zeros(1)
+    force = np.abs(trace[f"{mesh}.force"]) if f"{mesh}.force" in trace else np.zeros(1)
     centre = float(trace.time[int(np.argmax(force))])
     half = 0.025 * (end - start)
     if angle is not None and angle[-1] > 2 * np.pi * periods:
@@ -104,10 +106,10 @@ def _document(
         page.head(title, str(summary.get("outcome", "outcome not given")), f"{stage}{' · ' + about if about else ''}"),
         page.facts(_facts(summary)),
         page.section("Results", _results(trace)),
-        *[page.figure(plot) for plot in made if plot.name not in NVH],
+        *[page.figure(plot) for plot in made if not plot.name.startswith(NVH)],
         *_warned(trace),
         *([page.section("Octave bands", bands)] if (bands := _octaves(trace)) else []),
-        *[page.figure(plot) for plot in made if plot.name in NVH],
+        *[page.figure(plot) for plot in made if plot.name.startswith(NVH)],
         page.section("Accuracy and cost", *_accuracy(summary, spec, bodies)),
         page.details("Where it comes from", page.pairs_table(_provenance(summary)), _channels(trace)),
     ]
@@ -127,7 +129,7 @@ def _warned(trace: Trace) -> list[str]:
 def _facts(summary: Mapping[str, Any]) -> dict[str, str]:
     return {
         "fidelity level": _text(summary, "level"),
-        "dynamic modes, both gears": _text(summary, "n_dyn"),
+        "dynamic modes, all gears": _text(summary, "n_dyn"),
         "slices": _text(summary, "slices"),
         "internal step": _text(summary, "h", 1e6, "µs"),
         "communication step": _text(summary, "H", 1e6, "µs"),
@@ -160,12 +162,7 @@ NAMES = {
 
 def _results(trace: Trace) -> str:
     window = window_of_interest(trace)
-    rows = []
-    for key, value in key_results(trace).items():
-        bearing = key.removeprefix("bearing_").removesuffix("_rms_ac_N")
-        rows.append(
-            (NAMES.get(key, f"bearing {bearing}, rms of the alternating part, both directions, N"), f"{value:.4g}")
-        )
+    rows = [(_result_name(key, meshes(trace)), f"{value:.4g}") for key, value in key_results(trace).items()]
     where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise. "
     where += (
         "Alternating: without the mean."
@@ -177,6 +174,16 @@ def _results(trace: Trace) -> str:
         if rows
         else page.note("The trace holds no mesh or bearing channel.")
     )
+
+
+def _result_name(key: str, names: Sequence[str]) -> str:
+    """A result of key_results in words. names: of the meshes; of several the name stands first."""
+    mesh = next((name for name in names if len(names) > 1 and key.startswith(f"{name}_")), "")
+    plain = key.removeprefix(f"{mesh}_") if mesh else key
+    if plain in NAMES:
+        return f"{mesh}: {NAMES[plain]}" if mesh else NAMES[plain]
+    bearing = key.removeprefix("bearing_").removesuffix("_rms_ac_N")
+    return f"bearing {bearing}, rms of the alternating part, both directions, N"
 
 
 def _octaves(trace: Trace) -> str:

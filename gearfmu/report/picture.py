@@ -11,9 +11,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.geometry import PairGeometry
-from gearfmu.report.plots import Plot
+from gearfmu.report.plots import Plot, of_mesh
 from gearfmu.report.scene3d import Shape, draw
 from gearfmu.report.signals import GEAR_PHI
+from gearfmu.spec.general import GeneralStage
+from gearfmu.stage.meshes import mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.trace import Trace
 
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
@@ -27,46 +29,52 @@ class Contact:
     rolls: tuple[float, float]
 
 
-def deformed_pair(trace: Trace, spec: Any, bodies: Sequence[Any]) -> Plot | None:
-    """The pair at the largest |mesh force|: its elastic displacement, enlarged, under that force applied statically and
-    split evenly over the tooth pairs in contact. None without the mesh force or the gear angles.
+def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence[Any]) -> Plot | None:
+    """Two gears in mesh at the largest |force| of their engagement: their elastic displacement, enlarged, under that
+    force applied statically and split evenly over the tooth pairs in contact. Drawn with gear A at the origin and gear
+    B on +x. None without the force or the angle of gear A.
 
-    spec : StageSpec; bodies : ReducedBody of pinion and wheel with their `display`.
+    bodies : ReducedBody of every gear of the stage with its `display`.
     """
-    names = [gear.name + GEAR_PHI for gear in spec.gears]
-    if "mesh.force" not in trace or names[0] not in trace or any(body.display is None for body in bodies):
+    engagement = next((e for e in stage.engagements if e.name == mesh), None)
+    if engagement is None:
         return None
-    sample = int(np.argmax(np.abs(trace["mesh.force"])))
-    force = float(trace["mesh.force"][sample])
-    pair = PairGeometry.of(spec)
+    numbers = [[gear.name for gear in stage.gears].index(name) for name in engagement.gears]
+    own, turning = [bodies[number] for number in numbers], stage.rotor_of(engagement.gears[0]) + GEAR_PHI
+    if f"{mesh}.force" not in trace or turning not in trace or any(body.display is None for body in own):
+        return None
+    sample = int(np.argmax(np.abs(trace[f"{mesh}.force"])))
+    force = float(trace[f"{mesh}.force"][sample])
+    pair = mesh_geometry(stage, engagement)
     sg = 1 if force >= 0 else -1
-    angles = meshing_angles(pair, float(trace[names[0]][sample]), sg)
+    (x, y), (u, v) = mesh_axes(stage, engagement)
+    place = tooth_phases(stage)[engagement.gears[0]] - math.atan2(v - y, u - x)
+    angles = meshing_angles(pair, float(trace[turning][sample]) + place, sg)
     contacts = contacts_at(pair, angles, sg)
     if not contacts or force == 0:
         return None
     moved = [
-        _displacement(bodies[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)
+        _displacement(own[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)
     ]
     scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
-    placed = [_placed(bodies[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
+    placed = [_placed(own[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
     world = [u @ _rotation(angle).T for u, angle in zip(moved, angles, strict=True)]
     approach = _approach(pair, contacts, sg, placed, world)
     drawn = [points + scale * u for points, u in zip(placed, world, strict=True)]
     drawn[0] = drawn[0] @ _rotation(sg * scale * approach / pair.gears[0].r_b).T
-    shapes = [_shape(bodies[g].display, drawn[g], moved[g]) for g in (0, 1)]
+    shapes = [_shape(own[g].display, drawn[g], moved[g]) for g in (0, 1)]
     caption = (
         f"At t = {trace.time[sample]:.5f} s: mesh force {force / 1e3:.2f} kN on the "
         f"{'drive' if sg > 0 else 'coast'} flanks, tooth pairs in contact: "
         f"{len(contacts)}. Right: the mesh, seen along the axis. Elastic displacement, enlarged {scale:g} times, "
-        "under that force applied statically and split "
-        "evenly over the pairs in contact; the pinion is turned on until the loaded flanks meet again. Local "
-        "flattening is left out."
+        "under that force applied statically and split evenly over the pairs in contact; "
+        f"{engagement.gears[0]} is turned on until the loaded flanks meet again. Local flattening is left out."
     )
     pitch_point = np.array([pair.r_w[0], 0, 0])
     image = draw(shapes, pitch_point, 3.2 * pair.gears[0].m, "elastic displacement in µm")
-    return Plot(
-        "deformed_pair", "The deformed pair at the largest mesh force", caption, image, _columns(shapes, moved, spec)
-    )
+    file = "deformed_pair" if len(stage.engagements) == 1 else f"deformed_pair_{mesh}"
+    title = of_mesh(trace, mesh, "The deformed pair at the largest mesh force")
+    return Plot(file, title, caption, image, _columns(shapes, moved))
 
 
 def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
@@ -170,7 +178,7 @@ def _round_scale(scale: float) -> float:
     return float(next(step * power for step in (5, 2, 1) if step * power <= scale))
 
 
-def _columns(shapes: Sequence[Shape], moved: Sequence[np.ndarray], spec: Any) -> dict[str, np.ndarray]:
+def _columns(shapes: Sequence[Shape], moved: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     points = np.vstack([shape.points for shape in shapes])
     displacement = np.vstack(moved)
     gear = np.repeat([0, 1], [len(u) for u in moved])

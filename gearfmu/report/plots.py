@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from gearfmu.report.signals import LOCKED, lock_time, shafts, spans
+from gearfmu.report.signals import LOCKED, bearings, lock_time, meshes, spans
 from gearfmu.report.style import COAST, INK, MUTED, OPEN, panels, styled, svg
 from gearfmu.stage.trace import Trace, heading
 
@@ -72,46 +72,52 @@ def speeds(trace: Trace) -> Plot | None:
     return Plot("speed", "Speeds", "Magnitudes; the data keep sign and rad/s.", picture, columns(trace, names))
 
 
-def mesh_force_and_error(trace: Trace, window: tuple[float, float] | None = None) -> Plot | None:
-    """Mesh force and transmission error over the run or a window (s); shaded where the teeth are apart or on the coast
-    flanks; None without either channel."""
-    names = [name for name in ("mesh.force", "mesh.te") if name in trace]
+def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | None = None) -> Plot | None:
+    """Force and transmission error of an engagement over the run or a window (s); shaded where its teeth are apart or
+    on the coast flanks; None without either channel."""
+    scales = {f"{mesh}.force": (1e-3, "mesh force in kN"), f"{mesh}.te": (1e6, "transmission error in µm")}
+    names = [name for name in scales if name in trace]
     if not names:
         return None
     part = trace if window is None else trace.window(*window)
     with styled():
         figure, axes = panels((1.9,) * len(names))
         for axis, name in zip(axes, names, strict=True):
-            scale, label = (1e-3, "mesh force in kN") if name == "mesh.force" else (1e6, "transmission error in µm")
+            scale, label = scales[name]
             axis.plot(part.time, part[name] * scale, lw=0.8 if window is None else 1.2)
             axis.set_ylabel(label)
             axis.margins(x=0)
-        _shade_contact(part, axes)
+        _shade_contact(part, mesh, axes)
         axes[-1].set_xlabel("time in s")
-        name = "mesh" if window is None else "mesh_detail"
-        picture = svg(figure, name)
-    title = "Mesh force and transmission error" + ("" if window is None else ", detail")
-    extra = [n for n in ("mesh.contact", "mesh.pairs") if n in part]
-    return Plot(name, title, _contact_words(part), picture, columns(part, names + extra))
+        file = mesh if window is None else f"{mesh}_detail"
+        picture = svg(figure, file)
+    title = of_mesh(trace, mesh, "Mesh force and transmission error") + ("" if window is None else ", detail")
+    extra = [n for n in (f"{mesh}.contact", f"{mesh}.pairs") if n in part]
+    return Plot(file, title, _contact_words(part, mesh), picture, columns(part, names + extra))
+
+
+def of_mesh(trace: Trace, mesh: str, title: str) -> str:
+    """The title of a figure; with the name of the mesh where there are several."""
+    return f"{title}, {mesh}" if len(meshes(trace)) > 1 else title
 
 
 def bearing_forces(trace: Trace) -> Plot | None:
-    """Bearing forces x and y of every shaft over time; None without them."""
-    bearings = [
-        found for shaft in shafts(trace) if (found := [n for d in "xy" if (n := f"bearing.{shaft}.f{d}") in trace])
-    ]
-    if not bearings:
+    """Bearing forces x and y of every bearing over time; None without them."""
+    groups = [found for b in bearings(trace) if (found := [n for d in "xy" if (n := f"bearing.{b}.f{d}") in trace])]
+    if not groups:
         return None
     with styled():
-        figure, axes = panels((1.7,) * len(bearings))
-        for axis, found in zip(axes, bearings, strict=True):
+        figure, axes = panels((1.7,) * len(groups))
+        for axis, found in zip(axes, groups, strict=True):
             for name in found:
                 axis.plot(trace.time, trace[name] * 1e-3, label=name, lw=0.8)
             _finish(axis, "force in kN")
         axes[-1].set_xlabel("time in s")
         picture = svg(figure, "bearing")
-    names = [name for found in bearings for name in found]
-    caption = "Force of the gear on its bearing; x points from pinion to wheel."
+    names = [name for found in groups for name in found]
+    caption = "Force of the shaft on its bearing, along the axes x and y of the stage."
+    if len(meshes(trace)) == 1:
+        caption = "Force of the gear on its bearing; x points from pinion to wheel."
     return Plot("bearing", "Bearing forces", caption, picture, columns(trace, names))
 
 
@@ -158,11 +164,11 @@ def _mark_lock(trace: Trace, axes: list[Axes]) -> None:
                 )
 
 
-def _shade_contact(trace: Trace, axes: list[Axes]) -> None:
-    if "mesh.contact" not in trace:
+def _shade_contact(trace: Trace, mesh: str, axes: list[Axes]) -> None:
+    if f"{mesh}.contact" not in trace:
         return
     for state, colour in ((0, OPEN), (-1, COAST), (2, GREY_BOTH)):
-        for start, end in spans(trace.time, trace["mesh.contact"] == state):
+        for start, end in spans(trace.time, trace[f"{mesh}.contact"] == state):
             for axis in axes:
                 axis.axvspan(start, end, color=colour, lw=0)
 
@@ -170,10 +176,10 @@ def _shade_contact(trace: Trace, axes: list[Axes]) -> None:
 GREY_BOTH = "#dcdfe3"
 
 
-def _contact_words(trace: Trace) -> str:
-    if "mesh.contact" not in trace:
+def _contact_words(trace: Trace, mesh: str) -> str:
+    if f"{mesh}.contact" not in trace:
         return ""
-    state = trace["mesh.contact"]
+    state = trace[f"{mesh}.contact"]
     shares = [
         (0, "the teeth are apart", "orange"),
         (-1, "coast flanks carry", "blue"),

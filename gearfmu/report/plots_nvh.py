@@ -3,33 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from gearfmu.report import metrics
-from gearfmu.report.plots import Plot
-from gearfmu.report.signals import Window, shafts
+from gearfmu.report.plots import Plot, of_mesh
+from gearfmu.report.signals import Window, bearings, meshes
 from gearfmu.report.style import INK, MUTED, panels, png, styled, svg
 from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
 ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
+DASHES = ((0, (4, 4)), (0, (1, 3)))  # of the orders of one mesh and the next
 SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 
 def force_channels(trace: Trace) -> list[str]:
-    """The channels whose sound matters: bearing forces, then the mesh force. Where the mean over the communication
-    step was
-    recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back."""
-    names = [f"bearing.{shaft}.{direction}" for shaft in shafts(trace) for direction in ("fx", "fy")] + ["mesh.force"]
+    """The channels whose sound matters: bearing forces, then mesh forces. Where the mean over the communication step
+    was recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back."""
+    names = [f"bearing.{name}.{direction}" for name in bearings(trace) for direction in ("fx", "fy")]
+    names += [f"{mesh}.force" for mesh in meshes(trace)]
     best = [next((n for n in (f"{name}_mean", name) if n in trace), None) for name in names]
     return [name for name in best if name is not None]
 
 
-def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) -> Plot | None:
-    """Level of every bearing force and of the mesh force over frequency, mesh orders marked; None without forces."""
+def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray]) -> Plot | None:
+    """Level of every bearing and mesh force over frequency, mesh orders marked; None without forces. angles: mesh angle
+    (n,) rad by engagement."""
     names = force_channels(trace)
     if not names:
         return None
@@ -45,23 +49,31 @@ def force_spectrum(trace: Trace, window: Window, mesh_angle: np.ndarray | None) 
                 axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, lw=0.9)
             _level_axis(axis, "dB re 1 N")
             axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
-            marked = _mark_orders(axis, part.time, trace, mesh_angle)
+            marked = [mesh for mesh, angle in angles.items() if _mark_orders(axis, part.time, trace, (mesh, angle))]
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
         f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). "
-        + ("Dotted: mesh orders." if marked else "Mesh orders are not marked: the speed is not known or not steady.")
+        + (
+            f"Dotted: {of_mesh(trace, ' and '.join(marked), 'mesh orders')}."
+            if marked
+            else "Mesh orders are not marked: the speed is not known or not steady."
+        )
     )
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
 
 
-def order_cuts(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
-    """Level of the first mesh orders of every bearing force along the run; None without forces or without the speed."""
-    names = [name for name in force_channels(trace) if ".fx" not in name or len(shafts(trace)) < 2]
-    if mesh_angle is None or not names:
+def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
+    """Level of the first orders of an engagement in its force and every bearing force along the run; None without
+    forces. mesh_angle (n,) rad: of this engagement."""
+    others = tuple(f"{other}." for other in meshes(trace) if other != mesh)
+    names = [name for name in force_channels(trace) if not name.startswith(others)]
+    names = [name for name in names if ".fx" not in name or len(bearings(trace)) < 2]
+    if not names:
         return None
+    file = "orders" if not others else f"orders_{mesh}"
     cuts = {name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS) for name in names}
     with styled():
         figure, axes = panels((1.6,) * len(cuts))
@@ -73,7 +85,7 @@ def order_cuts(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
             axis.set_title(name, loc="left", color=INK)
         axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=ORDERS, borderaxespad=0.1)
         axes[-1].set_xlabel("time in s")
-        picture = svg(figure, "orders")
+        picture = svg(figure, file)
     first = next(iter(cuts.values()))
     low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
     caption = (
@@ -82,13 +94,13 @@ def order_cuts(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
         "angle, so an order keeps its level while the speed changes. Orders above 0.45 of the sampling rate are "
         "left out."
     )
-    return Plot("orders", "Mesh orders along the run", caption, picture, _order_columns(cuts))
+    title = of_mesh(trace, mesh, "Mesh orders along the run")
+    return Plot(file, title, caption, picture, _order_columns(cuts))
 
 
-def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | None:
-    """Level of one force over time and frequency with the mesh orders on top: a bearing force, or in a coarsely
-    sampled trace
-    a mean over the step, which folds less; None without forces."""
+def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | None:
+    """Level of one force over time and frequency with the mesh orders on top: a bearing force, or in a coarsely sampled
+    trace a mean over the step, which folds less; None without forces. angles: mesh angle (n,) rad by engagement."""
     names = force_channels(trace)
     if not names:
         return None
@@ -115,11 +127,12 @@ def force_spectrogram(trace: Trace, mesh_angle: np.ndarray | None) -> Plot | Non
             xlim=(time[0], time[-1]),
             ylim=(0, 1e-3 * min(SHOWN_TO, 0.5 / step)),
         )
-        _overlay_orders(axis, trace, mesh_angle, min(SHOWN_TO, 0.5 / step))
+        for style, angle in zip(cycle(DASHES), angles.values()):  # noqa: B905 – as many as there are meshes
+            _overlay_orders(axis, trace, (angle, style), min(SHOWN_TO, 0.5 / step))
         picture = png(figure)
     caption = (
         f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
-        f"Dashed: mesh orders from the instantaneous speed."
+        f"Dashed: orders {' and, dotted, '.join(f'of {mesh}' for mesh in angles) or 'of the mesh'} from the speed."
     )
     data = {
         "time_[s]": np.repeat(time, picture_data.frequency.size),
@@ -183,18 +196,19 @@ def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
 
 
-def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndarray | None) -> bool:
-    """Mark the mesh orders at the median speed, if nine tenths of the window stay within 10 %; whether it did."""
-    if mesh_angle is None:
-        return False
-    frequency = np.interp(time, trace.time, np.gradient(mesh_angle, trace.time)) / (2 * np.pi)
+def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray]) -> bool:
+    """Mark the orders of an engagement (name, mesh angle) at the median speed, if nine tenths of the window stay within
+    10 %; whether it did."""
+    name, angle = mesh
+    frequency = np.interp(time, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
     low, middle, high = np.percentile(frequency, [5, 50, 95])
     if middle <= 0 or high - low > 0.1 * middle:
         return False
-    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 24) + 1):
+    several = len(meshes(trace)) > 1
+    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 3 if several else 24) + 1):
         axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
         axis.annotate(
-            str(order),
+            f"{name} {order}" if several else str(order),
             (order * middle / 1e3, 1),
             (3, -9),
             xycoords=("data", "axes fraction"),
@@ -205,14 +219,14 @@ def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh_angle: np.ndar
     return True
 
 
-def _overlay_orders(axis: Axes, trace: Trace, mesh_angle: np.ndarray | None, limit: float) -> None:
-    if mesh_angle is None:
-        return
-    frequency = np.gradient(mesh_angle, trace.time) / (2 * np.pi)
+def _overlay_orders(axis: Axes, trace: Trace, mesh: tuple[np.ndarray, Any], limit: float) -> None:
+    """Curves of the first orders below `limit` (Hz). mesh: mesh angle (n,) rad, line style."""
+    angle, style = mesh
+    frequency = np.gradient(angle, trace.time) / (2 * np.pi)
     for order in range(1, ORDERS + 1):
         curve = np.where(order * frequency < limit, order * frequency, np.nan)
         if np.any(np.isfinite(curve)):
-            axis.plot(trace.time, curve / 1e3, color="white", lw=0.8, ls=(0, (4, 4)), alpha=0.75)
+            axis.plot(trace.time, curve / 1e3, color="white", lw=0.8, ls=style, alpha=0.75)
             last = np.flatnonzero(np.isfinite(curve))[-1]
             x = min(trace.time[last], axis.get_xlim()[1])
             axis.annotate(

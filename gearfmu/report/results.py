@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
-from gearfmu.report.signals import SETTLED, lock_time, shafts, window_of_interest
+from gearfmu.report.signals import SETTLED, bearings, lock_time, meshes, window_of_interest
 from gearfmu.stage.trace import Trace
 
 
@@ -18,34 +18,40 @@ def key_results(trace: Trace) -> dict[str, float]:
     not repeat.
 
     "ac" is the signal minus its mean where the scene has a settling time (steady running), else minus a 10 ms moving
-    average.
+    average. Of several meshes every name begins with that of the mesh.
     """
     window = window_of_interest(trace)
     part = trace.window(window.start, window.end)
     steady = window.reason == SETTLED
     found: dict[str, float] = {}
-    if "mesh.force" in part:
-        found |= {
-            "mesh_force_mean_N": float(np.mean(part["mesh.force"])),
-            "mesh_force_rms_ac_N": _rms_ac(part, "mesh.force", steady),
-        }
-    if "mesh.te" in part:
-        found |= {
-            "te_mean_um": 1e6 * float(np.mean(part["mesh.te"])),
-            "te_rms_ac_um": 1e6 * _rms_ac(part, "mesh.te", steady),
-        }
-    for shaft in shafts(part):
-        forces = [name for d in "xy" if (name := f"bearing.{shaft}.f{d}") in part]
+    several = len(meshes(trace)) > 1
+    for mesh in meshes(trace):
+        own = _mesh_results(trace, part, mesh, steady)
+        found |= {f"{mesh}_{key}" if several else key: value for key, value in own.items()}
+    for bearing in bearings(part):
+        forces = [name for d in "xy" if (name := f"bearing.{bearing}.f{d}") in part]
         if len(forces) == 2:
-            found[f"bearing_{shaft}_rms_ac_N"] = math.hypot(*[_rms_ac(part, name, steady) for name in forces])
-    if "mesh.contact" in trace:
-        found["contact_loss_percent"] = 100 * float(np.mean(trace["mesh.contact"] == 0))
-        found["coast_contact_percent"] = 100 * float(np.mean(trace["mesh.contact"] == -1))
-    if "mesh.impacts" in trace:
-        found["impacts"] = float(trace["mesh.impacts"][-1])
+            found[f"bearing_{bearing}_rms_ac_N"] = math.hypot(*[_rms_ac(part, name, steady) for name in forces])
     locked = lock_time(trace)
     if locked is not None:
         found["lock_time_s"] = locked
+    return found
+
+
+def _mesh_results(trace: Trace, part: Trace, mesh: str, steady: bool) -> dict[str, float]:
+    """Numbers of one engagement; part: the window of interest of the trace."""
+    found: dict[str, float] = {}
+    if f"{mesh}.force" in part:
+        found["mesh_force_mean_N"] = float(np.mean(part[f"{mesh}.force"]))
+        found["mesh_force_rms_ac_N"] = _rms_ac(part, f"{mesh}.force", steady)
+    if f"{mesh}.te" in part:
+        found["te_mean_um"] = 1e6 * float(np.mean(part[f"{mesh}.te"]))
+        found["te_rms_ac_um"] = 1e6 * _rms_ac(part, f"{mesh}.te", steady)
+    if f"{mesh}.contact" in trace:
+        found["contact_loss_percent"] = 100 * float(np.mean(trace[f"{mesh}.contact"] == 0))
+        found["coast_contact_percent"] = 100 * float(np.mean(trace[f"{mesh}.contact"] == -1))
+    if f"{mesh}.impacts" in trace:
+        found["impacts"] = float(trace[f"{mesh}.impacts"][-1])
     return found
 
 

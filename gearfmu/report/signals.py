@@ -1,4 +1,5 @@
-"""What a trace tells about itself: which shafts it has, where it is in steady operation, how fast the teeth mesh."""
+"""What a trace tells about itself: which meshes and bearings it has, where it is in steady operation, how fast the
+teeth mesh."""
 
 from __future__ import annotations
 
@@ -8,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from gearfmu.report.metrics import mesh_angle
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.turning import mesh_teeth
 from gearfmu.stage.trace import Trace
 
 GEAR_SPEED = ".gear.w"
 GEAR_PHI = ".gear.phi"
 LOCKED = ".clutch.locked"
+MESH_CHANNELS = ("force", "force_mean", "te", "contact", "impacts")
 SETTLED = "after the scene's settling time"
 
 
@@ -25,26 +29,28 @@ class Window:
     reason: str
 
 
-def shafts(trace: Trace) -> list[str]:
-    """Shaft names, in the trace's order, pinion first: all X with a channel "X.gear.w" or "bearing.X.…"."""
-    found = [name.removesuffix(GEAR_SPEED) for name in trace.channels if name.endswith(GEAR_SPEED)]
-    found += [name.split(".")[1] for name in trace.channels if name.startswith("bearing.") and name.count(".") == 2]
-    return list(dict.fromkeys(found))
+def bearings(trace: Trace) -> list[str]:
+    """Names of the bearings, in the trace's order: all X with a channel "bearing.X.…"."""
+    return list(
+        dict.fromkeys(n.split(".")[1] for n in trace.channels if n.startswith("bearing.") and n.count(".") == 2)
+    )
 
 
-def teeth(trace: Trace, spec: Any = None) -> dict[str, int]:
-    """Tooth numbers by shaft, from the StageSpec or the trace's meta "teeth"; empty when neither says."""
-    if spec is not None:
-        return {gear.name: int(gear.teeth) for gear in spec.gears}
-    return {str(name): int(z) for name, z in dict(trace.meta.get("teeth") or {}).items()}
+def meshes(trace: Trace) -> list[str]:
+    """Names of the engagements, in the trace's order: all X with a channel as X.force; that of a pair is "mesh"."""
+    found = (name.split(".") for name in trace.channels)
+    return list(dict.fromkeys(parts[0] for parts in found if len(parts) == 2 and parts[1] in MESH_CHANNELS))
 
 
-def angle_of_mesh(trace: Trace, tooth_numbers: dict[str, int]) -> np.ndarray | None:
-    """Mesh angle (n,) rad of the first shaft whose speed and tooth number are known; None when there is none."""
-    for shaft, number in tooth_numbers.items():
-        if shaft + GEAR_SPEED in trace:
-            return mesh_angle(trace.time, trace[shaft + GEAR_SPEED], number)
-    return None
+def mesh_angles(trace: Trace, spec: Any = None) -> dict[str, np.ndarray]:
+    """Mesh angle (n,) rad of every engagement whose gear's speed and teeth are known, from the stage `spec` or the
+    trace's meta "meshes"."""
+    known = mesh_teeth(as_general(spec)) if spec is not None else dict(trace.meta.get("meshes") or {})
+    return {
+        mesh: mesh_angle(trace.time, trace[rotor + GEAR_SPEED], int(teeth))
+        for mesh, (rotor, teeth) in known.items()
+        if rotor + GEAR_SPEED in trace
+    }
 
 
 def lock_time(trace: Trace) -> float | None:

@@ -9,6 +9,11 @@ from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, PlacedP
 from gearfmu.spec.stage import StageSpec
 
 
+def as_general(spec: StageSpec | GeneralStage) -> GeneralStage:
+    """The stage in the terms of any stage, whichever way its file is written."""
+    return expand_pair(spec) if isinstance(spec, StageSpec) else spec
+
+
 def expand_pair(spec: StageSpec) -> GeneralStage:
     """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
     the origin, wheel on +x."""

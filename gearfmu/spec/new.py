@@ -37,8 +37,10 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
         remedy = "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
         raise SpecError([Problem("", "name", f'"{name}"', remedy)])
     source = find_stage(like)
-    load_stage(source)
-    text = stage_text(read_layers(source).tables | {"name": name}, name, str(like))
+    if load_stage(source).kind == "general":
+        text = _renamed(source.read_text(encoding="utf-8"), name)
+    else:
+        text = stage_text(read_layers(source).tables | {"name": name}, name, str(like))
     try:
         _write_new(target, text)
     except FileExistsError:
@@ -53,6 +55,11 @@ def stage_text(raw: dict[str, Any], name: str, like: str) -> str:
     tables = {key: value for key, value in raw.items() if key != "source"}
     kind = PlanetarySpec if tables.get("kind") == "planetary_set" else StageSpec
     return _HEAD.format(name=name, like=like) + "\n".join(_table(kind, tables, ())) + "\n"
+
+
+def _renamed(text: str, name: str) -> str:
+    """The file of a general stage, which has its comments already, under another name."""
+    return re.sub(r'^name = ".*"', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
 
 
 def _write_new(target: Path, text: str) -> None:

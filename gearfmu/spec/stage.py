@@ -78,18 +78,25 @@ def load_stage(stage: str | os.PathLike[str]) -> Any:
 
 
 def load_pair(stage: str | os.PathLike[str]) -> StageSpec:
-    """`load_stage` where only a pair will do; SpecError for a planetary set."""
+    """`load_stage` where only a pair will do; SpecError for any other stage."""
     spec = load_stage(stage)
     require_pair(spec)
     return spec
 
 
 def require_pair(spec: Any) -> None:
-    """SpecError unless `spec` is a pair: other stages have bodies, but no motion in time yet."""
+    """SpecError unless `spec` is a pair: a verb about one pair, or its gears' files, means nothing else."""
     if spec.kind != "external_pair":
+        remedy = "this is about one pair: name a stage of kind external_pair, such as fzg_c"
+        raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
+
+
+def require_motion(spec: Any) -> None:
+    """SpecError for a stage that has bodies, but no motion in time yet: a planetary set."""
+    if spec.kind == "planetary_set":
         remedy = (
-            "this needs a pair; other stages can be meshed, reduced and inspected so far, their motion in time is not "
-            "built yet: name a stage of kind external_pair, such as fzg_c"
+            "planetary sets can be meshed, reduced and inspected so far, their motion in time is not built yet: name a "
+            "stage of kind external_pair or general, such as fzg_c or two_stage"
         )
         raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
 

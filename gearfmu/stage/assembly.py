@@ -11,7 +11,7 @@ import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec
@@ -42,7 +42,7 @@ def assemble(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int =
 
 def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
-    stage = expand_pair(spec) if isinstance(spec, StageSpec) else spec
+    stage = as_general(spec)
     shapes = [GearGeometry.of(gear, gear, 1) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:

@@ -6,12 +6,12 @@ What an effect costs is measured (benchmarks/effects_cost.py) and lies beside th
 from __future__ import annotations
 
 import csv
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 
 from gearfmu.stage.model import StageModel
+from gearfmu.stage.te import place_of, statics_of
 
 COSTS = "effects_cost.csv"
 
@@ -239,25 +239,25 @@ def costs() -> dict[str, Cost]:
     return {r["effect"]: Cost(r["effect"], float(r["on"]), float(r["off"]), float(r["without"])) for r in rows}
 
 
-def torque_on_flanks_alone(model: StageModel, positions: int = 24) -> float:
-    """Largest torque (N·m, at most torque_max) at which flanks carry alone at these positions of a pitch, statically:
-    up to it tip corners may be off. To 1 %."""
-    pitch = 2 * math.pi / model.pair.gears[1].teeth
-    kernels = [model.kernel(**{"level": 0.0, "effect.tip_contact": on}) for on in (1.0, 0.0)]
-    for kernel in kernels:
-        kernel.prepare()
+def torque_on_flanks_alone(model: StageModel, mesh: str | None = None, positions: int = 24) -> float:
+    """Largest input torque (N·m, at most what brings the engagement to its torque_max) at which the flanks of an
+    engagement, the first when None, carry alone at these positions of its pitch, statically: up to it tip corners may
+    be off. To 1 %."""
+    place = place_of(model, mesh)
+    kernels = [statics_of(model, **{"effect.tip_contact": on}) for on in (1.0, 0.0)]
 
     def alone(torque: float) -> bool:
         for i in range(positions):
-            on, off = (kernel.transmission(-pitch * i / positions, torque).te for kernel in kernels)
+            at = -place.pitch * i / positions
+            on, off = (abs(kernel.transmission(at, torque, place.number).te) for kernel in kernels)
             if off - on > 1e-6 * on:
                 return False
         return True
 
-    low, high = 0.0, model.pair.torque_max
+    low, high = 0.0, place.most
     if alone(high):
         return high
-    while high - low > 0.01 * high and high > 1e-3 * model.pair.torque_max:
+    while high - low > 0.01 * high and high > 1e-3 * place.most:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if alone(middle) else (low, middle)
     return low

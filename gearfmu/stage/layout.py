@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -79,7 +79,8 @@ def stage_layout(stage: GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS)
 def _gear(stage: GeneralStage, gear: GearBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
     shape = GearGeometry.of(gear, gear, 1)
     chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
-    return free_gear(body, chosen, degrees, resampling(body.roll, shape.s_form, shape.s_tip, rolls))
+    free = free_gear(body, chosen, degrees, resampling(body.roll, shape.s_form, shape.s_tip, rolls))
+    return replace(free, name=gear.name)  # a body's file may come from another stage
 
 
 def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, Variable
+from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.turning import Shafts, shafts_of
 from gearfmu.stage.blob import blob_hash
 
 
@@ -22,6 +25,16 @@ class StageModel:
     @property
     def name(self) -> str:
         return self.spec.name
+
+    @cached_property
+    def stage(self) -> GeneralStage:
+        """The stage in the terms of any stage: a pair file expanded."""
+        return as_general(self.spec)
+
+    @cached_property
+    def shafts(self) -> Shafts:
+        """Input, output and ratio. SpecError where the stage has no two ports that its meshes connect."""
+        return shafts_of(self.stage)
 
     @property
     def pair(self) -> StageSpec:

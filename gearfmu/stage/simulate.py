@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from gearfmu.errors import SimulationError
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.stage.model import StageModel
+from gearfmu.stage.te import statics_of
 from gearfmu.stage.trace import Channel, Trace
 
 WINDING_POSITIONS = 16
@@ -22,11 +22,11 @@ Inputs = Callable[[float], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Steady:
-    """Inputs of a pair at constant speed and load: both shafts' outer ends turn at constant speed, wound up so that
-    shafts and mesh carry the torque on average: τ/k on either shaft and the mean loaded transmission error between
-    them.
+    """Inputs of a stage at constant speed and load: the outer ends of its input and output turn at constant speed,
+    wound up so that shafts and meshes carry the torque on average: τ/k on either port and the mean loaded transmission
+    between them.
 
-    speed: of the pinion, rad/s; torque: on the pinion, N·m. For spring ports without a chain.
+    speed: of the input, rad/s; torque: on the input, N·m. For spring ports without a chain.
     """
 
     model: StageModel
@@ -35,26 +35,29 @@ class Steady:
 
     @cached_property
     def winding(self) -> float:
-        """Angle of the pinion (rad) that the mesh takes up under the torque, mean over a pitch."""
-        kernel = self.model.kernel(level=0.0)
-        kernel.prepare()
-        pitch = 2 * np.pi / self.model.pair.gears[1].teeth
-        mean = np.mean(
-            [kernel.transmission(-pitch * i / WINDING_POSITIONS, self.torque).te for i in range(WINDING_POSITIONS)]
-        )
-        return float(mean / PairGeometry.of(self.model.pair).gears[0].r_b)
+        """Angle of the input (rad) that the stage takes up under the torque, mean over a pitch of its slowest mesh."""
+        kernel, ratio = statics_of(self.model), self.model.shafts.ratio
+        angles = [-self._pitch * i / WINDING_POSITIONS for i in range(WINDING_POSITIONS)]
+        return float(np.mean([kernel.transmission(at, self.torque).phi - ratio * at for at in angles]))
+
+    @property
+    def _pitch(self) -> float:
+        """Angle of the output (rad) over the longest pitch of the meshes on its rotor."""
+        stage = self.model.stage
+        rotor = stage.rotor_of(stage.ports[self.model.shafts.output].body)
+        gears = {name for mesh in stage.engagements for name in mesh.gears}
+        teeth = [g.teeth for g in stage.gears if g.name in gears and stage.rotor_of(g.name) == rotor]
+        return 2 * np.pi / min(teeth)
 
     def __call__(self, time: float) -> Mapping[str, float]:
-        spec = self.model.pair
-        values = {}
-        for gear, sign in zip(spec.gears, (1, -1), strict=True):
-            ratio = spec.gears[0].teeth / gear.teeth
-            w = sign * self.speed * ratio
-            stiffness = spec.ports[gear.name].k
+        shafts, values = self.model.shafts, {}
+        for port, turn in ((shafts.input, 1.0), (shafts.output, 1.0 / shafts.ratio)):
+            stiffness = self.model.stage.ports[port].k
             assert stiffness is not None, "the port is a spring"
-            wound = self.torque / ratio / stiffness + (self.winding if sign > 0 else 0.0)
-            values[f"{gear.name}.phi"] = wound + w * time
-            values[f"{gear.name}.w"] = w
+            sense = 1.0 if port == shafts.input else -1.0
+            wound = sense * self.torque / turn / stiffness + (self.winding if port == shafts.input else 0.0)
+            values[f"{port}.phi"] = wound + self.speed * turn * time
+            values[f"{port}.w"] = self.speed * turn
         return values
 
 

@@ -1,5 +1,5 @@
-"""Quasi-static loaded transmission error over one pitch: wheel held, torque on the pinion, by the contact routine of
-the step."""
+"""Quasi-static loaded transmission error of an engagement over one pitch: output held, torque on the input, by the
+contact routine of the step."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.geometry import PairGeometry
+from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, TeState
+from gearfmu.spec.turning import turns
+from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 
 TANGENT = 1e-4
@@ -34,35 +36,68 @@ class TeResult:
 
 
 def loaded_te(
-    model: StageModel, torques: Sequence[float], positions: int = 41, rigid_bearings: bool = False, **parameters: float
+    model: StageModel,
+    torques: Sequence[float],
+    positions: int = 41,
+    rigid_bearings: bool = False,
+    mesh: str | None = None,
+    **parameters: float,
 ) -> TeResult:
-    """te = r_b1 φ_1 + r_b2 φ_2 of the bore nodes at positions i/N of one pitch (no end point), wheel held at
-    −position · 2π/z_2.
+    """te = r_bA φ_A + r_bB φ_B of an engagement at positions i/N of one of its pitches (no end point): the output held
+    so that gear B, without load, would stand at −position · 2π/z_B.
 
-    torques: N·m on the pinion; positive drives, 0 is the limit of a vanishing driving torque: the unloaded (kinematic)
-    transmission error. rigid_bearings: the bore nodes are held on their axes. parameters: of the kernel, e.g.
-    slices=10. SimulationError(no_equilibrium) where there is none.
+    torques: N·m on the input (the first port; `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
+    driving torque: the unloaded (kinematic) transmission error. rigid_bearings: the nodes on the axes are held. mesh:
+    name of the engagement, the first when None. parameters: of the kernel, e.g. slices=10.
+    SimulationError(no_equilibrium) where there is none.
     """
     held = {"effect.bearings": 0.0} if rigid_bearings else {}
-    kernel = statics_of(model, **held, **parameters)
-    pitch = 2 * math.pi / model.pair.gears[1].teeth
-    base_radius = PairGeometry.of(model.pair).gears[0].r_b
-    position = np.arange(positions) / positions
+    kernel, place = statics_of(model, **held, **parameters), place_of(model, mesh)
+    position, least = np.arange(positions) / positions, LEAST * place.most
     te, stiffness, shares = (
         np.empty((len(torques), positions)),
         np.empty((len(torques), positions)),
         np.zeros((len(torques), positions, SHARES)),
     )
-    least = LEAST * model.pair.torque_max
     for i, torque in enumerate(torques):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         for j, part in enumerate(position):
-            state = kernel.transmission(-part * pitch, carried)
-            tangent = _tangent(kernel, -part * pitch, carried)
+            at = -part * place.pitch
+            state = kernel.transmission(at, carried, place.number)
+            tangent = _tangent(kernel, at, carried, place.number)
             te[i, j] = state.te + (torque - carried) / tangent
-            stiffness[i, j] = tangent / base_radius
+            stiffness[i, j] = tangent / place.lever
             shares[i, j] = _shares(state)
     return TeResult(np.asarray(torques, float), position, te, stiffness, shares)
+
+
+@dataclass(frozen=True)
+class MeshPlace:
+    """An engagement in its train. number: the kernel's; pitch: angle (rad) of the output for one pitch of gear B;
+    lever (m): input torque over mesh force; most: input torque (N·m) that is its torque_max on gear A."""
+
+    number: int
+    pitch: float
+    lever: float
+    most: float
+
+
+def place_of(model: StageModel, mesh: str | None) -> MeshPlace:
+    """Where an engagement stands between input and output; the first when None. ModelError for one that there is not,
+    or that does not turn with the ports."""
+    stage, turning = model.stage, turns(model.stage, model.shafts.input)
+    names = [engagement.name for engagement in stage.engagements]
+    if mesh is not None and mesh not in names:
+        raise ModelError(f"{model.name} has no engagement '{mesh}'; it has {', '.join(names)}")
+    number = 0 if mesh is None else names.index(mesh)
+    engagement = stage.engagements[number]
+    rotors = [stage.rotor_of(gear) for gear in engagement.gears]
+    if any(rotor not in turning for rotor in rotors):
+        raise ModelError(f"{model.name}: the engagement '{engagement.name}' does not turn with its ports: name another")
+    a, b = mesh_geometry(stage, engagement).gears
+    speed_a, speed_b = (float(turning[rotor]) for rotor in rotors)
+    pitch = 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
+    return MeshPlace(number, pitch, a.r_b * speed_a, engagement.torque_max * abs(speed_a))
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:
@@ -73,14 +108,14 @@ def statics_of(model: StageModel, **parameters: float) -> Kernel:
     return kernel
 
 
-def _tangent(kernel: Kernel, phi: float, torque: float) -> float:
+def _tangent(kernel: Kernel, phi: float, torque: float, mesh: int) -> float:
     """dT/dte (N) by a central difference of ±TANGENT·T."""
-    ends = [kernel.transmission(phi, torque * (1 + sign * TANGENT)).te for sign in (-1, 1)]
+    ends = [kernel.transmission(phi, torque * (1 + sign * TANGENT), mesh).te for sign in (-1, 1)]
     return 2 * TANGENT * torque / (ends[1] - ends[0])
 
 
 def _shares(state: TeState) -> np.ndarray:
-    """Shares by tooth number of the pinion: pair k of the path is tooth k − 2 …, counted from the tooth that leaves
+    """Shares by tooth number of gear A: pair k of the path is tooth k − 2 …, counted from the tooth that leaves
     the mesh."""
     total = sum(sum(forces) for forces in state.forces.values()) or 1.0
     shares = np.zeros(SHARES)

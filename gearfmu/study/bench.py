@@ -17,9 +17,8 @@ import numpy as np
 
 from gearfmu.body import load_stage_bodies
 from gearfmu.cosim.coupled import OK
-from gearfmu.cosim.drivetrain import shafts_of, stage_ports
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
-from gearfmu.cosim.scene_run import run_once
+from gearfmu.cosim.scene_run import in_drivetrain, run_once
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -125,8 +124,7 @@ def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
     along a flank; changes: of the StageSpec."""
     spec = load_stage(scene.stage.name).model_copy(update=changes)
-    spec = spec.model_copy(update={"ports": stage_ports(scene, shafts_of(spec))})
-    return assemble(spec, bodies or load_stage_bodies(spec), rolls)
+    return assemble(in_drivetrain(scene, spec), bodies or load_stage_bodies(spec), rolls)
 
 
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:

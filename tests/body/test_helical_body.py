@@ -78,11 +78,11 @@ def test_normal_and_profile_tables_of_a_tooth_are_positive_together(made: Simple
 
 
 def test_kept_offsets_fit_the_file_and_reach_what_the_kernel_reads() -> None:
-    """3.5 MB before compression, at least −3 … 3, all of them where they fit, a spur gear always all."""
+    """3.5 MB before compression, at least −3 … 3, all of them where they fit or are needed."""
     for teeth, rolls, functions, expected in ((37, 22, 6, 11), (37, 28, 7, 7), (9, 22, 6, 9), (12, 4, 2, 12)):
         table = np.broadcast_to(np.zeros(1), (2, 2, teeth, rolls, rolls, functions, functions))
-        assert kept_offsets(table, True).shape[2] == expected
-        assert kept_offsets(table, False).shape[2] == teeth
+        assert kept_offsets(table, whole=False).shape[2] == expected
+        assert kept_offsets(table, whole=True).shape[2] == teeth
 
 
 def test_a_body_with_few_offsets_reads_back_by_its_offset(made: SimpleNamespace, tmp_path: Path) -> None:

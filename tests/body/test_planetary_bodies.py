@@ -200,5 +200,7 @@ def test_gearfmu_reduce_remakes_the_shipped_set(shipped, tmp_path):
         modal = theirs < (50e3 if made.name == "carrier" else np.inf)
         assert np.allclose(ours[modal], theirs[modal], rtol=1e-8) and np.allclose(ours, theirs, rtol=1e-6)
         for field in ("static",) if made.name == "carrier" else ("static_ff", "static_fb", "static_bb"):
-            stored = getattr(old, field)
-            assert np.abs(getattr(made, field) - stored).max() <= 1e-6 * np.abs(stored).max()
+            offsets = [0, 1, 2, 3, -3, -2, -1] if field == "static_ff" else slice(None)  # those that every file has
+            axis = (slice(None), slice(None), offsets) if field == "static_ff" else offsets
+            stored = getattr(old, field)[axis]
+            assert np.abs(getattr(made, field)[axis] - stored).max() <= 1e-6 * np.abs(stored).max()

@@ -26,7 +26,7 @@ from gearfmu.cosim.table import page
 from gearfmu.spec.drivetrain import PassengerCar, TestRig, table
 from gearfmu.spec.scene import SceneSpec, load_scene
 
-SHAFTS = Shafts("pinion", "wheel", 1.5)
+SHAFTS = Shafts("pinion", "wheel", -1.5)
 CAR = PassengerCar()
 
 

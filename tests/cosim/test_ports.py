@@ -17,7 +17,7 @@ SHAFTS = ("pinion", "wheel")
 
 
 def drivetrain(name: str) -> PyUnit:
-    return PyUnit(build(load_scene(name), Shafts("pinion", "wheel", 1.5)))
+    return PyUnit(build(load_scene(name), Shafts("pinion", "wheel", -1.5)))
 
 
 def torques(n: int) -> list[float]:
@@ -59,7 +59,7 @@ def test_ahead_changes_nothing():
 def test_ahead_ends_where_the_step_ends():
     """φ + wH + ½aH² is the angle after the step under the held torque, with micro-steps too."""
     for micro_step in (None, 1e-4):
-        unit = PyUnit(build(load_scene("clutch_closure"), Shafts("pinion", "wheel", 1.5)), micro_step)
+        unit = PyUnit(build(load_scene("clutch_closure"), Shafts("pinion", "wheel", -1.5)), micro_step)
         ports, motion, h = ports_of(unit, SHAFTS), np.zeros(6), 1e-3
         ports.begin(0.0)
         ports.hold([-50.0, 70.0])

@@ -27,7 +27,7 @@ def scene(folder: Path, effects: str) -> SceneSpec:
 
 
 def test_a_scene_switches_effects(tmp_path: Path) -> None:
-    """Bearings off: the gears' bores do not move; through FMU and kernel alike. Nothing named: the scene's hash stays."""
+    """Bearings off: no bore moves; through FMU and kernel alike. Nothing named: the scene's hash stays."""
     held = scene(tmp_path, "bearings = false\ncoast_flank = true")
     model = stage_model(held)
     traces = [

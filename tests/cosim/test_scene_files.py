@@ -11,13 +11,13 @@ from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
 
 
 def test_shipped_scenes():
-    assert shipped_scenes() == ["clutch_closure", "clutch_dump", "pair_light", "pair_loaded"]
+    assert shipped_scenes() == ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded"]
     for name in shipped_scenes():
         scene = load_scene(name)
         assert (
             scene.name == name
-            and scene.stage.name == "fzg_c/stage_relief"
-            and scene.stage.level == "standard"
+            and scene.stage.name == ("two_stage" if name.endswith("_train") else "fzg_c/stage_relief")
+            and scene.stage.level == ("fast" if name.endswith("_train") else "standard")
             and scene.stage.slices == 5
         )
 
@@ -159,5 +159,5 @@ def test_whatever_stands_in_a_field_it_loads_or_lists_problems(tmp_path, name):
 
 
 def test_unknown_scene_names_the_shipped_ones():
-    with pytest.raises(SpecError, match="clutch_closure, clutch_dump"):
+    with pytest.raises(SpecError, match="clutch_closure, clutch_closure_train, clutch_dump"):
         load_scene("clutch_clousre")

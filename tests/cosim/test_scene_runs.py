@@ -48,7 +48,7 @@ def test_a_run_leaves_trace_and_summary_with_the_promised_fields(tmp_path):
     assert np.array_equal(read["mesh.te"], trace["mesh.te"]) and read.meta == trace.meta == summary
     promised = ("outcome", "simulated_s", "cpu_s", "realtime_factor", "coupling_error", "energy_residual", "level")
     assert all(summary[key] is not None for key in (*promised, "n_dyn", "slices", "h", "hashes", "versions"))
-    assert summary["outcome"] == OK and summary["level"] == "fast" and summary["teeth"] == {"pinion": 16, "wheel": 24}
+    assert summary["outcome"] == OK and summary["level"] == "fast" and summary["meshes"] == {"mesh": ["pinion", 16]}
     assert 0 < summary["stage_cpu_s"] <= summary["cpu_s"] and summary["coupling_error_of"] == "pinion.tau"
     assert {"scene", "model", "body pinion", "body wheel"} <= set(summary["hashes"])
 

@@ -12,6 +12,7 @@ from gearfmu.body import load_stage_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report import picture
 from gearfmu.report.scene3d import Shape, draw
+from gearfmu.spec.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.trace import Channel, Trace
 
@@ -69,13 +70,17 @@ def test_a_load_on_another_tooth_is_the_same_field_turned(stage: tuple[Any, list
     assert np.allclose(hot[1], turn @ hot[0], atol=1e-6)
 
 
+def shown(trace: Trace, stage: tuple[Any, list[Any]]) -> Any:
+    return picture.deformed_pair(trace, as_general(stage[0]), "mesh", stage[1])
+
+
 @pytest.mark.parametrize("force", [4000.0, -4000.0])
 def test_picture_of_the_largest_force(stage: tuple[Any, list[Any]], force: float) -> None:
     t = np.arange(5) * 1e-3
     trace = Trace(
         t, {"mesh.force": Channel(np.array([0, 1, force, 1, 0.0]), "N"), "pinion.gear.phi": Channel(t * 200, "rad")}, {}
     )
-    plot = picture.deformed_pair(trace, *stage)
+    plot = shown(trace, stage)
     assert plot is not None and plot.picture.startswith("<img") and "t = 0.00200 s" in plot.caption
     assert ("coast" in plot.caption) == (force < 0)
     assert len(plot.columns["gear"]) == sum(len(body.display.points) for body in stage[1])
@@ -84,8 +89,8 @@ def test_picture_of_the_largest_force(stage: tuple[Any, list[Any]], force: float
 def test_no_force_no_picture(stage: tuple[Any, list[Any]]) -> None:
     t = np.arange(3.0)
     still = {"mesh.force": Channel(np.zeros(3), "N"), "pinion.gear.phi": Channel(t, "rad")}
-    assert picture.deformed_pair(Trace(t, still, {}), *stage) is None
-    assert picture.deformed_pair(Trace(t, {"mesh.force": Channel(t, "N")}, {}), *stage) is None
+    assert shown(Trace(t, still, {}), stage) is None
+    assert shown(Trace(t, {"mesh.force": Channel(t, "N")}, {}), stage) is None
 
 
 def test_near_faces_hide_far_ones() -> None:

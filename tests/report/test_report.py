@@ -44,7 +44,7 @@ def coupled_run() -> Trace:
     for shaft, sign in (("pinion", 1), ("wheel", -1)):
         channels[f"bearing.{shaft}.fx"] = Channel(sign * 0.38 * force, "N")
         channels[f"bearing.{shaft}.fy"] = Channel(sign * 0.92 * force, "N")
-    return Trace(t, channels, {"scene": "closure", "stage": "pair", "teeth": {"pinion": 16, "wheel": 24}})
+    return Trace(t, channels, {"scene": "closure", "stage": "pair", "meshes": {"mesh": ("pinion", 16)}})
 
 
 SUMMARY = {

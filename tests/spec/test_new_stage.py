@@ -17,7 +17,7 @@ from gearfmu.spec.schema import stage_schema
 from gearfmu.spec.stage import load_stage
 
 
-@pytest.mark.parametrize("like", ["fzg_c", "fzg_c/stage_relief"])
+@pytest.mark.parametrize("like", ["fzg_c", "fzg_c/stage_relief", "two_stage"])
 def test_a_new_stage_is_the_old_one_under_its_name(tmp_path: Path, like: str) -> None:
     path = new_stage("mine", like, tmp_path)
     assert path == tmp_path / "mine" / "stage.toml"

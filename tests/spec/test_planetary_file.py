@@ -85,7 +85,7 @@ def test_all_problems_come_at_once(tmp_path):
 
 
 def test_a_verb_that_needs_a_pair_says_so():
-    with pytest.raises(SpecError, match="this needs a pair"):
+    with pytest.raises(SpecError, match="this is about one pair"):
         load_pair("planetary54")
 
 

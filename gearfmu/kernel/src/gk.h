@@ -92,12 +92,12 @@ GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work 
                           double H);
 GK_API double gk_time(const gk_data *data);
 
-/* Quasi-static loaded transmission error: torque on the pinion's bore, wheel's bore held at phi_wheel; by the contact
- * routine of the step. After gk_prepare; `keep` continues from the last call. out[0] = te (m), then for each of *places
- * tooth pairs {flank 0 drive 1 coast, tooth number of the pinion, force of each slice (N)}; at most 1 + 8·12 numbers.
- */
-GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_wheel,
-                        double torque, int keep, double *out, int *places);
+/* Quasi-static loaded transmission error of an engagement: torque on the bore of the first port, the bore of the second
+ * held at phi_out, further ports free; by the contact routine of the step. After gk_prepare; `keep` continues from the
+ * last call. out[0] = te (m), out[1] = angle of the first port's bore (rad), then for each of *places tooth pairs {flank
+ * 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most 2 + 8·12 numbers. */
+GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
+                        double torque, int engagement, int keep, double *out, int *places);
 
 /* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds
  * with -DGK_PROFILE only, else they stay 0. */

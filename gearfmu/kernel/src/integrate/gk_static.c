@@ -328,6 +328,7 @@ static int search(rest *r)
             balance_rotation(r, solved = 1);
         }
         if (moved * (MOBILITY / mobility) <= rest_limit(r)) return 1;
+        if (moved * (MOBILITY / mobility) > SEE) begin(r); /* out of sight of all flanks: from the start again */
     }
     return 0;
 }
@@ -357,37 +358,49 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     return GK_OK;
 }
 
-/* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_wheel; what
- * chains the ports have is left out. out:
- * te (m), then for every tooth pair of the first engagement {flank, tooth of gear A, force of each slice}; room for
- * 1 + MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
-gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_wheel,
-                 double torque, int keep, double *out, int *places)
+/* angle of the first port's bore under its torque: what the rows move it by comes on top of the spin */
+static double driven_angle(const gk_model *model, const gk_work *work)
 {
-    gk_boundary b[MAX_PORTS] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_wheel, 0.0}};
-    double phi_pinion = 0.0;
-    if (model->ports < 2 || !model->engagements) return GK_BAD_CALL;
-    for (int p = 2; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
-    gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
-    if (outcome) return outcome;
+    double angle = 0.0;
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
             if (s->port_of[i] == 0 && s->joint_of[i] == JOINT_PORT)
-                phi_pinion = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+                angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
     }
-    const gk_engagement *first = &model->engagement[0];
-    const gk_engaged *engaged = &work->engaged[0];
+    return angle;
+}
+
+/* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out, other
+ * ports free; what chains the ports have is left out. out: te (m) of engagement e, angle (rad) of the first port's bore,
+ * then for every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 2 + MAX_PAIRS·(2 + MAX_SLICES)
+ * numbers. `keep` continues from the last call. */
+gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
+                 double torque, int e, int keep, double *out, int *places)
+{
+    gk_boundary b[MAX_PORTS] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_out, 0.0}};
+    double angle[MAX_ROTORS];
+    if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;
+    for (int p = 2; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
+    gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
+    if (outcome) return outcome;
+    for (int r = 0; r < model->rotors; r++) angle[r] = data->x[r];
+    angle[model->port[0].rotor] = driven_angle(model, work);
+    angle[model->port[1].rotor] = phi_out;
+    const gk_engagement *mesh = &model->engagement[e];
+    const gk_gear *A = &model->gear[mesh->gear[0]], *B = &model->gear[mesh->gear[1]];
+    const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    *out++ = model->gear[first->gear[0]].r_b * phi_pinion + first->kind * model->gear[first->gear[1]].r_b * phi_wheel;
+    *out++ = A->r_b * angle[A->rotor] + mesh->kind * B->r_b * angle[B->rotor];
+    *out++ = angle[model->port[0].rotor];
     *places = engaged->places;
     for (int p = 0; p < *places; p++, out += 2 + setup->slices) {
         out[0] = engaged->place[p].key.flank;
         out[1] = engaged->place[p].key.tooth;
         for (int i = 0; i < setup->slices; i++) {
             const int strip = i < s->strips ? i : setup->slices - 1 - i;
-            out[2 + i] = s->force[p * s->strips + strip] * first->width /
-                         (setup->slices * setup->mesh[0].strip_width[strip]);
+            out[2 + i] = s->force[p * s->strips + strip] * mesh->width /
+                         (setup->slices * setup->mesh[e].strip_width[strip]);
         }
     }
     return GK_OK;

@@ -149,8 +149,9 @@ struct gk_setup {
     int chained[MAX_PORTS];      /* inertia, clutch and shaft lie between port and bore */
     int given_torque[MAX_PORTS]; /* the port's row carries a given torque */
     int clutches;
-    double port_own[MAX_PORTS];                   /* residual of the bore angle */
-    double port_support[MAX_PORTS][MAX_SUPPORTS]; /* force on a support per unit moment at a port, beside the oscillators' */
+    double port_own[MAX_PORTS]; /* residual of the bore angle */
+    double port_support[MAX_PORTS]
+                       [MAX_SUPPORTS]; /* force on a support per unit moment at a port, beside the oscillators' */
     gk_modal modal[MAX_GEARS];
     gk_base base;
     gk_mesh mesh[MAX_ENGAGEMENTS];

@@ -1,0 +1,61 @@
+"""The FMU of a train: the kernel's numbers bit for bit, one terminal for each port, variables of every mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_stage import unpack
+
+from gearfmu.body import load_stage_bodies
+from gearfmu.fmu import export, validate
+from gearfmu.fmu.probes import Subject
+from gearfmu.fmu.terminals import shafts
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, Steady, assemble
+
+STEPS, H = 20, 1e-4
+
+
+@pytest.fixture(scope="module")
+def train() -> StageModel:
+    spec = load_stage("two_stage")
+    fast = spec.levels.model_copy(update={"standard_cut": spec.levels.fast_cut})
+    return assemble(spec.model_copy(update={"levels": fast}), load_stage_bodies(spec))
+
+
+@pytest.fixture(scope="module")
+def fmu(train: StageModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export(train, tmp_path_factory.mktemp("train") / "train.fmu")
+
+
+def test_the_fmu_of_a_train_is_its_kernel_bit_for_bit(train: StageModel, fmu: Path) -> None:
+    drive, kernel, subject = Steady(train, 200.0, 100.0), train.kernel(), Subject(unpack(fmu, fmu.parent / "open"))
+    references = {v.name: v.valueReference for v in subject.variables}
+    outputs = [v.name for v in train.kernel_variables() if v.causality == "output" and v.type == "Real"]
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    ours, theirs = [], []
+    for step in range(STEPS):
+        for name, value in drive(step * H).items():
+            kernel.set(name, value)
+            subject.fmu.setReal([references[name]], [value])
+        if step == 0:
+            kernel.initialize(0.0)
+            subject.fmu.exitInitializationMode()
+        kernel.step(step * H, H)
+        subject.fmu.doStep(step * H, H)
+        ours.append([kernel.get(name) for name in outputs])
+        theirs.append(subject.fmu.getReal([references[name] for name in outputs]))
+    subject.close()
+    found = np.array(ours)
+    assert np.abs(found[:, outputs.index("stage2.force")]).min() > 1000, "the run loads the teeth"
+    assert found.tobytes() == np.array(theirs).tobytes()
+
+
+def test_the_fmu_of_a_train_is_valid_and_names_ports_and_meshes(train: StageModel, fmu: Path) -> None:
+    assert validate(fmu) == []
+    assert list(shafts(train.kernel_variables())) == ["input", "output"]
+    names = {v.name for v in train.kernel_variables()}
+    assert {"stage1.force", "stage2.te", "stage1.backlash", "bearing.input_left.fx", "seat.wheel2.mz"} <= names

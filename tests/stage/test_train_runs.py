@@ -1,0 +1,228 @@
+"""Trains in motion and at rest: independent pairs in one model, a stage turned as a whole, ratio and torque through the
+meshes, the same pair written in two ways."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfmu.body import load_stage_bodies
+from gearfmu.errors import ModelError, SpecError
+from gearfmu.spec.base import read_toml
+from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.general import GeneralStage, RotorSpec
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.stage import load_stage
+from gearfmu.spec.turning import shafts_of, turns
+from gearfmu.stage import StageModel, Steady, assemble, loaded_te
+from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.te import statics_of
+
+FAST, STEPS, H = 1, 60, 5e-5
+TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
+
+
+@pytest.fixture(scope="module")
+def two_stage() -> StageModel:
+    spec = load_stage("two_stage")
+    return assemble(spec, load_stage_bodies(spec))
+
+
+def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[str, np.ndarray]:
+    """Outputs (steps + 1,) by name. drives: functions of time → inputs, each with a prefix for its names."""
+    kernel = model.kernel(level=FAST, **parameters)
+    names = [v.name for v in kernel.variables.values() if v.causality == "output"]
+    rows = []
+    for step in range(STEPS + 1):
+        for prefix, drive in drives.items():
+            for name, value in drive(max(step - 1, 0) * H).items():
+                kernel.set(prefix + name, value)
+        if step == 0:
+            kernel.initialize()
+        else:
+            kernel.step((step - 1) * H, H)
+        rows.append([kernel.get(name) for name in names])
+    return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def side_by_side(pair: GeneralStage) -> GeneralStage:
+    """The pair twice in one stage, far apart; names of the second begin with "b_"."""
+
+    def named(name: str) -> str:
+        return f"b_{name}"
+
+    bodies = {named(n): gear.model_copy(update={"name": named(n)}) for n, gear in pair.bodies.items()}
+    rotors = {
+        named(n): RotorSpec(axis=(rotor.axis[0], 1.0), bodies={named(b): at for b, at in rotor.bodies.items()})
+        for n, rotor in pair.rotors.items()
+    }
+    meshes = [
+        mesh.model_copy(update={"name": named(mesh.name), "gears": tuple(map(named, mesh.gears))})
+        for mesh in pair.engagements
+    ]
+    supports = [s.model_copy(update={"name": named(s.name), "body": named(s.body)}) for s in pair.supports]
+    ports = {named(n): port.model_copy(update={"body": named(port.body)}) for n, port in pair.ports.items()}
+    return pair.model_copy(
+        update={
+            "bodies": pair.bodies | bodies,
+            "rotors": pair.rotors | rotors,
+            "engagements": (*pair.engagements, *meshes),
+            "supports": (*pair.supports, *supports),
+            "ports": pair.ports | ports,
+        }
+    )
+
+
+def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, relieved) -> None:
+    """Pairs that nothing connects do not know of each other, at different loads and speeds: the same to rounding. Sums
+    over all oscillators of the ground are in another order, and the search for rest goes on until both rest."""
+    both = assemble(side_by_side(expand_pair(relief_spec)), [*bodies, *bodies])
+    first, second = Steady(relieved, 200.0, 300.0), Steady(relieved, 90.0, 40.0)
+    together = run(both, {"": first, "b_": second})
+    for prefix, alone in (("", run(relieved, {"": first})), ("b_", run(relieved, {"": second}))):
+        own = [name for name in alone if not name.startswith(("energy.", "solver."))]
+        for name in own:
+            head, _, rest = name.partition(".")
+            found = together[f"bearing.{prefix}{rest}" if head == "bearing" else prefix + name]
+            assert np.abs(found - alone[name]).max() <= 1e-6 * np.abs(alone[name]).max(), name
+        assert np.ptp(alone["mesh.force"]) > 10
+
+
+def turned(stage: GeneralStage, angle: float) -> GeneralStage:
+    """The whole stage about the z axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    rotors = {
+        name: rotor.model_copy(
+            update={"axis": (c * rotor.axis[0] - s * rotor.axis[1], s * rotor.axis[0] + c * rotor.axis[1])}
+        )
+        for name, rotor in stage.rotors.items()
+    }
+    return stage.model_copy(update={"rotors": rotors})
+
+
+def test_a_pair_turned_as_a_whole_runs_the_same(relief_spec, bodies, relieved) -> None:
+    """By three pitches of the pinion, whose tooth 0 stands on +x at φ = 0: the mesh is the same to rounding, bearing
+    forces turn with the stage."""
+    angle = 2 * math.pi * 3 / relief_spec.gears[0].teeth
+    again = assemble(turned(expand_pair(relief_spec), angle), bodies)
+    drive = Steady(relieved, 200.0, 300.0)
+    before, after = (run(model, {"": drive}) for model in (relieved, again))
+    for name in ("mesh.force", "pinion.tau", "wheel.tau"):
+        scale = np.abs(before[name]).max()
+        error = np.abs(after[name] - before[name]).max() / scale
+        print(f"{name}: {error:.1e}")
+        assert error < 1e-6, name  # rows are of single precision: 1.2e-7
+    x, y = before["bearing.pinion.fx"], before["bearing.pinion.fy"]
+    wanted = math.cos(angle) * x - math.sin(angle) * y
+    assert np.abs(after["bearing.pinion.fx"] - wanted).max() < 1e-6 * np.hypot(x, y).max()
+
+
+def at_rest(model: StageModel, **parameters: float) -> dict[str, float]:
+    """Outputs in static equilibrium under TORQUE, input and output wound against each other."""
+    kernel = model.kernel(level=FAST, **parameters)
+    for name, value in Steady(model, 0.0, TORQUE)(0.0).items():
+        kernel.set(name, value)
+    kernel.initialize()
+    return {v.name: kernel.get(v.name) for v in kernel.variables.values() if v.causality == "output"}
+
+
+def test_torque_comes_through_a_train_by_its_ratio(two_stage) -> None:
+    """Without relief and tip corners normals are lines of action, and meshes carry what the teeth's ratio says. A
+    relief is a slope of the flank: by it, a part of a per cent, the ratio of the torques at rest differs."""
+    stage, shafts = two_stage.stage, two_stage.shafts
+    assert shafts.ratio == pytest.approx(61 / 25 * 73 / 19)
+    kernel = statics_of(two_stage, **{"effect.tip_relief": 0.0, "effect.tip_contact": 0.0})
+    for number, (mesh, torque) in enumerate(zip(stage.engagements, (TORQUE, TORQUE * 61 / 25), strict=True)):
+        forces = kernel.transmission(0.0, TORQUE, number).forces
+        carried = sum(sum(slices) for slices in forces.values())
+        assert carried == pytest.approx(torque / mesh_geometry(stage, mesh).gears[0].r_b, rel=1e-5), mesh.name
+    found = at_rest(two_stage)
+    assert -found["output.tau"] / found["input.tau"] == pytest.approx(shafts.ratio, rel=0.01)
+    for direction in "xy":
+        bearings = [v for n, v in found.items() if n.startswith("bearing.input") and n.endswith(f".f{direction}")]
+        assert sum(bearings) == pytest.approx(found[f"seat.pinion1.f{direction}"], rel=1e-4)
+
+
+def test_a_train_turns_at_its_ratio_and_carries_its_torque(two_stage) -> None:
+    """In motion: mean speeds of the rotors are those of the teeth, both meshes stay closed."""
+    trace = run(two_stage, {"": Steady(two_stage, SPEED, TORQUE)})
+    late = slice(STEPS // 2, None)
+    for rotor, turn in turns(two_stage.stage, "input").items():
+        assert trace[f"{rotor}.gear.w"][late].mean() == pytest.approx(SPEED * float(turn), rel=0.02), rotor
+    assert trace["solver.trouble"][-1] == 0
+    assert trace["stage1.contact"].min() == 1 and trace["stage2.contact"].max() == -1
+    assert trace["output.tau"][late].mean() == pytest.approx(TORQUE * two_stage.shafts.ratio, rel=0.01)
+
+
+def test_every_mesh_of_a_train_has_its_transmission_error(two_stage) -> None:
+    """Each over its own pitch: positive against the direction in which gear A is driven; periodic; a mesh that there is
+    not is refused."""
+    found = {mesh: loaded_te(two_stage, [100.0, 200.0], 3, mesh=mesh) for mesh in ("stage1", "stage2")}
+    assert found["stage1"].te.min() > 0 > found["stage2"].te.max()
+    assert all(np.all(np.diff(np.abs(result.te), axis=0) > 0) for result in found.values())
+    assert all(np.all(result.stiffness > 0) for result in found.values())
+    with pytest.raises(ModelError, match="it has stage1, stage2"):
+        loaded_te(two_stage, [100.0], 3, mesh="stage3")
+
+
+def as_general_file(pair: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a pair file as those of a general stage."""
+    rack = {key: pair["pair"][key] for key in ("normal_module", "pressure_angle")}
+    names = list(pair["gears"])
+    distance = pair["pair"]["center_distance"]
+    bearings = {name: gear.pop("bearing") for name, gear in pair["gears"].items()}
+    return {
+        "name": pair["name"],
+        "kind": "general",
+        "slices": pair["contact"]["slices"],
+        "bodies": {name: gear | rack for name, gear in pair["gears"].items()},
+        "rotors": {
+            name: {"axis": [x, "0 mm"], "bodies": {name: "0 mm"}}
+            for name, x in zip(names, ("0 mm", distance), strict=True)
+        },
+        "engagements": [
+            {"name": "mesh", "gears": names, "backlash": pair["pair"]["backlash"]}
+            | {"damping": pair["contact"]["damping"]}
+            | {key: pair[key] for key in ("torque_max", "speed_max")}
+        ],
+        "supports": [
+            {"name": name, "body": name, "radial": b["stiffness"], "damping_ratio": b["damping_ratio"]}
+            for name, b in bearings.items()
+        ],
+        "ports": {name: port | {"body": name} for name, port in pair["ports"].items()},
+        "levels": pair.get("levels", {}),
+    }
+
+
+def toml(value: Any) -> str:
+    """A value as inline TOML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f'"{key}" = {toml(item)}' for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def test_a_pair_written_as_a_general_stage_is_the_same_model(tmp_path: Path, bodies, plain) -> None:
+    """Same gears, same bodies, same blob: a pair file is the short form."""
+    tables = as_general_file(read_toml(find_stage("fzg_c")))
+    path = tmp_path / "stage.toml"
+    path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in tables.items()), encoding="utf-8")
+    spec = load_stage(path)
+    assert isinstance(spec, GeneralStage)
+    assert load_stage_bodies(spec, find_stage("fzg_c").parent)[0].input_hash == bodies[0].input_hash
+    assert assemble(spec, bodies).hash == plain.hash
+
+
+def test_a_stage_without_input_and_output_is_refused(two_stage) -> None:
+    stage = two_stage.stage
+    lonely = stage.model_copy(update={"ports": {"input": stage.ports["input"]}})
+    with pytest.raises(SpecError, match="ports = input: a stage needs an input and an output"):
+        shafts_of(lonely)
+    apart = stage.model_copy(update={"engagements": stage.engagements[:1]})
+    with pytest.raises(SpecError, match="no meshes lead from the first port to the second"):
+        shafts_of(apart)
