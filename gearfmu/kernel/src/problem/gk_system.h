@@ -8,6 +8,11 @@
 #define GK_SYSTEM_H
 #include "setup/gk_setup.h"
 
+/* how much of a damper's force at the end of the last step goes into that of this one (docs/theory.md, 3.2) */
+#ifndef GK_MEMORY
+#define GK_MEMORY 0.5
+#endif
+
 enum {
     MAX_JOINTS = 2 * JOINTS, /* of one engagement */
     MAX_ROWS = MAX_CONTACTS + MAX_JOINTS,
@@ -91,7 +96,6 @@ void gk_solve_clear(gk_system *s);
 void gk_solve_settle(gk_system *s);
 void gk_solve_status(gk_system *s);
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
-void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag);
 void gk_solve_path(const gk_system *s, const double *x, double *y);
 double gk_solve_stored(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the distance

@@ -35,10 +35,10 @@ static oscillator free_flow(double omega, double zeta, double h)
 
 static oscillator exponential(double omega, double zeta, double h, double gamma)
 {
-    oscillator o = free_flow(omega, zeta, h);
     double plain, unused, omega2 = omega * omega;
     gk_sincos(omega * h, &plain, &unused);
-    double sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
+    const double sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
+    oscillator o = free_flow(omega, zeta * sigma, h);
     o.bq = o.b0q = o.mobility = 0.5 * (1.0 - o.a11) / (omega2 * sigma);
     o.bv = o.b0v = 0.5 * o.a12 / sigma;
     o.kappa = (1.0 / sigma - 1.0) / omega2;

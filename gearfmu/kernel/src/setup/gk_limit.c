@@ -8,6 +8,7 @@
 #include "integrate/gk_integrate.h"
 
 static const double MU = 0.5, MU_MOST = 0.75; /* μ′ of the default step; of any other, by γ */
+static const double NYQUIST = 2.0 / (1.0 - GK_MEMORY);
 static const double WITHIN = 0.9,
                     BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
 static const double NEAR = 50e-6; /* m: flanks that count as closed */
@@ -66,7 +67,7 @@ static double largest(const double *L, const double *K, int n)
 static void yielding(const double *S, const double *damping, int n, double *X)
 {
     double B[MAX_SLICES * MAX_SLICES];
-    for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * damping[i % n] + (i / n == i % n);
+    for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * NYQUIST * damping[i % n] + (i / n == i % n);
     for (int k = 0; k < n; k++)
         for (int i = 0; i < n; i++) {
             if (i == k) continue;
@@ -99,7 +100,7 @@ void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
     }
     for (int i = s->contacts; i < n; i++)
-        if (counts(s, i)) C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? s->damping[i] * s->spring[i] : 0.0));
+        if (counts(s, i)) C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? NYQUIST * s->damping[i] * s->spring[i] : 0.0));
 }
 
 /* K (n, n): κ part */
