@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include "integrate/gk_integrate.h"
 
-static const double MU = 0.5, MU_MOST = 0.75; /* μ′ of the default step; of any other, by γ */
+static const double MU = 0.5, MU_MOST = PLT_MU; /* μ′ of the default step; of any other, by γ */
 static const double NYQUIST = 2.0 / (1.0 - GK_MEMORY);
 static const double WITHIN = 0.9,
                     BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */

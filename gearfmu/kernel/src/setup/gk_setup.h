@@ -122,6 +122,7 @@ typedef struct gk_ground_flow { /* the same of the ground group */
 
 typedef struct gk_coefficients {
     double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
+    double stretched_h; /* step of the trapezoidal ones */
     int timeless;                                                     /* forces move nothing in the step: D = 0 */
     int curved_read;                                                  /* mix4: the gap reads more than q */
     gk_flow flow[MAX_GEARS];
