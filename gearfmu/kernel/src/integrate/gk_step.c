@@ -7,10 +7,10 @@ static const double PAYABLE =
     1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot repay
                                        waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
-static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
+static const double FARTHEST = 0.25 * 2.0 * GK_PI;            /* a quarter of a pitch */
 
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
-static double speed_lead(double h, double gamma) { return h * h * (2.0 * gamma - 1.0) / 12.0; }
+static double speed_lead(double h, double gamma) { return h * h * (2.0 * gk_correction(gamma) - 1.0) / 12.0; }
 
 /* ---- state --------------------------------------------------------------------------------------------------------- */
 /* Σ (½ v² + ½ ω² q²)/s² of a gear group, summed in double in fixed lanes */

@@ -1,6 +1,6 @@
-/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + ½A + (late − ½)Q,
+/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + late·A,
  * S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its limit ±(λ0 + λ1) is
- * ±B instead, an end force at its limit ±λ1 is ±Q with late = 0. By columns of whole quads; an inactive row is an empty
+ * ±B instead, an end force at its limit ±λ1 is ±A with late = 0. By columns of whole quads; an inactive row is an empty
  * one. Close to symmetric positive definite: no pivoting. */
 #include "problem/gk_system.h"
 

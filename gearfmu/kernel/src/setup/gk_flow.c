@@ -1,9 +1,11 @@
 /* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory.md, 3.1 and eq. 9).
  *
- *   exponential where ωh < 1.2: exact flow; trapezoidal above. Force constant in the step, ½(f_n + f_{n+1}) with equal
- * coefficients bq, bv at both ends. σ = sin(ωh)/(ωh), s = σ^(−γ/2), κ = (σ^(−γ) − 1)/ω² (rigid: s = 1, κ = γh²/6): the
- * sampled system then has the exact pole, residue and static value. The scaled row sW of the derivation is carried by
- * bq, bv and κ (each times s²): state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. */
+ *   exponential where ωh < 1.2: exact flow; trapezoidal above, with a step stretched for the mesh mode. Force constant in
+ * the step, ½(f_n + f_{n+1}) with equal coefficients bq, bv at both ends. With p = min(1, 2γ), σ = (sin(ωh)/(ωh))^p,
+ * s² = 1/σ, κ = (1/σ − 1)/ω² (rigid: s = 1, κ = ph²/6): the sampled system then has the exact pole, residue and static
+ * value, and with ζσ for ζ the loss. The scaled row sW of the derivation is carried by bq, bv and κ (each times s²):
+ * state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. A lower γ first takes the stiffest modes out
+ * of the exponential ones, ωh < 1.2γ, and only below ½ weakens the correction. */
 #include "problem/gk_work.h"
 
 static const double EXPONENTIAL_BELOW = 1.2;
@@ -35,11 +37,11 @@ static oscillator free_flow(double omega, double zeta, double h)
     return o;
 }
 
-static oscillator exponential(double omega, double zeta, double h, double gamma)
+static oscillator exponential(double omega, double zeta, double h, double power)
 {
     double plain, unused, omega2 = omega * omega;
     gk_sincos(omega * h, &plain, &unused);
-    const double sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
+    const double sigma = gk_exp(power * gk_log(plain / (omega * h)));
     oscillator o = free_flow(omega, zeta * sigma, h);
     o.bq = o.b0q = o.mobility = 0.5 * (1.0 - o.a11) / (omega2 * sigma);
     o.bv = o.b0v = 0.5 * o.a12 / sigma;
@@ -148,8 +150,9 @@ static oscillator oscillator_of(const gk_setup *setup, const gk_coefficients *k,
     const oscillator nothing = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     if (!GK_ON(setup, modal_damping)) zeta = 0.0;
     if (!(omega > 0.0)) return nothing;
-    if (omega * k->h >= EXPONENTIAL_BELOW) return trapezoidal(omega, zeta, k->stretched_h);
-    return setup->integrator == MIX4 ? linear_force(omega, zeta, k->h) : exponential(omega, zeta, k->h, k->gamma);
+    if (omega * k->h >= EXPONENTIAL_BELOW * gk_max(k->gamma, 0.5)) return trapezoidal(omega, zeta, k->stretched_h);
+    return setup->integrator == MIX4 ? linear_force(omega, zeta, k->h)
+                                     : exponential(omega, zeta, k->h, gk_correction(k->gamma));
 }
 
 static void fill_gear(const gk_setup *setup, gk_coefficients *k, int g)
@@ -218,7 +221,7 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
     oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
     oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
     oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
-    oldest->rigid_kappa = gamma * h * h / 6.0;
+    oldest->rigid_kappa = gk_correction(gamma) * h * h / 6.0;
     for (int g = 0; g < model->gears; g++) fill_gear(setup, oldest, g);
     fill_ground(model, setup, oldest);
     oldest->age = ++work->clock;
