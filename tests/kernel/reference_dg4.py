@@ -7,9 +7,9 @@ G = offset + W q + C λ. A contact has 0 ≤ λ ⊥ G ≥ 0, a bilateral row G =
 
 The step. The force is constant in a step, λ̄ = ½(λ₀ + λ₁ + η);
 modes answer exactly (ωh < 1.2) or by the trapezoidal rule.
-With σ = sin(ωh)/(ωh), rows scaled by σ^(−γ/2) and the compliance C′ = C − W κ Wᵀ, κ = (1 − σ^γ)/ω² (rigid:
-γh²/6), closed
-contact is of 4th order for γ = 1 (Fox and Goodwin's rule for rigid modes) and of 2nd for γ = 0 (`em`).
+With σ = sin(ωh)/(ωh), p = min(1, 2γ), rows scaled by σ^(−p/2) and the compliance C′ = C − W κ Wᵀ, κ = (1 − σ^p)/ω²
+(rigid: ph²/6), closed contact is of 4th order for γ = 1 (Fox and Goodwin's rule for rigid modes) and of 2nd for γ = 0
+(`em`). γ between ½ and 1 makes modes trapezoidal from ωh = 1.2γ on. Exponential modes are damped by ζσ^p.
 η, along one direction
 and of one scalar, makes the work of a step in which a contact opens or closes equal to the change of ½ λᵀC′λ (a
 discrete
@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 EXPONENTIAL_LIMIT = 1.2
-MEMORY = 0.75  # of a dashpot's force at the end of a step
+MEMORY = 0.25  # of a dashpot's force at the end of a step
 ROUNDS = 12
 
 
@@ -69,6 +69,16 @@ class Scheme:
     energy: bool = True
     epsilon: float = 0.0
     tolerance: float = 1e-9
+
+    @property
+    def power(self) -> float:
+        """Of σ in the corrections."""
+        return min(1.0, 2.0 * self.gamma)
+
+    @property
+    def exponential_below(self) -> float:
+        """Modes with ωh below it answer exactly."""
+        return EXPONENTIAL_LIMIT * max(self.gamma, 0.5)
 
 
 @dataclass
@@ -158,11 +168,11 @@ class Reference:
     def __init__(self, problem: Problem, scheme: Scheme) -> None:
         self.problem, self.scheme = problem, scheme
         self.scale, self.kappa = _corrections(problem.omega, scheme)
-        self.flow, self.bq, self.bv = _flow(problem, scheme.h)
+        self.flow, self.bq, self.bv = _flow(problem, scheme)
         self.w = problem.rows * self.scale
         self.d = (self.w * self.bq) @ self.w.T
         self.c = problem.compliance - (self.w * self.kappa) @ self.w.T
-        self.a, self.q = self.c - problem.path, problem.compliance - problem.path
+        self.a = self.c - problem.path
         self.rounds = self.changes = self.failures = 0
 
     def mu(self) -> float:
@@ -195,14 +205,14 @@ class Reference:
         force, eta, dash, late = self._forces(gap, state)
         y = y + self.bq * (self.w.T @ (force + eta))
         v = v + self.bv * (self.w.T @ (force + eta))
-        reached = gap + self.d @ (force + eta) + self.c @ force + self._lag(dash, late)
+        reached = gap + self.d @ (force + eta) + self.c @ force + self.a @ late
         return State(y, v, outer + self.w.T @ force, force, reached, eta, dash, late)
 
     def energy(self, state: State) -> float:
         """The invariant of the undamped step without external work: ½v² + ½ω²y² + ½λᵀC′λ, J, and what the dashpots'
         force holds in the compliance outside their paths."""
         modal = 0.5 * state.v @ state.v + 0.5 * (self.problem.omega * state.y) @ (self.problem.omega * state.y)
-        held = self._lag(state.dash, state.late) @ (state.force + 0.5 * state.late)
+        held = self.a @ state.late @ (state.force + 0.5 * state.late)
         return float(modal + 0.5 * state.force @ self.c @ state.force + held)
 
     def displacement(self, state: State) -> np.ndarray:
@@ -236,10 +246,6 @@ class Reference:
         dash = dashpots.by @ force + dashpots.fixed
         return force, eta + dash, dash, dashpots.late_by @ force + dashpots.late_fixed
 
-    def _lag(self, dash: np.ndarray, late: np.ndarray) -> np.ndarray:
-        """What the dashpots' force deflects outside their paths: Q late − ½K dash, K = Q − A."""
-        return self.q @ (late - 0.5 * dash) + self.a @ (0.5 * dash)
-
     def _solve(self, gap: np.ndarray, state: State, start: np.ndarray, slow: float = 0.0) -> Solved:
         """The complementarity problem with η = η_d + slow (λ₁ − λ₀). Where a dashpot stands follows from λ₁ and is
         sought; for each stand η_d and f_d are linear in λ₁ whether a contact is open or closed, and nothing jumps
@@ -247,10 +253,9 @@ class Reference:
         was = (state.force > 0) | self.problem.bilateral
         nowhere = np.zeros(len(gap), int)
         dashpots = self._dashpots(state, was.astype(int), nowhere, nowhere)
-        mean = self.d + 0.5 * (self.a - self.q)  # what η_d does to the gaps; f_d does Q
         for i in range(200):
-            lagged = (1 + slow) * self.d + mean @ dashpots.by + self.q @ dashpots.late_by
-            shifted = gap + mean @ dashpots.fixed + self.q @ dashpots.late_fixed - slow * self.d @ state.force
+            lagged = (1 + slow) * self.d + self.d @ dashpots.by + self.a @ dashpots.late_by
+            shifted = gap + self.d @ (dashpots.fixed - slow * state.force) + self.a @ dashpots.late_fixed
             force, active = solve_lcp(lagged + self.c, shifted, self.problem.bilateral, start)
             found = self._stand(state, force, was | active)
             if found.stand_as(dashpots):
@@ -324,21 +329,22 @@ class Reference:
 def _corrections(omega: np.ndarray, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
     """Scale s of the rows and correction κ of the compliance, per mode."""
     x = omega * scheme.h
-    exact = (x < EXPONENTIAL_LIMIT) & (omega > 0)
-    sigma = np.sinc(np.where(exact, x, 0.0) / np.pi)
-    kappa = np.where(exact, (1 - sigma**scheme.gamma) / np.where(exact, omega, 1.0) ** 2, 0.0)
-    kappa[omega == 0] = scheme.gamma * scheme.h**2 / 6
-    return sigma ** (-0.5 * scheme.gamma), kappa
+    exact = (x < scheme.exponential_below) & (omega > 0)
+    sigma = np.sinc(np.where(exact, x, 0.0) / np.pi) ** scheme.power
+    kappa = np.where(exact, (1 - sigma) / np.where(exact, omega, 1.0) ** 2, 0.0)
+    kappa[omega == 0] = scheme.power * scheme.h**2 / 6
+    return sigma**-0.5, kappa
 
 
-def _flow(problem: Problem, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _flow(problem: Problem, scheme: Scheme) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Flow (2, 2, n) and force coefficients bq, bv (n,), equal for both ends of the step."""
-    omega, zeta = problem.omega, problem.zeta
+    omega, zeta, h = problem.omega, problem.zeta, scheme.h
     flow, bq, bv = np.empty((2, 2, len(omega))), np.empty(len(omega)), np.empty(len(omega))
     for k, (w, z) in enumerate(zip(omega, zeta, strict=True)):
         if w == 0:
             flow[:, :, k], bq[k], bv[k] = [[1, h], [0, 1]], h * h / 4, h / 2
-        elif w * h < EXPONENTIAL_LIMIT:
+        elif w * h < scheme.exponential_below:
+            z *= np.sinc(w * h / np.pi) ** scheme.power
             wd, decay = w * np.sqrt(1 - z * z), np.exp(-z * w * h)
             cosine, sine = decay * np.cos(wd * h), decay * np.sin(wd * h) / wd
             flow[:, :, k] = [[cosine + z * w * sine, sine], [-w * w * sine, cosine - z * w * sine]]

@@ -7,13 +7,10 @@ static const double PAYABLE =
     1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot repay
                                        waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
-static const double MEMORY =
-    0.75; /* of a damper's force at the end of the step: how much of the last one's goes into it
-                                      (docs/theory, 3.4) */
-static const double FARTHEST = 0.25 * 2.0 * GK_PI; /* a quarter of a pitch */
+static const double FARTHEST = 0.25 * 2.0 * GK_PI;            /* a quarter of a pitch */
 
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
-static double speed_lead(double h, double gamma) { return h * h * (2.0 * gamma - 1.0) / 12.0; }
+static double speed_lead(double h, double gamma) { return h * h * (2.0 * gk_correction(gamma) - 1.0) / 12.0; }
 
 /* ---- state --------------------------------------------------------------------------------------------------------- */
 /* Σ (½ v² + ½ ω² q²)/s² of a gear group, summed in double in fixed lanes */
@@ -212,7 +209,7 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
     gk_law_apply(s);
     gk_solve_settle(s);
     s->stored0 = gk_solve_stored(s);
-    gk_solve_lag(s, s->end0, s->dash0, s->lag0);
+    gk_solve_times(s, s->A, s->end0, s->lag0);
     s->held0 = 0.0;
     for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
 }
@@ -228,15 +225,15 @@ void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *d
     memcpy(s->squeeze0, s->squeeze, (size_t)s->stride * sizeof *s->squeeze);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
-        s->beta[i] = acted ? 0.25 * (3.0 + MEMORY) : 0.5;
-        s->tail[i] = acted ? -0.25 * (1.0 - MEMORY) * s->dash0[i] - MEMORY * s->end0[i] : 0.0;
+        s->beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;
+        s->tail[i] = acted ? -0.25 * (1.0 - GK_MEMORY) * s->dash0[i] - GK_MEMORY * s->end0[i] : 0.0;
         s->g0[i] = -gk_solve_massless(s, i);
         s->hold[i] = 0;
     }
     for (int i = 0; i < s->contacts; i++) {
         const int memory = engaged->place[s->place_of[i]].memory;
         s->recalled[i] = memory >= 0;
-        s->g0[i] = memory < 0 ? s->g[i] : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
+        s->g0[i] = memory < 0 ? gk_max(s->g[i], 0.0) : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }
@@ -254,7 +251,7 @@ void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *d
         gk_solve_settle(s);
     else if (s->dashpots) {
         memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
-        gk_solve_lag(s, s->end, s->dash, s->lag);
+        gk_solve_times(s, s->A, s->end, s->lag);
     }
     s->owed = data->meshing[e].owed;
     s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);

@@ -52,7 +52,6 @@
 #define gk_solve_status gk_solve_status_avx2
 #define gk_solve_times gk_solve_times_avx2
 #define gk_solve_path gk_solve_path_avx2
-#define gk_solve_lag gk_solve_lag_avx2
 #define gk_solve_stored gk_solve_stored_avx2
 #define gk_tangent_factorise gk_tangent_factorise_avx2
 #define gk_tangent_solve gk_tangent_solve_avx2

@@ -78,7 +78,7 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
-    gk_solve_lag(s, late, dash, lag);
+    gk_solve_times(s, s->A, late, lag);
     for (int i = 0; i < s->n; i++) {
         const double direct = p[i] + s->direction[i];
         if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;

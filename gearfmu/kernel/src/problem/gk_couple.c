@@ -11,15 +11,14 @@ static const double TOLERANCE = 1e-11;
 static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
 #endif
 
-/* forces of an engagement by what they meet: z (D), λ (A), the dampers' mean and end */
-static void forces_of(const gk_system *s, double x[PARTS][MAX_STRIDE], double end[MAX_STRIDE])
+/* forces of an engagement by what they meet: z (D), λ (A), the dampers' at the end (A) */
+static void forces_of(const gk_system *s, double x[PARTS][MAX_STRIDE])
 {
     for (int i = 0; i < s->stride; i++) {
         const int row = i < s->n, clutch = row && s->kind[i] == ROW_CLUTCH;
         x[D_PART][i] = row ? s->z[i] : 0.0;
         x[FORCE_PART][i] = row && !clutch ? s->force[i] : 0.0;
-        x[DAMPER_PART][i] = row && !clutch ? 0.5 * s->dash[i] : 0.0;
-        end[i] = row && !clutch ? s->end[i] : 0.0;
+        x[DAMPER_PART][i] = row && !clutch ? s->end[i] : 0.0;
     }
 }
 
@@ -28,8 +27,8 @@ static void give(const gk_model *model, const gk_setup *setup, gk_work *work, in
 {
     gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    double x[PARTS][MAX_STRIDE], end[MAX_STRIDE];
-    forces_of(s, x, end);
+    double x[PARTS][MAX_STRIDE];
+    forces_of(s, x);
     for (int part = 0; part < PARTS; part++) {
         double *ground = engaged->given_ground + part * setup->base.n;
         memset(ground, 0, (size_t)setup->base.n * sizeof *ground);
@@ -39,7 +38,7 @@ static void give(const gk_model *model, const gk_setup *setup, gk_work *work, in
     }
     memset(engaged->given_far, 0, 2 * (size_t)setup->far * sizeof *engaged->given_far);
     gk_rows_push_far(model, setup, work, e, x[FORCE_PART], engaged->given_far);
-    gk_rows_push_far(model, setup, work, e, end, engaged->given_far + setup->far);
+    gk_rows_push_far(model, setup, work, e, x[DAMPER_PART], engaged->given_far + setup->far);
 }
 
 /* sums over the other engagements of the island, weighed: what they do per unit row */

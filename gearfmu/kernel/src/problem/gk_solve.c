@@ -34,22 +34,6 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x,
                     double *y){GK_SIZED(s -> stride / 4, times, s, matrix, x, y)}
 
-GK_INLINE void lagging(const gk_system *s, const double *end, const double *dash, double *lag, const int quads)
-{
-    gk_quad sum[MAX_STRIDE / 4];
-    for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
-    for (int j = 0; j < s->n; j++) {
-        const gk_quad *Q = (const gk_quad *)s->Q + j * quads, *A = (const gk_quad *)s->A + j * quads;
-        const double mean = 0.5 * dash[j], later = end[j] - mean;
-        for (int q = 0; q < quads; q++) sum[q] += later * Q[q] + mean * A[q];
-    }
-    memcpy(lag, sum, (size_t)quads * sizeof *sum);
-}
-
-/* what the dashpots' force deflects outside their paths: Q·end − ½K·dash, K = Q − A */
-void gk_solve_lag(const gk_system *s, const double *end, const double *dash,
-                  double *lag){GK_SIZED(s -> stride / 4, lagging, s, end, dash, lag)}
-
 /* P x; x and y of whole quads */
 GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const int strips)
 {
@@ -99,7 +83,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
     times(s, s->D, s->z, s->Dz, quads);
     times(s, s->A, s->force, s->Al, quads);
     if (s->dashpots)
-        lagging(s, s->end, s->dash, s->lag, quads);
+        times(s, s->A, s->end, s->lag, quads);
     else
         memset(s->lag, 0, (size_t)quads * sizeof(gk_quad));
 }

@@ -2,11 +2,14 @@
  * Closed contact, bilateral row, sticking clutch:
  *     g + D z + Aλ + lag + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction
  * D: what a force in the step does to the gaps; P + δ: compliance parallel to the row's own damper; A = Q − K:
- * everything else that is quasi-static, Q, less the κ part. lag = Q f_d − ½K η_d: what the dampers' force at the end of
- * the step, f_d = β η_d + tail, deflects; the κ part of its mean. */
+ * everything else that is quasi-static, Q, less the κ part. lag = A f_d: what the dampers' force at the end of the step,
+ * f_d = β η_d + tail, deflects. */
 #ifndef GK_SYSTEM_H
 #define GK_SYSTEM_H
 #include "setup/gk_setup.h"
+
+/* how much of a damper's force at the end of the last step goes into that of this one (docs/theory.md, 3.2) */
+#define GK_MEMORY 0.25
 
 enum {
     MAX_JOINTS = 2 * JOINTS, /* of one engagement */
@@ -40,7 +43,7 @@ typedef struct gk_system {
     double rigid[MAX_LOCAL][MAX_STRIDE]; /* derivative of the rows by each spin of the engagement */
     double *D, *A, *Q;                   /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
     double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
-                                         factor; what a damper's force does, D + ½A + (late − ½)Q */
+                                         factor; what a damper's force does, D + late·A */
     double inverse[MAX_STRIDE]; /* of the pivots */
     double path[MAX_PAIRS][MAX_BLOCK + 4],
         spring[MAX_STRIDE]; /* P: strips of a tooth pair, (strips, strips); joints: 1/k */
@@ -62,7 +65,7 @@ typedef struct gk_system {
     double end[MAX_STRIDE],
         begin[MAX_STRIDE]; /* f_d; mix4, whose forces are linear in the step: f_d at its start, which
                                                   the prediction contains; else 0 */
-    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];               /* D z, Aλ, Q f_d − ½K η_d */
+    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];               /* D z, Aλ, A f_d */
     double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at λ: δ, δ′, ∫ λ dδ; 0 in joints */
     double slope[MAX_STRIDE];                                           /* δ′ in the tangent */
@@ -92,7 +95,6 @@ void gk_solve_clear(gk_system *s);
 void gk_solve_settle(gk_system *s);
 void gk_solve_status(gk_system *s);
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
-void gk_solve_lag(const gk_system *s, const double *end, const double *dash, double *lag);
 void gk_solve_path(const gk_system *s, const double *x, double *y);
 double gk_solve_stored(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the distance

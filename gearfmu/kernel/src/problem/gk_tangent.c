@@ -1,17 +1,16 @@
-/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + ½A + (late − ½)Q,
+/* Tangent of the active rows (docs/theory.md, 3.2) and its factors:  J = D + A + S + B Γ S,  B = D + late·A,
  * S = P + diag δ′ (links: 1/k), Γ = diag 2c/h of the rows whose dashpot is linear; a dashpot at its limit ±(λ0 + λ1) is
- * ±B instead, an end force at its limit ±λ1 is ±Q with late = 0. By columns of whole quads; an inactive row is an empty
+ * ±B instead, an end force at its limit ±λ1 is ±A with late = 0. By columns of whole quads; an inactive row is an empty
  * one. Close to symmetric positive definite: no pivoting. */
 #include "problem/gk_system.h"
 
 /* column j of B: what the dashpot of row j does to all rows */
 GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 {
-    const double later = s->late[j] - 0.5;
-    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
-                  *Q = (const gk_quad *)s->Q + j * quads;
+    const double late = s->late[j];
+    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads;
     gk_quad *B = (gk_quad *)s->B + j * quads;
-    for (int q = 0; q < quads; q++) B[q] = D[q] + 0.5 * A[q] + later * Q[q];
+    for (int q = 0; q < quads; q++) B[q] = D[q] + late * A[q];
 }
 
 /* column j: what λ_j does to all rows */
@@ -27,7 +26,7 @@ GK_INLINE void contact_column(const gk_system *s, int j, double *column, const i
     if (s->pull[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
     if (s->held[j] != 0.0)
-        for (int q = 0; q < quads; q++) c[q] += s->held[j] * ((const gk_quad *)s->Q)[j * quads + q];
+        for (int q = 0; q < quads; q++) c[q] += s->held[j] * A[q];
     for (int e = 0; e < strips; e++) {
         own[e] = path[e * strips] + (first + e == j ? s->slope[j] : 0.0);
         const double moves = s->gain[first + e] * own[e];

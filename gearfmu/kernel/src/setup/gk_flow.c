@@ -1,12 +1,16 @@
 /* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory.md, 3.1 and eq. 9).
  *
- *   exponential where ωh < 1.2: exact flow; trapezoidal above. Force constant in the step, ½(f_n + f_{n+1}) with equal
- * coefficients bq, bv at both ends. σ = sin(ωh)/(ωh), s = σ^(−γ/2), κ = (σ^(−γ) − 1)/ω² (rigid: s = 1, κ = γh²/6): the
- * sampled system then has the exact pole, residue and static value. The scaled row sW of the derivation is carried by
- * bq, bv and κ (each times s²): state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. */
+ *   exponential where ωh < 1.2: exact flow; trapezoidal above, with a step stretched for the mesh mode. Force constant in
+ * the step, ½(f_n + f_{n+1}) with equal coefficients bq, bv at both ends. With p = min(1, 2γ), σ = (sin(ωh)/(ωh))^p,
+ * s² = 1/σ, κ = (1/σ − 1)/ω² (rigid: s = 1, κ = ph²/6): the sampled system then has the exact pole, residue and static
+ * value, and with ζσ for ζ the loss. The scaled row sW of the derivation is carried by bq, bv and κ (each times s²):
+ * state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. A lower γ first takes the stiffest modes out
+ * of the exponential ones, ωh < 1.2γ, and only below ½ weakens the correction. */
 #include "problem/gk_work.h"
 
 static const double EXPONENTIAL_BELOW = 1.2;
+static const double MESH_STIFFNESS = 0.1125; /* over 2(1 − ν²)/(πE) of both gears: 20 N/(mm µm) for steel */
+static const double STRETCHED_MOST = 0.6;    /* of ½Ωh */
 
 typedef struct oscillator {
     double a11, a12, a21, a22, b0q, b0v, bq, bv, mobility, read_q, read_v, kappa, inverse_s2;
@@ -33,12 +37,12 @@ static oscillator free_flow(double omega, double zeta, double h)
     return o;
 }
 
-static oscillator exponential(double omega, double zeta, double h, double gamma)
+static oscillator exponential(double omega, double zeta, double h, double power)
 {
-    oscillator o = free_flow(omega, zeta, h);
     double plain, unused, omega2 = omega * omega;
     gk_sincos(omega * h, &plain, &unused);
-    double sigma = gk_exp(gamma * gk_log(plain / (omega * h)));
+    const double sigma = gk_exp(power * gk_log(plain / (omega * h)));
+    oscillator o = free_flow(omega, zeta * sigma, h);
     o.bq = o.b0q = o.mobility = 0.5 * (1.0 - o.a11) / (omega2 * sigma);
     o.bv = o.b0v = 0.5 * o.a12 / sigma;
     o.kappa = (1.0 / sigma - 1.0) / omega2;
@@ -104,13 +108,51 @@ static void store(gk_flow *f, int i, const oscillator *o)
     f->kappa[i] = (gk_real)o->kappa, f->inverse_s2[i] = (gk_real)o->inverse_s2;
 }
 
+/* Σ centre² over the dynamic ground oscillators: 1/mass that a gear's own motion in row c meets */
+static double mobility_of_centre(const gk_base *base, int g, int c)
+{
+    const double *row = base->centre[g] + c * base->n + base->from[g];
+    return gk_dot_quads(row, row, base->width[g] / 4);
+}
+
+/* rad/s: the highest mesh mode of the engagements, gears as rigid bodies on the mesh stiffness of ISO 6336-1 */
+static double mesh_mode(const gk_model *model, const gk_setup *setup)
+{
+    double highest = 0.0;
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_engagement *engagement = &model->engagement[e];
+        double mobility = 0.0, soft = 0.0;
+        if (engagement->kind == MESH_FLAT) continue;
+        for (int w = 0; w < 2; w++) {
+            const int g = engagement->gear[w];
+            const gk_gear *gear = &model->gear[g];
+            const double turns = setup->inverse_inertia[gear->rotor] + mobility_of_centre(&setup->base, g, 5);
+            mobility += gear->r_b * gear->r_b * turns;
+            mobility += 0.5 * (mobility_of_centre(&setup->base, g, 0) + mobility_of_centre(&setup->base, g, 1));
+            soft += gear->local;
+        }
+        highest = gk_max(highest, sqrt(MESH_STIFFNESS / soft * engagement->width * mobility));
+    }
+    return highest;
+}
+
+/* h tan x/x, x = ½Ωh, Ω: the mesh mode (docs/theory.md, 3.1) */
+static double stretched(const gk_model *model, const gk_setup *setup, double h)
+{
+    const double x = gk_min(0.5 * h * mesh_mode(model, setup), STRETCHED_MOST);
+    double sine, cosine;
+    gk_sincos(x, &sine, &cosine);
+    return x > 0.0 ? h * sine / (cosine * x) : h;
+}
+
 static oscillator oscillator_of(const gk_setup *setup, const gk_coefficients *k, double omega, double zeta)
 {
     const oscillator nothing = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     if (!GK_ON(setup, modal_damping)) zeta = 0.0;
     if (!(omega > 0.0)) return nothing;
-    if (omega * k->h >= EXPONENTIAL_BELOW) return trapezoidal(omega, zeta, k->h);
-    return setup->integrator == MIX4 ? linear_force(omega, zeta, k->h) : exponential(omega, zeta, k->h, k->gamma);
+    if (omega * k->h >= EXPONENTIAL_BELOW * gk_max(k->gamma, 0.5)) return trapezoidal(omega, zeta, k->stretched_h);
+    return setup->integrator == MIX4 ? linear_force(omega, zeta, k->h)
+                                     : exponential(omega, zeta, k->h, gk_correction(k->gamma));
 }
 
 static void fill_gear(const gk_setup *setup, gk_coefficients *k, int g)
@@ -174,11 +216,12 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
     oldest->h = h;
     oldest->gamma = gamma;
     oldest->timeless = 0;
+    oldest->stretched_h = setup->integrator == MIX4 ? h : stretched(model, setup, h);
     oldest->curved_read = setup->integrator == MIX4;
     oldest->rigid_b0 = oldest->curved_read ? h * h / 3.0 : 0.25 * h * h;
     oldest->rigid_bq = oldest->curved_read ? h * h / 6.0 : 0.25 * h * h;
     oldest->rigid_mobility = oldest->curved_read ? h * h / 12.0 : 0.25 * h * h;
-    oldest->rigid_kappa = gamma * h * h / 6.0;
+    oldest->rigid_kappa = gk_correction(gamma) * h * h / 6.0;
     for (int g = 0; g < model->gears; g++) fill_gear(setup, oldest, g);
     fill_ground(model, setup, oldest);
     oldest->age = ++work->clock;

@@ -1,13 +1,13 @@
 /* Which internal step: μ′ = largest eigenvalue of C⁻¹K over the roll positions (docs/theory.md, 3.5), C the compliance
- * that answers at once: outside the paths of the dashpots all of it, in them what the dashpots let move within a step,
- * S(1 + ΓS)⁻¹. Energy is conserved while C′ > 0, that is μ′ < 1. Modes above ωh = 1.2 have no κ, so μ′ goes up and down
- * with h. Default h: the largest with μ′ ≤ ½, at most h_max of the stage and 1/40 of the mesh period at speed_max. Any
- * other h lowers γ until μ′ = ¾ (a lower γ costs more accuracy than a larger μ′); above 1/8 of the period it is
- * refused. */
+ * that a force of alternating sign meets: outside the paths of the dashpots all of it, in them what the dashpots let
+ * move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m). A closed contact is stable up to μ′ = 1. Modes above ωh = 1.2 have no κ, so μ′
+ * goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and 1/40 of the mesh period at
+ * speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "integrate/gk_integrate.h"
 
-static const double MU = 0.5, MU_MOST = 0.75; /* μ′ of the default step; of any other, by γ */
+static const double MU_MOST = 0.9;                        /* μ′ of a step */
+static const double AT_NYQUIST = 2.0 / (1.0 - GK_MEMORY); /* f_d over half of η_d where forces alternate */
 static const double WITHIN = 0.9,
                     BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
 static const double NEAR = 50e-6; /* m: flanks that count as closed */
@@ -66,7 +66,7 @@ static double largest(const double *L, const double *K, int n)
 static void yielding(const double *S, const double *damping, int n, double *X)
 {
     double B[MAX_SLICES * MAX_SLICES];
-    for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * damping[i % n] + (i / n == i % n);
+    for (int i = 0; i < n * n; i++) X[i] = S[i], B[i] = S[i] * AT_NYQUIST * damping[i % n] + (i / n == i % n);
     for (int k = 0; k < n; k++)
         for (int i = 0; i < n; i++) {
             if (i == k) continue;
@@ -80,7 +80,7 @@ static void yielding(const double *S, const double *damping, int n, double *X)
 static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING; }
 
 /* C (n, n): compliance of the massless part with all contacts closed under the line load `full`; with dashpots what
- * answers at once */
+ * yields to a force of alternating sign */
 void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C)
 {
     const int n = s->n, strips = s->strips;
@@ -100,7 +100,8 @@ void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
     }
     for (int i = s->contacts; i < n; i++)
-        if (counts(s, i)) C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? s->damping[i] * s->spring[i] : 0.0));
+        if (counts(s, i))
+            C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? AT_NYQUIST * s->damping[i] * s->spring[i] : 0.0));
 }
 
 /* K (n, n): κ part */
@@ -217,7 +218,7 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work
         for (int i = 0; i < rungs; i++) {
             h = gk_min(ladder[i], limit);
             if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) &&
-                (!corrected || gk_limit_mu(model, setup, work, h, 1.0) <= MU))
+                (!corrected || gk_limit_mu(model, setup, work, h, 1.0) <= MU_MOST))
                 break;
         }
     if (h > period / 8.0) {

@@ -124,12 +124,16 @@ typedef struct gk_ground_flow { /* the same of the ground group */
 
 typedef struct gk_coefficients {
     double h, gamma, rigid_b0, rigid_bq, rigid_mobility, rigid_kappa; /* the same of a free mass */
+    double stretched_h;                                               /* step of the trapezoidal ones */
     int timeless;                                                     /* forces move nothing in the step: D = 0 */
     int curved_read;                                                  /* mix4: the gap reads more than q */
     gk_flow flow[MAX_GEARS];
     gk_ground_flow ground;
     uint64_t age;
 } gk_coefficients;
+
+/* share of the correction κ that a free mass has: γ lowers it below ½ only (gk_flow.c) */
+static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamma); }
 
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
