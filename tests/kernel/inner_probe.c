@@ -2,20 +2,23 @@
  * together with gearfmu/kernel/src. */
 #include "integrate/gk_integrate.h"
 
-/* out: per place {flank, tooth, gap, gradient[6], roll A, roll B, curvature} */
-GK_API int probe_places(const gk_model *model, const gk_setup *setup, const double *pose, double reach, double *out)
+/* planar: x, y, φ of both gears; out: per place {flank, tooth, gap, gradient[6], roll A, roll B, curvature} */
+GK_API int probe_places(const gk_model *model, const gk_setup *setup, const double *planar, double reach, double *out)
 {
     gk_place place[MAX_PAIRS];
     gk_position position[2];
+    double pose[POSE] = {0};
+    for (int c = 0; c < 2 * PLANE; c++) pose[SPACE * (c / PLANE) + c % PLANE] = planar[c];
     int found = gk_flank_find(model, setup, &setup->mesh[0], pose, reach, position, place);
     for (int i = 0; i < found; i++, out += 12) {
+        const gk_point *point = &place[i].point[0];
         out[0] = place[i].flank;
         out[1] = place[i].key.tooth;
         out[2] = place[i].gap;
-        memcpy(out + 3, place[i].gradient, sizeof place[i].gradient);
-        out[9] = place[i].roll[0];
-        out[10] = place[i].roll[1];
-        out[11] = place[i].curvature;
+        for (int c = 0; c < 2 * PLANE; c++) out[3 + c] = point->gradient[SPACE * (c / PLANE) + c % PLANE];
+        out[9] = point->roll[0];
+        out[10] = point->roll[1];
+        out[11] = point->curvature;
     }
     return found;
 }

@@ -18,6 +18,7 @@ from gearfmu.spec.stage import StageSpec
 
 DRIVE = 0
 RZ = 5
+BORE = (0, 1, RZ)
 
 
 @dataclass(frozen=True)
@@ -64,14 +65,15 @@ class Pair:
         return load * (c - 0.5 * a * np.log(beta * load)) if hertz else load * self.secant(rolls)
 
     def compliance(self, rolls: tuple[float, float], slices: int, modes_only: bool = False) -> np.ndarray:
-        """(slices, slices) m/N: te of the bore nodes under slice forces at one tooth of either gear, held by the
-        torques at the bores. modes_only: what the stored modes alone give, Σ N Nᵀ/ω²."""
+        """(slices, slices) m/N: te of the bore nodes under slice forces at one tooth of either gear, the bores held by
+        torques and forces there. modes_only: what the stored modes alone give, Σ N Nᵀ/ω²."""
         total = np.zeros((slices, slices))
         for body, roll in zip(self.bodies, rolls, strict=True):
             weights = slice_weights(slices, body.flank_rows.shape[2])
             flank, cross, bore = (_modal if modes_only else _static)(body, roll)
-            side = body.r_b * (weights @ cross)
-            total += weights @ flank @ weights.T - side[:, None] - side[None, :] + body.r_b**2 * bore
+            held = np.append(-_normal(body, roll), -body.r_b)  # force x, y and moment at the bore per unit slice force
+            side = weights @ cross @ held
+            total += weights @ flank @ weights.T + side[:, None] + side[None, :] + held @ bore @ held
         return total
 
     def te(self, position: float, torque: float, hertz: bool = True, elastic: np.ndarray | None = None) -> float:
@@ -156,17 +158,23 @@ def _at(body: ReducedBody, roll: float, values: np.ndarray) -> np.ndarray:
     return np.asarray(BarycentricInterpolator(body.roll, values)(roll))
 
 
-def _static(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """(A, A) of a tooth's drive flank with itself, (A,) with the bore's rotation, rotation with itself, per N and
-    N·m."""
+def _normal(body: ReducedBody, roll: float) -> np.ndarray:
+    """Outward normal (x, y) of the drive flank of tooth 0."""
+    t = body.psi_b - roll / body.r_b
+    return np.array([-math.sin(t), math.cos(t)])
+
+
+def _static(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(A, A) of a tooth's drive flank with itself, (A, 3) with the bore's x, y and rotation, (3, 3) of the bore, per N
+    and N·m."""
     flank = _at(body, roll, _at(body, roll, body.static_ff[DRIVE, DRIVE, 0]))
-    return flank, _at(body, roll, body.static_fb[DRIVE, :, :, RZ]), float(body.static_bb[RZ, RZ])
+    return flank, _at(body, roll, body.static_fb[DRIVE][:, :, BORE]), body.static_bb[np.ix_(BORE, BORE)]
 
 
-def _modal(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, float]:
+def _modal(body: ReducedBody, roll: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rows = _at(body, roll, body.flank_rows[DRIVE]) / (2 * math.pi * body.frequency)
-    bore = body.bore_rows[RZ] / (2 * math.pi * body.frequency)
-    return rows @ rows.T, rows @ bore, float(bore @ bore)
+    bore = body.bore_rows[list(BORE)] / (2 * math.pi * body.frequency)
+    return rows @ rows.T, rows @ bore.T, bore @ bore.T
 
 
 def cut_near(body: ReducedBody, wish: float) -> float:

@@ -263,10 +263,12 @@ static int modes_at_level(const gk_model *model, gk_level level, int g)
     }
 }
 
-/* what moves rigidly is dynamic at every level; of the rest what lies below the cut */
+/* what moves rigidly is dynamic at every level; of the rest what lies below the cut. Rigid gears whose bores are held do
+ * not move. */
 static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
 {
     const gk_ground *ground = &model->ground[setup->base.set];
+    if (!setup->on.elastic && !setup->on.bearings) return 0;
     if (ground->rigid_share[k] > 0.5) return 1;
     if (!setup->on.elastic || setup->level == LEVEL_RIGID) return 0;
     if (setup->level != LEVEL_FAST && setup->level != LEVEL_STANDARD) return 1;
