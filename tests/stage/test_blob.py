@@ -7,7 +7,7 @@ import hashlib
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
@@ -34,6 +34,7 @@ values = st.one_of(
 )
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])  # on a busy machine the first draw takes seconds
 @given(st.dictionaries(names, values, max_size=8))
 def test_what_is_written_is_read_back(sections: dict) -> None:
     blob = write_blob(sections)

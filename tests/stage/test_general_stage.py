@@ -118,7 +118,9 @@ def test_teeth_touch_in_every_engagement_at_angle_zero(train):
     phases = tooth_phases(train)
     assert phases["wheel1"] == PairGeometry.of(SimpleNamespace(
         gears=(train.bodies["pinion1"], train.bodies["wheel1"]),
-        pair=SimpleNamespace(normal_module=0.0045, pressure_angle=math.radians(20), center_distance=A, backlash=1e-4),
+        pair=SimpleNamespace(
+            normal_module=0.0045, pressure_angle=math.radians(20), helix_angle=0.0, center_distance=A, backlash=1e-4
+        ),
     )).wheel_phase  # fmt: skip
     for mesh in train.engagements:
         pair = mesh_geometry(train, mesh)

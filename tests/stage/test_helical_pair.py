@@ -224,12 +224,13 @@ def test_transmission_error_is_smooth_without_a_filter(
 
 
 def test_energy_is_kept_in_motion(demo: SimpleNamespace) -> None:
-    """Half a pitch per 10 steps, relief and crowning as shipped, 5 ms; the balance of the undamped pair closes."""
+    """Relief and crowning as shipped, no damping but the bearings': of the energy that passes through, what the balance
+    leaves."""
     model = assemble(demo.spec, demo.bodies)
     run = steady(model, **{"effect.contact_damping": 0.0, "effect.modal_damping": 0.0})
-    stored, left = run["energy.stored"], run["energy.residual"]
-    print(f"stored {stored[-1]:.3f} J, left {np.abs(left).max():.2e} J")
-    assert np.abs(left).max() < 1e-4 * stored.max()
+    left, through = np.abs(run["energy.residual"]).max(), TORQUE * SPEED * 10 * 2 * math.pi / 23 / SPEED
+    print(f"{through:.0f} J passed through, left {left:.2e} J")
+    assert left < 1e-5 * through
     assert run["mesh.force_mean"].mean() == pytest.approx(
         TORQUE / (demo.pair.gears[0].r_b * math.cos(demo.pair.gears[0].beta_b)), rel=5e-3
     )

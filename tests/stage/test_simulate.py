@@ -72,10 +72,11 @@ def test_work_is_accounted_for(steady: Trace) -> None:
     assert np.ptp(change) < 1e-9 * stored.max()
 
 
-@pytest.mark.parametrize(("level", "modes"), [(0, 0), (1, 77), (2, 137), (3, 400), (4, 400)])
+@pytest.mark.parametrize(("level", "modes"), [(0, 4), (1, 74), (2, 144), (3, 404), (4, 404)])
 def test_every_level_runs_and_carries_the_load(relieved: StageModel, level: int, modes: int) -> None:
-    """Levels rigid, fast, standard, full, paper at their default integrator and step; modes of both gears. Half of the
-    799 stored ones are antisymmetric about mid-width: no symmetric load excites them, the model leaves them out."""
+    """Levels rigid, fast, standard, full, paper at their default integrator and step; modes of both gears and four of
+    the gears on their bearings. Half of the 799 stored ones are antisymmetric about mid-width: no symmetric load
+    excites them, the model leaves them out."""
     trace = simulate(relieved, Steady(relieved, SPEED, LOAD), 4e-3, H, {"level": level})
     assert trace.meta["outcome"] == "completed" and trace.meta["n_dyn"] == modes
     force, expected = trace["mesh.force_mean"][1:].mean(), LOAD / PairGeometry.of(relieved.spec).gears[0].r_b
@@ -135,9 +136,10 @@ def test_saved_state_goes_on_with_the_same_bits(relieved: StageModel) -> None:
         assert go_on(kernel, 40, 90) == wanted and kernel.save() == end
 
 
-@pytest.mark.parametrize("level, drift", [(RIGID, 1e-9), (FAST, 2e-5)])
+@pytest.mark.parametrize("level, drift", [(RIGID, 2e-7), (FAST, 2e-5)])
 def test_standstill_under_load_stays_at_rest(relieved: StageModel, level: int, drift: float) -> None:
-    """The static start is the equilibrium of the step; modal states of single precision hold it to their rounding."""
+    """The static start is the equilibrium of the step; rows and modal states of single precision hold it to their
+    rounding."""
     trace = simulate(relieved, Steady(relieved, 0.0, LOAD), 0.01, H, {"level": level})
     for channel in ("mesh.force", "mesh.te", "bearing.pinion.fy", "bearing.wheel.fy", "pinion.tau", "wheel.tau"):
         values = trace[channel]

@@ -21,7 +21,7 @@ LOAD = 302.0  # N·m
 LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
 UNDAMPED = {"effect.hertz": 0.0, "effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 LADDER = np.array([0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 7.5]) * 1e-6  # s: the steps the kernel looks at
-MU, MU_MOST = 0.5, 0.75  # of the default step; of any other, by γ
+MU = 0.9  # of the default step, and of any other by γ
 STEPS = 1500
 
 
@@ -50,7 +50,7 @@ def standing(library: Path, model: StageModel, level: int, h: float) -> tuple[st
     return "ok", np.array(te)
 
 
-@pytest.mark.parametrize("level", ["rigid", "fast", "standard"])
+@pytest.mark.parametrize("level", ["fast", "standard"])
 def test_both_sides_of_the_limit(library: Path, relieved: StageModel, level: str) -> None:
     """μ′ is the worst over the pitch: where the pair stands the limit may lie some way beyond 1."""
     number = LEVELS[level]
@@ -86,7 +86,7 @@ def test_a_larger_step_lowers_gamma_with_a_warning_and_keeps_the_limit(library: 
         found = re.search(r"gamma lowered to (\d\.\d+)", inner.kernel.warning)
         assert found and "smaller h" in inner.kernel.warning
         told.append(float(found[1]))
-        assert inner.mu(h, 1.0) > MU_MOST and inner.mu(h, told[-1] - 0.01) <= MU_MOST
+        assert inner.mu(h, 1.0) > MU and inner.mu(h, told[-1] - 0.01) <= MU
     assert all(0 <= b < a < 0.7 for a, b in zip(told, told[1:], strict=False))
 
 

@@ -138,6 +138,15 @@ static const gk_row *listed(const gk_model *model, int index, int *instance)
     return NULL;
 }
 
+/* tilts and moments of a support have units of their own */
+static const char *unit_of(const gk_model *model, const gk_row *row, int instance)
+{
+    if (row->scope != SCOPE_SUPPORT) return row->unit;
+    const char *direction = strrchr(model->support_name[instance], '.');
+    if (!direction || direction[1] != 'm') return row->unit;
+    return strcmp(row->unit, "N") ? "rad" : "N.m";
+}
+
 gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
 {
     int instance;
@@ -148,7 +157,7 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
     info->type = row->type;
     info->causality = row->causality;
     expand(info->name, sizeof info->name, model, row, instance);
-    copy(info->unit, sizeof info->unit, row->unit);
+    copy(info->unit, sizeof info->unit, unit_of(model, row, instance));
     copy(info->items, sizeof info->items, row->items);
     copy(info->description, sizeof info->description, row->description);
     info->start = start_of(model, row, instance);

@@ -3,7 +3,9 @@
  * the gaps. */
 #include "problem/gk_system.h"
 
-enum { ENERGY_LIMIT = 12 };
+#ifndef GK_ENERGY_LIMIT /* rounds of the search for α; a test builds a kernel with none */
+#define GK_ENERGY_LIMIT 12
+#endif
 static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
 #ifdef GK_DOUBLE_MODES
 static const double STEADY_BALANCE = 1e-9;
@@ -161,7 +163,7 @@ static double root_of(const balance *b)
 static int find_alpha(const gk_island *island, balance b)
 {
     double p[MAX_STRIDE], dash[MAX_STRIDE];
-    for (int round = 0; round < ENERGY_LIMIT; round++) {
+    for (int round = 0; round < GK_ENERGY_LIMIT; round++) {
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
             sensitivity(s, s->along, dash);

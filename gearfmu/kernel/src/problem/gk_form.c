@@ -92,7 +92,7 @@ static int list_runs(const gk_engaged *engaged, int strips, run runs[MAX_PAIRS])
 
 typedef struct row_source { /* a row of the tables of one side: at two neighbouring nodes, with their weights */
     const gk_real *Q, *next_Q, *D, *next_D;
-    double low, high, square_low, mixed, square_high;
+    double square_low, mixed, square_high;
     size_t columns;
 } row_source;
 
@@ -103,17 +103,16 @@ static row_source source_of(const gk_setup *setup, const gk_engaged *engaged, co
     const size_t columns = (size_t)side->columns, points = (size_t)(side->candidates * GK_STRIPS(setup));
     const size_t row = (size_t)at->node * points + (size_t)point;
     const double x = at->part, y = 1.0 - x;
-    row_source s = {.low = y, .high = x, .square_low = y * y, .mixed = x * y, .square_high = x * x, .columns = columns};
-    s.Q = side->residual + row * columns, s.next_Q = s.Q + points * columns;
+    row_source s = {.square_low = y * y, .mixed = x * y, .square_high = x * x, .columns = columns};
+    s.Q = side->residual + row * 2 * columns, s.next_Q = s.Q + points * 2 * columns;
     s.D = moves ? moves + row * 4 * columns : NULL, s.next_D = moves ? s.D + points * 4 * columns : NULL;
     return s;
 }
 
 #define WIDENED(values) GK_WIDENED(*(const gk_four *)(values))
-#define LINEAR(s, at) ((s).low * WIDENED((s).Q + (at)) + (s).high * WIDENED((s).next_Q + (at)))
-#define SQUARE(s, at)                                                                                                  \
-    ((s).square_low * WIDENED((s).D + (at)) + (s).mixed * WIDENED((s).D + (at) + (s).columns) +                        \
-     (s).square_high * WIDENED((s).next_D + (at)))
+#define SQUARE(s, table, at)                                                                                           \
+    ((s).square_low * WIDENED((s).table + (at)) + (s).mixed * WIDENED((s).table + (at) + (s).columns) +                \
+     (s).square_high * WIDENED((s).next_##table + (at)))
 
 /* a row of D, −K and Q between the contacts; moves 0: of Q alone. What a quad writes beyond a run the next run writes
  * again. */
@@ -125,10 +124,10 @@ static void table_row(const row_source source[2], const run *runs, int count, in
         for (int c = 0; c < runs[r].count; c += 4) {
             const size_t a = (size_t)(runs[r].point[0] + c), b = (size_t)(runs[r].point[1] + c);
             const int to = runs[r].column + c;
-            *(gk_quad *)(Q + to) = LINEAR(p, a) + LINEAR(q, b);
+            *(gk_quad *)(Q + to) = SQUARE(p, Q, a) + SQUARE(q, Q, b);
             if (!moves) continue;
-            *(gk_quad *)(D + to) = SQUARE(p, a) + SQUARE(q, b);
-            *(gk_quad *)(A + to) = SQUARE(p, a + 2 * p.columns) + SQUARE(q, b + 2 * q.columns);
+            *(gk_quad *)(D + to) = SQUARE(p, D, a) + SQUARE(q, D, b);
+            *(gk_quad *)(A + to) = SQUARE(p, D, a + 2 * p.columns) + SQUARE(q, D, b + 2 * q.columns);
         }
 }
 

@@ -100,7 +100,7 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->rows = reals(b, points * (size_t)setup->modal[side->gear].n);
     side->ground = doubles(b, points * (size_t)setup->base.n);
     side->columns = (int)((C * strips + 3) / 4 * 4 + 4);
-    side->residual = reals(b, nodes * C * strips * (size_t)side->columns);
+    side->residual = reals(b, 2 * nodes * C * strips * (size_t)side->columns);
     side->path = doubles(b, points * strips);
     side->port = doubles(b, points);
     side->support = doubles(b, points * (size_t)model->supports);

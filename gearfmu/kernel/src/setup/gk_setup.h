@@ -81,11 +81,13 @@ typedef struct gk_side {
     gk_real *rows;           /* (nodes + 1, candidates, strips, n) */
     double *ground;          /* (nodes + 1, points, width of the gear): what ground oscillators displace outward, beside
                                rigid motion, at the nominal place of contact */
-    gk_real *residual; /* (nodes + 1, points, columns): C of what is not dynamic; points: strips of the candidates */
-    double *path;      /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
-    double *port;      /* (nodes + 1, candidates, strips): residual between flank and bore angle */
-    double *support;   /* (nodes + 1, candidates, strips, supports): force on supports beside the oscillators' */
-    gk_real *far; /* (nodes + 1, points, far): outward, of every ground oscillator that is not dynamic over Ω, then
+    gk_real
+        *residual; /* (nodes + 1, points, 2, columns): C of what is not dynamic at the node, and mixed with the next, so
+                          that the whole of C is a parabola between nodes at every level; points: strips of the candidates */
+    double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
+    double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
+    double *support; /* (nodes + 1, candidates, strips, supports): force on supports beside the oscillators' */
+    gk_real *far;    /* (nodes + 1, points, far): outward, of every ground oscillator that is not dynamic over Ω, then
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
 } gk_side;
 

@@ -330,30 +330,50 @@ static void flexibility_of_still(const node *n, double *still)
     }
 }
 
-/* the residual between two candidates, and of a tooth with itself what no stored mode carries: what its damper is
- * parallel to */
-static void store_block(const node *n, int at, const double *still, int p, int q)
+/* Σ a b/ω² over the dynamic modes, rows halfway to the next node as the step interpolates them */
+static double carried_halfway(const node *n, int at, int i, int j)
+{
+    const gk_modal *m = &n->setup->modal[n->side->gear];
+    const gk_real *rows = n->side->rows + (size_t)at * n->points * m->n, *next = rows + (size_t)n->points * m->n;
+    const gk_real *a = rows + (size_t)i * m->n, *c = next + (size_t)i * m->n;
+    const gk_real *b = rows + (size_t)j * m->n, *d = next + (size_t)j * m->n;
+    double lane[4] = {0, 0, 0, 0};
+    for (int k = 0; k < m->n; k++)
+        if (m->omega2[k] > 0) lane[k % 4] += 0.25 * ((double)a[k] + c[k]) * ((double)b[k] + d[k]) / m->omega2[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+
+/* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its damper
+ * is parallel to. Halfway to the next node: what makes the parabola there right. */
+static void store_block(const node *n, int at, int halfway, const double *still, int p, int q)
 {
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
-    gk_real *table = side->residual + (size_t)at * n->points * side->columns;
+    const size_t columns = (size_t)side->columns, size = 2 * (size_t)n->points * columns;
+    gk_real *table = side->residual + (size_t)at * size;
     double cell[MAX_BLOCK];
     const int near = tabulated(n, p, q, cell);
     for (int c = 0; c < square; c++) {
         const int i = p * strips + c / strips, j = q * strips + c % strips;
-        const double stored = carried(n, i, j, n->gear->modes);
-        if (p == q) side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
-        const double all = near ? cell[c] : stored;
+        const size_t here = 2 * (size_t)i * columns + (size_t)j, mirrored = 2 * (size_t)j * columns + (size_t)i;
+        const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
         const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, i, j, still);
-        const gk_real value = (gk_real)(all - carried(n, i, j, dynamic) + ground);
-        table[(size_t)i * side->columns + j] = table[(size_t)j * side->columns + i] = value;
+        const double all = (near ? cell[c] : stored) + ground;
+        if (halfway) {
+            const double middle = all - carried_halfway(n, at, i, j);
+            table[here + columns] = table[mirrored + columns] = (gk_real)(4.0 * middle - table[here] -
+                                                                          table[here + size]);
+            continue;
+        }
+        if (p == q) side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
+        table[here] = table[mirrored] = (gk_real)(all - carried(n, i, j, dynamic));
     }
 }
 
-static void store_residual(const node *n, int at, const double *still)
+static void store_residual(const node *n, int at, int halfway, const double *still)
 {
     for (int p = 0; p < n->side->candidates; p++)
-        for (int q = p; q < n->side->candidates; q++) store_block(n, at, still, p, q);
+        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, still, p, q);
 }
 
 /* flank to bore angle and to supports, beside what dynamic oscillators carry */
@@ -486,14 +506,18 @@ void gk_side_fill(const gk_model *model, const gk_setup *setup, gk_work *work, i
         gather_node(&n, (double)at / side->nodes);
         store_rows(&n, at);
         if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
-        if (setup->on.residual) store_residual(&n, at, still);
+        if (setup->on.residual) store_residual(&n, at, 0, still);
         if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, still);
         if (setup->far && setup->on.residual) store_far(&n, at, still);
+    }
+    for (int at = 0; at < side->nodes && setup->on.residual; at++) {
+        gather_node(&n, (at + 0.5) / side->nodes);
+        store_residual(&n, at, 1, still);
     }
     if (!setup->on.elastic || n.e->kind == MESH_FLAT)
         memset(side->ground, 0, nodes * points * (size_t)setup->base.width[side->gear] * sizeof *side->ground);
     if (!setup->on.residual) {
-        memset(side->residual, 0, nodes * points * (size_t)side->columns * sizeof(gk_real));
+        memset(side->residual, 0, 2 * nodes * points * (size_t)side->columns * sizeof(gk_real));
         memset(side->path, 0, nodes * points * (size_t)setup->strips * sizeof *side->path);
     }
     if (!setup->on.residual) memset(side->far, 0, nodes * points * (size_t)setup->far * sizeof *side->far);
