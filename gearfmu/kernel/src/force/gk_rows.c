@@ -138,7 +138,7 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
     }
     for (int i = s->contacts; i < s->n; i++)
         if (gk_rows_at_bore(setup, s, i))
-            read[i] = gk_dot_quads(base->port_rows + s->port_of[i] * base->n, ground, base->n / 4);
+            read[i] = gk_dot_span(base->port_span[s->port_of[i]], base->port_rows + s->port_of[i] * base->n, ground);
 }
 
 /* what the rows of an engagement read of displacements of the ground group, rigid motion included */
@@ -155,7 +155,7 @@ void gk_rows_read_ground(const gk_model *model, const gk_setup *setup, const gk_
     }
     for (int i = s->contacts; i < s->n; i++)
         if (gk_rows_at_bore(setup, s, i))
-            read[i] = gk_dot_quads(base->port_rows + s->port_of[i] * base->n, ground, base->n / 4);
+            read[i] = gk_dot_span(base->port_span[s->port_of[i]], base->port_rows + s->port_of[i] * base->n, ground);
     gk_rows_read_rigid(model, setup, engaged, e, ground, read);
 }
 
@@ -272,7 +272,7 @@ void gk_rows_push_ground(const gk_model *model, const gk_setup *setup, const gk_
     }
     for (int i = s->contacts; i < s->n; i++)
         if (x[i] != 0.0 && gk_rows_at_bore(setup, s, i))
-            gk_axpy(x[i], base->port_rows + s->port_of[i] * base->n, out, 0, base->n / 4);
+            gk_axpy_span(base->port_span[s->port_of[i]], x[i], base->port_rows + s->port_of[i] * base->n, out);
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */

@@ -76,9 +76,10 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
     double taken = 0.0;
     for (int d = 0; d < model->dampers; d++) {
         const double *e = setup->base.damper_rows + d * n, *pulls = k->ground.pulls + d * n;
-        const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_quads(e, v, n / 4) : 0.0;
+        const gk_span span = setup->base.damper_span[d];
+        const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_span(span, e, v) : 0.0;
         if (speed == 0.0) continue;
-        gk_axpy(-decay * speed, pulls, v, 0, n / 4);
+        gk_axpy_span(span, -decay * speed, pulls, v);
         taken += 0.5 * decay * (2.0 - decay) * speed * speed / k->ground.mass[d];
     }
     return taken;

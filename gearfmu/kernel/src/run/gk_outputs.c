@@ -65,9 +65,10 @@ static void support_forces(const gk_model *model, const gk_setup *setup, const g
     double moved[MAX_GROUND + 4];
     for (int i = 0; i < n; i++) moved[i] = x[i] - k->ground.kappa[i] * f[i];
     for (int s = 0; s < supports; s++) {
-        out[s] = n ? gk_dot_quads(base->support_rows + s * n, moved, n / 4) : 0.0;
+        out[s] = n ? gk_dot_span(base->support_span[s], base->support_rows + s * n, moved) : 0.0;
         if (s < model->dampers && n)
-            out[s] += model->ground[base->set].damper[s] * gk_dot_quads(base->damper_rows + s * n, v, n / 4);
+            out[s] += model->ground[base->set].damper[s] *
+                      gk_dot_span(base->damper_span[s], base->damper_rows + s * n, v);
     }
     for (int e = 0; e < model->engagements; e++) {
         const gk_engaged *engaged = &work->engaged[e];
@@ -82,7 +83,8 @@ static void support_forces(const gk_model *model, const gk_setup *setup, const g
                                                      (size_t)(candidate * setup->strips + i % setup->strips)) *
                                                         supports;
                 const double *high = low + (size_t)points * supports;
-                for (int s = 0; s < supports; s++) out[s] -= force * (low[s] + at->part * (high[s] - low[s]));
+                for (int s = side->held.from; s < side->held.from + side->held.width; s++)
+                    out[s] -= force * (low[s] + at->part * (high[s] - low[s]));
             }
         for (int i = system->contacts; i < system->n; i++)
             if (gk_rows_at_bore(setup, system, i))

@@ -347,6 +347,14 @@ static void fill_centre(const gk_model *model, gk_base *base, int g)
     base->width[g] = from < to ? (to + 3) / 4 * 4 - base->from[g] : 0;
 }
 
+static gk_span span_of(const double *row, int n)
+{
+    int from = n, to = 0;
+    for (int k = 0; k < n; k++)
+        if (row[k] != 0.0) from = k < from ? k : from, to = k + 1;
+    return from < to ? (gk_span){from / 4 * 4, (to + 3) / 4 * 4 - from / 4 * 4} : (gk_span){0, 0};
+}
+
 static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *which)
 {
     gk_base *base = &setup->base;
@@ -368,6 +376,10 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
                 sum += ground->kappa[s * model->supports + t] * ground->support_rows[t * ground->n + which[k]];
             base->support_rows[s * base->n + k] = sum;
         }
+    for (int d = 0; d < model->dampers; d++) base->damper_span[d] = span_of(base->damper_rows + d * base->n, base->n);
+    for (int s = 0; s < model->supports; s++)
+        base->support_span[s] = span_of(base->support_rows + s * base->n, base->n);
+    for (int p = 0; p < model->ports; p++) base->port_span[p] = span_of(base->port_rows + p * base->n, base->n);
     for (int g = 0; g < model->gears; g++) fill_centre(model, base, g);
 }
 

@@ -55,15 +55,20 @@ typedef struct gk_modal { /* dynamic modes of a gear group: n lanes, [first memb
     gk_real *cosine, *sine; /* (z, pairs) */
 } gk_modal;
 
+typedef struct gk_span { /* the part of a row that is not zero, quads-aligned */
+    int from, width;
+} gk_span;
+
 typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by rotor, each padded to quads */
     int set, n, count;
     int32_t *which; /* (n) their numbers in the model, −1: padding */
     int32_t *slot;  /* (all ground oscillators of the set) place among the dynamic ones, −1: not dynamic */
-    double *omega, *zeta, *omega2;         /* (n), 0 in padding */
-    double *damper_rows;                   /* (dampers, n) */
-    double *support_rows;                  /* (supports, n): force on the support, kappa included */
-    double *port_rows;                     /* (ports, n) */
-    double *centre[MAX_GEARS];             /* (6, n): rigid motion of every gear at its mid-width */
+    double *omega, *zeta, *omega2; /* (n), 0 in padding */
+    double *damper_rows;           /* (dampers, n) */
+    double *support_rows;          /* (supports, n): force on the support, kappa included */
+    double *port_rows;             /* (ports, n) */
+    double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
+    gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], port_span[MAX_PORTS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
 } gk_base;
 
@@ -87,6 +92,7 @@ typedef struct gk_side {
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
     double *support; /* (nodes + 1, candidates, strips, supports): force on supports beside the oscillators' */
+    gk_span held;    /* the supports among them that this side loads */
     gk_real *far;    /* (nodes + 1, points, far): outward, of every ground oscillator that is not dynamic over Ω, then
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
 } gk_side;
@@ -200,5 +206,14 @@ const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
+/* Σ of a row over its span, and its multiple added there */
+static inline double gk_dot_span(gk_span span, const double *row, const double *x)
+{
+    return gk_dot_quads(row + span.from, x + span.from, span.width / 4);
+}
+static inline void gk_axpy_span(gk_span span, double f, const double *row, double *y)
+{
+    gk_axpy(f, row, y, span.from / 4, (span.from + span.width) / 4);
+}
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out);
 #endif

@@ -494,10 +494,20 @@ static node begin_node(const gk_model *model, const gk_setup *setup, double *roo
     return n;
 }
 
-/* tables of a side that the level decides */
-void gk_side_fill(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which)
+/* the supports that any point of the tables loads */
+static gk_span held_by(const double *support, size_t points, int supports)
 {
-    const gk_side *side = &setup->mesh[e].side[which];
+    int from = supports, to = 0;
+    for (size_t i = 0; i < points; i++)
+        for (int s = 0; s < supports; s++)
+            if (support[i * (size_t)supports + (size_t)s] != 0.0) from = s < from ? s : from, to = s >= to ? s + 1 : to;
+    return from < to ? (gk_span){from, to - from} : (gk_span){0, 0};
+}
+
+/* tables of a side that the level decides */
+void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which)
+{
+    gk_side *side = &setup->mesh[e].side[which];
     node n = begin_node(model, setup, work->columns, e, side);
     double still[MAX_GROUND];
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
@@ -525,6 +535,7 @@ void gk_side_fill(const gk_model *model, const gk_setup *setup, gk_work *work, i
         memset(side->port, 0, nodes * points * sizeof *side->port);
         memset(side->support, 0, nodes * points * (size_t)model->supports * sizeof *side->support);
     }
+    side->held = held_by(side->support, nodes * points, model->supports);
 }
 
 /* Σ a b over modes between all points: rows of one node, and mixed with those of the next (NULL: none) */
