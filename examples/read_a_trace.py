@@ -19,7 +19,8 @@ spectrum = amplitude_spectrum(force, sample_step(settled.time))
 top = int(spectrum.amplitude.argmax())
 print(f"highest line: {level(spectrum.amplitude[top]):.1f} dB re 1 N at {spectrum.frequency[top]:.0f} Hz")
 
-angle = mesh_angle(settled.time, settled["pinion.gear.w"], trace.meta["teeth"]["pinion"])
+rotor, teeth = trace.meta["meshes"]["mesh"]
+angle = mesh_angle(settled.time, settled[f"{rotor}.gear.w"], teeth)
 cuts = order_cuts(settled.time, force, angle, orders=5)
 for order, amplitude in zip(cuts.orders, cuts.amplitude, strict=True):
     print(

@@ -138,7 +138,7 @@ def test_simulate_writes_the_same_kind_of_trace(tmp_path: Path) -> None:
         tmp_path,
     )
     trace = Trace.load(tmp_path / "trace.h5")
-    assert trace.meta["level"] == "rigid" and trace.meta["n_dyn"] == 0 and trace.time[-1] == pytest.approx(5e-3)
+    assert trace.meta["level"] == "rigid" and trace.meta["n_dyn"] == 4 and trace.time[-1] == pytest.approx(5e-3)
 
 
 @pytest.mark.full

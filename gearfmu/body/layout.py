@@ -86,8 +86,8 @@ def _static_entries() -> tuple[Entry, ...]:
             (2, 2, "M", "R", "R", "A", "A"),
             "m/N",
             "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, "
-            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2 (of "
-            "a helical gear 0 … K), the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2, or "
+            "0 … K where more do not fit, the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
         ),
         Entry(
             "static/c_fb",

@@ -67,6 +67,7 @@ def lead_section(index: int, gear: GearSpec) -> dict[str, np.ndarray]:
 
 
 def mismatches(gear: GearSpec, shape: GearGeometry, body: Any) -> list[str]:
+    """What says that a reduced body is not that of a gear, one sentence each; empty when it is."""
     pairs = {
         "teeth": (gear.teeth, body.teeth),
         "base radius": (shape.r_b, body.r_b),

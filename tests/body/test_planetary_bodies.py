@@ -177,7 +177,7 @@ def test_a_set_is_reduced_whole_and_left_alone_when_it_is_current(carrier, tmp_p
 
 def test_pair_functions_refuse_a_set():
     for function in (load_stage_bodies, reduce_stage):
-        with pytest.raises(SpecError, match="this needs a pair"):
+        with pytest.raises(SpecError, match="this is about one pair"):
             function(SPEC)
 
 

@@ -59,7 +59,7 @@ def test_the_whole_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         (("fzg_c", "--body", "pinion", "--torque", "1 N*m"), 100, "know no torque"),
         (("fzg_c", "--torque", "0 N*m"), 100, "must be above 0"),
         (("fzg_c", "--torque", "302"), 100, "--torque"),
-        (("planetary54",), 1, "this needs a pair"),
+        (("planetary54",), 1, "this is about one pair"),
     ],
 )
 def test_messages(
