@@ -29,9 +29,6 @@
 #define gk_rows_read_rigid gk_rows_read_rigid_avx2
 #define gk_rows_scatter gk_rows_scatter_avx2
 #define gk_side_step gk_side_step_avx2
-#define gk_side_fill gk_side_fill_avx2
-#define gk_side_plan gk_side_plan_avx2
-#define gk_side_scratch gk_side_scratch_avx2
 #define gk_form_system gk_form_system_avx2
 #define gk_form_rates gk_form_rates_avx2
 #define gk_law_set gk_law_set_avx2
@@ -47,7 +44,6 @@
 #define gk_rows_push_ground gk_rows_push_ground_avx2
 #define gk_rows_read_far gk_rows_read_far_avx2
 #define gk_rows_push_far gk_rows_push_far_avx2
-#define gk_side_port_far gk_side_port_far_avx2
 #define gk_solve_settle gk_solve_settle_avx2
 #define gk_solve_status gk_solve_status_avx2
 #define gk_solve_times gk_solve_times_avx2
@@ -73,7 +69,7 @@
 #include "force/gk_flank.c"
 #include "force/gk_still.c"
 #include "force/gk_rows.c"
-#include "setup/gk_side.c"
+#include "setup/gk_moves.c"
 #include "problem/gk_form.c"
 #include "problem/gk_tangent.c"
 #include "problem/gk_solve.c"

@@ -104,6 +104,7 @@ size_t gk_side_scratch(const gk_model *model);
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
 void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *work, int port);
+/* gk_moves.c */
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 /* gk_rows.c */
 void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
