@@ -40,7 +40,7 @@ from gearfmu.spec.general import GeneralStage, gear_as_pair
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.stage import StageSpec, require_pair
 
-FRF_CUT = 120e3  # Hz, the cut of level `standard` (DESIGN 4.6)
+FRF_CUT = 120e3  # Hz, the cut of level `standard`
 
 Progress = Callable[[str, float], None]
 Geometry = GearGeometry | InternalGearGeometry

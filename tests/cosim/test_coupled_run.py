@@ -56,7 +56,7 @@ def test_two_runs_give_the_same_bits():
 
 @pytest.mark.parametrize(("name", "low", "high"), [("gs_mean", 0.8, 1.3), ("jacobi", 0.8, 1.3)])
 def test_richardson_predicts_the_true_coupling_error(name, low, high):
-    """Estimated over true error of the shaft's torque, against the uncut equations; FINDINGS of prototypes: 0.8–1.1."""
+    """Estimated over true error of the shaft's torque, against the uncut equations; prototypes: 0.8–1.1."""
     coarse, fine = run_coupled(cut(), plan(name)), run_coupled(cut(), plan(name, 1e-4))
     estimate = coupling_errors(coarse.trace, fine.trace, coarse.order, Window(0.0, steady=False))["input.tau"].relative
     unit = PyUnit(CLOSURE.monolithic(), CLOSURE.micro_step)

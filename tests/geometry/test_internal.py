@@ -74,7 +74,7 @@ def test_area_and_polar_moment_are_those_of_the_outline():
 
 
 def test_planet_and_ring_touch_where_the_gap_vanishes():
-    """s_ring = s_planet + L: the two flank points coincide, with opposite normals (DESIGN: internal pair)."""
+    """s_ring = s_planet + L: the two flank points coincide, with opposite normals."""
     mesh = SET.ring_mesh
     t = -math.acos((mesh.ring.r_b - mesh.planet.r_b) / mesh.a)  # direction of the tangent points, planet on +x, sg = +1
     for s in np.linspace(mesh.path["A"], mesh.path["E"], 7):
