@@ -1,20 +1,21 @@
 /* What the rows of an engagement read of the oscillators, and what their forces do to them. A contact's row on a gear
  * group is the interpolated row of its candidate, for the reference tooth 0: the group's state is turned to the
  * reference tooth before it is read, and its force turned back (docs/theory.md, eq. 3). On the ground group a row is
- * minus the outward displacement of both gears plus the gap's gradient times their rigid motion. */
+ * minus the outward displacement of both gears plus the gap's gradient times their rigid motion; it is kept over the
+ * oscillators that the two gears read, those of gear A first. */
 #include "problem/gk_work.h"
-
-static const int RIGID_ROW[SPACE] = {0, 1, 5, 2, 3, 4}; /* of a pose among the rows of a gear's rigid motion */
 
 /* rigid motion of both gears of an engagement by displacements (or speeds) of the ground group */
 static void read_rigid(const gk_model *model, const gk_setup *setup, int e, const double *ground, double rigid[POSE])
 {
     const gk_base *base = &setup->base;
+    memset(rigid, 0, POSE * sizeof *rigid);
     for (int w = 0; w < 2; w++) {
-        const int g = model->engagement[e].gear[w], from = base->from[g], quads = base->width[g] / 4;
-        for (int c = 0; c < gk_directions(setup); c++)
-            rigid[SPACE * w + c] = gk_dot_quads(base->centre[g] + RIGID_ROW[c] * base->n + from, ground + from, quads);
-        for (int c = gk_directions(setup); c < SPACE; c++) rigid[SPACE * w + c] = 0.0;
+        const int g = model->engagement[e].gear[w];
+        for (int m = 0; m < base->motions[g]; m++) {
+            const int c = base->motion[g][m];
+            rigid[SPACE * w + c] = gk_dot_quads(base->moved[g][c], ground + base->from[g], base->width[g] / 4);
+        }
     }
 }
 
@@ -26,6 +27,7 @@ void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const dou
     for (int w = 0; w < 2; w++) pose[SPACE * w + PHIA] += spin[model->gear[model->engagement[e].gear[w]].rotor];
 }
 
+/* Fills the rows of the contacts on the gear groups */
 static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *work, gk_real *out)
 {
     const gk_position *at = &work->position[side->which];
@@ -37,59 +39,77 @@ static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_en
         const size_t first = ((size_t)at->node * points + (size_t)(work->place[p].candidate[side->which] * strips)) *
                              halves;
         const gk_half *low = (const gk_half *)side->rows + first, *high = low + (size_t)points * halves;
-        for (int k = 0; k < strips * halves; k++) to[k] = low[k] + part * (high[k] - low[k]);
+        for (int k = 0; k < strips * halves; k += 2) {
+            to[k] = low[k] + part * (high[k] - low[k]);
+            to[k + 1] = low[k + 1] + part * (high[k + 1] - low[k + 1]);
+        }
         to += strips * halves;
     }
 }
 
-/* what the ground oscillators displace outward at the contacts */
-static void outward_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *work, double *out)
-{
-    const gk_position *at = &work->position[side->which];
-    const int quads = setup->base.width[side->gear] / 4, strips = GK_STRIPS(setup), points = side->candidates * strips;
-    gk_quad *to = (gk_quad *)out;
-    for (int p = 0; p < work->places; p++, to += strips * quads) {
-        const size_t first = ((size_t)at->node * points + (size_t)(work->place[p].candidate[side->which] * strips)) *
-                             quads;
-        const gk_quad *low = (const gk_quad *)side->ground + first, *high = low + (size_t)points * quads;
-        for (int q = 0; q < strips * quads; q++) to[q] = low[q] + at->part * (high[q] - low[q]);
-    }
-}
-
-/* Fills the rows of the contacts that were found: on the gear groups and on the ground group */
-void gk_rows_form(const gk_model *model, const gk_setup *setup, gk_work *work, int e)
+void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
 {
     gk_engaged *engaged = &work->engaged[e];
-    (void)model;
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
         if (GK_LANES(setup, side->gear)) contact_rows(setup, side, engaged, engaged->basis[w]);
-        if (setup->base.width[side->gear]) outward_rows(setup, side, engaged, engaged->outward[w]);
     }
 }
 
-/* the whole rows on the ground group, of contacts and joints: for steps that have no tables */
-void gk_rows_whole(const gk_model *model, const gk_setup *setup, gk_work *work, int e)
+/* rows of the contacts on the part of the ground group that one gear reads */
+GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, int local,
+                              double *out, const int own_points)
 {
     const gk_base *base = &setup->base;
-    const gk_engaged *engaged = &work->engaged[e];
+    const gk_position *at = &engaged->position[side->which];
+    const int quads = base->width[side->gear] / 4, strips = GK_STRIPS(setup), points = side->candidates * strips;
+    const int motions = base->motions[side->gear];
+    const double part = at->part;
+    for (int p = 0; p < engaged->places; p++) {
+        const gk_place *place = &engaged->place[p];
+        const gk_quad *low = (const gk_quad *)side->ground +
+                             ((size_t)at->node * points + (size_t)(place->candidate[side->which] * strips)) * quads;
+        const gk_quad *high = low + (size_t)points * quads;
+        for (int q = 0; q < quads; q++) {
+            gk_quad rigid = {0};
+            for (int i = 0; i < strips; i++) {
+                const size_t k = (size_t)(i * quads + q);
+                if (i == 0 || own_points) {
+                    const double *gradient = place->point[i].gradient + SPACE * side->which;
+                    rigid = (gk_quad){0};
+                    for (int m = 0; m < motions; m++) {
+                        const int c = base->motion[side->gear][m];
+                        rigid += gradient[c] * ((const gk_quad *)base->moved[side->gear][c])[q];
+                    }
+                }
+                ((gk_quad *)(out + (size_t)(p * strips + i) * local))[q] += rigid - (low[k] + part * (high[k] - low[k]));
+            }
+        }
+    }
+}
+
+/* Fills the rows of contacts and joints on the ground group; the rows have been listed */
+void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
+{
+    const gk_base *base = &setup->base;
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    const size_t size = (size_t)base->n * sizeof(double);
-    for (int i = 0; i < s->n; i++) {
-        double *row = engaged->ground + (size_t)i * base->n;
-        memset(row, 0, size);
-        if (i >= s->contacts) {
-            if (gk_rows_at_bore(setup, s, i)) memcpy(row, base->port_rows + s->port_of[i] * base->n, size);
-            continue;
-        }
-        const double *gradient = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s))->gradient;
-        for (int w = 0; w < 2; w++) {
-            const int g = model->engagement[e].gear[w], from = base->from[g], width = base->width[g];
-            for (int c = 0; c < gk_directions(setup); c++)
-                gk_axpy(gradient[SPACE * w + c], base->centre[g] + RIGID_ROW[c] * base->n, row, from / 4,
-                        (from + width) / 4);
-            gk_axpy(-1.0, engaged->outward[w] + (size_t)i * width, row + from, 0, width / 4);
-        }
+    const int local = mesh->local;
+    if (!local) return;
+    memset(engaged->ground, 0, (size_t)(s->contacts * local) * sizeof *engaged->ground);
+    for (int w = 0; w < 2; w++) {
+        if (setup->spatial)
+            ground_rows_of(setup, &mesh->side[w], engaged, local, engaged->ground + mesh->at[w], 1);
+        else
+            ground_rows_of(setup, &mesh->side[w], engaged, local, engaged->ground + mesh->at[w], 0);
+    }
+    for (int i = s->contacts; i < s->n; i++) {
+        double *row = engaged->ground + (size_t)i * local;
+        if (gk_rows_at_bore(setup, s, i))
+            gk_local_gather(mesh, base->port_rows + s->port_of[i] * base->n, row);
+        else
+            memset(row, 0, (size_t)local * sizeof *row);
     }
 }
 
@@ -119,44 +139,44 @@ static void turn_forth(const gk_modal *m, int tooth, const gk_real *f, gk_real *
     }
 }
 
-/* What the rows of an engagement read of displacements (or speeds) y of the gear groups and `ground`, rigid motion of the
- * gears left out: the gap reads that */
+/* what the rows of an engagement read of displacements (or speeds) of the ground group */
+void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    const gk_system *s = &engaged->system;
+    for (int i = 0; i < s->n; i++)
+        read[i] = mesh->local ? gk_local_dot(mesh, engaged->ground + (size_t)i * mesh->local, ground) : 0.0;
+    for (int i = s->n; i < s->stride; i++) read[i] = 0.0;
+}
+
+/* the same with displacements (or speeds) y of the gear groups */
 void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
                   double *read)
 {
-    const gk_base *base = &setup->base;
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    gk_rows_read_ground(setup, engaged, e, ground, read);
     for (int w = 0; w < 2; w++) {
-        const int g = setup->mesh[e].side[w].gear, n = GK_LANES(setup, g), from = base->from[g], width = base->width[g];
-        if (n && s->contacts) turn_back(&setup->modal[g], engaged->position[w].tooth, y[g], work->turned);
-        for (int i = 0; i < s->contacts; i++) {
-            if (n) read[i] -= gk_dot(engaged->basis[w] + (size_t)i * n, work->turned, n);
-            read[i] -= gk_dot_quads(engaged->outward[w] + (size_t)i * width, ground + from, width / 4);
-        }
+        const int g = setup->mesh[e].side[w].gear, n = GK_LANES(setup, g);
+        if (!n || !s->contacts) continue;
+        turn_back(&setup->modal[g], engaged->position[w].tooth, y[g], work->turned);
+        for (int i = 0; i < s->contacts; i++) read[i] -= gk_dot(engaged->basis[w] + (size_t)i * n, work->turned, n);
     }
-    for (int i = s->contacts; i < s->n; i++)
-        if (gk_rows_at_bore(setup, s, i))
-            read[i] = gk_dot_span(base->port_span[s->port_of[i]], base->port_rows + s->port_of[i] * base->n, ground);
 }
 
-/* what the rows of an engagement read of displacements of the ground group, rigid motion included */
-void gk_rows_read_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                         const double *ground, double *read)
+/* Takes away what rigid motion of the gears by `ground` makes of the gaps of the contacts: places are found with it */
+void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                           const double *ground, double *read)
 {
-    const gk_base *base = &setup->base;
-    const gk_system *s = &engaged->system;
-    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
-    for (int w = 0; w < 2; w++) {
-        const int g = model->engagement[e].gear[w], from = base->from[g], width = base->width[g];
-        for (int i = 0; i < s->contacts; i++)
-            read[i] -= gk_dot_quads(engaged->outward[w] + (size_t)i * width, ground + from, width / 4);
-    }
-    for (int i = s->contacts; i < s->n; i++)
-        if (gk_rows_at_bore(setup, s, i))
-            read[i] = gk_dot_span(base->port_span[s->port_of[i]], base->port_rows + s->port_of[i] * base->n, ground);
-    gk_rows_read_rigid(model, setup, engaged, e, ground, read);
+    double rigid[POSE];
+    read_rigid(model, setup, e, ground, rigid);
+    for (int p = 0, i = 0; p < engaged->places; p++)
+        for (int strip = 0; strip < GK_STRIPS(setup); strip++, i++) {
+            const double *gradient = gk_point_of(setup, &engaged->place[p], strip)->gradient;
+            for (int w = 0; w < 2; w++)
+                for (int c = 0; c < gk_directions(setup); c++)
+                    read[i] -= gradient[SPACE * w + c] * rigid[SPACE * w + c];
+        }
 }
 
 /* interpolated far row of a contact on one side, its sign that of the contact's row */
@@ -207,72 +227,68 @@ void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_wor
     }
 }
 
-/* adds what rigid motion of the gears by `ground` makes of the gaps of the contacts */
-void gk_rows_read_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                        const double *ground, double *read)
+typedef struct pushes { /* rows whose forces are not zero */
+    int count, row[MAX_ROWS];
+    double x[MAX_ROWS], y[MAX_ROWS];
+} pushes;
+
+static void list_pushes(const double *x, const double *y, int rows, pushes *p)
 {
-    const gk_system *s = &engaged->system;
-    double rigid[POSE];
-    read_rigid(model, setup, e, ground, rigid);
-    for (int i = 0; i < s->contacts; i++) {
-        const double *gradient = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s))->gradient;
-        for (int w = 0; w < 2; w++)
-            for (int c = 0; c < gk_directions(setup); c++) read[i] += gradient[SPACE * w + c] * rigid[SPACE * w + c];
+    p->count = 0;
+    for (int i = 0; i < rows; i++) {
+        p->row[p->count] = i, p->x[p->count] = x[i], p->y[p->count] = y[i];
+        p->count += x[i] != 0.0 || y[i] != 0.0;
     }
 }
 
-/* Σ rows·x and Σ rows·y of a gear group, in the frame of the reference tooth */
-static void contact_forces(const gk_setup *setup, const gk_engaged *work, const gk_side *side, const double *x,
-                           const double *y, gk_real *out_x, gk_real *out_y)
+/* −Σ rows·x and −Σ rows·y over `halves` of a gear group from `first` on, in registers */
+GK_INLINE void push_halves(const pushes *p, const gk_half *rows, int width, int first, gk_half *out_x, gk_half *out_y,
+                           const int halves)
 {
-    const gk_system *s = &work->system;
-    const int halves = 2 * GK_LANES(setup, side->gear) / LANES;
-    const gk_half *rows[MAX_CONTACTS];
-    gk_half of_x[MAX_CONTACTS], of_y[MAX_CONTACTS];
-    int count = 0;
-    for (int r = 0; r < s->contacts; r++) {
-        if (x[r] == 0.0 && y[r] == 0.0) continue;
-        of_x[count] = (gk_half){0} - (gk_real)x[r];
-        of_y[count] = (gk_half){0} - (gk_real)y[r];
-        rows[count++] = (const gk_half *)work->basis[side->which] + (size_t)r * halves;
+    gk_half sum_x[4] = {{0}}, sum_y[4] = {{0}};
+    for (int r = 0; r < p->count; r++) {
+        const gk_half *row = rows + (size_t)p->row[r] * width + first;
+        const gk_real x = (gk_real)p->x[r], y = (gk_real)p->y[r];
+        for (int k = 0; k < halves; k++) sum_x[k] -= x * row[k], sum_y[k] -= y * row[k];
     }
-    for (int i = 0; i < halves; i++) {
-        gk_half sum_x = {0}, sum_y = {0};
-        for (int r = 0; r < count; r++) {
-            const gk_half b = rows[r][i];
-            sum_x += of_x[r] * b;
-            sum_y += of_y[r] * b;
+    for (int k = 0; k < halves; k++) out_x[first + k] = sum_x[k], out_y[first + k] = sum_y[k];
+}
+
+/* −Σ rows·x and −Σ rows·y of a gear group, in the frame of the reference tooth */
+static void contact_forces(const gk_setup *setup, const gk_engaged *work, const gk_side *side, const pushes *p,
+                           gk_real *out_x, gk_real *out_y)
+{
+    const int width = 2 * GK_LANES(setup, side->gear) / LANES;
+    const gk_half *rows = (const gk_half *)work->basis[side->which];
+    int first = 0;
+    for (; first + 4 <= width; first += 4)
+        push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 4);
+    for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
+}
+
+/* adds the forces x and y of the rows on the ground group */
+static void ground_forces(const gk_mesh *mesh, const gk_engaged *engaged, const pushes *p, double *out_x, double *out_y)
+{
+    const int width = mesh->local / 4;
+    for (int w = 0, first = 0; w < 2; first += mesh->part[w].width / 4, w++)
+        for (int q = 0; q < mesh->part[w].width / 4; q++) {
+            const int to = mesh->part[w].from / 4 + q;
+            gk_quad sum_x = ((gk_quad *)out_x)[to], sum_y = ((gk_quad *)out_y)[to];
+            for (int r = 0; r < p->count; r++) {
+                const gk_quad row = ((const gk_quad *)engaged->ground)[(size_t)p->row[r] * width + first + q];
+                sum_x += p->x[r] * row, sum_y += p->y[r] * row;
+            }
+            ((gk_quad *)out_x)[to] = sum_x, ((gk_quad *)out_y)[to] = sum_y;
         }
-        ((gk_half *)out_x)[i] = sum_x;
-        ((gk_half *)out_y)[i] = sum_y;
-    }
 }
 
 /* adds the forces x of the rows on the ground group */
-void gk_rows_push_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *work, int e, const double *x,
-                         double *out)
+void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, double *out)
 {
-    const gk_base *base = &setup->base;
-    const gk_system *s = &work->system;
-    double rigid[POSE] = {0};
-    for (int i = 0; i < s->contacts; i++) {
-        const double *gradient = gk_point_of(setup, &work->place[s->place_of[i]], i % GK_STRIPS(s))->gradient;
-        if (x[i] == 0.0) continue;
-        for (int d = 0; d < POSE; d++) rigid[d] += x[i] * gradient[d];
-        for (int w = 0; w < 2; w++) {
-            const int g = model->engagement[e].gear[w], width = base->width[g];
-            gk_axpy(-x[i], work->outward[w] + (size_t)i * width, out + base->from[g], 0, width / 4);
-        }
-    }
-    for (int w = 0; w < 2; w++) {
-        const int g = model->engagement[e].gear[w], from = base->from[g];
-        for (int c = 0; c < gk_directions(setup); c++)
-            gk_axpy(rigid[SPACE * w + c], base->centre[g] + RIGID_ROW[c] * base->n, out, from / 4,
-                    (from + base->width[g]) / 4);
-    }
-    for (int i = s->contacts; i < s->n; i++)
-        if (x[i] != 0.0 && gk_rows_at_bore(setup, s, i))
-            gk_axpy_span(base->port_span[s->port_of[i]], x[i], base->port_rows + s->port_of[i] * base->n, out);
+    const gk_mesh *mesh = &setup->mesh[e];
+    const gk_system *s = &engaged->system;
+    for (int i = 0; i < s->n; i++)
+        if (x[i] != 0.0 && mesh->local) gk_local_axpy(mesh, x[i], engaged->ground + (size_t)i * mesh->local, out);
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */
@@ -289,18 +305,18 @@ void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
     memset(work->ground_next, 0, width);
     for (int e = 0; e < model->engagements; e++) {
         const gk_engaged *engaged = &work->engaged[e];
-        const double *of_x = x(&engaged->system), *of_y = y(&engaged->system);
+        const gk_system *s = &engaged->system;
+        pushes p;
+        list_pushes(x(s), y(s), s->n, &p);
+        if (setup->mesh[e].local) ground_forces(&setup->mesh[e], engaged, &p, work->ground_force, work->ground_next);
+        while (p.count && p.row[p.count - 1] >= s->contacts) p.count--;
         for (int w = 0; w < 2; w++) {
             const gk_side *side = &setup->mesh[e].side[w];
-            if (!GK_LANES(setup, side->gear) || !engaged->system.contacts) continue;
-            contact_forces(setup, engaged, side, of_x, of_y, work->turned, work->turned_next);
+            if (!GK_LANES(setup, side->gear) || !p.count) continue;
+            contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
             turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, work->turned, work->force[side->gear]);
             turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, work->turned_next,
                        work->next[side->gear]);
         }
-        if (!width) continue;
-        gk_rows_push_ground(model, setup, engaged, e, of_x, work->ground_force);
-        if (of_x != of_y) gk_rows_push_ground(model, setup, engaged, e, of_y, work->ground_next);
     }
-    if (width && model->engagements && x == y) memcpy(work->ground_next, work->ground_force, width);
 }

@@ -136,7 +136,7 @@ static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, i
         s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
         s->slope[i] = i < s->contacts ? gk_law_at(gk_law_of(s, i), s->width[i], full * s->width[i]).slope : 0.0;
     }
-    gk_limit_compliance(s, full, 0, s->J);
+    gk_limit_compliance(s, s->A, full, 0, s->J);
     return gk_limit_cholesky(s->J, s->n);
 }
 
@@ -155,7 +155,7 @@ static void press(const gk_model *model, const gk_setup *setup, gk_work *work, i
     const gk_real *u[MAX_GEARS];
     double rate[MAX_STRIDE], *y = s->force, *both = s->z, *c = s->eta;
     for (int g = 0; g < model->gears; g++) u[g] = work->trial[g] + setup->modal[g].n;
-    gk_form_rates(model, setup, work, e, u, work->ground_trial + setup->base.n, work->trial_spin + MAX_SPINS, rate);
+    gk_form_rates(setup, work, e, u, work->ground_trial + setup->base.n, work->trial_spin + MAX_SPINS, rate);
     for (int i = 0; i < s->n; i++) y[i] = s->active[i] ? rate[i] : 0.0;
     gk_limit_solve(s->J, y, s->n);
     memcpy(c, y, (size_t)s->n * sizeof *c);

@@ -35,7 +35,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
 double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work);
 /* gk_limit.c */
 int gk_limit_cholesky(double *a, int n);
-void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C);
+void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C);
 void gk_limit_solve(const double *L, double *x, int n);
 int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
                    int e, double position);

@@ -66,7 +66,7 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++)
         engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
-    gk_rows_form(model, setup, work, e);
+    gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, &work->explicit_rows, work, e);
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;
     gk_step_recall(setup, work, data, e, s);
@@ -86,7 +86,7 @@ static void solve_contacts(const gk_model *model, const gk_setup *setup, gk_work
         gk_balance_plain(&island);
     }
     for (int e = 0; e < model->engagements; e++) {
-        gk_form_rates(model, setup, work, e, speed, work->ground_trial + setup->base.n, work->speed, rate);
+        gk_form_rates(setup, work, e, speed, work->ground_trial + setup->base.n, work->speed, rate);
         add_dashpots(setup, &setup->mesh[e], &work->engaged[e].system, rate);
     }
 }

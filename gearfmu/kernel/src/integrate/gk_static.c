@@ -162,7 +162,7 @@ static int form(rest *r, int e)
         gk_flank_move(&r->setup, place, moved);
         place->memory = gk_step_remembered(&r->data->meshing[e], place->key);
     }
-    gk_rows_form(r->model, &r->setup, work, e);
+    gk_rows_form(&r->setup, work, e);
     gk_form_system(r->model, &r->setup, r->data, &r->k, work, e);
     gk_step_recall(&r->setup, work, r->data, e, &engaged->system);
     return 1;

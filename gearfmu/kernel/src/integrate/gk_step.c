@@ -523,7 +523,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     for (int e = 0; e < model->engagements; e++)
         if ((outcome = find_places(model, setup, work, data, e)) != GK_OK) return outcome;
     GK_LAP(work, PHASE_FIND);
-    for (int e = 0; e < model->engagements; e++) gk_rows_form(model, setup, work, e);
+    for (int e = 0; e < model->engagements; e++) gk_rows_form(setup, work, e);
     GK_LAP(work, PHASE_ROWS);
     for (int e = 0; e < model->engagements; e++) {
         gk_form_system(model, setup, data, k, work, e);

@@ -25,8 +25,8 @@
 #define gk_rows_pose gk_rows_pose_avx2
 #define gk_rows_form gk_rows_form_avx2
 #define gk_rows_read gk_rows_read_avx2
-#define gk_rows_whole gk_rows_whole_avx2
-#define gk_rows_read_rigid gk_rows_read_rigid_avx2
+#define gk_rows_form_ground gk_rows_form_ground_avx2
+#define gk_rows_without_rigid gk_rows_without_rigid_avx2
 #define gk_rows_scatter gk_rows_scatter_avx2
 #define gk_side_step gk_side_step_avx2
 #define gk_form_system gk_form_system_avx2

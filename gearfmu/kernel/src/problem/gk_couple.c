@@ -32,7 +32,7 @@ static void give(const gk_model *model, const gk_setup *setup, gk_work *work, in
     for (int part = 0; part < PARTS; part++) {
         double *ground = engaged->given_ground + part * setup->base.n;
         memset(ground, 0, (size_t)setup->base.n * sizeof *ground);
-        gk_rows_push_ground(model, setup, engaged, e, x[part], ground);
+        gk_rows_push_ground(setup, engaged, e, x[part], ground);
         for (int l = 0; l < setup->mesh[e].spins; l++)
             engaged->given_spin[part][l] = gk_dot_quads(s->rigid[l], x[part], s->stride / 4);
     }
@@ -87,7 +87,7 @@ static double take(const gk_model *model, const gk_setup *setup, gk_work *work, 
     field f = others(model, setup, work, k, setup->mesh[e].island, e);
     double read[PARTS][MAX_STRIDE], far[2][MAX_STRIDE], change = 0.0, scale = 1e-12;
     for (int part = 0; part < PARTS; part++) {
-        gk_rows_read_ground(model, setup, engaged, e, f.ground[part], read[part]);
+        gk_rows_read_ground(setup, engaged, e, f.ground[part], read[part]);
         for (int l = 0; l < setup->mesh[e].spins; l++)
             gk_axpy(f.spin[part][setup->mesh[e].spin[l]], s->rigid[l], read[part], 0, s->stride / 4);
     }

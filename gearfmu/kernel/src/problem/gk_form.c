@@ -90,70 +90,86 @@ static int list_runs(const gk_engaged *engaged, int strips, run runs[MAX_PAIRS])
     return count;
 }
 
+/* D and A are symmetric and filled by block rows of quads: row i of a contact has columns up to the end of its block, that
+ * of a joint up to itself; mirror() writes the rest. */
+static int block_end(int i) { return i / 4 * 4 + 4; }
+
+static void mirror(gk_system *s)
+{
+    for (int i = 1; i < s->stride; i++)
+        for (int j = 0; j < (i < s->contacts ? i / 4 * 4 : i); j++) {
+            s->D[j * s->stride + i] = s->D[i * s->stride + j];
+            s->A[j * s->stride + i] = s->A[i * s->stride + j];
+        }
+}
+
 typedef struct row_source { /* a row of the tables of one side: at two neighbouring nodes, with their weights */
-    const gk_real *Q, *next_Q, *D, *next_D;
+    const gk_real *low, *high;
     double square_low, mixed, square_high;
     size_t columns;
 } row_source;
 
-static row_source source_of(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, const gk_real *moves,
-                            int point)
+/* table: (nodes + 1, points, parts, columns) */
+static row_source source_of(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, const gk_real *table,
+                            int parts, int point)
 {
     const gk_position *at = &engaged->position[side->which];
     const size_t columns = (size_t)side->columns, points = (size_t)(side->candidates * GK_STRIPS(setup));
-    const size_t row = (size_t)at->node * points + (size_t)point;
+    const size_t row = (size_t)at->node * points + (size_t)point, width = (size_t)parts * columns;
     const double x = at->part, y = 1.0 - x;
-    row_source s = {.square_low = y * y, .mixed = x * y, .square_high = x * x, .columns = columns};
-    s.Q = side->residual + row * 2 * columns, s.next_Q = s.Q + points * 2 * columns;
-    s.D = moves ? moves + row * 4 * columns : NULL, s.next_D = moves ? s.D + points * 4 * columns : NULL;
-    return s;
+    return (row_source){table + row * width, table + (row + points) * width, y * y, x * y, x * x, columns};
 }
 
 #define WIDENED(values) GK_WIDENED(*(const gk_four *)(values))
-#define SQUARE(s, table, at)                                                                                           \
-    ((s).square_low * WIDENED((s).table + (at)) + (s).mixed * WIDENED((s).table + (at) + (s).columns) +                \
-     (s).square_high * WIDENED((s).next_##table + (at)))
+#define SQUARE(s, at)                                                                                                  \
+    ((s).square_low * WIDENED((s).low + (at)) + (s).mixed * WIDENED((s).low + (at) + (s).columns) +                    \
+     (s).square_high * WIDENED((s).high + (at)))
 
-/* a row of D, −K and Q between the contacts; moves 0: of Q alone. What a quad writes beyond a run the next run writes
- * again. */
-static void table_row(const row_source source[2], const run *runs, int count, int moves, double *D, double *A,
-                      double *Q)
+/* a row of D and A between the contacts, or of A alone. What a quad writes beyond a run the next run writes again. */
+GK_INLINE void table_row(const row_source source[2], const run *runs, int count, int end, double *D, double *A,
+                         const int moves)
 {
     const row_source p = source[0], q = source[1];
     for (int r = 0; r < count; r++)
-        for (int c = 0; c < runs[r].count; c += 4) {
+        for (int c = 0; c < runs[r].count && runs[r].column + c < end; c += 4) {
             const size_t a = (size_t)(runs[r].point[0] + c), b = (size_t)(runs[r].point[1] + c);
             const int to = runs[r].column + c;
-            *(gk_quad *)(Q + to) = SQUARE(p, Q, a) + SQUARE(q, Q, b);
-            if (!moves) continue;
-            *(gk_quad *)(D + to) = SQUARE(p, D, a) + SQUARE(q, D, b);
-            *(gk_quad *)(A + to) = SQUARE(p, D, a + 2 * p.columns) + SQUARE(q, D, b + 2 * q.columns);
+            if (moves) {
+                *(gk_quad *)(D + to) = SQUARE(p, a) + SQUARE(q, b);
+                *(gk_quad *)(A + to) = SQUARE(p, a + 2 * p.columns) + SQUARE(q, b + 2 * q.columns);
+            } else {
+                *(gk_quad *)(A + to) = SQUARE(p, a) + SQUARE(q, b);
+            }
         }
 }
 
-/* compliance between the contacts through both gears, from the tables; the rest of D, A and Q is cleared */
-static void between_contacts(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_real *const moves[2])
+/* compliance between the contacts through both gears, from the tables: of the step, or of what is not dynamic alone; the
+ * rest of D and A is cleared */
+static void between_contacts(const gk_setup *setup, const gk_engaged *engaged, int e, int tables)
 {
     const gk_system *s = &engaged->system;
     const gk_side *side = setup->mesh[e].side;
-    const int strips = GK_STRIPS(s), tables = moves[0] && moves[1], from = tables ? s->contacts : 0;
+    const int strips = GK_STRIPS(s), parts = tables ? 4 : 2;
+    const gk_real *const table[2] = {tables ? engaged->table[0].moves : side[0].residual,
+                                     tables ? engaged->table[1].moves : side[1].residual};
     run runs[MAX_PAIRS];
     const int count = list_runs(engaged, strips, runs);
-    for (int i = 0; i < s->stride; i++) {
-        double *D = s->D + i * s->stride, *A = s->A + i * s->stride, *Q = s->Q + i * s->stride;
-        const int contact = i < s->contacts;
-        if (contact) {
-            const int *candidate = engaged->place[s->place_of[i]].candidate;
-            const row_source source[2] = {
-                source_of(setup, engaged, &side[0], moves[0], candidate[0] * strips + i % strips),
-                source_of(setup, engaged, &side[1], moves[1], candidate[1] * strips + i % strips)};
-            table_row(source, runs, count, tables, D, A, Q);
+    double *D = s->D, *A = s->A;
+    for (int p = 0, i = 0; p < engaged->places; p++)
+        for (int strip = 0; strip < strips; strip++, i++, D += s->stride, A += s->stride) {
+            const int *candidate = engaged->place[p].candidate, end = block_end(i);
+            row_source source[2];
+            for (int w = 0; w < 2; w++)
+                source[w] = source_of(setup, engaged, &side[w], table[w], parts, candidate[w] * strips + strip);
+            if (tables)
+                table_row(source, runs, count, end, D, A, 1);
+            else
+                table_row(source, runs, count, end, D, A, 0);
+            for (int j = tables ? s->contacts : 0; j < end; j++) D[j] = 0.0;
+            for (int j = s->contacts; j < end; j++) A[j] = 0.0;
         }
-        const int first = contact ? from : 0, first_Q = contact ? s->contacts : 0;
-        memset(D + first, 0, (size_t)(s->stride - first) * sizeof *D);
-        memset(A + first, 0, (size_t)(s->stride - first) * sizeof *A);
-        memset(Q + first_Q, 0, (size_t)(s->stride - first_Q) * sizeof *Q);
-    }
+    for (int i = s->contacts; i < s->stride; i++, D += s->stride, A += s->stride)
+        for (int q = 0; q <= i / 4; q++) ((gk_quad *)D)[q] = ((gk_quad *)A)[q] = (gk_quad){0};
 }
 
 /* rows diag(mobility) rowsᵀ and −rows diag(κ) rowsᵀ, added to D and A: for a step that has no table */
@@ -168,14 +184,12 @@ static void gram(const gk_setup *setup, gk_work *work, gk_engaged *engaged, cons
     for (int i = 0; i < s->contacts; i++) {
         const gk_real *b = engaged->basis[side->which] + (size_t)i * n;
         for (int l = 0; l < n; l++) moves[l] = b[l] * flow->mobility[l], yields[l] = b[l] * flow->kappa[l];
-        for (int j = i; j < s->contacts; j++) {
+        for (int j = 0; j < block_end(i) && j < s->contacts; j++) {
             const gk_real *other = engaged->basis[side->which] + (size_t)j * n;
-            const double moved = gk_dot(moves, other, n);
-            const double yielded = flow->exact
-                                       ? gk_dot(yields, other, flow->exact) + gk_dot(yields + P, other + P, flow->exact)
-                                       : 0.0;
-            s->D[i * s->stride + j] += moved, s->A[i * s->stride + j] -= yielded;
-            if (i != j) s->D[j * s->stride + i] += moved, s->A[j * s->stride + i] -= yielded;
+            s->D[i * s->stride + j] += gk_dot(moves, other, n);
+            if (flow->exact)
+                s->A[i * s->stride + j] -= gk_dot(yields, other, flow->exact) +
+                                           gk_dot(yields + P, other + P, flow->exact);
         }
     }
 }
@@ -186,96 +200,101 @@ static void joint_residual(const gk_model *model, const gk_setup *setup, gk_enga
     gk_system *s = &engaged->system;
     const int strips = GK_STRIPS(s);
     for (int r = s->contacts; r < s->n; r++) {
+        double *A = s->A + r * s->stride;
         if (!gk_rows_at_bore(setup, s, r)) continue;
-        s->Q[r * s->stride + r] += setup->port_own[s->port_of[r]];
+        A[r] += setup->port_own[s->port_of[r]];
         for (int w = 0; w < 2; w++) {
             const gk_side *side = &setup->mesh[e].side[w];
-            const gk_position *at = &engaged->position[w];
+            const double part = engaged->position[w].part;
+            const int points = side->candidates * strips;
             if (model->gear[side->gear].rotor != model->port[s->port_of[r]].rotor) continue;
-            for (int i = 0; i < s->contacts; i++) {
-                const int point = engaged->place[s->place_of[i]].candidate[w] * strips + i % strips;
-                const double *t = side->port + (size_t)at->node * side->candidates * strips + point;
-                const double turns = t[0] + at->part * (t[side->candidates * strips] - t[0]);
-                s->Q[r * s->stride + i] -= turns, s->Q[i * s->stride + r] -= turns;
+            for (int p = 0; p < engaged->places; p++) {
+                const double *low = side->port + (size_t)engaged->position[w].node * points +
+                                    engaged->place[p].candidate[w] * strips;
+                for (int i = 0; i < strips; i++) A[p * strips + i] -= low[i] + part * (low[points + i] - low[i]);
             }
         }
     }
 }
 
 /* ---- compliance of the ground group and of the spins --------------------------------------------------------------- */
-/* D += W mobility Wᵀ, A −= W κ Wᵀ over the dynamic ground oscillators, from whole rows */
-static void add_ground(const gk_model *model, const gk_setup *setup, gk_work *work, int e, const gk_coefficients *k)
+/* D += W mobility Wᵀ, A −= W κ Wᵀ over the dynamic ground oscillators, from the rows: for a step that has no table */
+static void add_ground(const gk_setup *setup, gk_work *work, int e, const gk_coefficients *k)
 {
+    const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
-    const int width = setup->base.n, quads = width / 4;
-    double *moves = work->ground_scaled, *yields = moves + width;
+    const int width = mesh->local;
+    double *moves = work->ground_scaled, *yields = moves + width, mobility[MAX_GROUND + 4 * MAX_ROTORS],
+           kappa[MAX_GROUND + 4 * MAX_ROTORS];
     if (!width || k->timeless) return;
-    gk_rows_whole(model, setup, work, e);
+    gk_local_gather(mesh, k->ground.mobility, mobility);
+    gk_local_gather(mesh, k->ground.kappa, kappa);
     for (int i = 0; i < s->n; i++) {
         const double *row = engaged->ground + (size_t)i * width;
-        for (int l = 0; l < width; l++)
-            moves[l] = row[l] * k->ground.mobility[l], yields[l] = row[l] * k->ground.kappa[l];
-        for (int j = i; j < s->n; j++) {
+        for (int l = 0; l < width; l++) moves[l] = row[l] * mobility[l], yields[l] = row[l] * kappa[l];
+        for (int j = 0; j < block_end(i) && j < s->n; j++) {
             const double *other = engaged->ground + (size_t)j * width;
-            const double moved = gk_dot_quads(moves, other, quads), yielded = gk_dot_quads(yields, other, quads);
-            s->D[i * s->stride + j] += moved, s->A[i * s->stride + j] -= yielded;
-            if (i != j) s->D[j * s->stride + i] += moved, s->A[j * s->stride + i] -= yielded;
+            s->D[i * s->stride + j] += gk_dot_quads(moves, other, width / 4);
+            s->A[i * s->stride + j] -= gk_dot_quads(yields, other, width / 4);
         }
     }
 }
 
-/* The same of one side from tables: with W = −u + gΦ (u outward, g gradient, Φ rigid motion) what u alone makes is in the
- * tables of the contacts; the rest is −h gᵀ − g hᵀ, h = uMΦᵀ − ½ gΦMΦᵀ */
-typedef struct pulled {                                                        /* of the contacts on one side */
-    double g[SPACE][MAX_STRIDE], h[2][SPACE][MAX_STRIDE], port[2][MAX_STRIDE]; /* 2: in D, in K */
-    int count, of[SPACE];                                                      /* motions that the gear has */
+/* The same from tables: with W = −u + gΦ (u outward, g gradient, Φ rigid motion) what u alone makes is in the tables of the
+ * contacts; the rest is −h gᵀ − g hᵀ, h = uMΦᵀ − ½ gΦMΦᵀ, motion by motion of both gears */
+typedef struct pulled { /* a motion of a gear */
+    double g[MAX_STRIDE], moved[MAX_STRIDE], yielded[MAX_STRIDE]; /* h in D, in K */
 } pulled;
 
+/* motions of one gear, and what the bore of its rotor has in common with the contacts: `port`, in D and in K */
 GK_INLINE void pull(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, pulled *p,
-                    const int directions)
+                    double port[2][MAX_STRIDE], const int quads)
 {
     const gk_system *s = &engaged->system;
     const gk_position *at = &engaged->position[side->which];
     const gk_step_side *table = &engaged->table[side->which];
-    const int strips = GK_STRIPS(setup), points = side->candidates * strips;
-    const int common = directions == SPACE ? COMMON : COMMON / 2;
-    p->count = 0;
-    for (int c = 0; c < directions; c++) {
-        if (table->own[0][c][c] != 0.0 || c < PHIA) p->of[p->count++] = c;
-        p->g[c][s->stride - 1] = p->h[0][c][s->stride - 1] = p->h[1][c][s->stride - 1] = 0.0;
-        for (int i = s->contacts; i < s->stride; i++) p->g[c][i] = p->h[0][c][i] = p->h[1][c][i] = 0.0;
-    }
-    for (int i = 0; i < s->contacts; i++) {
-        const gk_place *place = &engaged->place[s->place_of[i]];
-        const double *g = gk_point_of(setup, place, i % strips)->gradient + SPACE * side->which;
-        const size_t row = (size_t)at->node * points + (size_t)(place->candidate[side->which] * strips + i % strips);
-        for (int c = 0; c < directions; c++) p->g[c][i] = g[c];
-        for (int kind = 0; kind < 2; kind++) {
-            const double *low = table->pulls + (2 * row + (size_t)kind) * common, *high = low + 2 * points * common;
-            for (int c = 0; c <= directions; c++) {
-                const double u = low[c] + at->part * (high[c] - low[c]);
-                double own = 0.0;
-                for (int d = 0; d < directions; d++) own += g[d] * table->own[kind][c][d];
-                if (c < directions)
-                    p->h[kind][c][i] = u - 0.5 * own;
-                else
-                    p->port[kind][i] = own - u;
+    const int strips = GK_STRIPS(setup), points = side->candidates * strips, bore = gk_directions(setup);
+    const int motions = setup->base.motions[side->gear], *motion = setup->base.motion[side->gear];
+    for (int m = 0; m < motions; m++)
+        for (int i = s->contacts; i < s->stride; i++) p[m].g[i] = p[m].moved[i] = p[m].yielded[i] = 0.0;
+    for (int place = 0, i = 0; place < engaged->places; place++) {
+        const gk_place *found = &engaged->place[place];
+        const size_t row = (size_t)at->node * points + (size_t)(found->candidate[side->which] * strips);
+        const gk_quad *low = (const gk_quad *)table->pulls + 2 * row * quads, *high = low + 2 * points * quads;
+        gk_quad own[2][COMMON / 4];
+        const double *g = NULL;
+        for (int strip = 0; strip < strips; strip++, i++)
+            for (int kind = 0; kind < 2; kind++, low += quads, high += quads) {
+                gk_quad h[COMMON / 4];
+                if (strip == 0 || setup->spatial) {
+                    g = found->point[strip].gradient + SPACE * side->which;
+                    for (int q = 0; q < quads; q++) own[kind][q] = (gk_quad){0};
+                    for (int m = 0; m < motions; m++)
+                        for (int q = 0; q < quads; q++)
+                            own[kind][q] += g[motion[m]] * ((const gk_quad *)table->own[kind][motion[m]])[q];
+                }
+                for (int q = 0; q < quads; q++)
+                    h[q] = (low[q] + at->part * (high[q] - low[q])) -
+                           ((const gk_quad *)table->share)[q] * own[kind][q];
+                for (int m = 0; m < motions; m++) {
+                    (kind ? p[m].yielded : p[m].moved)[i] = ((const double *)h)[motion[m]];
+                    p[m].g[i] = g[motion[m]];
+                }
+                port[kind][i] = -((const double *)h)[bore];
             }
-        }
     }
 }
 
-GK_INLINE void add_pulled(gk_system *s, const pulled *p, const int quads)
+GK_INLINE void add_pulled(gk_system *s, const pulled *p, int motions, const int quads)
 {
     for (int i = 0; i < s->contacts; i++) {
         gk_quad *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
-        for (int m = 0; m < p->count; m++) {
-            const int c = p->of[m];
-            const gk_quad *g = (const gk_quad *)p->g[c], *h = (const gk_quad *)p->h[0][c],
-                          *k = (const gk_quad *)p->h[1][c];
-            const double own = p->g[c][i], moved = p->h[0][c][i], yielded = p->h[1][c][i];
-            for (int q = 0; q < quads; q++) D[q] -= moved * g[q] + own * h[q], A[q] += yielded * g[q] + own * k[q];
+        for (int m = 0; m < motions; m++) {
+            const gk_quad *g = (const gk_quad *)p[m].g, *h = (const gk_quad *)p[m].moved,
+                          *k = (const gk_quad *)p[m].yielded;
+            const double own = p[m].g[i], moved = p[m].moved[i], yielded = p[m].yielded[i];
+            for (int q = 0; q <= i / 4; q++) D[q] -= moved * g[q] + own * h[q], A[q] += yielded * g[q] + own * k[q];
         }
     }
 }
@@ -283,51 +302,41 @@ GK_INLINE void add_pulled(gk_system *s, const pulled *p, const int quads)
 static void add_ground_tables(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
 {
     gk_system *s = &engaged->system;
-    const int port = gk_directions(setup); /* among what is common */
-    pulled p;
+    const int bore = gk_directions(setup); /* among what is common */
+    double port[2][MAX_STRIDE];
+    pulled p[POSE];
+    int motions = 0;
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
         if (!setup->base.width[side->gear]) continue;
         if (setup->spatial)
-            pull(setup, engaged, side, &p, SPACE);
+            pull(setup, engaged, side, p + motions, port, COMMON / 4);
         else
-            pull(setup, engaged, side, &p, PLANE);
-        GK_SIZED(s->stride / 4, add_pulled, s, &p)
+            pull(setup, engaged, side, p + motions, port, COMMON / 8);
+        motions += setup->base.motions[side->gear];
         for (int r = s->contacts; r < s->n; r++) {
             if (!gk_rows_at_bore(setup, s, r) || model->port[s->port_of[r]].rotor != model->gear[side->gear].rotor)
                 continue;
-            const int at = r * s->stride;
-            for (int i = 0; i < s->contacts; i++) {
-                s->D[at + i] += p.port[0][i], s->D[i * s->stride + r] += p.port[0][i];
-                s->A[at + i] -= p.port[1][i], s->A[i * s->stride + r] -= p.port[1][i];
-            }
-            s->D[at + r] += engaged->table[w].own[0][port][port], s->A[at + r] -= engaged->table[w].own[1][port][port];
+            double *D = s->D + r * s->stride, *A = s->A + r * s->stride;
+            for (int i = 0; i < s->contacts; i++) D[i] += port[0][i], A[i] -= port[1][i];
+            D[r] += engaged->table[w].own[0][bore][bore], A[r] -= engaged->table[w].own[1][bore][bore];
         }
     }
+    GK_SIZED(s->stride / 4, add_pulled, s, p, motions)
 }
 
-/* row i of R = Σ rowᵀrow/J over the spins that move */
-GK_INLINE void spin_row(const double *inverse, const gk_system *s, int spins, int i, gk_quad *sum, const int quads)
+/* D takes mobility·R, A gives κ·R, R = Σ rowᵀrow/J over the spins that move */
+GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spins, gk_system *s, const int quads)
 {
-    for (int q = 0; q < quads; q++) sum[q] = (gk_quad){0};
     for (int m = 0; m < spins; m++) {
-        const double *coordinate = s->rigid[m], w = inverse[m] * coordinate[i];
-        if (w != 0.0)
-            for (int q = 0; q < quads; q++) sum[q] += w * ((const gk_quad *)coordinate)[q];
-    }
-}
-
-/* A ← A + Q; D takes mobility·R, A gives κ·R; shared: strips of a tooth pair with the same row of R */
-GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spins, int shared, gk_system *s,
-                        const int quads)
-{
-    gk_quad sum[MAX_STRIDE / 4], *D = (gk_quad *)s->D, *A = (gk_quad *)s->A;
-    const gk_quad *Q = (const gk_quad *)s->Q;
-    for (int first = 0, next; first < s->n; first = next) {
-        next = first + (first < s->contacts ? shared : 1);
-        spin_row(inverse, s, spins, first, sum, quads);
-        for (int i = first; i < next; i++, D += quads, A += quads, Q += quads)
-            for (int q = 0; q < quads; q++) D[q] += k->rigid_mobility * sum[q], A[q] += Q[q] - k->rigid_kappa * sum[q];
+        const double moves = k->rigid_mobility * inverse[m], yields = k->rigid_kappa * inverse[m];
+        const gk_quad *row = (const gk_quad *)s->rigid[m];
+        for (int i = 0; i < s->n; i++) {
+            const double x = s->rigid[m][i];
+            gk_quad *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
+            if (x == 0.0) continue;
+            for (int q = 0; q <= i / 4; q++) D[q] += moves * x * row[q], A[q] -= yields * x * row[q];
+        }
     }
 }
 
@@ -337,10 +346,9 @@ static void add_spins(const gk_setup *setup, const gk_coefficients *k, gk_system
     const gk_mesh *mesh = &setup->mesh[e];
     double inverse[MAX_LOCAL];
     for (int l = 0; l < mesh->spins; l++) inverse[l] = setup->inverse_inertia[mesh->spin[l]];
-    GK_SIZED(s->stride / 4, add_rows, k, inverse, mesh->spins, setup->spatial ? 1 : GK_STRIPS(s), s)
-    for (int i = s->contacts; i < s->n; i++)
-        if (s->kind[i] == ROW_CLUTCH)
-            for (int j = 0; j < s->n; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
+    GK_SIZED(s->stride / 4, add_rows, k, inverse, mesh->spins, s)
+    for (int i = s->n - s->clutches; i < s->n; i++) /* the last rows */
+        for (int j = 0; j <= i; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
 }
 
 /* ---- gaps ------------------------------------------------------------------------------------------------------------ */
@@ -369,12 +377,14 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
     gk_system *s = &engaged->system;
     for (int d = 0; d < mesh->spins; d++) memset(s->rigid[d], 0, (size_t)s->stride * sizeof(double));
     gk_rows_read(setup, work, e, work->y, work->ground_y, engaged->read);
+    gk_rows_without_rigid(model, setup, engaged, e, work->ground_y, engaged->read);
     memcpy(s->g, engaged->read, (size_t)s->n * sizeof *s->g);
-    for (int i = 0; i < s->contacts; i++) {
-        const gk_point *p = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s));
-        s->g[i] += p->gap;
-        s->rigid[0][i] = p->gradient[PHIA], s->rigid[1][i] = p->gradient[PHIB];
-    }
+    for (int p = 0, i = 0; p < engaged->places; p++)
+        for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
+            const gk_point *point = gk_point_of(setup, &engaged->place[p], strip);
+            s->g[i] += point->gap;
+            s->rigid[0][i] = point->gradient[PHIA], s->rigid[1][i] = point->gradient[PHIB];
+        }
     for (int i = s->contacts; i < s->n; i++) {
         const int clutch = s->kind[i] == ROW_CLUTCH;
         const double reading = joint_reading(model, setup, mesh, s, i, clutch ? work->speed : work->spin);
@@ -384,13 +394,12 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
 }
 
 /* d/dt of the gaps that the rows read, for given speeds, at the problem formed last */
-void gk_form_rates(const gk_model *model, const gk_setup *setup, gk_work *work, int e,
+void gk_form_rates(const gk_setup *setup, gk_work *work, int e,
                    const gk_real *const modal_speed[], const double *ground_speed, const double *speed, double *rate)
 {
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &work->engaged[e].system;
     gk_rows_read(setup, work, e, modal_speed, ground_speed, rate);
-    gk_rows_read_rigid(model, setup, &work->engaged[e], e, ground_speed, rate);
     for (int i = 0; i < s->n; i++) {
         for (int d = 0; d < mesh->spins; d++) rate[i] += s->rigid[d][i] * speed[mesh->spin[d]];
         if (s->kind[i] == ROW_SPRING && s->joint_of[i] == JOINT_PORT) rate[i] -= work->outer_speed[s->port_of[i]];
@@ -412,39 +421,40 @@ static double path_share(const gk_engaged *engaged, int p)
 }
 
 /* P of a tooth pair: both teeth */
-static void path_of(const gk_setup *setup, const gk_engaged *engaged, int e, int p, double *out)
+GK_INLINE void path_of(const gk_setup *setup, const gk_engaged *engaged, int e, int p, double share, double *out,
+                       const int strips)
 {
-    const int square = GK_STRIPS(setup) * GK_STRIPS(setup);
-    for (int c = 0; c < square; c++) out[c] = 0.0;
+    const int square = strips * strips;
+    const gk_side *side = setup->mesh[e].side;
+    const double *low[2], *high[2], part[2] = {engaged->position[0].part, engaged->position[1].part};
     for (int w = 0; w < 2; w++) {
-        const gk_side *side = &setup->mesh[e].side[w];
-        const gk_position *at = &engaged->position[w];
-        const double *low = side->path +
-                            ((size_t)at->node * side->candidates + engaged->place[p].candidate[w]) * square;
-        const double *high = low + side->candidates * square;
-        for (int c = 0; c < square; c++) out[c] += low[c] + at->part * (high[c] - low[c]);
+        low[w] = side[w].path +
+                 ((size_t)engaged->position[w].node * side[w].candidates + engaged->place[p].candidate[w]) * square;
+        high[w] = low[w] + side[w].candidates * square;
     }
+    for (int c = 0; c < square; c++)
+        out[c] = share * ((low[0][c] + part[0] * (high[0][c] - low[0][c])) +
+                          (low[1][c] + part[1] * (high[1][c] - low[1][c])));
 }
 
-/* the paths of the contacts' own dampers; what is in P is not in A and Q */
-static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
+/* the paths of the contacts' own dampers; what is in P is not in A */
+GK_INLINE void paths(const gk_setup *setup, gk_engaged *engaged, int e, const int strips)
 {
     gk_system *s = &engaged->system;
-    const int strips = GK_STRIPS(s);
     for (int p = 0; p < engaged->places; p++) {
-        const double share = path_share(engaged, p);
-        path_of(setup, engaged, e, p, s->path[p]);
-        for (int c = 0; c < strips * strips; c++) s->path[p][c] *= share;
-        for (int a = 0; a < strips; a++)
-            for (int b = 0; b < strips; b++) {
-                const int at = (p * strips + a) * s->stride + p * strips + b;
-                s->A[at] -= s->path[p][a * strips + b];
-                s->Q[at] -= s->path[p][a * strips + b];
-            }
+        double *A = s->A + (size_t)(p * strips) * (s->stride + 1);
+        path_of(setup, engaged, e, p, path_share(engaged, p), s->path[p], strips);
+        for (int a = 0; a < strips; a++, A += s->stride)
+            for (int b = 0; b < strips; b++) A[b] -= s->path[p][a * strips + b];
     }
 }
 
-/* Forms the problem of engagement e at its places for the step k: D, A, Q and the paths of the rows' own dampers, P and
+static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
+{
+    GK_STRIPPED(GK_STRIPS(setup), paths, setup, engaged, e)
+}
+
+/* Forms the problem of engagement e at its places for the step k: D, A and the paths of the rows' own dampers, P and
  * 1/k; C′ = A + P. The local law is in neither (it depends on the force). */
 void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                     gk_work *work, int e)
@@ -453,15 +463,15 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     gk_system *s = &engaged->system;
     list_rows(model, setup, data, k->h, work, e);
     const size_t size = (size_t)(s->stride * s->stride + 4); /* a quad may write beyond the last row */
-    const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma;
+    const int tables = work->table_h > 0.0 && k->h == work->table_h && k->gamma == work->table_gamma &&
+                       !setup->mesh[e].joined;
     s->D = engaged->matrix;
     s->A = s->D + size;
-    s->Q = s->A + size;
-    s->J = s->Q + size;
+    s->J = s->A + size;
     s->L = s->J + size;
     s->B = s->L + size;
-    const gk_real *const moves[2] = {tables ? engaged->table[0].moves : NULL, tables ? engaged->table[1].moves : NULL};
-    between_contacts(setup, engaged, e, moves);
+    gk_rows_form_ground(setup, work, e);
+    between_contacts(setup, engaged, e, tables);
     for (int w = 0; w < 2 && !tables; w++) gram(setup, work, engaged, &setup->mesh[e].side[w], k);
     memset(s->outer, 0, (size_t)s->stride * sizeof(double));
     memset(s->beyond, 0, (size_t)s->stride * sizeof(double));
@@ -470,10 +480,11 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     if (tables)
         add_ground_tables(model, setup, engaged, e);
     else
-        add_ground(model, setup, work, e, k);
-    add_spins(setup, k, s, e);
+        add_ground(setup, work, e, k);
     if (GK_ON(setup, residual) && GK_ON(setup, contact_damping))
         take_paths(setup, engaged, e);
     else
         memset(s->path, 0, (size_t)engaged->places * sizeof *s->path); /* no damper asks for it */
+    add_spins(setup, k, s, e);
+    mirror(s);
 }

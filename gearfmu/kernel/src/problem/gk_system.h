@@ -41,7 +41,7 @@ typedef struct gk_system {
     int own_laws;                 /* every strip has a law of its own, else the strips of a tooth pair share one */
     gk_local local[MAX_CONTACTS]; /* laws of the contacts, per metre */
     double rigid[MAX_LOCAL][MAX_STRIDE]; /* derivative of the rows by each spin of the engagement */
-    double *D, *A, *Q;                   /* (n, stride) symmetric; Q: A without the κ part, C_res − P */
+    double *D, *A;                       /* (n, stride) symmetric */
     double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
                                          factor; what a damper's force does, D + late·A */
     double inverse[MAX_STRIDE]; /* of the pivots */

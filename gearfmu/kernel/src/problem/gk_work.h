@@ -36,11 +36,12 @@ typedef struct gk_position {
 /* of them that a model knows */
 static inline int gk_common(const gk_setup *setup) { return setup->spatial ? COMMON : COMMON / 2; }
 
-typedef struct gk_step_side { /* D and −K of one step h: squares of nodes and products of neighbours */
-    gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of −K */
+typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
+    gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
     double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
                       motion of the gear, then with the bore angle: in D, in K */
     double own[2][COMMON][COMMON]; /* the same of these with each other */
+    double share[COMMON];          /* of what they have with each other in h: ½, of the bore angle 1 */
 } gk_step_side;
 
 typedef struct gk_engaged { /* an engagement in a step */
@@ -49,8 +50,7 @@ typedef struct gk_engaged { /* an engagement in a step */
     double pose[POSE]; /* predicted */
     gk_position position[2];
     gk_real *basis[2];       /* (contacts, n) rows of the contacts in the frame of the reference tooth */
-    double *ground;          /* (MAX_ROWS, n of ground): whole rows of contacts and joints, for steps without tables */
-    double *outward[2];      /* (contacts, width of the gear): what ground oscillators displace outward */
+    double *ground;          /* (rows, local part): rows of contacts and joints on the ground group */
     double *matrix;          /* D, A, Q, J, L, B */
     double read[MAX_STRIDE]; /* what the rows read of the oscillators */
     double *given_ground,
@@ -109,12 +109,12 @@ void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, c
 /* gk_rows.c */
 void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
                   double *pose);
-void gk_rows_form(const gk_model *model, const gk_setup *setup, gk_work *work, int e);
-void gk_rows_whole(const gk_model *model, const gk_setup *setup, gk_work *work, int e);
+void gk_rows_form(const gk_setup *setup, gk_work *work, int e);
+void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e);
 void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
                   double *read);
-void gk_rows_read_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                        const double *ground, double *read);
+void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                           const double *ground, double *read);
 void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
                      const double *(*y)(const gk_system *));
 /* does a joint pull at the bore of its port's rotor? */
@@ -122,10 +122,8 @@ static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int
 {
     return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
-void gk_rows_read_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                         const double *ground, double *read);
-void gk_rows_push_ground(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                         const double *x, double *out);
+void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read);
+void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, double *out);
 void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
                       double *read);
 void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *x,
@@ -143,6 +141,6 @@ void gk_couple_recall(gk_coupled *coupled);
 /* gk_form.c */
 void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                     gk_work *work, int e);
-void gk_form_rates(const gk_model *model, const gk_setup *setup, gk_work *work, int e,
+void gk_form_rates(const gk_setup *setup, gk_work *work, int e,
                    const gk_real *const modal_speed[], const double *ground_speed, const double *speed, double *rate);
 #endif

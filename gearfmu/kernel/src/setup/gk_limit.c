@@ -79,13 +79,13 @@ static void yielding(const double *S, const double *damping, int n, double *X)
 /* a row that no spring carries has no part in the limit */
 static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING; }
 
-/* C (n, n): compliance of the massless part with all contacts closed under the line load `full`; with dashpots what
- * yields to a force of alternating sign */
-void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *C)
+/* C (n, n): compliance of the massless part with all contacts closed under the line load `full`, Q (n, stride) without
+ * the κ part; with dashpots what yields to a force of alternating sign */
+void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C)
 {
     const int n = s->n, strips = s->strips;
     for (int i = 0; i < n * n; i++)
-        C[i] = counts(s, i / n) && counts(s, i % n) ? s->Q[i / n * s->stride + i % n] : i / n == i % n;
+        C[i] = counts(s, i / n) && counts(s, i % n) ? Q[i / n * s->stride + i % n] : i / n == i % n;
     for (int p = 0; p * strips < s->contacts; p++) {
         const int first = p * strips;
         double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
@@ -105,12 +105,12 @@ void gk_limit_compliance(const gk_system *s, double full, int dashpots, double *
 }
 
 /* K (n, n): κ part */
-static void kappa_part(const gk_system *s, double *K)
+static void kappa_part(const gk_system *s, const double *Q, double *K)
 {
     const int n = s->n;
     for (int i = 0; i < n * n; i++) {
         const int at = i / n * s->stride + i % n;
-        K[i] = counts(s, i / n) && counts(s, i % n) ? s->Q[at] - s->A[at] : 0.0;
+        K[i] = counts(s, i / n) && counts(s, i % n) ? Q[at] - s->A[at] : 0.0;
     }
 }
 
@@ -138,7 +138,7 @@ int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, 
                                     engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = -1;
-    gk_rows_form(model, setup, work, e);
+    gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, k, work, e);
     return 1;
 }
@@ -148,10 +148,12 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work,
 {
     const gk_system *s = &work->engaged[e].system;
     const gk_engagement *engagement = &model->engagement[e];
-    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
+    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS], Q[MAX_STRIDE * MAX_STRIDE];
+    if (!gk_limit_place(model, setup, work, data, &work->explicit_rows, e, position)) return INFINITY;
+    memcpy(Q, s->A, (size_t)(s->n * s->stride) * sizeof *Q);
     if (!gk_limit_place(model, setup, work, data, k, e, position)) return INFINITY;
-    gk_limit_compliance(s, engagement->force_max / engagement->width, 1, C);
-    kappa_part(s, K);
+    gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
+    kappa_part(s, Q, K);
     return gk_limit_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
 }
 

@@ -1,4 +1,4 @@
-/* What a step makes of the rows in the tables of a side: D and −K between all points. A row between two nodes is linear, so
+/* What a step makes of the rows in the tables of a side: D and A = C − K between all points, C what is not dynamic. A row between two nodes is linear, so
  * both are quadratic there: tabulated as squares of nodes and products of neighbours, they are exactly the bilinear form
  * of the interpolated rows. */
 #include "problem/gk_work.h"
@@ -38,11 +38,9 @@ static double weighed(const double *a, const double *b, const double *by, int n)
 static int common_rows(const gk_model *model, const gk_setup *setup, const gk_side *side, const double *rows[COMMON])
 {
     static const double nothing[MAX_GROUND + 4 * MAX_ROTORS];
-    static const int row[SPACE] = {0, 1, 5, 2, 3, 4};
     const gk_base *base = &setup->base;
-    const double *centre = base->centre[side->gear] + base->from[side->gear];
     const int directions = gk_directions(setup);
-    for (int c = 0; c < directions; c++) rows[c] = centre + row[c] * base->n;
+    for (int c = 0; c < directions; c++) rows[c] = base->moved[side->gear][c];
     rows[directions] = nothing;
     for (int p = 0; p < model->ports; p++)
         if (model->port[p].rotor == model->gear[side->gear].rotor)
@@ -76,12 +74,25 @@ static void add_ground_products(const gk_model *model, const gk_setup *setup, co
             for (int c = 0; c < count; c++)
                 table->pulls[(((size_t)at * points + i) * 2 + kind) * padded + c] = weighed(a, common[c], by, width);
         }
-        for (int c = 0; c < count; c++)
+        for (int c = 0; c < count; c++) {
+            table->share[c] = c < count - 1 ? 0.5 : 1.0;
             for (int d = 0; d < count; d++) table->own[kind][c][d] = weighed(common[c], common[d], by, width);
+        }
     }
 }
 
-/* D and −K of a step on both sides of an engagement */
+/* adds what is not dynamic to −K */
+static void add_residual(const gk_side *side, int at, int points, gk_real *out)
+{
+    const size_t columns = (size_t)side->columns;
+    for (int i = 0; i < points; i++) {
+        const gk_real *C = side->residual + ((size_t)at * (size_t)points + (size_t)i) * 2 * columns;
+        gk_real *to = out + (size_t)i * 4 * columns + 2 * columns;
+        for (size_t j = 0; j < 2 * columns; j++) to[j] += C[j];
+    }
+}
+
+/* D and A of a step on both sides of an engagement */
 static void fill_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e,
                       int which)
 {
@@ -100,6 +111,7 @@ static void fill_step(const gk_model *model, const gk_setup *setup, gk_work *wor
             store_products(side, scaled, rows, next_scaled, next, n, (int)points, kind ? -1.0 : 1.0, out);
         }
         add_ground_products(model, setup, k, &work->engaged[e].table[which], side, at);
+        add_residual(side, at, (int)points, work->engaged[e].table[which].moves + (size_t)at * size);
     }
 }
 

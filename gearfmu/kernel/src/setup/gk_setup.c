@@ -149,9 +149,8 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
     }
-    for (int w = 0; w < 2; w++) engaged->outward[w] = doubles(b, contacts * (size_t)setup->base.n);
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
-    engaged->matrix = doubles(b, 6 * rows * rows);
+    engaged->matrix = doubles(b, 5 * rows * rows);
     engaged->given_ground = doubles(b, 3 * (size_t)setup->base.n);
     engaged->given_far = doubles(b, 2 * (size_t)setup->far);
 }
@@ -331,7 +330,7 @@ static void select_rows(const gk_base *base, const double *rows, int count, int 
 }
 
 /* rigid motion of a gear by the dynamic oscillators, and the part of them that it reads */
-static void fill_centre(const gk_model *model, gk_base *base, int g)
+static void fill_centre(const gk_model *model, gk_base *base, int directions, int g)
 {
     const gk_gear *gear = &model->gear[g];
     const int reads = gear->ground[base->set].reads;
@@ -345,6 +344,14 @@ static void fill_centre(const gk_model *model, gk_base *base, int g)
     }
     base->from[g] = from < to ? from / 4 * 4 : 0;
     base->width[g] = from < to ? (to + 3) / 4 * 4 - base->from[g] : 0;
+    base->motions[g] = 0;
+    for (int c = 0; c < SPACE; c++) {
+        const double *moved = base->centre[g] + GK_RIGID_ROW[c] * base->n + base->from[g];
+        double size = 0.0;
+        for (int k = 0; k < base->width[g]; k++) size += fabs(moved[k]);
+        base->moved[g][c] = moved;
+        if (size > 0.0 && c < directions) base->motion[g][base->motions[g]++] = c;
+    }
 }
 
 static gk_span span_of(const double *row, int n)
@@ -380,7 +387,33 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
     for (int s = 0; s < model->supports; s++)
         base->support_span[s] = span_of(base->support_rows + s * base->n, base->n);
     for (int p = 0; p < model->ports; p++) base->port_span[p] = span_of(base->port_rows + p * base->n, base->n);
-    for (int g = 0; g < model->gears; g++) fill_centre(model, base, g);
+    for (int g = 0; g < model->gears; g++) fill_centre(model, base, gk_directions(setup), g);
+}
+
+static gk_span hull(gk_span a, gk_span b)
+{
+    if (!a.width || !b.width) return a.width ? a : b;
+    const int from = a.from < b.from ? a.from : b.from;
+    const int to = a.from + a.width > b.from + b.width ? a.from + a.width : b.from + b.width;
+    return (gk_span){from, to - from};
+}
+
+/* the parts of the ground group that the rows of an engagement read: its gears, and the ports among its joints */
+static void fill_parts(const gk_model *model, const gk_base *base, gk_mesh *mesh)
+{
+    for (int w = 0; w < 2; w++) {
+        const int g = mesh->side[w].gear;
+        mesh->part[w] = (gk_span){base->from[g], base->width[g]};
+        for (int p = 0; p < mesh->ports; p++)
+            if (model->port[mesh->port[p]].rotor == model->gear[g].rotor)
+                mesh->part[w] = hull(mesh->part[w], base->port_span[mesh->port[p]]);
+    }
+    gk_span *a = &mesh->part[0], *b = &mesh->part[1];
+    mesh->joined = a->width && b->width && a->from < b->from + b->width && b->from < a->from + a->width;
+    if (mesh->joined) *a = hull(*a, *b), *b = (gk_span){0, 0};
+    mesh->local = a->width + b->width;
+    mesh->at[0] = base->from[mesh->side[0].gear] - a->from;
+    mesh->at[1] = base->from[mesh->side[1].gear] - (b->width ? b->from - a->width : a->from);
 }
 
 static void add_joint(gk_setup *setup, int port, int which, int live, double k, double c)
@@ -472,6 +505,7 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
     const double *a = engagement->position[0], *b = engagement->position[1];
     const double distance = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
     fill_spins(model, mesh);
+    fill_parts(model, &setup->base, mesh);
     mesh->damping = data->mesh[e][V_DAMPING];
     if (engagement->kind != MESH_FLAT)
         mesh->allowance = (data->mesh[e][V_BACKLASH] - engagement->nominal_backlash) *

@@ -55,6 +55,9 @@ typedef struct gk_modal { /* dynamic modes of a gear group: n lanes, [first memb
     gk_real *cosine, *sine; /* (z, pairs) */
 } gk_modal;
 
+/* of a pose among the rows of a gear's rigid motion */
+static const int GK_RIGID_ROW[SPACE] = {0, 1, 5, 2, 3, 4};
+
 typedef struct gk_span { /* the part of a row that is not zero, quads-aligned */
     int from, width;
 } gk_span;
@@ -68,6 +71,8 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     double *support_rows;          /* (supports, n): force on the support, kappa included */
     double *port_rows;             /* (ports, n) */
     double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
+    const double *moved[MAX_GEARS][SPACE]; /* the same as in a pose, from the part on that the gear reads */
+    int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], port_span[MAX_PORTS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
 } gk_base;
@@ -100,6 +105,10 @@ typedef struct gk_side {
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
     gk_side side[2];
+    gk_span part[2]; /* parts of the ground group that its rows read: gear A's, gear B's; one where these meet */
+    int local;       /* their widths together */
+    int at[2];       /* where the part of either gear begins in such a row */
+    int joined;      /* both gears read the same oscillators: what a step does has no tables */
     int ports, port[2];            /* ports whose rows stand in this engagement's system */
     int spins, spin[6];            /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
     int joint_spin[2][2];          /* inertia and disc of its ports among them, −1: none */
@@ -214,6 +223,27 @@ static inline double gk_dot_span(gk_span span, const double *row, const double *
 static inline void gk_axpy_span(gk_span span, double f, const double *row, double *y)
 {
     gk_axpy(f, row, y, span.from / 4, (span.from + span.width) / 4);
+}
+/* a row over the parts of an engagement, and a whole vector x or y of the ground group */
+static inline double gk_local_dot(const gk_mesh *mesh, const double *row, const double *x)
+{
+    const gk_quad *a = (const gk_quad *)row;
+    gk_quad sum = {0};
+    for (int w = 0; w < 2; w++) {
+        const gk_quad *b = (const gk_quad *)(x + mesh->part[w].from);
+        for (int q = 0; q < mesh->part[w].width / 4; q++) sum += *a++ * b[q];
+    }
+    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
+}
+static inline void gk_local_axpy(const gk_mesh *mesh, double f, const double *row, double *y)
+{
+    gk_axpy(f, row, y + mesh->part[0].from, 0, mesh->part[0].width / 4);
+    gk_axpy(f, row + mesh->part[0].width, y + mesh->part[1].from, 0, mesh->part[1].width / 4);
+}
+static inline void gk_local_gather(const gk_mesh *mesh, const double *x, double *row)
+{
+    memcpy(row, x + mesh->part[0].from, (size_t)mesh->part[0].width * sizeof *row);
+    memcpy(row + mesh->part[0].width, x + mesh->part[1].from, (size_t)mesh->part[1].width * sizeof *row);
 }
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out);
 #endif
