@@ -56,36 +56,44 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* rows of the contacts on the part of the ground group that one gear reads */
-GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, int local,
-                              double *out, const int own_points)
+/* adds the rows of the contacts on the part of the ground group that one gear reads; strips of a place whose gradient is the
+ * same: all, or each has its own */
+GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
+                              const int each, const int strips)
 {
     const gk_base *base = &setup->base;
     const gk_position *at = &engaged->position[side->which];
-    const int quads = base->width[side->gear] / 4, strips = GK_STRIPS(setup), points = side->candidates * strips;
-    const int motions = base->motions[side->gear];
-    const double part = at->part;
+    const int quads = base->width[side->gear] / 4, points = side->candidates * strips;
+    const int motions = base->motions[side->gear], *motion = base->motion[side->gear];
+    const size_t local = (size_t)setup->mesh[engaged->index].local / 4;
+    const gk_quad *const node = (const gk_quad *)side->ground + (size_t)(at->node * points) * quads;
     for (int p = 0; p < engaged->places; p++) {
         const gk_place *place = &engaged->place[p];
-        const gk_quad *low = (const gk_quad *)side->ground +
-                             ((size_t)at->node * points + (size_t)(place->candidate[side->which] * strips)) * quads;
+        const gk_quad *low = node + (size_t)(place->candidate[side->which] * strips) * quads;
         const gk_quad *high = low + (size_t)points * quads;
-        for (int q = 0; q < quads; q++) {
-            gk_quad rigid = {0};
-            for (int i = 0; i < strips; i++) {
-                const size_t k = (size_t)(i * quads + q);
-                if (i == 0 || own_points) {
-                    const double *gradient = place->point[i].gradient + SPACE * side->which;
-                    rigid = (gk_quad){0};
-                    for (int m = 0; m < motions; m++) {
-                        const int c = base->motion[side->gear][m];
-                        rigid += gradient[c] * ((const gk_quad *)base->moved[side->gear][c])[q];
-                    }
+        gk_quad *to = (gk_quad *)out + (size_t)(p * strips) * local;
+        for (int first = 0; first < strips; first += each) {
+            const double *gradient = place->point[first].gradient + SPACE * side->which;
+            for (int q = 0; q < quads; q++) {
+                gk_quad rigid = {0};
+                for (int m = 0; m < motions; m++)
+                    rigid += gradient[motion[m]] * ((const gk_quad *)base->moved[side->gear][motion[m]])[q];
+                for (int i = first; i < first + each; i++) {
+                    const gk_quad here = low[i * quads + q];
+                    to[(size_t)i * local + q] += rigid - (here + at->part * (high[i * quads + q] - here));
                 }
-                ((gk_quad *)(out + (size_t)(p * strips + i) * local))[q] += rigid - (low[k] + part * (high[k] - low[k]));
             }
         }
     }
+}
+
+GK_INLINE void ground_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
+                           const int strips)
+{
+    if (setup->spatial)
+        ground_rows_of(setup, side, engaged, out, 1, strips);
+    else
+        ground_rows_of(setup, side, engaged, out, strips, strips);
 }
 
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
@@ -98,12 +106,8 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     const int local = mesh->local;
     if (!local) return;
     memset(engaged->ground, 0, (size_t)(s->contacts * local) * sizeof *engaged->ground);
-    for (int w = 0; w < 2; w++) {
-        if (setup->spatial)
-            ground_rows_of(setup, &mesh->side[w], engaged, local, engaged->ground + mesh->at[w], 1);
-        else
-            ground_rows_of(setup, &mesh->side[w], engaged, local, engaged->ground + mesh->at[w], 0);
-    }
+    for (int w = 0; w < 2; w++)
+        GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w])
     for (int i = s->contacts; i < s->n; i++) {
         double *row = engaged->ground + (size_t)i * local;
         if (gk_rows_at_bore(setup, s, i))
@@ -144,8 +148,10 @@ void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e
 {
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &engaged->system;
-    for (int i = 0; i < s->n; i++)
-        read[i] = mesh->local ? gk_local_dot(mesh, engaged->ground + (size_t)i * mesh->local, ground) : 0.0;
+    const int quads = mesh->local / 4;
+    double local[MAX_GROUND + 4 * MAX_ROTORS];
+    gk_local_gather(mesh, ground, local);
+    for (int i = 0; i < s->n; i++) read[i] = gk_dot_quads(engaged->ground + (size_t)i * mesh->local, local, quads);
     for (int i = s->n; i < s->stride; i++) read[i] = 0.0;
 }
 
@@ -160,7 +166,8 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
         const int g = setup->mesh[e].side[w].gear, n = GK_LANES(setup, g);
         if (!n || !s->contacts) continue;
         turn_back(&setup->modal[g], engaged->position[w].tooth, y[g], work->turned);
-        for (int i = 0; i < s->contacts; i++) read[i] -= gk_dot(engaged->basis[w] + (size_t)i * n, work->turned, n);
+        const gk_real *row = engaged->basis[w];
+        for (int i = 0; i < s->contacts; i++, row += n) read[i] -= gk_dot(row, work->turned, n);
     }
 }
 
@@ -168,14 +175,21 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
 void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
                            const double *ground, double *read)
 {
+    const int each = setup->spatial ? 1 : GK_STRIPS(setup);
     double rigid[POSE];
     read_rigid(model, setup, e, ground, rigid);
     for (int p = 0, i = 0; p < engaged->places; p++)
-        for (int strip = 0; strip < GK_STRIPS(setup); strip++, i++) {
-            const double *gradient = gk_point_of(setup, &engaged->place[p], strip)->gradient;
-            for (int w = 0; w < 2; w++)
-                for (int c = 0; c < gk_directions(setup); c++)
-                    read[i] -= gradient[SPACE * w + c] * rigid[SPACE * w + c];
+        for (int first = 0; first < GK_STRIPS(setup); first += each) {
+            const double *gradient = engaged->place[p].point[first].gradient;
+            double sum = 0.0;
+            for (int w = 0; w < 2; w++) {
+                const int g = setup->mesh[e].side[w].gear;
+                for (int m = 0; m < setup->base.motions[g]; m++) {
+                    const int c = SPACE * w + setup->base.motion[g][m];
+                    sum += gradient[c] * rigid[c];
+                }
+            }
+            for (int strip = 0; strip < each; strip++) read[i++] -= sum;
         }
 }
 

@@ -94,53 +94,71 @@ static int list_runs(const gk_engaged *engaged, int strips, run runs[MAX_PAIRS])
  * of a joint up to itself; mirror() writes the rest. */
 static int block_end(int i) { return i / 4 * 4 + 4; }
 
-static void mirror(gk_system *s)
+GK_INLINE void mirror(gk_system *s, const int quads)
 {
-    for (int i = 1; i < s->stride; i++)
-        for (int j = 0; j < (i < s->contacts ? i / 4 * 4 : i); j++) {
-            s->D[j * s->stride + i] = s->D[i * s->stride + j];
-            s->A[j * s->stride + i] = s->A[i * s->stride + j];
+    const int stride = 4 * quads;
+    for (int block = 1; block < quads; block++)
+        for (int i = 4 * block; i < 4 * block + 4; i++)
+            for (int j = 0; j < 4 * block; j++) {
+                s->D[j * stride + i] = s->D[i * stride + j];
+                s->A[j * stride + i] = s->A[i * stride + j];
+            }
+    for (int i = s->contacts; i < s->n; i++)
+        for (int j = i / 4 * 4; j < i; j++) {
+            s->D[j * stride + i] = s->D[i * stride + j];
+            s->A[j * stride + i] = s->A[i * stride + j];
         }
 }
 
-typedef struct row_source { /* a row of the tables of one side: at two neighbouring nodes, with their weights */
+typedef struct blend { /* a table of one side at two neighbouring nodes: (points, parts, columns) each, and their weights */
     const gk_real *low, *high;
     double square_low, mixed, square_high;
-    size_t columns;
-} row_source;
+    size_t columns, row; /* of one part; of all parts */
+} blend;
 
-/* table: (nodes + 1, points, parts, columns) */
-static row_source source_of(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, const gk_real *table,
-                            int parts, int point)
+static blend blend_of(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, const gk_real *table,
+                      int parts)
 {
     const gk_position *at = &engaged->position[side->which];
-    const size_t columns = (size_t)side->columns, points = (size_t)(side->candidates * GK_STRIPS(setup));
-    const size_t row = (size_t)at->node * points + (size_t)point, width = (size_t)parts * columns;
+    const size_t columns = (size_t)side->columns, row = (size_t)parts * columns;
+    const size_t node = (size_t)(side->candidates * GK_STRIPS(setup)) * row;
     const double x = at->part, y = 1.0 - x;
-    return (row_source){table + row * width, table + (row + points) * width, y * y, x * y, x * x, columns};
+    const gk_real *low = table + (size_t)at->node * node;
+    return (blend){low, low + node, y * y, x * y, x * x, columns, row};
 }
 
 #define WIDENED(values) GK_WIDENED(*(const gk_four *)(values))
-#define SQUARE(s, at)                                                                                                  \
-    ((s).square_low * WIDENED((s).low + (at)) + (s).mixed * WIDENED((s).low + (at) + (s).columns) +                    \
-     (s).square_high * WIDENED((s).high + (at)))
+#define BLENDED(b, at)                                                                                                 \
+    ((b).square_low * WIDENED((b).low + (at)) + (b).mixed * WIDENED((b).low + (at) + (b).columns) +                    \
+     (b).square_high * WIDENED((b).high + (at)))
 
-/* a row of D and A between the contacts, or of A alone. What a quad writes beyond a run the next run writes again. */
-GK_INLINE void table_row(const row_source source[2], const run *runs, int count, int end, double *D, double *A,
-                         const int moves)
+/* rows of D and A between the contacts, or of A alone. What a quad writes beyond a run the next run writes again. */
+GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend *q, const run *runs, int count,
+                          const int moves, const int strips)
 {
-    const row_source p = source[0], q = source[1];
-    for (int r = 0; r < count; r++)
-        for (int c = 0; c < runs[r].count && runs[r].column + c < end; c += 4) {
-            const size_t a = (size_t)(runs[r].point[0] + c), b = (size_t)(runs[r].point[1] + c);
-            const int to = runs[r].column + c;
-            if (moves) {
-                *(gk_quad *)(D + to) = SQUARE(p, a) + SQUARE(q, b);
-                *(gk_quad *)(A + to) = SQUARE(p, a + 2 * p.columns) + SQUARE(q, b + 2 * q.columns);
-            } else {
-                *(gk_quad *)(A + to) = SQUARE(p, a) + SQUARE(q, b);
+    const gk_system *s = &engaged->system;
+    double *D = s->D, *A = s->A;
+    for (int place = 0, i = 0; place < engaged->places; place++) {
+        size_t first = (size_t)(engaged->place[place].candidate[0] * strips) * p->row;
+        size_t second = (size_t)(engaged->place[place].candidate[1] * strips) * q->row;
+        for (int strip = 0; strip < strips; strip++, i++, first += p->row, second += q->row) {
+            const int end = block_end(i);
+            for (int r = 0; r < count; r++) {
+                const size_t a = first + (size_t)runs[r].point[0], b = second + (size_t)runs[r].point[1];
+                for (int c = 0, to = runs[r].column; c < runs[r].count && to < end; c += 4, to += 4) {
+                    const size_t at = a + (size_t)c, of = b + (size_t)c;
+                    if (moves) {
+                        *(gk_quad *)(D + to) = BLENDED(*p, at) + BLENDED(*q, of);
+                        *(gk_quad *)(A + to) = BLENDED(*p, at + 2 * p->columns) + BLENDED(*q, of + 2 * q->columns);
+                    } else {
+                        *(gk_quad *)(A + to) = BLENDED(*p, at) + BLENDED(*q, of);
+                    }
+                }
             }
+            for (int j = s->contacts; j < end; j++) D[j] = A[j] = 0.0;
+            D += s->stride, A += s->stride;
         }
+    }
 }
 
 /* compliance between the contacts through both gears, from the tables: of the step, or of what is not dynamic alone; the
@@ -149,27 +167,21 @@ static void between_contacts(const gk_setup *setup, const gk_engaged *engaged, i
 {
     const gk_system *s = &engaged->system;
     const gk_side *side = setup->mesh[e].side;
-    const int strips = GK_STRIPS(s), parts = tables ? 4 : 2;
-    const gk_real *const table[2] = {tables ? engaged->table[0].moves : side[0].residual,
-                                     tables ? engaged->table[1].moves : side[1].residual};
+    const int strips = GK_STRIPS(s);
+    blend of[2];
     run runs[MAX_PAIRS];
     const int count = list_runs(engaged, strips, runs);
-    double *D = s->D, *A = s->A;
-    for (int p = 0, i = 0; p < engaged->places; p++)
-        for (int strip = 0; strip < strips; strip++, i++, D += s->stride, A += s->stride) {
-            const int *candidate = engaged->place[p].candidate, end = block_end(i);
-            row_source source[2];
-            for (int w = 0; w < 2; w++)
-                source[w] = source_of(setup, engaged, &side[w], table[w], parts, candidate[w] * strips + strip);
-            if (tables)
-                table_row(source, runs, count, end, D, A, 1);
-            else
-                table_row(source, runs, count, end, D, A, 0);
-            for (int j = tables ? s->contacts : 0; j < end; j++) D[j] = 0.0;
-            for (int j = s->contacts; j < end; j++) A[j] = 0.0;
-        }
-    for (int i = s->contacts; i < s->stride; i++, D += s->stride, A += s->stride)
-        for (int q = 0; q <= i / 4; q++) ((gk_quad *)D)[q] = ((gk_quad *)A)[q] = (gk_quad){0};
+    for (int w = 0; w < 2; w++)
+        of[w] = tables ? blend_of(setup, engaged, &side[w], engaged->table[w].moves, 4)
+                       : blend_of(setup, engaged, &side[w], side[w].residual, 2);
+    if (tables) {
+        GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], runs, count, 1)
+    } else {
+        memset(s->D, 0, (size_t)(s->contacts * s->stride) * sizeof *s->D);
+        GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], runs, count, 0)
+    }
+    memset(s->D + s->contacts * s->stride, 0, (size_t)((s->stride - s->contacts) * s->stride) * sizeof *s->D);
+    memset(s->A + s->contacts * s->stride, 0, (size_t)((s->stride - s->contacts) * s->stride) * sizeof *s->A);
 }
 
 /* rows diag(mobility) rowsᵀ and −rows diag(κ) rowsᵀ, added to D and A: for a step that has no table */
@@ -195,26 +207,30 @@ static void gram(const gk_setup *setup, gk_work *work, gk_engaged *engaged, cons
 }
 
 /* residual between contacts and the bores of their own gear, and of the bores */
-static void joint_residual(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
+GK_INLINE void joint_rows(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e, const int strips)
 {
     gk_system *s = &engaged->system;
-    const int strips = GK_STRIPS(s);
     for (int r = s->contacts; r < s->n; r++) {
-        double *A = s->A + r * s->stride;
         if (!gk_rows_at_bore(setup, s, r)) continue;
-        A[r] += setup->port_own[s->port_of[r]];
+        s->A[r * s->stride + r] += setup->port_own[s->port_of[r]];
         for (int w = 0; w < 2; w++) {
             const gk_side *side = &setup->mesh[e].side[w];
             const double part = engaged->position[w].part;
             const int points = side->candidates * strips;
+            double *A = s->A + r * s->stride;
             if (model->gear[side->gear].rotor != model->port[s->port_of[r]].rotor) continue;
-            for (int p = 0; p < engaged->places; p++) {
-                const double *low = side->port + (size_t)engaged->position[w].node * points +
-                                    engaged->place[p].candidate[w] * strips;
-                for (int i = 0; i < strips; i++) A[p * strips + i] -= low[i] + part * (low[points + i] - low[i]);
+            const double *node = side->port + (size_t)engaged->position[w].node * points;
+            for (int p = 0; p < engaged->places; p++, A += strips) {
+                const double *low = node + engaged->place[p].candidate[w] * strips, *high = low + points;
+                for (int i = 0; i < strips; i++) A[i] -= low[i] + part * (high[i] - low[i]);
             }
         }
     }
+}
+
+static void joint_residual(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
+{
+    GK_STRIPPED(GK_STRIPS(setup), joint_rows, model, setup, engaged, e)
 }
 
 /* ---- compliance of the ground group and of the spins --------------------------------------------------------------- */
@@ -249,50 +265,63 @@ typedef struct pulled { /* a motion of a gear */
 
 /* motions of one gear, and what the bore of its rotor has in common with the contacts: `port`, in D and in K */
 GK_INLINE void pull(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, pulled *p,
-                    double port[2][MAX_STRIDE], const int quads)
+                    double port[2][MAX_STRIDE], const int quads, const int motions, const int strips)
 {
     const gk_system *s = &engaged->system;
     const gk_position *at = &engaged->position[side->which];
     const gk_step_side *table = &engaged->table[side->which];
-    const int strips = GK_STRIPS(setup), points = side->candidates * strips, bore = gk_directions(setup);
-    const int motions = setup->base.motions[side->gear], *motion = setup->base.motion[side->gear];
+    const int points = side->candidates * strips, *motion = setup->base.motion[side->gear];
+    const int bore = quads == 1 ? PLANE : SPACE, each = quads == 1 ? strips : 1; /* strips with the same gradient */
+    const gk_quad *const node = (const gk_quad *)table->pulls + 2 * (size_t)(at->node * points) * quads;
     for (int m = 0; m < motions; m++)
         for (int i = s->contacts; i < s->stride; i++) p[m].g[i] = p[m].moved[i] = p[m].yielded[i] = 0.0;
     for (int place = 0, i = 0; place < engaged->places; place++) {
         const gk_place *found = &engaged->place[place];
-        const size_t row = (size_t)at->node * points + (size_t)(found->candidate[side->which] * strips);
-        const gk_quad *low = (const gk_quad *)table->pulls + 2 * row * quads, *high = low + 2 * points * quads;
-        gk_quad own[2][COMMON / 4];
-        const double *g = NULL;
-        for (int strip = 0; strip < strips; strip++, i++)
-            for (int kind = 0; kind < 2; kind++, low += quads, high += quads) {
-                gk_quad h[COMMON / 4];
-                if (strip == 0 || setup->spatial) {
-                    g = found->point[strip].gradient + SPACE * side->which;
-                    for (int q = 0; q < quads; q++) own[kind][q] = (gk_quad){0};
-                    for (int m = 0; m < motions; m++)
-                        for (int q = 0; q < quads; q++)
-                            own[kind][q] += g[motion[m]] * ((const gk_quad *)table->own[kind][motion[m]])[q];
-                }
-                for (int q = 0; q < quads; q++)
-                    h[q] = (low[q] + at->part * (high[q] - low[q])) -
-                           ((const gk_quad *)table->share)[q] * own[kind][q];
+        const gk_quad *low = node + 2 * (size_t)(found->candidate[side->which] * strips) * quads,
+                      *high = low + 2 * (size_t)points * quads;
+        for (int first = 0; first < strips; first += each) {
+            const double *g = found->point[first].gradient + SPACE * side->which;
+            gk_quad own[2][COMMON / 4] = {{{0}}};
+            for (int m = 0; m < motions; m++)
+                for (int kind = 0; kind < 2; kind++)
+                    for (int q = 0; q < quads; q++)
+                        own[kind][q] += g[motion[m]] * ((const gk_quad *)table->own[kind][motion[m]])[q];
+            for (int kind = 0; kind < 2; kind++)
+                for (int q = 0; q < quads; q++) own[kind][q] *= ((const gk_quad *)table->share)[q];
+            for (int strip = 0; strip < each; strip++, i++, low += 2 * quads, high += 2 * quads) {
+                double h[2][COMMON];
+                for (int kind = 0; kind < 2; kind++)
+                    for (int q = 0; q < quads; q++)
+                        ((gk_quad *)h[kind])[q] = low[kind * quads + q] - own[kind][q] +
+                                                  at->part * (high[kind * quads + q] - low[kind * quads + q]);
                 for (int m = 0; m < motions; m++) {
-                    (kind ? p[m].yielded : p[m].moved)[i] = ((const double *)h)[motion[m]];
                     p[m].g[i] = g[motion[m]];
+                    p[m].moved[i] = h[0][motion[m]], p[m].yielded[i] = h[1][motion[m]];
                 }
-                port[kind][i] = -((const double *)h)[bore];
+                port[0][i] = -h[0][bore], port[1][i] = -h[1][bore];
             }
+        }
     }
+}
+
+GK_INLINE void pull_stripped(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, pulled *p,
+                             double port[2][MAX_STRIDE], const int strips)
+{
+    const int motions = setup->base.motions[side->gear];
+    if (setup->spatial)
+        pull(setup, engaged, side, p, port, COMMON / 4, motions, strips);
+    else if (motions == 2)
+        pull(setup, engaged, side, p, port, COMMON / 8, 2, strips);
+    else
+        pull(setup, engaged, side, p, port, COMMON / 8, motions, strips);
 }
 
 GK_INLINE void add_pulled(gk_system *s, const pulled *p, int motions, const int quads)
 {
-    for (int i = 0; i < s->contacts; i++) {
-        gk_quad *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
-        for (int m = 0; m < motions; m++) {
-            const gk_quad *g = (const gk_quad *)p[m].g, *h = (const gk_quad *)p[m].moved,
-                          *k = (const gk_quad *)p[m].yielded;
+    for (int m = 0; m < motions; m++) {
+        const gk_quad *g = (const gk_quad *)p[m].g, *h = (const gk_quad *)p[m].moved, *k = (const gk_quad *)p[m].yielded;
+        gk_quad *D = (gk_quad *)s->D, *A = (gk_quad *)s->A;
+        for (int i = 0; i < s->contacts; i++, D += quads, A += quads) {
             const double own = p[m].g[i], moved = p[m].moved[i], yielded = p[m].yielded[i];
             for (int q = 0; q <= i / 4; q++) D[q] -= moved * g[q] + own * h[q], A[q] += yielded * g[q] + own * k[q];
         }
@@ -309,10 +338,7 @@ static void add_ground_tables(const gk_model *model, const gk_setup *setup, gk_e
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
         if (!setup->base.width[side->gear]) continue;
-        if (setup->spatial)
-            pull(setup, engaged, side, p + motions, port, COMMON / 4);
-        else
-            pull(setup, engaged, side, p + motions, port, COMMON / 8);
+        GK_STRIPPED(GK_STRIPS(s), pull_stripped, setup, engaged, side, p + motions, port)
         motions += setup->base.motions[side->gear];
         for (int r = s->contacts; r < s->n; r++) {
             if (!gk_rows_at_bore(setup, s, r) || model->port[s->port_of[r]].rotor != model->gear[side->gear].rotor)
@@ -331,11 +357,11 @@ GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spi
     for (int m = 0; m < spins; m++) {
         const double moves = k->rigid_mobility * inverse[m], yields = k->rigid_kappa * inverse[m];
         const gk_quad *row = (const gk_quad *)s->rigid[m];
-        for (int i = 0; i < s->n; i++) {
-            const double x = s->rigid[m][i];
-            gk_quad *D = (gk_quad *)s->D + i * quads, *A = (gk_quad *)s->A + i * quads;
+        gk_quad *D = (gk_quad *)s->D, *A = (gk_quad *)s->A;
+        for (int i = 0; i < s->n; i++, D += quads, A += quads) {
+            const double x = s->rigid[m][i], moved = moves * x, yielded = yields * x;
             if (x == 0.0) continue;
-            for (int q = 0; q <= i / 4; q++) D[q] += moves * x * row[q], A[q] -= yields * x * row[q];
+            for (int q = 0; q <= i / 4; q++) D[q] += moved * row[q], A[q] -= yielded * row[q];
         }
     }
 }
@@ -486,5 +512,5 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     else
         memset(s->path, 0, (size_t)engaged->places * sizeof *s->path); /* no damper asks for it */
     add_spins(setup, k, s, e);
-    mirror(s);
+    GK_SIZED(s->stride / 4, mirror, s)
 }

@@ -45,6 +45,7 @@ typedef struct gk_step_side { /* D and A of one step h: squares of nodes and pro
 } gk_step_side;
 
 typedef struct gk_engaged { /* an engagement in a step */
+    int index;
     gk_place place[MAX_PAIRS];
     int places;
     double pose[POSE]; /* predicted */
