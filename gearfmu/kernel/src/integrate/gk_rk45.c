@@ -46,7 +46,7 @@ static void add_dashpots(const gk_setup *setup, const gk_mesh *mesh, gk_system *
         if (!s->active[i]) continue;
         const double dashpot = s->kind[i] == ROW_CONTACT ? gk_clamp(y[i], -s->force[i], s->force[i]) : y[i];
         s->z[i] = s->force[i] + dashpot;
-        s->eta[i] = 2.0 * dashpot; /* reported force: λ + η/2 */
+        s->end[i] = dashpot;
     }
 }
 

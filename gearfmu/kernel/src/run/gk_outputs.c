@@ -3,7 +3,8 @@
 
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
 
-static double reported(const gk_system *s, int i) { return s->force[i] + 0.5 * s->eta[i]; }
+/* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never pulls. */
+static double reported(const gk_system *s, int i) { return s->force[i] + s->end[i]; }
 
 /* ---- forces ----------------------------------------------------------------------------------------------------------- */
 static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
@@ -53,44 +54,70 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
     }
 }
 
-/* forces on the supports at the end of the step: through the dynamic oscillators, their dashpots, and what the contacts
- * move directly */
-static void support_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                           double *out)
+/* what moves the springs of the supports, and what their dashpots see, of the dynamic oscillators */
+static void support_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved,
+                           double *speed)
+{
+    const int n = setup->base.n;
+    const gk_quad *x = (const gk_quad *)gk_ground_seen(data), *v = x + n / 4, *f = v + n / 4;
+    const gk_quad *kappa = (const gk_quad *)gk_flow_known(work, data->state_h, data->state_gamma)->ground.kappa;
+    for (int q = 0; q < n / 4; q++) {
+        ((gk_quad *)moved)[q] = x[q] - kappa[q] * f[q];
+        ((gk_quad *)speed)[q] = v[q];
+    }
+}
+
+/* forces on the supports by such motion (or its integral) */
+static void forces_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,
+                             double *out)
 {
     const gk_base *base = &setup->base;
-    const int n = base->n, supports = model->supports;
-    const double *x = gk_ground_seen(data), *v = x + n, *f = v + n;
-    const gk_coefficients *k = gk_flow_known(work, data->state_h, data->state_gamma);
-    double moved[MAX_GROUND + 4];
-    for (int i = 0; i < n; i++) moved[i] = x[i] - k->ground.kappa[i] * f[i];
-    for (int s = 0; s < supports; s++) {
-        out[s] = n ? gk_dot_span(base->support_span[s], base->support_rows + s * n, moved) : 0.0;
-        if (s < model->dampers && n)
+    for (int s = 0; s < model->supports; s++) {
+        out[s] = gk_dot_span(base->support_span[s], base->support_rows + s * base->n, moved);
+        if (s < model->dampers)
             out[s] += model->ground[base->set].damper[s] *
-                      gk_dot_span(base->damper_span[s], base->damper_rows + s * n, v);
+                      gk_dot_span(base->damper_span[s], base->damper_rows + s * base->n, speed);
     }
+}
+
+/* adds the forces on the supports that contacts and joints make directly, beside the oscillators */
+static void add_direct_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, double *out)
+{
     for (int e = 0; e < model->engagements; e++) {
         const gk_engaged *engaged = &work->engaged[e];
         const gk_system *system = &engaged->system;
-        for (int i = 0; i < system->contacts; i++)
-            for (int w = 0; w < 2; w++) {
-                const gk_side *side = &setup->mesh[e].side[w];
-                const gk_position *at = &engaged->position[w];
-                const double force = reported(system, i), points = side->candidates * setup->strips;
-                const int candidate = engaged->place[system->place_of[i]].candidate[w];
-                const double *low = side->support + ((size_t)at->node * (size_t)points +
-                                                     (size_t)(candidate * setup->strips + i % setup->strips)) *
-                                                        supports;
-                const double *high = low + (size_t)points * supports;
-                for (int s = side->held.from; s < side->held.from + side->held.width; s++)
-                    out[s] -= force * (low[s] + at->part * (high[s] - low[s]));
+        double force[MAX_ROWS];
+        for (int i = 0; i < system->n; i++) force[i] = reported(system, i);
+        for (int w = 0; w < 2; w++) {
+            const gk_side *side = &setup->mesh[e].side[w];
+            const gk_position *at = &engaged->position[w];
+            const size_t width = (size_t)side->held.width, next = (size_t)(side->candidates * setup->strips) * width;
+            const double *node = side->support + (size_t)at->node * next, high = at->part, low = 1.0 - high;
+            for (size_t s = 0; s < width; s++) {
+                double sum = 0.0;
+                for (int p = 0, i = 0; p < engaged->places; p++) {
+                    const double *table = node + (size_t)(engaged->place[p].candidate[w] * setup->strips) * width + s;
+                    for (int strip = 0; strip < setup->strips; strip++, i++, table += width)
+                        sum += force[i] * (low * table[0] + high * table[next]);
+                }
+                out[(size_t)side->held.from + s] -= sum;
             }
+        }
         for (int i = system->contacts; i < system->n; i++)
             if (gk_rows_at_bore(setup, system, i))
-                for (int s = 0; s < supports; s++)
-                    out[s] += reported(system, i) * setup->port_support[system->port_of[i]][s];
+                for (int s = 0; s < model->supports; s++)
+                    out[s] += force[i] * setup->port_support[system->port_of[i]][s];
     }
+}
+
+/* forces on the supports at the end of the step */
+static void support_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                           double *out)
+{
+    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS];
+    support_motion(setup, work, data, moved, speed);
+    forces_by_motion(model, setup, moved, speed, out);
+    add_direct_forces(model, setup, work, out);
 }
 
 static void support_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, const double *force)
@@ -214,10 +241,16 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         data->stage[V_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
 }
 
-void gk_outputs_begin(const gk_model *model, const gk_data *data, gk_tally *tally)
+void gk_outputs_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                      gk_tally *tally)
 {
-    memset(tally, 0, sizeof *tally);
-    for (int s = 0; s < model->supports; s++) tally->last[s] = data->support[s][V_FORCE];
+    const size_t size = (size_t)setup->base.n * sizeof(double);
+    memset(tally, 0, offsetof(gk_tally, moved));
+    memset(tally->moved, 0, size);
+    memset(tally->speed, 0, size);
+    support_motion(setup, work, data, tally->last_moved, tally->last_speed);
+    forces_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
+    for (int s = 0; s < model->supports; s++) tally->last[s] = data->support[s][V_FORCE] - tally->last[s];
 }
 
 static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h, gk_tally *tally)
@@ -243,16 +276,31 @@ static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h
     }
 }
 
+/* trapezoid of a vector over a step: sum += ½h (last + now), last ← now */
+static void integrate(double *sum, double *last, const double *now, int n, double h)
+{
+    const double half = 0.5 * h;
+    for (int q = 0; q < n / 4; q++) {
+        const gk_quad x = ((const gk_quad *)now)[q];
+        ((gk_quad *)sum)[q] += half * (((gk_quad *)last)[q] + x);
+        ((gk_quad *)last)[q] = x;
+    }
+}
+
 /* one internal step */
 void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
                       gk_tally *tally)
 {
-    double force[MAX_SUPPORTS];
+    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS], direct[MAX_SUPPORTS];
     for (int e = 0; e < model->engagements; e++) count_mesh(&work->engaged[e], data, e, h, tally);
-    support_forces(model, setup, work, data, force);
+    support_motion(setup, work, data, moved, speed);
+    integrate(tally->moved, tally->last_moved, moved, setup->base.n, h);
+    integrate(tally->speed, tally->last_speed, speed, setup->base.n, h);
+    memset(direct, 0, (size_t)model->supports * sizeof *direct);
+    add_direct_forces(model, setup, work, direct);
     for (int s = 0; s < model->supports; s++) {
-        tally->support[s] += 0.5 * h * (tally->last[s] + force[s]);
-        tally->last[s] = force[s];
+        tally->support[s] += 0.5 * h * (tally->last[s] + direct[s]);
+        tally->last[s] = direct[s];
     }
 }
 
@@ -261,7 +309,10 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
 {
     for (int p = 0; p < model->ports; p++)
         if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
-    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = tally->support[s] / H;
+    double force[MAX_SUPPORTS];
+    forces_by_motion(model, setup, tally->moved, tally->speed, force);
+    for (int s = 0; s < model->supports; s++)
+        data->support[s][V_FORCE_MEAN] = (force[s] + tally->support[s]) / H;
     for (int e = 0; e < model->engagements; e++) {
         data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
         data->mesh[e][V_FORCE_MAX] = tally->highest[e];

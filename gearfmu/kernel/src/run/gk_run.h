@@ -5,12 +5,17 @@
 
 typedef struct gk_tally { /* integrals over a communication step */
     double mesh[MAX_ENGAGEMENTS], highest[MAX_ENGAGEMENTS], port[MAX_PORTS];
-    double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* last: forces on the supports at the end of the step before */
+    double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* forces that contacts and joints put on the supports directly;
+                                                         last: at the end of the step before */
+    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS]; /* what moves springs and dashpots of
+                                                                                      the supports */
+    double last_moved[MAX_GROUND + 4 * MAX_ROTORS], last_speed[MAX_GROUND + 4 * MAX_ROTORS];
 } gk_tally;
 
 /* gk_outputs.c */
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
-void gk_outputs_begin(const gk_model *model, const gk_data *data, gk_tally *tally);
+void gk_outputs_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                      gk_tally *tally);
 void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data);
 void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
                       gk_tally *tally);

@@ -96,8 +96,8 @@ typedef struct gk_side {
                           that the whole of C is a parabola between nodes at every level; points: strips of the candidates */
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
-    double *support; /* (nodes + 1, candidates, strips, supports): force on supports beside the oscillators' */
-    gk_span held;    /* the supports among them that this side loads */
+    gk_span held;    /* the supports that this side loads */
+    double *support; /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
     gk_real *far;    /* (nodes + 1, points, far): outward, of every ground oscillator that is not dynamic over Ω, then
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
 } gk_side;

@@ -503,6 +503,15 @@ static gk_span held_by(const double *support, size_t points, int supports)
     return from < to ? (gk_span){from, to - from} : (gk_span){0, 0};
 }
 
+/* rows over the supports become rows over those that the side loads */
+static void keep_held(gk_side *side, size_t rows, int supports)
+{
+    const size_t width = (size_t)side->held.width;
+    for (size_t r = 0; r < rows; r++)
+        memmove(side->support + r * width, side->support + r * (size_t)supports + side->held.from,
+                width * sizeof *side->support);
+}
+
 /* tables of a side that the level decides */
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which)
 {
@@ -535,4 +544,5 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
         memset(side->support, 0, nodes * points * (size_t)model->supports * sizeof *side->support);
     }
     side->held = held_by(side->support, nodes * points, model->supports);
+    keep_held(side, nodes * points, model->supports);
 }
