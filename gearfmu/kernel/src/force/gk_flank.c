@@ -379,6 +379,34 @@ static int find_flat(const pair *q, double reach, gk_position position[2], gk_pl
     return p->gap < reach;
 }
 
+/* Gaps of both flanks of a tooth together depend on the centre distance alone: straight but for its square */
+static const double BENDS = 20.0, SURE = 1e-6; /* of it per centre distance; m */
+
+void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
+{
+    double pose[POSE] = {0}, d[2], sum[2];
+    pair q = pair_of(model, setup, mesh, pose);
+    const double step = 1e-5;
+    apart(&q, d);
+    mesh->distance = sqrt(d[0] * d[0] + d[1] * d[1]);
+    for (int i = 0; i < 2; i++) {
+        for (int c = 0; c < 2; c++) pose[XB + c] = i * step * d[c] / mesh->distance;
+        const flank_side drive = side_of(&q, 0), coast = side_of(&q, 1);
+        sum[i] = drive.gap + coast.gap;
+    }
+    mesh->clearance = sum[0];
+    mesh->clearance_slope = (sum[1] - sum[0]) / step;
+}
+
+/* no coast flank can be near, by the gaps of the drive flanks */
+static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *drive, double a, double reach)
+{
+    const double apart = a - mesh->distance, sum = mesh->clearance + mesh->clearance_slope * apart;
+    const double misplaced = GK_HAS(pitch_errors) ? q->gear[0]->index_most + q->gear[1]->index_most : 0.0;
+    return sum - drive->gap - misplaced - (q->setup->spatial ? LEAN : 0.0) >
+           reach + SURE + BENDS * apart * apart / mesh->distance;
+}
+
 /* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their tables; −1
  * when the poses are meaningless. The spins of a flat engagement are translations. */
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
@@ -395,6 +423,7 @@ int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *m
     place_sides(&q, mesh, &drive, position);
     const int found = find_side(&q, mesh, &drive, reach, position, place, MAX_PAIRS);
     if (found < 0 || !GK_ON(setup, coast_flank)) return found;
+    if (coast_is_open(&q, mesh, &drive, sqrt(a2), reach)) return found;
     const flank_side coast = side_of(&q, 1);
     const int back = find_side(&q, mesh, &coast, reach, position, place + found, MAX_PAIRS - found);
     return back < 0 ? -1 : found + back;

@@ -59,12 +59,12 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
 /* adds the rows of the contacts on the part of the ground group that one gear reads; strips of a place whose gradient is the
  * same: all, or each has its own */
 GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
-                              const int each, const int strips)
+                              const int motions, const int each, const int strips)
 {
     const gk_base *base = &setup->base;
     const gk_position *at = &engaged->position[side->which];
     const int quads = base->width[side->gear] / 4, points = side->candidates * strips;
-    const int motions = base->motions[side->gear], *motion = base->motion[side->gear];
+    const int *motion = base->motion[side->gear];
     const size_t local = (size_t)setup->mesh[engaged->index].local / 4;
     const gk_quad *const node = (const gk_quad *)side->ground + (size_t)(at->node * points) * quads;
     for (int p = 0; p < engaged->places; p++) {
@@ -74,10 +74,13 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
         gk_quad *to = (gk_quad *)out + (size_t)(p * strips) * local;
         for (int first = 0; first < strips; first += each) {
             const double *gradient = place->point[first].gradient + SPACE * side->which;
+            double g[SPACE];
+            const gk_quad *moved[SPACE];
+            for (int m = 0; m < motions; m++)
+                g[m] = gradient[motion[m]], moved[m] = (const gk_quad *)base->moved[side->gear][motion[m]];
             for (int q = 0; q < quads; q++) {
                 gk_quad rigid = {0};
-                for (int m = 0; m < motions; m++)
-                    rigid += gradient[motion[m]] * ((const gk_quad *)base->moved[side->gear][motion[m]])[q];
+                for (int m = 0; m < motions; m++) rigid += g[m] * moved[m][q];
                 for (int i = first; i < first + each; i++) {
                     const gk_quad here = low[i * quads + q];
                     to[(size_t)i * local + q] += rigid - (here + at->part * (high[i * quads + q] - here));
@@ -90,10 +93,13 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
 GK_INLINE void ground_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
                            const int strips)
 {
+    const int motions = setup->base.motions[side->gear];
     if (setup->spatial)
-        ground_rows_of(setup, side, engaged, out, 1, strips);
+        ground_rows_of(setup, side, engaged, out, motions, 1, strips);
+    else if (motions == 2)
+        ground_rows_of(setup, side, engaged, out, 2, strips, strips);
     else
-        ground_rows_of(setup, side, engaged, out, strips, strips);
+        ground_rows_of(setup, side, engaged, out, motions, strips, strips);
 }
 
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
@@ -130,17 +136,17 @@ static void turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *o
     }
 }
 
-/* adds a force in the frame of a tooth to the group's */
-static void turn_forth(const gk_modal *m, int tooth, const gk_real *f, gk_real *sum)
+/* adds two forces in the frame of a tooth to the group's */
+static void turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2])
 {
     const int half = m->n / LANES;
     const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
-    const gk_half *a = (const gk_half *)f, *b = a + half;
-    gk_half *to = (gk_half *)sum;
-    for (int k = 0; k < half; k++) {
-        to[k] += a[k] * c[k] - b[k] * s[k];
-        to[half + k] += a[k] * s[k] + b[k] * c[k];
-    }
+    for (int k = 0; k < half; k++)
+        for (int i = 0; i < 2; i++) {
+            const gk_half a = ((const gk_half *)f[i])[k], b = ((const gk_half *)f[i])[half + k];
+            ((gk_half *)sum[i])[k] += a * c[k] - b * s[k];
+            ((gk_half *)sum[i])[half + k] += a * s[k] + b * c[k];
+        }
 }
 
 /* what the rows of an engagement read of displacements (or speeds) of the ground group */
@@ -280,20 +286,33 @@ static void contact_forces(const gk_setup *setup, const gk_engaged *work, const 
     for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
 }
 
+/* adds Σ rows·x and Σ rows·y over `quads` of the ground group from `first` on */
+GK_INLINE void push_quads(const pushes *p, const gk_quad *rows, int width, int first, gk_quad *out_x, gk_quad *out_y,
+                          const int quads)
+{
+    gk_quad sum_x[4], sum_y[4];
+    for (int k = 0; k < quads; k++) sum_x[k] = out_x[k], sum_y[k] = out_y[k];
+    for (int r = 0; r < p->count; r++) {
+        const gk_quad *row = rows + (size_t)p->row[r] * width + first;
+        const double x = p->x[r], y = p->y[r];
+        for (int k = 0; k < quads; k++) sum_x[k] += x * row[k], sum_y[k] += y * row[k];
+    }
+    for (int k = 0; k < quads; k++) out_x[k] = sum_x[k], out_y[k] = sum_y[k];
+}
+
 /* adds the forces x and y of the rows on the ground group */
 static void ground_forces(const gk_mesh *mesh, const gk_engaged *engaged, const pushes *p, double *out_x, double *out_y)
 {
     const int width = mesh->local / 4;
-    for (int w = 0, first = 0; w < 2; first += mesh->part[w].width / 4, w++)
-        for (int q = 0; q < mesh->part[w].width / 4; q++) {
-            const int to = mesh->part[w].from / 4 + q;
-            gk_quad sum_x = ((gk_quad *)out_x)[to], sum_y = ((gk_quad *)out_y)[to];
-            for (int r = 0; r < p->count; r++) {
-                const gk_quad row = ((const gk_quad *)engaged->ground)[(size_t)p->row[r] * width + first + q];
-                sum_x += p->x[r] * row, sum_y += p->y[r] * row;
-            }
-            ((gk_quad *)out_x)[to] = sum_x, ((gk_quad *)out_y)[to] = sum_y;
-        }
+    const gk_quad *rows = (const gk_quad *)engaged->ground;
+    for (int w = 0, at = 0; w < 2; w++) {
+        const int quads = mesh->part[w].width / 4;
+        gk_quad *x = (gk_quad *)(out_x + mesh->part[w].from), *y = (gk_quad *)(out_y + mesh->part[w].from);
+        int q = 0;
+        for (; q + 3 <= quads; q += 3, at += 3) push_quads(p, rows, width, at, x + q, y + q, 3);
+        for (; q + 2 <= quads; q += 2, at += 2) push_quads(p, rows, width, at, x + q, y + q, 2);
+        for (; q < quads; q++, at++) push_quads(p, rows, width, at, x + q, y + q, 1);
+    }
 }
 
 /* adds the forces x of the rows on the ground group */
@@ -328,9 +347,9 @@ void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
             const gk_side *side = &setup->mesh[e].side[w];
             if (!GK_LANES(setup, side->gear) || !p.count) continue;
             contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
-            turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, work->turned, work->force[side->gear]);
-            turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, work->turned_next,
-                       work->next[side->gear]);
+            const gk_real *turned[2] = {work->turned, work->turned_next};
+            gk_real *sum[2] = {work->force[side->gear], work->next[side->gear]};
+            turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, turned, sum);
         }
     }
 }

@@ -80,7 +80,7 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
         const double decay = k->ground.decay[d], speed = decay > 0.0 ? gk_dot_span(span, e, v) : 0.0;
         if (speed == 0.0) continue;
         gk_axpy_span(span, -decay * speed, pulls, v);
-        taken += 0.5 * decay * (2.0 - decay) * speed * speed / k->ground.mass[d];
+        taken += k->ground.loss[d] * speed * speed;
     }
     return taken;
 }
@@ -187,17 +187,16 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
 }
 
 /* ---- the start of the step -------------------------------------------------------------------------------------------- */
-/* λ0 without dashpots, settled: massless deflection and energy at the start; linear: forces of the step are (mix4) */
+/* λ0 without dashpots: massless deflection and energy at the start; linear: forces of the step are (mix4) */
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
-    const size_t size = (size_t)s->stride * sizeof(double);
+    const size_t size = (size_t)s->stride * sizeof(double), joints = size - (size_t)s->contacts * sizeof(double);
     s->limit_reached = s->rounds = s->dashpots = 0;
     s->alpha = 0.0;
-    double *const nothing[] = {s->direction, s->squeeze0, s->gain, s->pull, s->late, s->rest, s->held};
-    for (size_t a = 0; a < sizeof nothing / sizeof *nothing; a++) memset(nothing[a], 0, size);
-    memset(s->delta + s->contacts, 0, size - (size_t)s->contacts * sizeof(double)); /* links know no local law */
-    memset(s->yield + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
-    memset(s->potential + s->contacts, 0, size - (size_t)s->contacts * sizeof(double));
+    memset(s->direction, 0, size);
+    memset(s->delta + s->contacts, 0, joints); /* links know no local law */
+    memset(s->yield + s->contacts, 0, joints);
+    memset(s->potential + s->contacts, 0, joints);
     memcpy(s->force, s->force0, size);
     if (linear)
         memcpy(s->begin, s->end0, size);
@@ -208,9 +207,8 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
         s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
     }
     gk_law_apply(s);
-    gk_solve_settle(s);
+    gk_solve_begin(s);
     s->stored0 = gk_solve_stored(s);
-    gk_solve_times(s, s->A, s->end0, s->lag0);
     s->held0 = 0.0;
     for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
 }
@@ -223,7 +221,6 @@ void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *d
     int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
     recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
-    memcpy(s->squeeze0, s->squeeze, (size_t)s->stride * sizeof *s->squeeze);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
         s->beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;
@@ -250,10 +247,8 @@ void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *d
     gk_solve_status(s);
     if (given)
         gk_solve_settle(s);
-    else if (s->dashpots) {
-        memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
-        gk_solve_times(s, s->A, s->end, s->lag);
-    }
+    else
+        gk_solve_begin_dashpots(s);
     s->owed = data->meshing[e].owed;
     s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
@@ -364,7 +359,8 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
 static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                           const gk_coefficients *k)
 {
-    double z[MAX_SPINS] = {0}, force[MAX_SPINS] = {0};
+    double z[MAX_SPINS], force[MAX_SPINS];
+    for (int d = 0; d < setup->spins; d++) z[d] = force[d] = 0.0;
     for (int e = 0; e < model->engagements; e++) {
         const gk_mesh *mesh = &setup->mesh[e];
         const gk_system *s = &work->engaged[e].system;
@@ -442,18 +438,20 @@ static void remember_engagement(const gk_setup *setup, const gk_engaged *engaged
     const gk_system *s = &engaged->system;
     gk_meshing *meshing = &data->meshing[e];
     double deepest = 0.0;
+    const int most = meshing->pairs > engaged->places ? meshing->pairs : engaged->places;
+    memset(meshing->memory, 0, (size_t)most * sizeof *meshing->memory);
     meshing->pairs = engaged->places;
-    memset(meshing->memory, 0, sizeof meshing->memory);
     for (int p = 0; p < engaged->places; p++) meshing->memory[p].key = engaged->place[p].key;
-    for (int i = 0; i < s->contacts; i++) {
-        gk_memory *m = &meshing->memory[s->place_of[i]];
-        const int strip = i % GK_STRIPS(s);
-        m->force[strip] = s->force[i];
-        m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-        m->dash[strip] = s->dash[i];
-        m->end[strip] = s->end[i];
-        deepest = gk_max(deepest, -engaged->place[s->place_of[i]].gap);
-        if (GK_ON(setup, hertz) && s->force[i] > gk_law_of(s, i)->high * s->width[i]) data->status |= STATUS_LAW;
+    for (int p = 0, i = 0; p < engaged->places; p++) {
+        gk_memory *m = &meshing->memory[p];
+        deepest = gk_max(deepest, -engaged->place[p].gap);
+        for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
+            m->force[strip] = s->force[i];
+            m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+            m->dash[strip] = s->dash[i];
+            m->end[strip] = s->end[i];
+            if (GK_ON(setup, hertz) && s->force[i] > gk_law_of(s, i)->high * s->width[i]) data->status |= STATUS_LAW;
+        }
     }
     for (int i = s->contacts; i < s->n; i++)
         data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){

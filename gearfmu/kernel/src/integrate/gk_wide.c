@@ -21,6 +21,7 @@
 #define gk_flow_known gk_flow_known_avx2
 #define gk_flank_find gk_flank_find_avx2
 #define gk_flank_move gk_flank_move_avx2
+#define gk_flank_clearance gk_flank_clearance_avx2
 #define gk_still_find gk_still_find_avx2
 #define gk_rows_pose gk_rows_pose_avx2
 #define gk_rows_form gk_rows_form_avx2
@@ -45,6 +46,8 @@
 #define gk_rows_read_far gk_rows_read_far_avx2
 #define gk_rows_push_far gk_rows_push_far_avx2
 #define gk_solve_settle gk_solve_settle_avx2
+#define gk_solve_begin gk_solve_begin_avx2
+#define gk_solve_begin_dashpots gk_solve_begin_dashpots_avx2
 #define gk_solve_status gk_solve_status_avx2
 #define gk_solve_times gk_solve_times_avx2
 #define gk_solve_path gk_solve_path_avx2

@@ -14,27 +14,32 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
     const gk_meshing *meshing = &data->meshing[e];
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
-    for (int p = 0; p < engaged->places; p++)
-        for (int i = 0; i < GK_STRIPS(s); i++, s->n++) {
-            const gk_place *place = &engaged->place[p];
+    static const gk_memory fresh;
+    const double damping = GK_ON(setup, contact_damping) ? 2.0 * mesh->damping / h : 0.0;
+    const double slice = setup->slices / model->engagement[e].width, per_cosine = 1.0 / mesh->cosine;
+    int n = 0;
+    for (int p = 0; p < engaged->places; p++) {
+        const gk_place *place = &engaged->place[p];
+        const gk_memory *memory = place->memory < 0 ? &fresh : &meshing->memory[place->memory];
+        if (!s->own_laws) gk_law_set(model, setup, mesh, place->point[0].curvature, &s->local[p]);
+        for (int i = 0; i < GK_STRIPS(s); i++, n++) {
             const gk_point *point = gk_point_of(setup, place, i);
             const double width = mesh->strip_width[i] * point->share;
-            const gk_memory *memory = place->memory < 0 ? NULL : &meshing->memory[place->memory];
-            s->kind[s->n] = ROW_CONTACT;
-            s->port_of[s->n] = s->joint_of[s->n] = -1;
-            s->place_of[s->n] = p;
-            s->force0[s->n] = memory ? memory->force[i] : 0.0;
-            s->end0[s->n] = memory ? memory->end[i] : 0.0;
-            s->dash0[s->n] = memory ? memory->dash[i] : 0.0;
-            s->damping[s->n] = GK_ON(setup, contact_damping) ? 2.0 * mesh->damping * width / h : 0.0;
-            s->bound[s->n] = 0.0;
-            s->weight[s->n] = width * setup->slices / model->engagement[e].width;
-            s->width[s->n] = width / mesh->cosine;
-            s->per_width[s->n] = mesh->cosine / width;
-            if (s->own_laws || i == 0)
-                gk_law_set(model, setup, mesh, point->curvature, &s->local[s->own_laws ? s->n : p]);
+            s->kind[n] = ROW_CONTACT;
+            s->port_of[n] = s->joint_of[n] = -1;
+            s->place_of[n] = p;
+            s->force0[n] = memory->force[i];
+            s->end0[n] = memory->end[i];
+            s->dash0[n] = memory->dash[i];
+            s->damping[n] = damping * width;
+            s->bound[n] = 0.0;
+            s->weight[n] = width * slice;
+            s->width[n] = width * per_cosine;
+            s->per_width[n] = 1.0 / s->width[n];
+            if (s->own_laws) gk_law_set(model, setup, mesh, point->curvature, &s->local[n]);
         }
-    s->contacts = s->n;
+    }
+    s->contacts = s->n = n;
 }
 
 static void list_joint(const gk_setup *setup, const gk_data *data, double h, gk_system *s, int port, int joint)
@@ -110,6 +115,22 @@ GK_INLINE void mirror(gk_system *s, const int quads)
         }
 }
 
+/* quads of a row between contacts: where they stand in the system and in the tables of both sides */
+typedef struct part {
+    int column, point[2];
+} part;
+
+static int list_parts(const gk_engaged *engaged, int strips, part *parts)
+{
+    run runs[MAX_PAIRS];
+    const int count = list_runs(engaged, strips, runs);
+    int n = 0;
+    for (int r = 0; r < count; r++)
+        for (int c = 0; c < runs[r].count; c += 4)
+            parts[n++] = (part){runs[r].column + c, {runs[r].point[0] + c, runs[r].point[1] + c}};
+    return n;
+}
+
 typedef struct blend { /* a table of one side at two neighbouring nodes: (points, parts, columns) each, and their weights */
     const gk_real *low, *high;
     double square_low, mixed, square_high;
@@ -132,8 +153,8 @@ static blend blend_of(const gk_setup *setup, const gk_engaged *engaged, const gk
     ((b).square_low * WIDENED((b).low + (at)) + (b).mixed * WIDENED((b).low + (at) + (b).columns) +                    \
      (b).square_high * WIDENED((b).high + (at)))
 
-/* rows of D and A between the contacts, or of A alone. What a quad writes beyond a run the next run writes again. */
-GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend *q, const run *runs, int count,
+/* rows of D and A between the contacts, or of A alone. What a quad writes beyond its run the next one writes again. */
+GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend *q, const part *parts, int count,
                           const int moves, const int strips)
 {
     const gk_system *s = &engaged->system;
@@ -143,16 +164,13 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
         size_t second = (size_t)(engaged->place[place].candidate[1] * strips) * q->row;
         for (int strip = 0; strip < strips; strip++, i++, first += p->row, second += q->row) {
             const int end = block_end(i);
-            for (int r = 0; r < count; r++) {
-                const size_t a = first + (size_t)runs[r].point[0], b = second + (size_t)runs[r].point[1];
-                for (int c = 0, to = runs[r].column; c < runs[r].count && to < end; c += 4, to += 4) {
-                    const size_t at = a + (size_t)c, of = b + (size_t)c;
-                    if (moves) {
-                        *(gk_quad *)(D + to) = BLENDED(*p, at) + BLENDED(*q, of);
-                        *(gk_quad *)(A + to) = BLENDED(*p, at + 2 * p->columns) + BLENDED(*q, of + 2 * q->columns);
-                    } else {
-                        *(gk_quad *)(A + to) = BLENDED(*p, at) + BLENDED(*q, of);
-                    }
+            for (int c = 0; c < count && parts[c].column < end; c++) {
+                const size_t a = first + (size_t)parts[c].point[0], b = second + (size_t)parts[c].point[1];
+                if (moves) {
+                    *(gk_quad *)(D + parts[c].column) = BLENDED(*p, a) + BLENDED(*q, b);
+                    *(gk_quad *)(A + parts[c].column) = BLENDED(*p, a + 2 * p->columns) + BLENDED(*q, b + 2 * q->columns);
+                } else {
+                    *(gk_quad *)(A + parts[c].column) = BLENDED(*p, a) + BLENDED(*q, b);
                 }
             }
             for (int j = s->contacts; j < end; j++) D[j] = A[j] = 0.0;
@@ -169,16 +187,16 @@ static void between_contacts(const gk_setup *setup, const gk_engaged *engaged, i
     const gk_side *side = setup->mesh[e].side;
     const int strips = GK_STRIPS(s);
     blend of[2];
-    run runs[MAX_PAIRS];
-    const int count = list_runs(engaged, strips, runs);
+    part parts[MAX_CONTACTS];
+    const int count = list_parts(engaged, strips, parts);
     for (int w = 0; w < 2; w++)
         of[w] = tables ? blend_of(setup, engaged, &side[w], engaged->table[w].moves, 4)
                        : blend_of(setup, engaged, &side[w], side[w].residual, 2);
     if (tables) {
-        GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], runs, count, 1)
+        GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], parts, count, 1)
     } else {
         memset(s->D, 0, (size_t)(s->contacts * s->stride) * sizeof *s->D);
-        GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], runs, count, 0)
+        GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], parts, count, 0)
     }
     memset(s->D + s->contacts * s->stride, 0, (size_t)((s->stride - s->contacts) * s->stride) * sizeof *s->D);
     memset(s->A + s->contacts * s->stride, 0, (size_t)((s->stride - s->contacts) * s->stride) * sizeof *s->A);

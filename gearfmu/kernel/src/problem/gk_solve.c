@@ -95,6 +95,32 @@ void gk_solve_settle(gk_system *s)
     GK_SIZED(s->stride / 4, dashpots_and_sums, s)
 }
 
+/* the start of a step, before rows and dashpots have a status: what follows from λ0 and from what dampers did last */
+void gk_solve_begin(gk_system *s)
+{
+    const int quads = s->stride / 4;
+    gk_solve_path(s, s->force, s->linear);
+    for (int q = 0; q < quads; q++) {
+        ((gk_quad *)s->squeeze)[q] = ((gk_quad *)s->linear)[q] + ((gk_quad *)s->delta)[q];
+        ((gk_quad *)s->squeeze0)[q] = ((gk_quad *)s->squeeze)[q];
+        ((gk_quad *)s->z)[q] = ((gk_quad *)s->force)[q] - ((gk_quad *)s->begin)[q];
+        ((gk_quad *)s->dash)[q] = ((gk_quad *)s->end)[q] = ((gk_quad *)s->lag)[q] = (gk_quad){0};
+    }
+    for (int i = s->n - s->clutches; i < s->n; i++)
+        s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
+    gk_solve_times(s, s->D, s->z, s->Dz);
+    gk_solve_times(s, s->A, s->force, s->Al);
+    gk_solve_times(s, s->A, s->end0, s->lag0);
+}
+
+/* and what is left of these at its end */
+void gk_solve_begin_dashpots(gk_system *s)
+{
+    if (!s->dashpots) return;
+    memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
+    gk_solve_times(s, s->A, s->end, s->lag);
+}
+
 static void residual(const gk_system *s, double *r)
 {
     const gk_quad *outer = (const gk_quad *)s->outer, *beyond = (const gk_quad *)s->beyond;

@@ -93,6 +93,8 @@ struct gk_island {
 void gk_solve_contacts(gk_system *s);
 void gk_solve_clear(gk_system *s);
 void gk_solve_settle(gk_system *s);
+void gk_solve_begin(gk_system *s);
+void gk_solve_begin_dashpots(gk_system *s);
 void gk_solve_status(gk_system *s);
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
 void gk_solve_path(const gk_system *s, const double *x, double *y);

@@ -68,6 +68,12 @@ GK_INLINE void columns(gk_system *s, const int quads)
     }
 }
 
+/* of a quad what lies below (LOWER) and above (UPPER) its entry k */
+#define ALL UINT64_MAX
+static const gk_unsigned LOWER[4] = {{0, ALL, ALL, ALL}, {0, 0, ALL, ALL}, {0, 0, 0, ALL}, {0, 0, 0, 0}};
+static const gk_unsigned UPPER[4] = {{0, 0, 0, 0}, {ALL, 0, 0, 0}, {ALL, ALL, 0, 0}, {ALL, ALL, ALL, 0}};
+#undef ALL
+
 /* pivots 4·block … of the factors: the columns right of them lose what the pivots explain */
 GK_INLINE void eliminate(gk_system *s, const int quads, const int block)
 {
@@ -77,9 +83,10 @@ GK_INLINE void eliminate(gk_system *s, const int quads, const int block)
         gk_quad l[MAX_STRIDE / 4];
         s->inverse[k] = 1.0 / pivot[k];
         for (int q = block; q < quads; q++) l[q] = s->inverse[k] * ((gk_quad *)pivot)[q];
-        for (int i = 0; i <= k - 4 * block; i++) l[block][i] = 0.0;
+        l[block] = (gk_quad)((gk_unsigned)l[block] & LOWER[k - 4 * block]);
         for (int q = block; q < quads; q++) ((gk_quad *)lower)[q] = l[q];
-        for (int i = k; i < 4 * block + 4; i++) pivot[i] = 0.0;
+        gk_quad *above = (gk_quad *)pivot + block;
+        *above = (gk_quad)((gk_unsigned)*above & UPPER[k - 4 * block]);
         for (int j = k + 1; j < n; j++) {
             gk_quad *column = (gk_quad *)s->J + j * quads;
             const double f = -((double *)column)[k];

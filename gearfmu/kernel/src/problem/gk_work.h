@@ -94,6 +94,7 @@ struct gk_work {
 };
 
 /* gk_flank.c */
+void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
                   gk_position position[2], gk_place *place);

@@ -178,8 +178,8 @@ static void fill_dampers(const gk_model *model, const gk_setup *setup, gk_coeffi
         double mass = 0.0;
         for (int i = 0; i < base->n; i++)
             if (base->omega[i] > 0.0) mass += e[i] * e[i] / f->inverse_s2[i];
-        f->mass[d] = mass;
         f->decay[d] = 1.0 - gk_exp(-0.5 * model->ground[base->set].damper[d] * mass * k->h);
+        f->loss[d] = mass > 0.0 ? 0.5 * f->decay[d] * (2.0 - f->decay[d]) / mass : 0.0;
         for (int i = 0; i < base->n; i++)
             f->pulls[d * base->n + i] = base->omega[i] > 0.0 && mass > 0.0 ? e[i] / (f->inverse_s2[i] * mass) : 0.0;
     }

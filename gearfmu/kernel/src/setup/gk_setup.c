@@ -513,6 +513,7 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
                           gk_base_reach(model, engagement) / distance;
     gk_strips_fill(model, setup, mesh);
     gk_law_bounds(model, mesh);
+    if (engagement->kind != MESH_FLAT) gk_flank_clearance(model, setup, mesh);
 }
 
 /* coefficients of problems in which no time passes: C′ is the quasi-static part alone */

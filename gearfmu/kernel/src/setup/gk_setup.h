@@ -112,6 +112,7 @@ typedef struct gk_mesh { /* an engagement */
     int ports, port[2];            /* ports whose rows stand in this engagement's system */
     int spins, spin[6];            /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
     int joint_spin[2][2];          /* inertia and disc of its ports among them, −1: none */
+    double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
@@ -136,7 +137,7 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
     double *pulls;                                  /* (dampers, n) s²e/n of a dashpot */
-    double decay[MAX_SUPPORTS], mass[MAX_SUPPORTS]; /* 1 − e^(−dh/2), n = Σ s²e² */
+    double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
 } gk_ground_flow;
 
 typedef struct gk_coefficients {
