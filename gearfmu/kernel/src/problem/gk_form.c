@@ -52,7 +52,6 @@ static void list_joint(const gk_setup *setup, const gk_data *data, double h, gk_
     s->force0[s->n] = clutch ? 0.0 : state->force;
     s->end0[s->n] = state->end;
     s->dash0[s->n] = state->dash;
-    s->spring[s->n] = setup->joint[port][joint].compliance;
     s->damping[s->n] = 2.0 * setup->joint[port][joint].damping / h;
     s->bound[s->n] = clutch ? 2.0 * data->shaft[port][V_CAPACITY] : 0.0;
     s->width[s->n] = s->per_width[s->n] = 0.0;
@@ -73,7 +72,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
             if (setup->joint[mesh->port[p]][joint].live) list_joint(setup, data, h, s, mesh->port[p], joint);
     s->stride = (s->n + 3) / 4 * 4;
     for (int i = s->n; i < s->n + 4 && i < MAX_STRIDE; i++)
-        s->g[i] = s->force0[i] = s->dash0[i] = s->end0[i] = s->spring[i] = s->width[i] = s->per_width[i] = 0.0;
+        s->g[i] = s->force0[i] = s->dash0[i] = s->end0[i] = s->damping[i] = s->width[i] = s->per_width[i] = 0.0;
 }
 
 /* ---- compliance of the gear groups and of what is not dynamic ------------------------------------------------------ */
@@ -346,29 +345,6 @@ GK_INLINE void add_pulled(gk_system *s, const pulled *p, int motions, const int 
     }
 }
 
-static void add_ground_tables(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
-{
-    gk_system *s = &engaged->system;
-    const int bore = gk_directions(setup); /* among what is common */
-    double port[2][MAX_STRIDE];
-    pulled p[POSE];
-    int motions = 0;
-    for (int w = 0; w < 2; w++) {
-        const gk_side *side = &setup->mesh[e].side[w];
-        if (!setup->base.width[side->gear]) continue;
-        GK_STRIPPED(GK_STRIPS(s), pull_stripped, setup, engaged, side, p + motions, port)
-        motions += setup->base.motions[side->gear];
-        for (int r = s->contacts; r < s->n; r++) {
-            if (!gk_rows_at_bore(setup, s, r) || model->port[s->port_of[r]].rotor != model->gear[side->gear].rotor)
-                continue;
-            double *D = s->D + r * s->stride, *A = s->A + r * s->stride;
-            for (int i = 0; i < s->contacts; i++) D[i] += port[0][i], A[i] -= port[1][i];
-            D[r] += engaged->table[w].own[0][bore][bore], A[r] -= engaged->table[w].own[1][bore][bore];
-        }
-    }
-    GK_SIZED(s->stride / 4, add_pulled, s, p, motions)
-}
-
 /* D takes mobility·R, A gives κ·R, R = Σ rowᵀrow/J over the spins that move */
 GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spins, gk_system *s, const int quads)
 {
@@ -384,15 +360,48 @@ GK_INLINE void add_rows(const gk_coefficients *k, const double *inverse, int spi
     }
 }
 
-/* a clutch is a row of speeds, without κ */
 static void add_spins(const gk_setup *setup, const gk_coefficients *k, gk_system *s, int e)
 {
     const gk_mesh *mesh = &setup->mesh[e];
     double inverse[MAX_LOCAL];
     for (int l = 0; l < mesh->spins; l++) inverse[l] = setup->inverse_inertia[mesh->spin[l]];
     GK_SIZED(s->stride / 4, add_rows, k, inverse, mesh->spins, s)
-    for (int i = s->n - s->clutches; i < s->n; i++) /* the last rows */
+}
+
+/* a clutch is a row of speeds, without κ; clutches are the last rows */
+static void leave_clutches(gk_system *s)
+{
+    for (int i = s->n - s->clutches; i < s->n; i++)
         for (int j = 0; j <= i; j++) s->A[i * s->stride + j] = s->A[j * s->stride + i] = 0.0;
+}
+
+/* ground group by its tables, and spins; numbers are written one by one well before quads of them are read */
+static void add_tabled(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_engaged *engaged,
+                       int e)
+{
+    gk_system *s = &engaged->system;
+    const int bore = gk_directions(setup); /* among what is common */
+    double port[2][2][MAX_STRIDE];
+    pulled p[POSE];
+    int motions = 0;
+    for (int w = 0; w < 2; w++) {
+        const gk_side *side = &setup->mesh[e].side[w];
+        if (!setup->base.width[side->gear]) continue;
+        GK_STRIPPED(GK_STRIPS(s), pull_stripped, setup, engaged, side, p + motions, port[w])
+        motions += setup->base.motions[side->gear];
+    }
+    add_spins(setup, k, s, e);
+    GK_SIZED(s->stride / 4, add_pulled, s, p, motions)
+    for (int r = s->contacts; r < s->n; r++)
+        for (int w = 0; w < 2; w++) {
+            const int g = setup->mesh[e].side[w].gear;
+            double *D = s->D + r * s->stride, *A = s->A + r * s->stride;
+            if (!setup->base.width[g] || !gk_rows_at_bore(setup, s, r) ||
+                model->port[s->port_of[r]].rotor != model->gear[g].rotor)
+                continue;
+            for (int i = 0; i < s->contacts; i++) D[i] += port[w][0][i], A[i] -= port[w][1][i];
+            D[r] += engaged->table[w].own[0][bore][bore], A[r] -= engaged->table[w].own[1][bore][bore];
+        }
 }
 
 /* ---- gaps ------------------------------------------------------------------------------------------------------------ */
@@ -420,9 +429,8 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     for (int d = 0; d < mesh->spins; d++) memset(s->rigid[d], 0, (size_t)s->stride * sizeof(double));
-    gk_rows_read(setup, work, e, work->y, work->ground_y, engaged->read);
-    gk_rows_without_rigid(model, setup, engaged, e, work->ground_y, engaged->read);
-    memcpy(s->g, engaged->read, (size_t)s->n * sizeof *s->g);
+    gk_rows_read(setup, work, e, work->y, work->ground_y, s->g);
+    gk_rows_without_rigid(model, setup, engaged, e, work->ground_y, s->g);
     for (int p = 0, i = 0; p < engaged->places; p++)
         for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
             const gk_point *point = gk_point_of(setup, &engaged->place[p], strip);
@@ -464,38 +472,38 @@ static double path_share(const gk_engaged *engaged, int p)
     return SHARE;
 }
 
-/* P of a tooth pair: both teeth */
-GK_INLINE void path_of(const gk_setup *setup, const gk_engaged *engaged, int e, int p, double share, double *out,
-                       const int strips)
-{
-    const int square = strips * strips;
-    const gk_side *side = setup->mesh[e].side;
-    const double *low[2], *high[2], part[2] = {engaged->position[0].part, engaged->position[1].part};
-    for (int w = 0; w < 2; w++) {
-        low[w] = side[w].path +
-                 ((size_t)engaged->position[w].node * side[w].candidates + engaged->place[p].candidate[w]) * square;
-        high[w] = low[w] + side[w].candidates * square;
-    }
-    for (int c = 0; c < square; c++)
-        out[c] = share * ((low[0][c] + part[0] * (high[0][c] - low[0][c])) +
-                          (low[1][c] + part[1] * (high[1][c] - low[1][c])));
-}
-
-/* the paths of the contacts' own dampers; what is in P is not in A */
+/* the paths of the contacts' own dampers, both teeth; what is in P is not in A */
 GK_INLINE void paths(const gk_setup *setup, gk_engaged *engaged, int e, const int strips)
 {
     gk_system *s = &engaged->system;
+    const int square = strips * strips;
+    const gk_side *side = setup->mesh[e].side;
+    const double part[2] = {engaged->position[0].part, engaged->position[1].part};
     for (int p = 0; p < engaged->places; p++) {
-        double *A = s->A + (size_t)(p * strips) * (s->stride + 1);
-        path_of(setup, engaged, e, p, path_share(engaged, p), s->path[p], strips);
-        for (int a = 0; a < strips; a++, A += s->stride)
-            for (int b = 0; b < strips; b++) A[b] -= s->path[p][a * strips + b];
+        double *A = s->A + (size_t)(p * strips) * (s->stride + 1), *P = s->P + (size_t)(p * strips) * (s->stride + 1);
+        const double share = path_share(engaged, p), *low[2], *high[2];
+        for (int w = 0; w < 2; w++) {
+            low[w] = side[w].path +
+                     ((size_t)engaged->position[w].node * side[w].candidates + engaged->place[p].candidate[w]) * square;
+            high[w] = low[w] + side[w].candidates * square;
+        }
+        for (int a = 0, c = 0; a < strips; a++, A += s->stride, P += s->stride)
+            for (int b = 0; b < strips; b++, c++) {
+                P[b] = share * ((low[0][c] + part[0] * (high[0][c] - low[0][c])) +
+                                (low[1][c] + part[1] * (high[1][c] - low[1][c])));
+                A[b] -= P[b];
+            }
     }
 }
 
 static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
 {
-    GK_STRIPPED(GK_STRIPS(setup), paths, setup, engaged, e)
+    gk_system *s = &engaged->system;
+    memset(s->P, 0, (size_t)(s->n * s->stride) * sizeof *s->P);
+    if (GK_ON(setup, residual) && GK_ON(setup, contact_damping)) /* else no damper asks for it */
+        GK_STRIPPED(GK_STRIPS(setup), paths, setup, engaged, e)
+    for (int i = s->contacts; i < s->n; i++)
+        s->P[i * s->stride + i] = setup->joint[s->port_of[i]][s->joint_of[i]].compliance;
 }
 
 /* Forms the problem of engagement e at its places for the step k: D, A and the paths of the rows' own dampers, P and
@@ -511,24 +519,22 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
                        !setup->mesh[e].joined;
     s->D = engaged->matrix;
     s->A = s->D + size;
-    s->J = s->A + size;
+    s->P = s->A + size;
+    s->J = s->P + size;
     s->L = s->J + size;
     s->B = s->L + size;
     gk_rows_form_ground(setup, work, e);
     between_contacts(setup, engaged, e, tables);
+    take_paths(setup, engaged, e); /* entry by entry: long before quads of the same rows are read again */
     for (int w = 0; w < 2 && !tables; w++) gram(setup, work, engaged, &setup->mesh[e].side[w], k);
     memset(s->outer, 0, (size_t)s->stride * sizeof(double));
     memset(s->beyond, 0, (size_t)s->stride * sizeof(double));
     if (GK_ON(setup, residual)) joint_residual(model, setup, engaged, e);
     gaps(model, setup, k->h, work, e);
     if (tables)
-        add_ground_tables(model, setup, engaged, e);
+        add_tabled(model, setup, k, engaged, e);
     else
-        add_ground(setup, work, e, k);
-    if (GK_ON(setup, residual) && GK_ON(setup, contact_damping))
-        take_paths(setup, engaged, e);
-    else
-        memset(s->path, 0, (size_t)engaged->places * sizeof *s->path); /* no damper asks for it */
-    add_spins(setup, k, s, e);
+        add_ground(setup, work, e, k), add_spins(setup, k, s, e);
+    leave_clutches(s);
     GK_SIZED(s->stride / 4, mirror, s)
 }

@@ -34,37 +34,30 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x,
                     double *y){GK_SIZED(s -> stride / 4, times, s, matrix, x, y)}
 
-/* P x; x and y of whole quads */
-GK_INLINE void along_paths(const gk_system *s, const double *x, double *y, const int strips)
-{
-    const gk_quad *spring = (const gk_quad *)s->spring, *from = (const gk_quad *)x;
-    for (int q = s->contacts / 4; q < s->stride / 4; q++) ((gk_quad *)y)[q] = spring[q] * from[q];
-    for (int first = 0, p = 0; first < s->contacts; first += strips, p++)
-        for (int a = 0; a < strips; a++) {
-            double sum = 0.0;
-            for (int b = 0; b < strips; b++) sum += s->path[p][a * strips + b] * x[first + b];
-            y[first + a] = sum;
-        }
-}
-
-void gk_solve_path(const gk_system *s, const double *x, double *y) { GK_STRIPPED(GK_STRIPS(s), along_paths, s, x, y) }
+void gk_solve_path(const gk_system *s, const double *x, double *y) { gk_solve_times(s, s->P, x, y); }
 
 /* rows and dashpots as numbers, after their status has changed */
 void gk_solve_status(gk_system *s)
 {
-    s->dashpots = 0;
-    for (int i = s->n; i < s->stride; i++)
-        s->on[i] = s->gain[i] = s->pull[i] = s->late[i] = s->rest[i] = s->held[i] = 0.0;
-    for (int i = 0; i < s->n; i++) {
-        const int clip = s->clip[i], lasts = clip != 2 && s->hold[i] == 0;
-        s->on[i] = s->active[i];
-        s->gain[i] = clip == 0 ? s->damping[i] : 0.0;
-        s->pull[i] = clip == 2 ? 0.0 : clip;
-        s->late[i] = lasts ? s->beta[i] : 0.0;
-        s->rest[i] = lasts ? s->tail[i] : 0.0;
-        s->held[i] = s->hold[i];
-        s->dashpots |= s->gain[i] != 0.0 || s->pull[i] != 0.0 || s->rest[i] != 0.0;
+    gk_bits any = {0};
+    for (int i = s->n; i < s->stride; i++) s->active[i] = 0, s->clip[i] = 2, s->hold[i] = 0;
+    for (int q = 0; q < s->stride / 4; q++) {
+        const unsigned char *active = s->active + 4 * q;
+        const signed char *clip = s->clip + 4 * q, *hold = s->hold + 4 * q;
+        const gk_bits clips = {clip[0], clip[1], clip[2], clip[3]}, holds = {hold[0], hold[1], hold[2], hold[3]};
+        const gk_bits acts = clips != 2, lasts = acts & (holds == 0), linear = clips == 0;
+        const gk_quad gain = GK_CHOOSE(linear, ((gk_quad *)s->damping)[q], GK_ALL(0.0));
+        const gk_quad pull = GK_CHOOSE(acts, __builtin_convertvector(clips, gk_quad), GK_ALL(0.0));
+        const gk_quad rest = GK_CHOOSE(lasts, ((gk_quad *)s->tail)[q], GK_ALL(0.0));
+        ((gk_quad *)s->on)[q] = (gk_quad){active[0], active[1], active[2], active[3]};
+        ((gk_quad *)s->gain)[q] = gain;
+        ((gk_quad *)s->pull)[q] = pull;
+        ((gk_quad *)s->late)[q] = GK_CHOOSE(lasts, ((gk_quad *)s->beta)[q], GK_ALL(0.0));
+        ((gk_quad *)s->rest)[q] = rest;
+        ((gk_quad *)s->held)[q] = __builtin_convertvector(holds, gk_quad);
+        any |= (gain != 0.0) | (pull != 0.0) | (rest != 0.0);
     }
+    s->dashpots = (any[0] | any[1] | any[2] | any[3]) != 0;
 }
 
 GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)

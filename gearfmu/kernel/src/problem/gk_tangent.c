@@ -4,6 +4,8 @@
  * one. Close to symmetric positive definite: no pivoting. */
 #include "problem/gk_system.h"
 
+static const gk_quad UNIT[4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+
 /* column j of B: what the dashpot of row j does to all rows */
 GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
 {
@@ -13,41 +15,26 @@ GK_INLINE void form_dashpot(gk_system *s, int j, const int quads)
     for (int q = 0; q < quads; q++) B[q] = D[q] + late * A[q];
 }
 
-/* column j: what λ_j does to all rows */
-GK_INLINE void contact_column(const gk_system *s, int j, double *column, const int quads, const int strips)
+/* column j: what λ_j does to all rows; `own`: strips that share its path */
+GK_INLINE void form_column(const gk_system *s, int j, double *column, const int quads, const int own)
 {
-    const int place = s->place_of[j], first = place * strips;
+    const int first = j < s->contacts ? s->place_of[j] * own : j, last = j < s->contacts ? first + own : j + 1;
     const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
-                  *B = (const gk_quad *)s->B, *on = (const gk_quad *)s->on;
-    const double *path = s->path[place] + j - first;
+                  *P = (const gk_quad *)s->P + j * quads, *B = (const gk_quad *)s->B, *on = (const gk_quad *)s->on;
+    const double *path = s->P + j * 4 * quads;
     gk_quad c[MAX_STRIDE / 4];
-    double own[MAX_SLICES];
-    for (int q = 0; q < quads; q++) c[q] = D[q] + A[q];
+    for (int q = 0; q < quads; q++) c[q] = D[q] + A[q] + P[q];
     if (s->pull[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
     if (s->held[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->held[j] * A[q];
-    for (int e = 0; e < strips; e++) {
-        own[e] = path[e * strips] + (first + e == j ? s->slope[j] : 0.0);
-        const double moves = s->gain[first + e] * own[e];
+    for (int e = first; e < last; e++) {
+        const double moves = s->gain[e] * (e == j ? path[e] + s->slope[j] : path[e]);
         if (moves == 0.0) continue;
-        for (int q = 0; q < quads; q++) c[q] += moves * B[(first + e) * quads + q];
+        for (int q = 0; q < quads; q++) c[q] += moves * B[e * quads + q];
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
-    for (int e = 0; e < strips; e++) column[first + e] += s->on[first + e] * own[e];
-}
-
-GK_INLINE void link_column(const gk_system *s, int j, double *column, const int quads)
-{
-    const gk_quad *D = (const gk_quad *)s->D + j * quads, *A = (const gk_quad *)s->A + j * quads,
-                  *B = (const gk_quad *)s->B + j * quads, *on = (const gk_quad *)s->on;
-    const double moves = s->gain[j] * s->spring[j];
-    for (int q = 0; q < quads; q++) {
-        gk_quad c = D[q] + A[q];
-        if (moves != 0.0) c += moves * B[q];
-        ((gk_quad *)column)[q] = c * on[q];
-    }
-    column[j] += s->spring[j];
+    ((gk_quad *)column)[j / 4] += s->slope[j] * UNIT[j % 4];
 }
 
 GK_INLINE void columns(gk_system *s, const int quads)
@@ -57,21 +44,19 @@ GK_INLINE void columns(gk_system *s, const int quads)
         if (s->gain[j] != 0.0 || s->pull[j] != 0.0) form_dashpot(s, j, quads);
     for (int j = 0; j < n; j++) {
         double *column = s->J + j * stride;
-        if (!s->active[j]) {
+        if (s->active[j]) {
+            GK_STRIPPED(strips, form_column, s, j, column, quads)
+        } else {
             memset(column, 0, (size_t)stride * sizeof *column);
             column[j] = 1.0;
-        } else if (j < s->contacts) {
-            GK_STRIPPED(strips, contact_column, s, j, column, quads)
-        } else {
-            link_column(s, j, column, quads);
         }
     }
 }
 
-/* of a quad what lies below (LOWER) and above (UPPER) its entry k */
+/* of a quad what lies below its entry k (LOWER), and what does not (UPPER) */
 #define ALL UINT64_MAX
 static const gk_unsigned LOWER[4] = {{0, ALL, ALL, ALL}, {0, 0, ALL, ALL}, {0, 0, 0, ALL}, {0, 0, 0, 0}};
-static const gk_unsigned UPPER[4] = {{0, 0, 0, 0}, {ALL, 0, 0, 0}, {ALL, ALL, 0, 0}, {ALL, ALL, ALL, 0}};
+static const gk_unsigned UPPER[4] = {{ALL, 0, 0, 0}, {ALL, ALL, 0, 0}, {ALL, ALL, ALL, 0}, {ALL, ALL, ALL, ALL}};
 #undef ALL
 
 /* pivots 4·block … of the factors: the columns right of them lose what the pivots explain */
@@ -86,7 +71,7 @@ GK_INLINE void eliminate(gk_system *s, const int quads, const int block)
         l[block] = (gk_quad)((gk_unsigned)l[block] & LOWER[k - 4 * block]);
         for (int q = block; q < quads; q++) ((gk_quad *)lower)[q] = l[q];
         gk_quad *above = (gk_quad *)pivot + block;
-        *above = (gk_quad)((gk_unsigned)*above & UPPER[k - 4 * block]);
+        *above = (gk_quad)((gk_unsigned)*above & UPPER[k - 4 * block]) - UNIT[k - 4 * block];
         for (int j = k + 1; j < n; j++) {
             gk_quad *column = (gk_quad *)s->J + j * quads;
             const double f = -((double *)column)[k];
@@ -118,6 +103,7 @@ GK_INLINE void forward(const gk_system *s, double *x, const int quads, const int
     }
 }
 
+/* the pivot less 1 stands in the factor, so that x_k becomes f with the others */
 GK_INLINE void backward(const gk_system *s, double *x, const int quads, const int block)
 {
     const int stride = 4 * quads, end = 4 * block + 4 < s->n ? 4 * block + 4 : s->n;
@@ -125,7 +111,6 @@ GK_INLINE void backward(const gk_system *s, double *x, const int quads, const in
         const gk_quad *column = (const gk_quad *)(s->J + k * stride);
         const double f = x[k] * s->inverse[k];
         for (int q = 0; q <= block; q++) ((gk_quad *)x)[q] -= f * column[q];
-        x[k] = f;
     }
 }
 

@@ -89,7 +89,7 @@ void gk_limit_compliance(const gk_system *s, const double *Q, double full, int d
     for (int p = 0; p * strips < s->contacts; p++) {
         const int first = p * strips;
         double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
-        memcpy(S, s->path[p], (size_t)(strips * strips) * sizeof *S);
+        for (int a = 0; a < strips * strips; a++) S[a] = s->P[(first + a / strips) * s->stride + first + a % strips];
         for (int a = 0; a < strips; a++)
             S[a * strips + a] +=
                 gk_law_at(gk_law_of(s, first + a), s->width[first + a], full * s->width[first + a]).slope;
@@ -100,8 +100,10 @@ void gk_limit_compliance(const gk_system *s, const double *Q, double full, int d
         for (int a = 0; a < strips * strips; a++) C[(first + a / strips) * n + first + a % strips] += X[a];
     }
     for (int i = s->contacts; i < n; i++)
-        if (counts(s, i))
-            C[i * n + i] += s->spring[i] / (1.0 + (dashpots ? AT_NYQUIST * s->damping[i] * s->spring[i] : 0.0));
+        if (counts(s, i)) {
+            const double spring = s->P[i * s->stride + i];
+            C[i * n + i] += spring / (1.0 + (dashpots ? AT_NYQUIST * s->damping[i] * spring : 0.0));
+        }
 }
 
 /* K (n, n): κ part */

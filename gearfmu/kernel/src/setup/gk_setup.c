@@ -151,7 +151,7 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
     }
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
     engaged->index = e;
-    engaged->matrix = doubles(b, 5 * rows * rows);
+    engaged->matrix = doubles(b, 6 * rows * rows);
     engaged->given_ground = doubles(b, 3 * (size_t)setup->base.n);
     engaged->given_far = doubles(b, 2 * (size_t)setup->far);
 }
