@@ -67,8 +67,9 @@ GK_INLINE void eliminate(gk_system *s, const int quads, const int block)
         double *pivot = s->J + k * stride, *lower = s->L + k * stride;
         gk_quad l[MAX_STRIDE / 4];
         s->inverse[k] = 1.0 / pivot[k];
-        for (int q = block; q < quads; q++) l[q] = s->inverse[k] * ((gk_quad *)pivot)[q];
-        l[block] = (gk_quad)((gk_unsigned)l[block] & LOWER[k - 4 * block]);
+        const gk_quad first = s->inverse[k] * ((gk_quad *)pivot)[block];
+        l[block] = (gk_quad)((gk_unsigned)first & LOWER[k - 4 * block]);
+        for (int q = block + 1; q < quads; q++) l[q] = s->inverse[k] * ((gk_quad *)pivot)[q];
         for (int q = block; q < quads; q++) ((gk_quad *)lower)[q] = l[q];
         gk_quad *above = (gk_quad *)pivot + block;
         *above = (gk_quad)((gk_unsigned)*above & UPPER[k - 4 * block]) - UNIT[k - 4 * block];
