@@ -73,7 +73,7 @@ def linearised(
     kernel = kernel or full_kernel(model)
     pitch = max((place.pitch for place in places_of(model)), key=abs)
     kernel.transmission(-position * pitch, torque)
-    return Linearised(kernel.linearise(), None if shafts is None else shafts)
+    return Linearised(kernel.linearise(), shafts)
 
 
 def full_kernel(model: StageModel) -> Kernel:
@@ -92,6 +92,19 @@ def places_of(model: StageModel) -> list[MeshPlace]:
 def largest_torque(model: StageModel) -> float:
     """Torque on the input (N·m) that brings no engagement beyond its torque_max."""
     return min(place.most for place in places_of(model))
+
+
+def engagements_per_turn(model: StageModel) -> list[float]:
+    """(E,): tooth engagements of every mesh in one revolution of the input, 0 where it does not turn with it."""
+    turning = turns(model.stage, model.shafts.input)
+    return [abs(float(turning.get(rotor, 0))) * teeth for rotor, teeth in mesh_teeth(model.stage).values()]
+
+
+def largest_speed(model: StageModel) -> float:
+    """Speed of the input (rad/s) that brings no engagement beyond its speed_max."""
+    cycles, teeth = engagements_per_turn(model), mesh_teeth(model.stage)
+    meshes = zip(model.stage.engagements, cycles, strict=True)
+    return min(mesh.speed_max * teeth[mesh.name][1] / each for mesh, each in meshes if each)
 
 
 def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:
