@@ -62,11 +62,14 @@ static void place_ground(const gk_setup *setup, const double *lanes, int first, 
 static int form(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
     const gk_meshing *meshing = &data->meshing[e];
+    const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     gk_rows_pose(model, setup, e, data->x, gk_ground_seen(data), engaged->pose);
-    engaged->places = gk_flank_find(model, setup, &setup->mesh[e], engaged->pose, meshing->reach, engaged->position,
-                                    engaged->place);
+    engaged->places =
+        GK_ON(setup, roll_motion)
+            ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->reach, engaged->position, engaged->place)
+            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++)
         engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
