@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
 @click.option(
-    "--torque", type=Quantity("N*m"), help='Without --body: torque on the input, "302 N*m"; the largest that no torque_max forbids when not given.'
+    "--torque",
+    type=Quantity("N*m"),
+    help='Without --body: torque on the input, "302 N*m"; default: what torque_max allows.',
 )
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
@@ -51,7 +54,7 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     if torque == 0:
         raise click.BadParameter("must not be 0: flanks have to carry load", param_hint="--torque")
     from gearfmu.modes.linear import engagements_per_turn, largest_speed, largest_torque, stage_modes
-    from gearfmu.report.campbell import RPM, campbell_columns, crossings, write_campbell
+    from gearfmu.report.campbell import campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
     from gearfmu.stage.trace import write_columns
 
@@ -60,10 +63,8 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     for line in stage_table(found):
         click.echo(line)
     name, cycles, speed_max = model.shafts.input, engagements_per_turn(model), largest_speed(model)
-    for crossing in crossings(found, cycles, speed_max):
-        mesh = f" of {crossing.mesh}" if len(cycles) > 1 else ""
-        speed = f"{RPM * crossing.speed:.0f} rpm of the {name}"
-        click.echo(f"mesh order {crossing.order}{mesh} meets mode {crossing.mode} at {speed}")
+    for line in crossing_lines(crossings(found, cycles, speed_max), name, len(cycles) > 1):
+        click.echo(line)
     out.mkdir(parents=True, exist_ok=True)
     paths = out / f"{spec.name}_frequencies.csv", out / f"{spec.name}_campbell.png"
     write_columns(paths[0], campbell_columns(found))
@@ -84,6 +85,18 @@ def stage_table(found: Any) -> list[str]:
             f"{share[3]:6.0f}"
         )
     return lines
+
+
+def crossing_lines(found: Any, shaft: str, train: bool) -> list[str]:
+    """A line for each mode and mesh: the orders that meet it, and where."""
+    lines: dict[tuple[str, int], list[str]] = {}
+    for crossing in found:
+        rpm = 30 / math.pi * crossing.speed
+        lines.setdefault((crossing.mesh, crossing.mode), []).append(f"{crossing.order} at {rpm:.0f}")
+    return [
+        f"mode {mode} meets mesh order {', '.join(orders)} rpm of the {shaft}" + (f" ({mesh})" if train else "")
+        for (mesh, mode), orders in lines.items()
+    ]
 
 
 def table(body: Any) -> list[str]:

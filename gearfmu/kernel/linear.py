@@ -27,7 +27,7 @@ ARRAYS = {  # in the order of gk_linear: type, shape by the names of the counts
     "damper": (np.float64, "dampers"),
     "damper_rows": (np.float64, "dampers coordinates"),
 }
-COUNTS = ("coordinates", "room", "supports", "dampers", "found")
+COUNTS = ("coordinates", "room", "supports", "dampers", "engagements", "found")
 SPIN, GROUND, FIRST_GEAR = -1, 0, 1  # values of `group`
 
 
@@ -47,7 +47,7 @@ class LinearModel:
     −1, port, joint, 0; force (m,) N or N·m at rest; dashpot (m,) N·s/m; te (m,) derivative of the gap by the
     transmission error; rows W (m, n); residual Q and own S (m, m) m/N, S parallel to the dashpots.
     Of s supports: force = support_rows (s, n) q + support_forces (s, m) λ, support_compliance (s,) m/N of their own
-    springs; of d dampers on them: damper (d,) N·s/m, damper_rows (d, n) of elongation.
+    springs; of d dampers on them: damper (d,) N·s/m, damper_rows (d, n) of elongation. engagements: of the stage.
     """
 
     group: np.ndarray
@@ -67,6 +67,7 @@ class LinearModel:
     support_forces: np.ndarray
     damper: np.ndarray
     damper_rows: np.ndarray
+    engagements: int
 
 
 def room_for(info: LinearInfo) -> dict[str, np.ndarray]:
@@ -82,4 +83,5 @@ def linear_model(info: LinearInfo, arrays: dict[str, np.ndarray]) -> LinearModel
     """The model with the rows that were found."""
     shapes = {name: shape.split() for name, (_, shape) in ARRAYS.items()}
     cut = {name: tuple(slice(info.found if c == "room" else None) for c in shape) for name, shape in shapes.items()}
-    return LinearModel(**{name: array[cut[name]].copy() for name, array in arrays.items()})
+    found = {name: array[cut[name]].copy() for name, array in arrays.items()}
+    return LinearModel(**found, engagements=info.engagements)

@@ -152,8 +152,7 @@ class Linearised:
         omega = np.sqrt(squared)
         forces = np.linalg.solve(self.compliance, self.linear.rows @ shapes)
         ratio = self._loss(forces, shapes) / (2 * omega)
-        engagements = self.linear.label[:, 0]
-        drive = [self._error(e) @ forces for e in range(engagements.max(initial=-1) + 1)]
+        drive = [self._error(e) @ forces for e in range(self.linear.engagements)]
         mesh_force = np.stack(drive, axis=1) ** 2 / (2 * ratio * squared)[:, None]
         return omega / (2 * np.pi), ratio, self._energies(forces, shapes) / squared[:, None], mesh_force
 

@@ -229,6 +229,7 @@ gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_li
     out->room = model->engagements * MAX_PAIRS * setup->strips + JOINTS * model->ports;
     out->supports = model->supports;
     out->dampers = model->dampers;
+    out->engagements = model->engagements;
     out->rows = 0;
     return GK_OK;
 }

@@ -9,9 +9,9 @@
 #define GK_LINEARISE_H
 #include "gk.h"
 
-typedef struct gk_linear {                        /* arrays are the caller's, row by row */
-    int32_t coordinates, room, supports, dampers; /* gk_linearise_room; room: for rows */
-    int32_t rows;                                 /* found, ≤ room */
+typedef struct gk_linear {                                     /* arrays are the caller's, row by row */
+    int32_t coordinates, room, supports, dampers, engagements; /* gk_linearise_room; room: for rows */
+    int32_t rows;                                              /* found, ≤ room */
     /* coordinates */
     int32_t *group,
         *number; /* −1: spin of rotor, or of a chain's inertia; 0: ground oscillator; 1 + g: mode of gear g */
