@@ -61,8 +61,11 @@ def stage_modes(
     position, kernel, shafts = np.arange(positions) / positions, full_kernel(model), shaft_rows(model, bodies)
     found = [linearised(model, torque, part, kernel, shafts).modes(count) for part in position]
     n = min(part[0].size for part in found)
-    columns = (np.stack([values[:n] for values in part]) for part in zip(*found, strict=True))
-    return StageModes(torque, position, *columns, tuple(mesh.name for mesh in model.stage.engagements))
+    frequency, damping_ratio, shares, mesh_force = (
+        np.stack([values[:n] for values in part]) for part in zip(*found, strict=True)
+    )
+    meshes = tuple(mesh.name for mesh in model.stage.engagements)
+    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes)
 
 
 def linearised(

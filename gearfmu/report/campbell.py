@@ -45,13 +45,13 @@ def crossings(modes: StageModes, cycles: Sequence[float], speed_max: float) -> l
 def loud(modes: StageModes) -> np.ndarray:
     """(n, E) whether the force of a mesh in a mode at resonance reaches `LOUD` of the largest one of that mesh."""
     force = modes.mesh_force.max(axis=0)
-    return force > LOUD * force.max(axis=0)
+    return np.asarray(force > LOUD * force.max(axis=0))
 
 
 def write_campbell(modes: StageModes, name: str, cycles: Sequence[float], speed_max: float, path: Path) -> None:
     """The diagram up to `speed_max` (rad/s of the input, the shaft `name`), natural frequencies as bands over the
     pitch. cycles: see `crossings`."""
-    limit, strong = speed_max * RPM, loud(modes).any(axis=1)
+    limit, strong = speed_max * RPM, np.any(loud(modes), axis=1)
     top = 1.1 * max(ORDERS * max(cycles) * limit / 60, float(modes.frequency[:, strong].min()))
     with styled():
         figure = Figure(figsize=(WIDTH, 0.62 * WIDTH), layout="constrained")
@@ -77,8 +77,8 @@ def _orders(figure: Figure, label: str, frequency: float, limit: float, number: 
     axis, look = figure.axes[0], ("-", "--", ":", "-.")[number % 4]
     for order in range(1, ORDERS + 1):
         end = order * frequency
-        known = {"label": f"mesh {label}"} if label and order == 1 else {}
-        axis.plot([0, limit], [0, end], color=MUTED, lw=0.8, ls=look, zorder=1, **known)
+        known = f"mesh {label}" if label and order == 1 else None
+        axis.plot([0, limit], [0, end], color=MUTED, lw=0.8, ls=look, zorder=1, label=known)
         axis.annotate(f"{order}", (limit, end), (4, 0), textcoords="offset points", va="center", color=MUTED)
 
 

@@ -242,7 +242,7 @@ def test_the_mesh_mode_loses_what_it_does_in_a_run(fzg: Stage) -> None:
         more = whole_residual(fzg.model, pluck, system, 0.95 if turning else 0.75).modes(12)[1][mesh]
         print(f"turning {turning:g}: mesh mode {own[0]:.0f} Hz, {own[1]:.3%}; linearised {frequency[mesh]:.0f} Hz, "
               f"{damping[mesh]:.3%}, with the whole residual {more:.3%}")  # fmt: skip
-        assert own[0] == pytest.approx(frequency[mesh], rel=4e-3)
+        assert own[0] == pytest.approx(frequency[mesh], rel=6e-3)
         assert own[1] == pytest.approx(damping[mesh], rel=0.03) and more > 1.03 * damping[mesh]
 
 
@@ -273,19 +273,26 @@ def test_mesh_force_of_all_modes_is_that_of_a_blocked_mesh(stages: dict[str, Sta
     assert frequency[0] > 1 and len(frequency) == len(system.linear.mass)
 
 
-def test_shares_are_what_stiffer_springs_raise(fzg: Stage) -> None:
-    """Rayleigh: dω²/ω² = share · dk/k, for bearings and for ports, by models with springs 1 % stiffer."""
-    stiffer = tuple(
-        g.model_copy(update={"bearing": g.bearing.model_copy(update={"stiffness": 1.01 * g.bearing.stiffness})})
+def stiffer(fzg: Stage, group: int, factor: float) -> StageModel:
+    """The pair with all bearings (group 1) or ports (2) stiffer by a factor."""
+    if group == 2:
+        return with_ports(fzg, **{name: {"k": factor * port.k} for name, port in fzg.spec.ports.items()})
+    gears = tuple(
+        g.model_copy(update={"bearing": g.bearing.model_copy(update={"stiffness": factor * g.bearing.stiffness})})
         for g in fzg.spec.gears
     )
-    bearings = assemble(fzg.spec.model_copy(update={"gears": stiffer}), fzg.bodies)
-    ports = with_ports(fzg, **{name: {"k": 1.01 * port.k} for name, port in fzg.spec.ports.items()})
-    own, *others = (linearised(model, TORQUE, 3 / 8).modes(6) for model in (fzg.model, bearings, ports))
-    for group, other in zip((1, 2), others, strict=True):
-        raised = ((other[0] / own[0]) ** 2 - 1) / np.log(1.01)
-        print(f"group {group}: shares {own[2][:, group]}, by difference {raised}")
-        assert raised == pytest.approx(own[2][:, group], rel=0.01, abs=4e-3)
+    return assemble(fzg.spec.model_copy(update={"gears": gears}), fzg.bodies)
+
+
+@pytest.mark.parametrize("group", [1, 2])
+def test_shares_are_what_stiffer_springs_raise(fzg: Stage, group: int) -> None:
+    """Rayleigh: dω²/ω² = share · dk/k, by models with springs 1 % stiffer and softer; under little load, so that they
+    stand in the same place."""
+    ends = [linearised(stiffer(fzg, group, factor), 1.0, 3 / 8).modes(6)[0] for factor in (1 / 1.01, 1.01)]
+    raised = np.log(ends[1] / ends[0]) / np.log(1.01)
+    shares = linearised(fzg.model, 1.0, 3 / 8, fzg.kernel).modes(6)[2][:, group]
+    print(f"group {group}: shares {shares}, by difference {raised}")
+    assert raised == pytest.approx(shares, rel=2e-3, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["fzg_c", "two_stage"])
@@ -312,7 +319,7 @@ def test_elastic_shafts_have_their_share(stages: dict[str, Stage]) -> None:
         update={"youngs_modulus": 1.01 * body.material.youngs_modulus})}) if name in shafts else body
         for name, body in train.spec.bodies.items()}  # fmt: skip
     model = assemble(train.spec.model_copy(update={"bodies": harder}), train.bodies)
-    raised = ((linearised(model, 150.0, 0.3).modes(8)[0] / own[0]) ** 2 - 1) / np.log(1.01)
+    raised = 2 * np.log(linearised(model, 150.0, 0.3).modes(8)[0] / own[0]) / np.log(1.01)
     print(f"shafts: shares {extra}, by difference {raised}")
     assert raised == pytest.approx(extra, rel=0.1, abs=0.02)
 
