@@ -151,6 +151,30 @@ def test_statics_are_the_tangent_of_the_contact_routine(stages: dict[str, Stage]
         assert mine == pytest.approx(theirs, rel=3e-3)
 
 
+@pytest.mark.parametrize("name", ["fzg_c", "helical_demo", "two_stage"])
+def test_statics_of_the_rows_do_not_know_the_level(stages: dict[str, Stage], name: str) -> None:
+    """Q + S + Σ w wᵀ/ω² over the oscillators: what is quasi-static at level rigid moves at level full, within an
+    engagement and, by the bodies and supports that they share, between engagements."""
+    model = stages[name].model
+    torque, found = 0.5 * largest_torque(model), {}
+    for level in (0.0, 1.0, 3.0):
+        kernel = model.kernel(level=level)
+        kernel.prepare()
+        linear = linearised(model, torque, 3 / 8, kernel).linear
+        moving = linear.omega > 0
+        flexible = linear.rows[:, moving] / linear.omega[moving]
+        found[level] = linear.residual + linear.own + flexible @ flexible.T
+    meshes = linear.label[:, 0]
+    between = (meshes[:, None] != meshes) & (meshes[:, None] >= 0) & (meshes >= 0)
+    for level in (0.0, 1.0):
+        off = np.abs(found[level] - found[3.0])
+        scale = np.sqrt(np.outer(np.diag(found[3.0]), np.diag(found[3.0])))
+        print(f"{name}, level {level:g}: {(off / scale).max():.1e}; between meshes "
+              f"{(np.abs(found[3.0]) / scale)[between].max(initial=0.0):.1e}")  # fmt: skip
+        assert (off / scale).max() < 5e-5  # tables are linear between nodes in one, their product in the other
+    assert not between.any() or (np.abs(found[3.0]) / scale)[between].max() > 1e-3
+
+
 def input_compliance(system: Linearised) -> float:
     """Angle of the first port's bore under a unit moment there, the second port's bore held, others free."""
     linear, own = system.linear, system.linear.own.copy()

@@ -65,8 +65,8 @@ def test_the_same_bodies_take_the_same_constant(relief_spec: StageSpec, bodies: 
 def test_the_path_is_the_local_law_and_most_of_the_teeths_residual(
     relief_spec: StageSpec, bodies: list[ReducedBody]
 ) -> None:
-    """By hand at the pitch point, load shared evenly by the slices of two tooth pairs: the mean over the path of contact
-    is some per cent longer, because teeth touch near root and tip."""
+    """By hand at the pitch point, load shared evenly by the slices of two tooth pairs: the mean over the path of
+    contact is near it."""
     torque = 0.5 * relief_spec.torque_max
     have = own_path(assemble(relief_spec, bodies), torque)
     want = by_hand(relief_spec, bodies, 0.5 * torque / PairGeometry.of(relief_spec).gears[0].r_b)
