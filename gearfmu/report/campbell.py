@@ -52,12 +52,13 @@ def write_campbell(modes: StageModes, name: str, cycles: Sequence[float], speed_
     """The diagram up to `speed_max` (rad/s of the input, the shaft `name`), natural frequencies as bands over the
     pitch. cycles: see `crossings`."""
     limit, strong = speed_max * RPM, np.any(loud(modes), axis=1)
-    top = 1.1 * max(ORDERS * max(cycles) * limit / 60, float(modes.frequency[:, strong].min()))
+    drawn = min(ORDERS * max(cycles) * limit / 60, float(modes.frequency.max()))  # above it modes are not known
+    top = 1.1 * max(drawn, float(modes.frequency[:, strong].min()))
     with styled():
         figure = Figure(figsize=(WIDTH, 0.62 * WIDTH), layout="constrained")
         axis = figure.subplots()
         for e, each in enumerate(cycles):
-            _orders(figure, modes.meshes[e] if len(cycles) > 1 else "", each * limit / 60, limit, e)
+            _orders(figure, modes.meshes[e] if len(cycles) > 1 else "", each / 60, (limit, top), e)
         used: set[str] = set()
         for k in np.flatnonzero(modes.frequency.min(axis=0) < top):
             _line(figure, modes, int(k), strong[k], limit, used)
@@ -66,20 +67,25 @@ def write_campbell(modes: StageModes, name: str, cycles: Sequence[float], speed_
             axis.plot(crossing.speed * RPM, height, "o", ms=4.5, mfc="white", mec=INK, mew=0.9, zorder=4)
         axis.set(xlim=(0, limit), ylim=(0, top), xlabel=f"speed of the {name} in rpm", ylabel="frequency in Hz")
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1, title=None)
-        axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS} (right)", loc="right", color=MUTED)
+        above = 18 if len(cycles) > 1 else None  # of the legend
+        axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS} (right)", loc="right", color=MUTED, pad=above)
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150, format="png")
 
 
-def _orders(figure: Figure, label: str, frequency: float, limit: float, number: int) -> None:
-    """The orders of one mesh, whose frequency is `frequency` (Hz) at `limit` rpm; of a train each mesh has its
-    dashes."""
-    axis, look = figure.axes[0], ("-", "--", ":", "-.")[number % 4]
+def _orders(figure: Figure, label: str, each: float, ends: tuple[float, float], number: int) -> None:
+    """The orders of one mesh, whose frequency is `each` (Hz per rpm), up to a speed and a frequency; of a train each
+    mesh has its dashes."""
+    (limit, top), axis, look = ends, figure.axes[0], ("-", "--", ":", "-.")[number % 4]
     for order in range(1, ORDERS + 1):
-        end = order * frequency
+        at = (limit, order * each * limit)
         known = f"mesh {label}" if label and order == 1 else None
-        axis.plot([0, limit], [0, end], color=MUTED, lw=0.8, ls=look, zorder=1, label=known)
-        axis.annotate(f"{order}", (limit, end), (4, 0), textcoords="offset points", va="center", color=MUTED)
+        axis.plot([0, at[0]], [0, at[1]], color=MUTED, lw=0.8, ls=look, zorder=1, label=known)
+        if at[1] <= top:
+            axis.annotate(f"{order}", at, (4, 0), textcoords="offset points", va="center", color=MUTED)
+        else:
+            at = (top / (order * each), top)
+            axis.annotate(f"{order}", at, (0, -3), textcoords="offset points", va="top", ha="right", color=MUTED)
 
 
 def _line(figure: Figure, modes: StageModes, k: int, strong: bool, limit: float, used: set[str]) -> None:
