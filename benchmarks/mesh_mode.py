@@ -28,10 +28,11 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     RATIO."""
     spec = load_stage(stage)
     bodies = load_stage_bodies(spec)
-    result = loaded_te(assemble(spec, bodies), [torque], positions=64, rigid_bearings=True)
+    model = assemble(spec, bodies)
+    result = loaded_te(model, [torque], positions=64, rigid_bearings=True)
     stiffness, pairs = result.stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
     gears = PairGeometry.of(spec).gears
-    path = own_path(spec, bodies, torque / gears[0].r_b / pairs)
+    path = own_path(model, torque)
     mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])
     width = min(gear.face_width for gear in spec.gears)
 

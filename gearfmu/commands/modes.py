@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
 @click.option(
-    "--torque", type=Quantity("N*m"), help='Without --body: torque on the pinion, "302 N*m"; torque_max when not given.'
+    "--torque",
+    type=Quantity("N*m"),
+    help='Without --body: torque on the input, "302 N*m"; default: what torque_max allows.',
 )
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
@@ -30,7 +33,8 @@ def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float
     """Natural frequencies of STAGE.
 
     With --body: elastic modes of one body, with nodal diameters, and per frequency a picture and a .vtu file. Without:
-    the stage linearised in loaded contact, gears, bearings and port springs together, and a Campbell diagram.
+    the stage linearised in loaded contact, gears, shafts, bearings and port springs together, and a Campbell diagram.
+    The torque acts on the input, the first port: a pair's pinion.
     """
     if name is None:
         if mounted:
@@ -46,33 +50,30 @@ def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float
 
 
 def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
-    from gearfmu.spec.stage import load_pair
-
-    load_pair(stage)
     spec, bodies = bodies_for_motion(stage)
-    from gearfmu.modes.linear import stage_modes
-    from gearfmu.report.campbell import RPM, campbell_columns, crossings, write_campbell
+    if torque == 0:
+        raise click.BadParameter("must not be 0: flanks have to carry load", param_hint="--torque")
+    from gearfmu.modes.linear import engagements_per_turn, largest_speed, largest_torque, stage_modes
+    from gearfmu.report.campbell import campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
     from gearfmu.stage.trace import write_columns
 
-    torque = spec.torque_max if torque is None else torque
-    if torque <= 0:
-        raise click.BadParameter("must be above 0: the drive flanks have to carry load", param_hint="--torque")
-    found = stage_modes(assemble(spec, bodies), bodies, torque, count)
+    model = assemble(spec, bodies)
+    found = stage_modes(model, bodies, largest_torque(model) if torque is None else torque, count)
     for line in stage_table(found):
         click.echo(line)
-    shafts = [(gear.name, gear.teeth) for gear in spec.gears]
-    for order, number, speed in crossings(found, shafts[0][1], spec.speed_max):
-        click.echo(f"mesh order {order} meets mode {number} at {RPM * speed:.0f} rpm of the {shafts[0][0]}")
+    name, cycles, speed_max = model.shafts.input, engagements_per_turn(model), largest_speed(model)
+    for line in crossing_lines(crossings(found, cycles, speed_max), name, len(cycles) > 1):
+        click.echo(line)
     out.mkdir(parents=True, exist_ok=True)
     paths = out / f"{spec.name}_frequencies.csv", out / f"{spec.name}_campbell.png"
     write_columns(paths[0], campbell_columns(found))
-    write_campbell(found, shafts, spec.speed_max, paths[1])
+    write_campbell(found, name, cycles, speed_max, paths[1])
     click.echo(f"{paths[0]}, {paths[1]}")
 
 
 def stage_table(found: Any) -> list[str]:
-    """The linearised stage's modes as lines of a table, means over the pitch."""
+    """The linearised stage's modes as lines of a table, means over the pitch; of a train the largest mesh force."""
     lines = [f"linearised at {found.torque:g} N·m, {len(found.position)} positions of one pitch",
              "  mode  frequency   lowest  highest  damping     mesh force    strain energy in %",
              "               Hz       Hz       Hz        %  per te, N/µm   mesh bearings shafts bodies"]  # fmt: skip
@@ -80,10 +81,22 @@ def stage_table(found: Any) -> list[str]:
         f, share = found.frequency[:, k], 100 * found.shares[:, k].mean(axis=0)
         lines.append(
             f"{k + 1:6d} {f.mean():10.0f} {f.min():8.0f} {f.max():8.0f} {100 * found.damping_ratio[:, k].mean():8.2f} "
-            f"{1e-6 * found.mesh_force[:, k].mean():13.1f} {share[0]:6.0f} {share[1]:8.0f} {share[2]:6.0f} "
+            f"{1e-6 * found.mesh_force[:, k].mean(axis=0).max():13.1f} {share[0]:6.0f} {share[1]:8.0f} {share[2]:6.0f} "
             f"{share[3]:6.0f}"
         )
     return lines
+
+
+def crossing_lines(found: Any, shaft: str, train: bool) -> list[str]:
+    """A line for each mode and mesh: the orders that meet it, and where."""
+    lines: dict[tuple[str, int], list[str]] = {}
+    for crossing in found:
+        rpm = 30 / math.pi * crossing.speed
+        lines.setdefault((crossing.mesh, crossing.mode), []).append(f"{crossing.order} at {rpm:.0f}")
+    return [
+        f"mode {mode} meets mesh order {', '.join(orders)} rpm of the {shaft}" + (f" ({mesh})" if train else "")
+        for (mesh, mode), orders in lines.items()
+    ]
 
 
 def table(body: Any) -> list[str]:

@@ -71,6 +71,8 @@ _SIGNATURES = {
         c_int,
         [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, c_int, POINTER(c_double), POINTER(c_int)],
     ),
+    "gk_linearise_room": (c_int, [c_void_p, c_void_p, c_void_p]),
+    "gk_linearise": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "gk_profile": (c_int, [c_void_p, c_int, POINTER(c_char_p), POINTER(c_uint64)]),
     "gk_state_size": (c_size_t, [c_void_p]),
     "gk_state_check": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t]),

@@ -6,9 +6,13 @@ import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel.binding import CAUSALITIES, OUTCOMES, TYPES, VariableInfo, aligned, blank_message, load
+
+if TYPE_CHECKING:
+    from gearfmu.kernel.linear import LinearModel
 
 PLACES = 8
 SLICES = 10
@@ -188,6 +192,17 @@ class Kernel:
         width = 2 + int(self.get("slices"))
         rows = [out[2 + i * width : 2 + (i + 1) * width] for i in range(count.value)]
         return TeState(out[0], out[1], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
+
+    def linearise(self) -> LinearModel:
+        """The stage linearised at the equilibrium that `transmission` or `initialize` found last, with the ports as the
+        model has them and clutches closed. SimulationError(bad_call) once a step has been made."""
+        from gearfmu.kernel.linear import LinearInfo, linear_model, room_for
+
+        info = LinearInfo()
+        self._check(self._lib.gk_linearise_room(self._model, self._setup, ctypes.byref(info)))
+        arrays = room_for(info)
+        self._check(self._lib.gk_linearise(self._model, self._setup, self._work, self._data, ctypes.byref(info)))
+        return linear_model(info, arrays)
 
     def profile(self) -> dict[str, int]:
         """Processor cycles by phase of the step since `prepare`; zeros unless the library was built with

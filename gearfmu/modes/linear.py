@@ -1,47 +1,45 @@
-"""The stage linearised about a loaded position: natural frequencies of pair, bearings, shafts and bodies together.
+"""The stage linearised about a loaded position: natural frequencies of gears, bearings, shafts and ports together.
 
-Unknowns q are those of the kernel at level full: x, y, φ of either gear's mean-axis frame and its stored modes, and the
-inertia of a chain in a port. Everything that couples them acts through rows R with flexibility of its own D and what
-the bodies yield beyond their stored modes, C_res (docs/theory.md eq. 2):
+The kernel gives the model, in its own terms (`Kernel.linearise`): coordinates q are spins and oscillators, rows W are
+the contacts under load and the springs of ports, S the compliance parallel to their dampers, Q all else that is
+quasi-static (docs/theory.md, 8):
 
-    u = R q + C_res f,   f = −D⁻¹ u     ⇒     M q̈ + [diag(0, ω²) + Rᵀ (D + C_res)⁻¹ R] q = 0                    (29)
+    x = W q,   λ = −(Q + S)⁻¹ x     ⇒     M q̈ + [diag(ω²) + Wᵀ (Q + S)⁻¹ W] q = 0                              (29)
 
-Rows: how far each loaded slice closes (D: tangent of the local law, eq. 8, at the force of `te`), the bore in its
-bearing (D = 1/k), the bore's angle against port spring or chain. The position is frozen; gears do not turn.
+The position is frozen; gears do not turn.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.linalg as sl
-from numpy.polynomial.legendre import Legendre
 
-from gearfmu.body import ReducedBody
-from gearfmu.errors import ModelError
-from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
-from gearfmu.spec.ports import PortSpec
-from gearfmu.spec.stage import StageSpec
+from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
+from gearfmu.spec.general import ShaftBody
+from gearfmu.spec.turning import mesh_teeth, turns
 from gearfmu.stage import StageModel
-from gearfmu.stage.assembly import FIXED_K
-from gearfmu.stage.tables import BORE, excited_modes, resampling, symmetric_functions
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.assembly import mount_sets
+from gearfmu.stage.groups import Group
+from gearfmu.stage.layout import stage_layout
+from gearfmu.stage.te import MeshPlace, place_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
-DRIVE = 0
-LEAST_HALF_WIDTH = 5e-6  # m: below it the local law is a parabola (docs/theory.md 2.4)
+FULL = 3.0  # level at which every oscillator is dynamic
 RIGID_HZ = 1.0  # below it a mode is rigid rotation of the stage
 
 
 @dataclass(frozen=True)
 class StageModes:
-    """Natural frequencies over one pitch. torque N·m; position (P,) in pitches; frequency (P, n) Hz, ascending at each
-    position, none rigid; damping_ratio (P, n); shares (P, n, 4): of the strain energy in `GROUPS`; mesh_force (P, n):
-    N/m, amplitude of the mesh force at resonance per amplitude of a transmission error that drives it."""
+    """Natural frequencies over one pitch. torque N·m on the input; position (P,) in pitches; frequency (P, n) Hz,
+    ascending at each position, none rigid; damping_ratio (P, n); shares (P, n, 4): of the strain energy in `GROUPS`;
+    mesh_force (P, n, E): N/m, amplitude of the force of each engagement at resonance per amplitude of a transmission
+    error there that drives it; meshes (E,): their names."""
 
     torque: float
     position: np.ndarray
@@ -49,267 +47,150 @@ class StageModes:
     damping_ratio: np.ndarray
     shares: np.ndarray
     mesh_force: np.ndarray
+    meshes: tuple[str, ...] = ("mesh",)
 
 
 def stage_modes(
-    model: StageModel, bodies: Sequence[ReducedBody], torque: float, count: int = 20, positions: int = 12
+    model: StageModel, bodies: Sequence[Any], torque: float, count: int = 20, positions: int = 12
 ) -> StageModes:
-    """The `count` lowest natural frequencies at positions i/N of one pitch under `torque` (N·m on the pinion, > 0).
+    """The `count` lowest natural frequencies under `torque` (N·m on the input, not 0; output held, other ports free) at
+    positions i/N of one pitch, of that mesh whose pitch is longest. bodies: those that the model is made of.
 
-    SimulationError(no_equilibrium) where the pair finds none, ModelError for a helical pair.
+    SimulationError(no_equilibrium) where the stage finds none.
     """
-    position, kernel = np.arange(positions) / positions, statics_of(model)
-    found = [linearised(model, bodies, torque, part, kernel).modes(count) for part in position]
-    return StageModes(torque, position, *(np.stack(part) for part in zip(*found, strict=True)))
+    position, kernel, shafts = np.arange(positions) / positions, full_kernel(model), shaft_rows(model, bodies)
+    found = [linearised(model, torque, part, kernel, shafts).modes(count) for part in position]
+    n = min(part[0].size for part in found)
+    frequency, damping_ratio, shares, mesh_force = (
+        np.stack([values[:n] for values in part]) for part in zip(*found, strict=True)
+    )
+    meshes = tuple(mesh.name for mesh in model.stage.engagements)
+    return StageModes(torque, position, frequency, damping_ratio, shares, mesh_force, meshes)
 
 
 def linearised(
-    model: StageModel, bodies: Sequence[ReducedBody], torque: float, position: float, kernel: Kernel | None = None
+    model: StageModel, torque: float, position: float, kernel: Kernel | None = None, shafts: np.ndarray | None = None
 ) -> Linearised:
-    """Equation (29) at one position (in pitches) under `torque`, N·m on the pinion. kernel: of the model, prepared for
-    statics; made here when None."""
-    if model.pair.pair.helix_angle:
-        raise ModelError(f"{model.name} is helical: the linearised stage knows spur pairs; modes --body takes any gear")
-    contacts = loaded_contacts(model.pair, kernel or statics_of(model), torque, position)
-    gears = [_gear(model.pair, bodies, index, position, contacts) for index in (0, 1)]
-    return _coupled(model.pair, gears, contacts)
+    """Equation (29) at one position (in pitches) under `torque`, N·m on the input. kernel: of the model, prepared, of
+    the level that decides which oscillators are dynamic (full when None); shafts: `shaft_rows`."""
+    kernel = kernel or full_kernel(model)
+    pitch = max((place.pitch for place in places_of(model)), key=abs)
+    kernel.transmission(-position * pitch, torque)
+    return Linearised(kernel.linearise(), shafts)
 
 
-@dataclass(frozen=True)
-class Contact:
-    """A loaded slice: tooth numbers of pinion and wheel, its number across the width, rolls (m) on both gears, force
-    (N)."""
-
-    teeth: tuple[int, int]
-    slice: int
-    rolls: tuple[float, float]
-    force: float
+def full_kernel(model: StageModel) -> Kernel:
+    """The kernel prepared at level full."""
+    kernel = model.kernel(level=FULL)
+    kernel.prepare()
+    return kernel
 
 
-def loaded_contacts(spec: StageSpec, kernel: Kernel, torque: float, position: float) -> list[Contact]:
-    """The slices that carry load at a position, wheel held, by the static contact routine."""
-    pair = PairGeometry.of(spec)
-    pinion, wheel = pair.gears
-    forces = kernel.transmission(-position * 2 * math.pi / wheel.z, torque).forces
-    found = []
-    for (flank, tooth), slices in forces.items():
-        if flank != DRIVE:
-            continue
-        roll = pinion.r_b * (2 * math.pi * (position + tooth) / pinion.z + pinion.psi_b + pair.alpha_wt)
-        rolls = (float(np.clip(roll, pinion.s_form, pinion.s_tip)),
-                 float(np.clip(pair.length - roll, wheel.s_form, wheel.s_tip)))  # fmt: skip
-        found += [Contact((tooth, -tooth), k, rolls, force) for k, force in enumerate(slices) if force > 0]
-    return found
+def places_of(model: StageModel) -> list[MeshPlace]:
+    """The engagements that turn with the ports."""
+    turning = turns(model.stage, model.shafts.input)
+    return [place_of(model, name) for name, (rotor, _) in mesh_teeth(model.stage).items() if rotor in turning]
 
 
-@dataclass(frozen=True)
-class _Gear:
-    """One gear's part of (29). mass (n,) of its unknowns x, y, φ, modes; omega (n,) rad/s, 0 for the rigid ones; rows
-    (c + 3, n): contacts, then the bore's x, y, φ; residual (c + 3, c + 3) m/N."""
-
-    mass: np.ndarray
-    omega: np.ndarray
-    zeta: np.ndarray
-    rows: np.ndarray
-    residual: np.ndarray
+def largest_torque(model: StageModel) -> float:
+    """Torque on the input (N·m) that brings no engagement beyond its torque_max."""
+    return min(place.most for place in places_of(model))
 
 
-def _gear(
-    spec: StageSpec, bodies: Sequence[ReducedBody], index: int, position: float, contacts: Sequence[Contact]
-) -> _Gear:
-    pair, body = PairGeometry.of(spec), bodies[index]
-    shape, side = pair.gears[index], (1.0, -1.0)[index]
-    degrees = symmetric_functions(min(b.width_functions for b in bodies))
-    chosen = excited_modes(body, degrees)
-    angle = (0.0, pair.wheel_phase)[index] + side * 2 * math.pi * position / shape.z
-    direction = math.pi / 2 - pair.alpha_wt - angle  # of the line of action in the body's frame
-    rigid = np.array([side * math.cos(direction), side * math.sin(direction), shape.r_b])
-    weights = slice_weights(spec.contact.slices, degrees)
-    places = [(c.teeth[index], resampling(body.roll, c.rolls[index], c.rolls[index], 1)[0]) for c in contacts]
-    flank = [
-        _on_tooth(np.einsum("r,a,ran->n", place, weights[c.slice], body.flank_rows[DRIVE][:, degrees][..., chosen]),
-                  body, chosen, tooth)
-        for (tooth, place), c in zip(places, contacts, strict=True)
-    ]  # fmt: skip
-    modal = np.vstack([*flank, body.bore_rows[np.ix_(np.array(BORE), chosen)]])
-    rows = np.hstack([np.vstack([np.tile(rigid, (len(contacts), 1)), np.eye(3)]), modal])
-    omega = 2 * np.pi * body.frequency[chosen]
-    static = _static(body, degrees, places, weights[[c.slice for c in contacts]])
-    return _Gear(
-        mass=np.concatenate([[body.mass, body.mass, body.inertia[2, 2]], np.ones(len(chosen))]),
-        omega=np.concatenate([np.zeros(3), omega]),
-        zeta=np.concatenate([np.zeros(3), body.damping_ratio[chosen]]),
-        rows=rows,
-        residual=static - (modal / omega) @ (modal / omega).T,
-    )
+def engagements_per_turn(model: StageModel) -> list[float]:
+    """(E,): tooth engagements of every mesh in one revolution of the input, 0 where it does not turn with it."""
+    turning = turns(model.stage, model.shafts.input)
+    return [abs(float(turning.get(rotor, 0))) * teeth for rotor, teeth in mesh_teeth(model.stage).values()]
 
 
-def slice_weights(slices: int, degrees: np.ndarray) -> np.ndarray:
-    """(slices, A): (2a + 1) × mean of P_a over each slice of the face width, for loading and reading."""
-    edges = np.linspace(-1, 1, slices + 1)
-    columns = []
-    for a in degrees:
-        integral = Legendre.basis(int(a)).integ()(edges)
-        columns.append((2 * a + 1) * np.diff(integral) / np.diff(edges))
-    return np.stack(columns, axis=1)
+def largest_speed(model: StageModel) -> float:
+    """Speed of the input (rad/s) that brings no engagement beyond its speed_max."""
+    cycles, teeth = engagements_per_turn(model), mesh_teeth(model.stage)
+    meshes = zip(model.stage.engagements, cycles, strict=True)
+    return min(mesh.speed_max * teeth[mesh.name][1] / each for mesh, each in meshes if each)
 
 
-def _on_tooth(row: np.ndarray, body: ReducedBody, chosen: np.ndarray, tooth: int) -> np.ndarray:
-    """Row (n,) of tooth 0 on another tooth (docs/theory.md eq. 3)."""
-    theta = 2 * np.pi * body.nodal_diameter[chosen] * tooth / body.teeth
-    first, second = np.flatnonzero(body.part[chosen] == 1), np.flatnonzero(body.part[chosen] == 2)
-    result = row * np.cos(theta)
-    result[first] -= row[second] * np.sin(theta[first])
-    result[second] += row[first] * np.sin(theta[first])
-    return result
+def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:
+    """(k, oscillators of the ground group): √2 × the square root of the strain energy of each mode of an elastic shaft,
+    beside what its ends yield beyond them; None where the stage has no shafts."""
+    if not any(isinstance(body, ShaftBody) for body in model.stage.bodies.values()):
+        return None
+    layout = stage_layout(model.stage, bodies)
+    group = mount_sets(layout)[0]
+    own = [_elastic(group, b) for b, body in enumerate(layout.bodies) if body.flank is None]
+    return np.vstack(own)
 
 
-def _static(
-    body: ReducedBody, degrees: np.ndarray, places: Sequence[tuple[int, np.ndarray]], weights: np.ndarray
-) -> np.ndarray:
-    """C_static (c + 3, c + 3) of contacts at `places` (tooth, weights of the roll points) and of the bore."""
-    count = len(places)
-    total = np.zeros((count + 3, count + 3))
-    bore = np.ix_(BORE, BORE)
-    total[count:, count:] = body.static_bb[bore]
-    for i, (tooth, place) in enumerate(places):
-        for j, (other, there) in enumerate(places):
-            block = body.static_ff[DRIVE, DRIVE, other - tooth][..., degrees, :][..., degrees]
-            total[i, j] = np.einsum("r,s,a,b,rsab->", place, there, weights[i], weights[j], block)
-        x, y, turn = np.einsum("r,a,rak->k", place, weights[i], body.static_fb[DRIVE][:, degrees])[list(BORE)]
-        theta = 2 * np.pi * tooth / body.teeth
-        c, s = math.cos(theta), math.sin(theta)
-        total[i, count:] = total[count:, i] = [c * x - s * y, s * x + c * y, turn]
-    return total
+def _elastic(group: Group, body: int) -> np.ndarray:
+    """ω times the modes of a body in the oscillators."""
+    omega = group.layout.bodies[body].omega
+    shapes = group.shapes[group.at[body]]
+    return omega[:, None] * shapes[len(shapes) - omega.size :]
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """Equation (29). mass (n,), omega (n,), zeta (n,) of the unknowns; rows R (m, n); own D (m,) m/N, residual C_res
-    (m, m); group (m,) index into GROUPS; dashpot (m,) N·s/m across a row's own path (a contact's includes the residual
-    of its tooth pair, `tooth` (m,) numbering those, −1 elsewhere)."""
+    """Equation (29). linear: of the kernel; shafts: `shaft_rows`, whose strain energy counts as that of shafts."""
 
-    mass: np.ndarray
-    omega: np.ndarray
-    zeta: np.ndarray
-    rows: np.ndarray
-    own: np.ndarray
-    residual: np.ndarray
-    group: np.ndarray
-    dashpot: np.ndarray
-    tooth: np.ndarray
+    linear: LinearModel
+    shafts: np.ndarray | None = None
+
+    @cached_property
+    def compliance(self) -> np.ndarray:
+        """Q + S (m, m), m/N."""
+        return self.linear.residual + self.linear.own
 
     @property
     def stiffness(self) -> np.ndarray:
         """(n, n), N/m."""
-        coupling = self.rows.T @ np.linalg.solve(np.diag(self.own) + self.residual, self.rows)
-        return np.diag(self.mass * self.omega**2) + 0.5 * (coupling + coupling.T)
+        linear = self.linear
+        coupling = linear.rows.T @ np.linalg.solve(self.compliance, linear.rows)
+        return np.diag(linear.mass * linear.omega**2) + 0.5 * (coupling + coupling.T)
 
     def modes(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Frequencies (count,) Hz above `RIGID_HZ`, ascending, damping ratios, shares (count, 4) of the strain energy,
-        and the mesh force at resonance per transmission error (N/m): Γ²/(2ζω²), Γ = 1ᵀ(D + C_res)⁻¹ R φ over the
-        contacts."""
-        scale = 1 / np.sqrt(self.mass)
-        last = min(count + 1, len(scale)) - 1  # at most one mode is rigid: two shafts and a mesh
-        squared, shapes = sl.eigh(scale[:, None] * self.stiffness * scale, subset_by_index=[0, last])
-        shapes = scale[:, None] * shapes
-        first = int(np.searchsorted(squared, (2 * np.pi * RIGID_HZ) ** 2))
-        squared, shapes = squared[first : first + count], shapes[:, first : first + count]
+        and of each engagement (count, E) the mesh force at resonance per transmission error (N/m): Γ²/(2ζω²), Γ the
+        force of a mode φ along the line of action, −τᵀ(Q + S)⁻¹Wφ, τ derivative of the gaps by the error."""
+        squared, shapes = self.shapes(count)
         omega = np.sqrt(squared)
-        forces = np.linalg.solve(np.diag(self.own) + self.residual, self.rows @ shapes)
-        bodies = self.mass[:, None] * (self.omega[:, None] * shapes) ** 2
-        work = forces * (self.rows @ shapes)
-        shares = np.stack([work[self.group == g].sum(axis=0) for g in range(3)] + [bodies.sum(axis=0)], axis=1)
-        ratio = self._loss(forces, bodies, omega) / (2 * squared)
-        drive = forces[self.group == 0].sum(axis=0)
-        return omega / (2 * np.pi), ratio, shares / squared[:, None], drive**2 / (2 * ratio * squared)
+        forces = np.linalg.solve(self.compliance, self.linear.rows @ shapes)
+        ratio = self._loss(forces, shapes) / (2 * omega)
+        drive = [self._error(e) @ forces for e in range(self.linear.engagements)]
+        mesh_force = np.stack(drive, axis=1) ** 2 / (2 * ratio * squared)[:, None]
+        return omega / (2 * np.pi), ratio, self._energies(forces, shapes) / squared[:, None], mesh_force
 
-    def _loss(self, forces: np.ndarray, bodies: np.ndarray, omega: np.ndarray) -> np.ndarray:
-        """Σ η U·2 of each mode: what dampers take of it, to first order. A dashpot c beside a flexibility p has the
-        loss factor η = ωcp."""
-        path = np.diag(self.own) + self.residual * (self.tooth[:, None] == self.tooth) * (self.tooth >= 0)
-        moved = path @ forces
-        lost = omega * (self.dashpot[:, None] * moved**2).sum(axis=0)
-        elastic = self.omega > 0
-        return lost + (2 * self.zeta[elastic, None] * bodies[elastic] * omega / self.omega[elastic, None]).sum(axis=0)
+    def shapes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """ω² (count,) of the modes above `RIGID_HZ`, ascending, and mass-normalised shapes (n, count)."""
+        scale = 1 / np.sqrt(self.linear.mass)
+        spins = int((self.linear.group == SPIN).sum())
+        last = min(count + spins, len(scale)) - 1  # no more modes are rigid than there are spins
+        squared, shapes = sl.eigh(scale[:, None] * self.stiffness * scale, subset_by_index=[0, last])
+        first = int(np.searchsorted(squared, (2 * np.pi * RIGID_HZ) ** 2))
+        return squared[first : first + count], scale[:, None] * shapes[:, first : first + count]
 
+    def _error(self, engagement: int) -> np.ndarray:
+        """(m,): derivative of the gaps by the transmission error of one engagement."""
+        return np.where(self.linear.label[:, 0] == engagement, self.linear.te, 0.0)
 
-def _coupled(spec: StageSpec, gears: Sequence[_Gear], contacts: Sequence[Contact]) -> Linearised:
-    """Both gears with their contacts, bearings and ports."""
-    first, second = gears
-    c = len(contacts)
-    rows = sl.block_diag(first.rows, second.rows)
-    residual = sl.block_diag(first.residual, second.residual)
-    fold = np.zeros((c + 6, 2 * c + 6))  # a contact closes by what both gears do
-    fold[:c, :c] = fold[:c, c + 3 : 2 * c + 3] = np.eye(c)
-    fold[c : c + 3, c : c + 3] = fold[c + 3 :, 2 * c + 3 :] = np.eye(3)
-    system = Linearised(
-        mass=np.concatenate([first.mass, second.mass]),
-        omega=np.concatenate([first.omega, second.omega]),
-        zeta=np.concatenate([first.zeta, second.zeta]),
-        rows=fold @ rows,
-        residual=fold @ residual @ fold.T,
-        own=np.concatenate([_tangents(spec, contacts), np.zeros(6)]),
-        group=np.concatenate([np.zeros(c, int), np.tile([1, 1, 2], 2)]),
-        dashpot=np.concatenate([_contact_dashpots(spec, c), np.zeros(6)]),
-        tooth=np.concatenate([[contact.teeth[0] + 1000 for contact in contacts], np.full(6, -1)]),
-    )
-    return _held(spec, system, [first.mass[0], second.mass[0]], c)
+    def _energies(self, forces: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+        """(modes, 4): twice the strain energy in each of `GROUPS`. What is neither in the rows nor in the springs of
+        supports nor in the shafts' modes is in the bodies."""
+        linear = self.linear
+        work = forces * (linear.rows @ shapes)
+        total = ((linear.omega[:, None] * shapes) ** 2).sum(axis=0) + work.sum(axis=0)
+        contact = linear.label[:, 0] >= 0
+        mesh, shafts = work[contact].sum(axis=0), work[~contact].sum(axis=0)
+        supported = linear.support_rows @ shapes - linear.support_forces @ forces
+        bearings = (linear.support_compliance[:, None] * supported**2).sum(axis=0)
+        if self.shafts is not None:
+            ground = linear.group == GROUND
+            shafts = shafts + ((self.shafts[:, linear.number[ground]] @ shapes[ground]) ** 2).sum(axis=0)
+        return np.stack([mesh, bearings, shafts, total - mesh - bearings - shafts], axis=1)
 
-
-def _tangents(spec: StageSpec, contacts: Sequence[Contact]) -> np.ndarray:
-    """δ′ (m/N) of the local law of each contact at its force, both bodies (docs/theory.md eqs. 7 and 8)."""
-    yields = [2 * (1 - g.material.poisson_ratio**2) / (math.pi * g.material.youngs_modulus) for g in spec.gears]
-    strips = [math.log(4 * g.body.strip_half_width) - 1 for g in spec.gears]
-    constant, length = float(np.dot(yields, strips)), min(g.face_width for g in spec.gears) / spec.contact.slices
-    result = []
-    for contact in contacts:
-        radius = 1 / (1 / contact.rolls[0] + 1 / contact.rolls[1])
-        half_width = math.sqrt(2 * sum(yields) * radius * contact.force / length)
-        result.append((constant - sum(yields) * (math.log(max(half_width, LEAST_HALF_WIDTH)) + 0.5)) / length)
-    return np.array(result)
-
-
-def _contact_dashpots(spec: StageSpec, contacts: int) -> np.ndarray:
-    length = min(gear.face_width for gear in spec.gears) / spec.contact.slices
-    return np.full(contacts, spec.contact.damping * length)
-
-
-def _held(spec: StageSpec, system: Linearised, masses: Sequence[float], contacts: int) -> Linearised:
-    """The system with the flexibilities and dashpots of bearings and ports; rows of ports that hold nothing go."""
-    own, dashpot, keep = system.own.copy(), system.dashpot.copy(), np.ones(len(system.own), bool)
-    chains: list[tuple[int, PortSpec]] = []
-    for index, gear in enumerate(spec.gears):
-        at, port = contacts + 3 * index, spec.ports[gear.name]
-        own[at : at + 2] = 1 / gear.bearing.stiffness
-        dashpot[at : at + 2] = 2 * gear.bearing.damping_ratio * math.sqrt(gear.bearing.stiffness * masses[index])
-        keep[at + 2] = port.kind != "torque"
-        if port.chain is not None:
-            own[at + 2], dashpot[at + 2] = 1 / port.chain.shaft_k, port.chain.shaft_c
-            chains.append((at + 2, port))
-        elif port.kind != "torque":
-            own[at + 2], dashpot[at + 2] = 1 / FIXED_K, 0.0
-            if port.kind == "spring":
-                assert port.k is not None and port.c is not None
-                own[at + 2], dashpot[at + 2] = 1 / port.k, port.c
-    rows, mass = system.rows, system.mass
-    for row, port in chains:
-        assert port.chain is not None and port.k is not None and port.c is not None
-        rows = np.hstack([rows, np.zeros((len(rows), 1))])
-        rows[row, -1] = -1.0
-        rows = np.vstack([rows, np.eye(rows.shape[1])[-1:]])
-        mass = np.append(mass, port.chain.inertia + port.chain.disc_inertia)
-        own, dashpot, keep = np.append(own, 1 / port.k), np.append(dashpot, port.c), np.append(keep, True)
-    extra, more = len(own) - len(system.own), len(mass) - len(system.mass)
-    residual = sl.block_diag(system.residual, np.zeros((extra, extra)))
-    return Linearised(
-        mass=mass,
-        omega=np.append(system.omega, np.zeros(more)),
-        zeta=np.append(system.zeta, np.zeros(more)),
-        rows=rows[keep],
-        own=own[keep],
-        residual=residual[np.ix_(keep, keep)],
-        group=np.append(system.group, np.full(extra, 2))[keep],
-        dashpot=dashpot[keep],
-        tooth=np.append(system.tooth, np.full(extra, -1))[keep],
-    )
+    def _loss(self, forces: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+        """2ζω of each mode, to first order: what dampers take at unit speed of it."""
+        linear = self.linear
+        across = linear.dashpot[:, None] * (linear.own @ forces) ** 2
+        on_supports = linear.damper[:, None] * (linear.damper_rows @ shapes) ** 2
+        modal = (2 * linear.zeta * linear.omega)[:, None] * shapes**2
+        return across.sum(axis=0) + on_supports.sum(axis=0) + modal.sum(axis=0)

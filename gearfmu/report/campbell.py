@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,49 +19,73 @@ RPM = 30 / np.pi
 LOUD = 0.05  # of the largest mesh force: modes above it are drawn strong and their crossings marked
 
 
-def crossings(modes: StageModes, teeth: int, speed_max: float) -> list[tuple[int, int, float]]:
-    """Mesh order, number of the mode (from 1) and speed (rad/s) below `speed_max` at which they meet, of the modes that
-    a transmission error drives."""
-    frequency = modes.frequency.mean(axis=0)
+@dataclass(frozen=True)
+class Crossing:
+    """Order `order` of a mesh meets mode `mode` (from 1) at `speed` (rad/s) of the input."""
+
+    mesh: str
+    order: int
+    mode: int
+    speed: float
+
+
+def crossings(modes: StageModes, cycles: Sequence[float], speed_max: float) -> list[Crossing]:
+    """Where mesh orders meet modes that a transmission error of that mesh drives, below `speed_max` (rad/s of the
+    input). cycles (E,): tooth engagements of every mesh in one revolution of the input."""
+    frequency, strong = modes.frequency.mean(axis=0), loud(modes)
     found = []
-    for order in range(1, ORDERS + 1):
-        for k in np.flatnonzero(loud(modes)):
-            speed = 2 * np.pi * frequency[k] / (order * teeth)
-            if speed <= speed_max:
-                found.append((order, int(k) + 1, float(speed)))
+    for e, (mesh, each) in enumerate(zip(modes.meshes, cycles, strict=True)):
+        for order in range(1, ORDERS + 1):
+            for k in np.flatnonzero(strong[:, e]):
+                if 2 * np.pi * frequency[k] <= order * each * speed_max:
+                    found.append(Crossing(mesh, order, int(k) + 1, float(2 * np.pi * frequency[k] / (order * each))))
     return found
 
 
 def loud(modes: StageModes) -> np.ndarray:
-    """(n,) whether the mesh force of a mode at resonance reaches `LOUD` of the largest one."""
+    """(n, E) whether the force of a mesh in a mode at resonance reaches `LOUD` of the largest one of that mesh."""
     force = modes.mesh_force.max(axis=0)
-    return force > LOUD * force.max()
+    return np.asarray(force > LOUD * force.max(axis=0))
 
 
-def write_campbell(modes: StageModes, shafts: Sequence[tuple[str, int]], speed_max: float, path: Path) -> None:
-    """The diagram up to `speed_max` (rad/s, first shaft), natural frequencies as bands over the pitch; shafts: (name,
-    teeth), the first one is that of the speed."""
-    (name, teeth), limit = shafts[0], speed_max * RPM
-    top = 1.1 * max(ORDERS * teeth * limit / 60, float(modes.frequency[:, loud(modes)].min()))
-    strong = loud(modes)
+def write_campbell(modes: StageModes, name: str, cycles: Sequence[float], speed_max: float, path: Path) -> None:
+    """The diagram up to `speed_max` (rad/s of the input, the shaft `name`), natural frequencies as bands over the
+    pitch. cycles: see `crossings`."""
+    limit, strong = speed_max * RPM, np.any(loud(modes), axis=1)
+    drawn = min(ORDERS * max(cycles) * limit / 60, float(modes.frequency.max()))  # above it modes are not known
+    top = 1.1 * max(drawn, float(modes.frequency[:, strong].min()))
     with styled():
         figure = Figure(figsize=(WIDTH, 0.62 * WIDTH), layout="constrained")
         axis = figure.subplots()
-        for order in range(1, ORDERS + 1):
-            end = order * teeth * limit / 60
-            axis.plot([0, limit], [0, end], color=MUTED, lw=0.8, zorder=1)
-            axis.annotate(f"{order}", (limit, end), (4, 0), textcoords="offset points", va="center", color=MUTED)
+        for e, each in enumerate(cycles):
+            _orders(figure, modes.meshes[e] if len(cycles) > 1 else "", each / 60, (limit, top), e)
         used: set[str] = set()
         for k in np.flatnonzero(modes.frequency.min(axis=0) < top):
             _line(figure, modes, int(k), strong[k], limit, used)
-        for _, number, speed in crossings(modes, teeth, speed_max):
-            height = modes.frequency[:, number - 1].mean()
-            axis.plot(speed * RPM, height, "o", ms=4.5, mfc="white", mec=INK, mew=0.9, zorder=4)
+        for crossing in crossings(modes, cycles, speed_max):
+            height = modes.frequency[:, crossing.mode - 1].mean()
+            axis.plot(crossing.speed * RPM, height, "o", ms=4.5, mfc="white", mec=INK, mew=0.9, zorder=4)
         axis.set(xlim=(0, limit), ylim=(0, top), xlabel=f"speed of the {name} in rpm", ylabel="frequency in Hz")
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1, title=None)
-        axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS} (right)", loc="right", color=MUTED)
+        above = 18 if len(cycles) > 1 else None  # of the legend
+        axis.set_title(f"{modes.torque:g} N·m; mesh orders 1–{ORDERS} (right)", loc="right", color=MUTED, pad=above)
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150, format="png")
+
+
+def _orders(figure: Figure, label: str, each: float, ends: tuple[float, float], number: int) -> None:
+    """The orders of one mesh, whose frequency is `each` (Hz per rpm), up to a speed and a frequency; of a train each
+    mesh has its dashes."""
+    (limit, top), axis, look = ends, figure.axes[0], ("-", "--", ":", "-.")[number % 4]
+    for order in range(1, ORDERS + 1):
+        at = (limit, order * each * limit)
+        known = f"mesh {label}" if label and order == 1 else None
+        axis.plot([0, at[0]], [0, at[1]], color=MUTED, lw=0.8, ls=look, zorder=1, label=known)
+        if at[1] <= top:
+            axis.annotate(f"{order}", at, (4, 0), textcoords="offset points", va="center", color=MUTED)
+        else:
+            at = (top / (order * each), top)
+            axis.annotate(f"{order}", at, (0, -3), textcoords="offset points", va="top", ha="right", color=MUTED)
 
 
 def _line(figure: Figure, modes: StageModes, k: int, strong: bool, limit: float, used: set[str]) -> None:
@@ -77,13 +102,15 @@ def _line(figure: Figure, modes: StageModes, k: int, strong: bool, limit: float,
 
 def campbell_columns(modes: StageModes) -> dict[str, np.ndarray]:
     """Columns of the table of natural frequencies, one row a mode: means over the pitch, and the range of the
-    frequency."""
+    frequency; of a train a mesh force for each mesh."""
     columns = {
         "mode": np.arange(1, modes.frequency.shape[1] + 1),
         "frequency_Hz": modes.frequency.mean(axis=0),
         "lowest_Hz": modes.frequency.min(axis=0),
         "highest_Hz": modes.frequency.max(axis=0),
         "damping_ratio": modes.damping_ratio.mean(axis=0),
-        "mesh_force_per_te_N_per_um": 1e-6 * modes.mesh_force.mean(axis=0),
     }
+    for e, mesh in enumerate(modes.meshes):
+        name = "mesh" if len(modes.meshes) == 1 else mesh
+        columns[f"{name}_force_per_te_N_per_um"] = 1e-6 * modes.mesh_force[:, :, e].mean(axis=0)
     return columns | {f"{group}_share": modes.shares[:, :, k].mean(axis=0) for k, group in enumerate(GROUPS)}

@@ -1,0 +1,248 @@
+/* The stage linearised at rest (docs/theory.md, 8): the problem of a step in which no time passes, formed at the
+ * equilibrium, as matrices. What a row reads is what its unit force does, so that all rows come from those functions that
+ * spread the forces of a step. */
+#include "problem/gk_linearise.h"
+#include "integrate/gk_integrate.h"
+
+static const double DAMPER_AT_UNIT_STEP = 0.5; /* c over 2c/h, h = 1 */
+
+typedef struct kept { /* a row of the linear model */
+    int engagement, row;
+} kept;
+
+/* ---- coordinates ------------------------------------------------------------------------------------------------- */
+/* coordinate of every spin; returns their number. A closed clutch makes one of two. */
+static int number_spins(const gk_model *model, const gk_setup *setup, int at[MAX_SPINS])
+{
+    int count = model->rotors;
+    for (int r = 0; r < model->rotors; r++) at[r] = r;
+    for (int p = 0; p < model->ports; p++)
+        if (setup->chained[p]) at[gk_inertia_of(model, p)] = at[gk_disc_of(model, p)] = count++;
+    return count;
+}
+
+static int oscillators(const gk_model *model, const gk_setup *setup)
+{
+    int count = setup->base.count;
+    for (int g = 0; g < model->gears; g++) count += setup->modal[g].count;
+    return count;
+}
+
+static void describe(gk_linear *out, int i, int group, int number, double omega, double zeta)
+{
+    out->group[i] = group, out->number[i] = number;
+    out->mass[i] = 1.0, out->omega[i] = omega, out->zeta[i] = zeta;
+}
+
+static void describe_coordinates(const gk_model *model, const gk_setup *setup, gk_linear *out)
+{
+    const gk_base *base = &setup->base;
+    const int damped = GK_ON(setup, modal_damping);
+    int at[MAX_SPINS], n = number_spins(model, setup, at);
+    for (int i = 0; i < n; i++) describe(out, i, -1, i, 0.0, 0.0), out->mass[i] = 0.0;
+    for (int d = 0; d < setup->spins; d++) out->mass[at[d]] += 1.0 / setup->inverse_inertia[d];
+    for (int i = 0; i < base->n; i++)
+        if (base->which[i] >= 0) describe(out, n++, 0, base->which[i], base->omega[i], damped ? base->zeta[i] : 0.0);
+    for (int g = 0; g < model->gears; g++) {
+        const gk_modal *m = &setup->modal[g];
+        for (int k = 0; k < m->count; k++)
+            describe(out, n++, 1 + g, k, m->omega[m->lane[k]], damped ? m->zeta[m->lane[k]] : 0.0);
+    }
+}
+
+/* a row over the ground group's lanes among all coordinates, the rest 0 */
+static void place_ground(const gk_setup *setup, const double *lanes, int first, int coordinates, double *out)
+{
+    memset(out, 0, (size_t)coordinates * sizeof *out);
+    for (int i = 0; i < setup->base.n; i++)
+        if (setup->base.which[i] >= 0) out[first++] = lanes[i];
+}
+
+/* ---- the problem at rest ------------------------------------------------------------------------------------------- */
+static int form(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
+{
+    const gk_meshing *meshing = &data->meshing[e];
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_engaged *engaged = &work->engaged[e];
+    gk_system *s = &engaged->system;
+    gk_rows_pose(model, setup, e, data->x, gk_ground_seen(data), engaged->pose);
+    engaged->places =
+        GK_ON(setup, roll_motion)
+            ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->reach, engaged->position, engaged->place)
+            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
+    if (engaged->places < 0) return engaged->places = 0;
+    for (int p = 0; p < engaged->places; p++)
+        engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
+    gk_rows_form(model, setup, work, e);
+    gk_form_system(model, setup, data, &work->explicit_rows, work, e);
+    memcpy(s->force, s->force0, (size_t)s->stride * sizeof *s->force);
+    gk_law_apply(s);
+    return 1;
+}
+
+static int form_all(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
+{
+    memcpy(work->spin, data->x, sizeof work->spin);
+    memset(work->speed, 0, sizeof work->speed);
+    for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
+    work->ground_y = work->ground_zero;
+    for (int e = 0; e < model->engagements; e++)
+        if (!form(model, setup, work, data, e)) return 0;
+    return 1;
+}
+
+/* rows that are at work: contacts under load, springs */
+static int list_kept(const gk_model *model, const gk_work *work, kept *rows)
+{
+    int count = 0;
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_system *s = &work->engaged[e].system;
+        for (int i = 0; i < s->n; i++)
+            if (i < s->contacts ? s->force0[i] > 0.0 : s->kind[i] == ROW_SPRING) rows[count++] = (kept){e, i};
+    }
+    return count;
+}
+
+/* ---- rows ---------------------------------------------------------------------------------------------------------- */
+static void describe_row(const gk_setup *setup, const gk_work *work, kept row, int r, gk_linear *out)
+{
+    const gk_engaged *engaged = &work->engaged[row.engagement];
+    const gk_system *s = &engaged->system;
+    const int i = row.row, contact = i < s->contacts;
+    int32_t *label = out->label + 4 * r;
+    out->force[r] = s->force0[i];
+    out->dashpot[r] = DAMPER_AT_UNIT_STEP * s->damping[i];
+    out->te[r] = 0.0;
+    label[0] = contact ? row.engagement : -1, label[1] = s->port_of[i], label[2] = s->joint_of[i], label[3] = 0;
+    if (!contact) return;
+    const gk_place *place = &engaged->place[s->place_of[i]];
+    label[1] = place->key.flank, label[2] = place->key.tooth, label[3] = i % GK_STRIPS(s);
+    out->te[r] = (place->key.flank ? 1.0 : -1.0) * setup->mesh[row.engagement].cosine;
+}
+
+/* S between two rows: the path of a tooth pair and its local law; 1/k */
+static double own_compliance(const gk_system *s, int i, int j)
+{
+    const int strips = GK_STRIPS(s);
+    if (i >= s->contacts) return i == j ? s->spring[i] : 0.0;
+    if (j >= s->contacts || s->place_of[i] != s->place_of[j]) return 0.0;
+    return s->path[s->place_of[i]][i % strips * strips + j % strips] + (i == j ? s->yield[i] : 0.0);
+}
+
+/* what a unit force of one row does at once to all rows of its own engagement, and through the bodies that they share to
+ * those of others */
+static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, const kept *rows, int r,
+                            gk_linear *out)
+{
+    const gk_system *s = &work->engaged[rows[r].engagement].system;
+    double unit[MAX_STRIDE] = {0}, read[MAX_STRIDE];
+    int of = -1;
+    unit[rows[r].row] = 1.0;
+    memset(work->far, 0, (size_t)setup->far * sizeof *work->far);
+    gk_rows_push_far(model, setup, work, rows[r].engagement, unit, work->far);
+    for (int c = 0; c < out->rows; c++) {
+        const int e = rows[c].engagement, same = e == rows[r].engagement;
+        double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
+        if (!same && e != of) gk_rows_read_far(model, setup, work, of = e, work->far, read);
+        *Q = same ? s->Q[rows[r].row * s->stride + rows[c].row]
+             : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
+                                                                               : 0.0;
+        out->S[(size_t)r * (size_t)out->room + (size_t)c] = same ? own_compliance(s, rows[r].row, rows[c].row) : 0.0;
+    }
+}
+
+/* what a unit force of one row does to every coordinate */
+static void fill_row(const gk_model *model, const gk_setup *setup, gk_work *work, kept row, double *W)
+{
+    const gk_mesh *mesh = &setup->mesh[row.engagement];
+    gk_system *s = &work->engaged[row.engagement].system;
+    int at[MAX_SPINS], n = number_spins(model, setup, at);
+    s->force[row.row] = 1.0;
+    gk_rows_scatter(model, setup, work, gk_step_force, gk_step_force);
+    s->force[row.row] = 0.0;
+    place_ground(setup, work->ground_force, n, n + oscillators(model, setup), W);
+    for (int l = 0; l < mesh->spins; l++) W[at[mesh->spin[l]]] += s->rigid[l][row.row];
+    n += setup->base.count;
+    for (int g = 0; g < model->gears; g++)
+        for (int k = 0; k < setup->modal[g].count; k++) W[n++] = (double)work->force[g][setup->modal[g].lane[k]];
+}
+
+static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *work, const kept *rows, gk_linear *out)
+{
+    for (int r = 0; r < out->rows; r++) {
+        describe_row(setup, work, rows[r], r, out);
+        fill_compliance(model, setup, work, rows, r, out);
+    }
+    for (int e = 0; e < model->engagements; e++)
+        memset(work->engaged[e].system.force, 0, sizeof work->engaged[e].system.force);
+    for (int r = 0; r < out->rows; r++)
+        fill_row(model, setup, work, rows[r], out->W + (size_t)r * (size_t)out->coordinates);
+}
+
+/* ---- supports ------------------------------------------------------------------------------------------------------ */
+/* what a unit force of one row does at once to the force on a support: one side's part of a contact */
+static double pressed(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, const gk_side *side,
+                      int i, int support)
+{
+    const gk_position *at = &engaged->position[side->which];
+    const size_t points = (size_t)(side->candidates * setup->strips), supports = (size_t)model->supports;
+    const int candidate = engaged->place[engaged->system.place_of[i]].candidate[side->which];
+    const size_t point = (size_t)at->node * points + (size_t)(candidate * setup->strips + i % setup->strips);
+    const double *low = side->support + point * supports + support;
+    return low[0] + at->part * (low[points * supports] - low[0]);
+}
+
+static void fill_supports(const gk_model *model, const gk_setup *setup, const gk_work *work, const kept *rows,
+                          gk_linear *out)
+{
+    const gk_base *base = &setup->base;
+    const gk_ground *ground = &model->ground[base->set];
+    int at[MAX_SPINS];
+    const int spins = number_spins(model, setup, at), n = out->coordinates;
+    for (int s = 0; s < model->supports; s++) {
+        out->support_compliance[s] = ground->support_compliance[s];
+        place_ground(setup, base->support_rows + s * base->n, spins, n, out->support_rows + (size_t)s * (size_t)n);
+        for (int r = 0; r < out->rows; r++) {
+            const gk_engaged *engaged = &work->engaged[rows[r].engagement];
+            const gk_system *system = &engaged->system;
+            const gk_side *side = setup->mesh[rows[r].engagement].side;
+            double force = 0.0;
+            if (rows[r].row < system->contacts)
+                for (int w = 0; w < 2; w++) force -= pressed(model, setup, engaged, &side[w], rows[r].row, s);
+            else if (gk_rows_at_bore(setup, system, rows[r].row))
+                force = setup->port_support[system->port_of[rows[r].row]][s];
+            out->support_forces[(size_t)s * (size_t)out->room + (size_t)r] = force;
+        }
+    }
+    for (int d = 0; d < model->dampers; d++) {
+        out->damper[d] = ground->damper[d];
+        place_ground(setup, base->damper_rows + d * base->n, spins, n, out->damper_rows + (size_t)d * (size_t)n);
+    }
+}
+
+/* ---- all of it ------------------------------------------------------------------------------------------------------- */
+gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_linear *out)
+{
+    int at[MAX_SPINS];
+    if (setup->magic != GK_SETUP_MAGIC) return GK_BAD_CALL;
+    out->coordinates = number_spins(model, setup, at) + oscillators(model, setup);
+    out->room = model->engagements * MAX_PAIRS * setup->strips + JOINTS * model->ports;
+    out->supports = model->supports;
+    out->dampers = model->dampers;
+    out->engagements = model->engagements;
+    out->rows = 0;
+    return GK_OK;
+}
+
+gk_outcome gk_linearise(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                        gk_linear *out)
+{
+    kept rows[MAX_ENGAGEMENTS * MAX_ROWS];
+    if (setup->magic != GK_SETUP_MAGIC || data->magic != GK_DATA_MAGIC || data->state_h != 0.0) return GK_BAD_CALL;
+    if (!form_all(model, setup, work, data)) return GK_DIVERGED;
+    out->rows = list_kept(model, work, rows);
+    describe_coordinates(model, setup, out);
+    fill_supports(model, setup, work, rows, out);
+    fill_rows(model, setup, work, rows, out);
+    return GK_OK;
+}
