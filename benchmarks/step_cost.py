@@ -4,8 +4,8 @@
 
 Pair with relief, 302 N·m at 2000 rpm, all outputs on. The earlier commit is unpacked and built beside this one; both
 kernels run the same mesh periods in turn, so that their times share the machine's moods. Prints instructions of a step
-by callgrind (where valgrind is there), the time of a step in the quickest mesh period of each run, which other load on the
-machine disturbs least, and the median of the ratios round by round.
+by callgrind (where valgrind is there), the time of a step in the quickest mesh period of each run, which other load on
+the machine disturbs least, and the median of the ratios round by round.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def write(folder: Path, level: float) -> None:
 
 
 def least(folder: Path, level: float) -> float:
-    """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package that this process imports."""
+    """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package of this process."""
     from gearfmu.body import load_stage_bodies
     from gearfmu.kernel import Kernel
     from gearfmu.spec.stage import load_stage

@@ -281,8 +281,7 @@ static void contact_forces(const gk_setup *setup, const gk_engaged *work, const 
     const int width = 2 * GK_LANES(setup, side->gear) / LANES;
     const gk_half *rows = (const gk_half *)work->basis[side->which];
     int first = 0;
-    for (; first + 4 <= width; first += 4)
-        push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 4);
+    for (; first + 4 <= width; first += 4) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 4);
     for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
 }
 

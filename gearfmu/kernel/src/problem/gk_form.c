@@ -130,7 +130,8 @@ static int list_parts(const gk_engaged *engaged, int strips, part *parts)
     return n;
 }
 
-typedef struct blend { /* a table of one side at two neighbouring nodes: (points, parts, columns) each, and their weights */
+typedef struct
+    blend { /* a table of one side at two neighbouring nodes: (points, parts, columns) each, and their weights */
     const gk_real *low, *high;
     double square_low, mixed, square_high;
     size_t columns, row; /* of one part; of all parts */
@@ -167,7 +168,8 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
                 const size_t a = first + (size_t)parts[c].point[0], b = second + (size_t)parts[c].point[1];
                 if (moves) {
                     *(gk_quad *)(D + parts[c].column) = BLENDED(*p, a) + BLENDED(*q, b);
-                    *(gk_quad *)(A + parts[c].column) = BLENDED(*p, a + 2 * p->columns) + BLENDED(*q, b + 2 * q->columns);
+                    *(gk_quad *)(A + parts[c].column) = BLENDED(*p, a + 2 * p->columns) +
+                                                        BLENDED(*q, b + 2 * q->columns);
                 } else {
                     *(gk_quad *)(A + parts[c].column) = BLENDED(*p, a) + BLENDED(*q, b);
                 }
@@ -276,7 +278,7 @@ static void add_ground(const gk_setup *setup, gk_work *work, int e, const gk_coe
 
 /* The same from tables: with W = −u + gΦ (u outward, g gradient, Φ rigid motion) what u alone makes is in the tables of the
  * contacts; the rest is −h gᵀ − g hᵀ, h = uMΦᵀ − ½ gΦMΦᵀ, motion by motion of both gears */
-typedef struct pulled { /* a motion of a gear */
+typedef struct pulled {                                           /* a motion of a gear */
     double g[MAX_STRIDE], moved[MAX_STRIDE], yielded[MAX_STRIDE]; /* h in D, in K */
 } pulled;
 
@@ -336,7 +338,8 @@ GK_INLINE void pull_stripped(const gk_setup *setup, const gk_engaged *engaged, c
 GK_INLINE void add_pulled(gk_system *s, const pulled *p, int motions, const int quads)
 {
     for (int m = 0; m < motions; m++) {
-        const gk_quad *g = (const gk_quad *)p[m].g, *h = (const gk_quad *)p[m].moved, *k = (const gk_quad *)p[m].yielded;
+        const gk_quad *g = (const gk_quad *)p[m].g, *h = (const gk_quad *)p[m].moved,
+                      *k = (const gk_quad *)p[m].yielded;
         gk_quad *D = (gk_quad *)s->D, *A = (gk_quad *)s->A;
         for (int i = 0; i < s->contacts; i++, D += quads, A += quads) {
             const double own = p[m].g[i], moved = p[m].moved[i], yielded = p[m].yielded[i];
@@ -446,8 +449,8 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
 }
 
 /* d/dt of the gaps that the rows read, for given speeds, at the problem formed last */
-void gk_form_rates(const gk_setup *setup, gk_work *work, int e,
-                   const gk_real *const modal_speed[], const double *ground_speed, const double *speed, double *rate)
+void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *const modal_speed[],
+                   const double *ground_speed, const double *speed, double *rate)
 {
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &work->engaged[e].system;

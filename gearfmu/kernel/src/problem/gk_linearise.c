@@ -73,7 +73,7 @@ static int form(const gk_model *model, const gk_setup *setup, gk_work *work, con
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++)
         engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
-    gk_rows_form(model, setup, work, e);
+    gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, &work->explicit_rows, work, e);
     memcpy(s->force, s->force0, (size_t)s->stride * sizeof *s->force);
     gk_law_apply(s);
@@ -123,10 +123,7 @@ static void describe_row(const gk_setup *setup, const gk_work *work, kept row, i
 /* S between two rows: the path of a tooth pair and its local law; 1/k */
 static double own_compliance(const gk_system *s, int i, int j)
 {
-    const int strips = GK_STRIPS(s);
-    if (i >= s->contacts) return i == j ? s->spring[i] : 0.0;
-    if (j >= s->contacts || s->place_of[i] != s->place_of[j]) return 0.0;
-    return s->path[s->place_of[i]][i % strips * strips + j % strips] + (i == j ? s->yield[i] : 0.0);
+    return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->yield[i] : 0.0);
 }
 
 /* what a unit force of one row does at once to all rows of its own engagement, and through the bodies that they share to
@@ -144,7 +141,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
         if (!same && e != of) gk_rows_read_far(model, setup, work, of = e, work->far, read);
-        *Q = same ? s->Q[rows[r].row * s->stride + rows[c].row]
+        *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
                                                                                : 0.0;
         out->S[(size_t)r * (size_t)out->room + (size_t)c] = same ? own_compliance(s, rows[r].row, rows[c].row) : 0.0;
@@ -181,15 +178,15 @@ static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
 
 /* ---- supports ------------------------------------------------------------------------------------------------------ */
 /* what a unit force of one row does at once to the force on a support: one side's part of a contact */
-static double pressed(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, const gk_side *side,
-                      int i, int support)
+static double pressed(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, int support)
 {
     const gk_position *at = &engaged->position[side->which];
-    const size_t points = (size_t)(side->candidates * setup->strips), supports = (size_t)model->supports;
+    const size_t points = (size_t)(side->candidates * setup->strips), width = (size_t)side->held.width;
     const int candidate = engaged->place[engaged->system.place_of[i]].candidate[side->which];
     const size_t point = (size_t)at->node * points + (size_t)(candidate * setup->strips + i % setup->strips);
-    const double *low = side->support + point * supports + support;
-    return low[0] + at->part * (low[points * supports] - low[0]);
+    if (support < side->held.from || support >= side->held.from + side->held.width) return 0.0;
+    const double *low = side->support + point * width + (support - side->held.from);
+    return low[0] + at->part * (low[points * width] - low[0]);
 }
 
 static void fill_supports(const gk_model *model, const gk_setup *setup, const gk_work *work, const kept *rows,
@@ -208,7 +205,7 @@ static void fill_supports(const gk_model *model, const gk_setup *setup, const gk
             const gk_side *side = setup->mesh[rows[r].engagement].side;
             double force = 0.0;
             if (rows[r].row < system->contacts)
-                for (int w = 0; w < 2; w++) force -= pressed(model, setup, engaged, &side[w], rows[r].row, s);
+                for (int w = 0; w < 2; w++) force -= pressed(setup, engaged, &side[w], rows[r].row, s);
             else if (gk_rows_at_bore(setup, system, rows[r].row))
                 force = setup->port_support[system->port_of[rows[r].row]][s];
             out->support_forces[(size_t)s * (size_t)out->room + (size_t)r] = force;

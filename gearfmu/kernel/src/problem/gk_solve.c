@@ -31,8 +31,10 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
 }
 
 /* y = matrix x; the matrix is symmetric, so its rows are its columns */
-void gk_solve_times(const gk_system *s, const double *matrix, const double *x,
-                    double *y){GK_SIZED(s -> stride / 4, times, s, matrix, x, y)}
+void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y)
+{
+    GK_SIZED(s->stride / 4, times, s, matrix, x, y)
+}
 
 void gk_solve_path(const gk_system *s, const double *x, double *y) { gk_solve_times(s, s->P, x, y); }
 

@@ -41,12 +41,12 @@ typedef struct gk_system {
     int own_laws;                 /* every strip has a law of its own, else the strips of a tooth pair share one */
     gk_local local[MAX_CONTACTS]; /* laws of the contacts, per metre */
     double rigid[MAX_LOCAL][MAX_STRIDE]; /* derivative of the rows by each spin of the engagement */
-    double *D, *A, *P; /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
+    double *D, *A, *P;          /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
     double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
                                          factor; what a damper's force does, D + late·A */
     double inverse[MAX_STRIDE]; /* of the pivots */
     double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE],
-        z[MAX_STRIDE];              /* λ, η_d, η = η_d + α·direction, λ + η */
+        z[MAX_STRIDE];                /* λ, η_d, η = η_d + α·direction, λ + η */
     unsigned char active[MAX_STRIDE]; /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_STRIDE],
         hold[MAX_STRIDE]; /* damper: 0 linear, ±1 at its limit ±(λ0 + λ1), 2 not acting; its force at

@@ -50,9 +50,9 @@ typedef struct gk_engaged { /* an engagement in a step */
     int places;
     double pose[POSE]; /* predicted */
     gk_position position[2];
-    gk_real *basis[2];       /* (contacts, n) rows of the contacts in the frame of the reference tooth */
-    double *ground;          /* (rows, local part): rows of contacts and joints on the ground group */
-    double *matrix;          /* D, A, Q, J, L, B */
+    gk_real *basis[2]; /* (contacts, n) rows of the contacts in the frame of the reference tooth */
+    double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
+    double *matrix;    /* D, A, Q, J, L, B */
     double *given_ground,
         given_spin[3][MAX_LOCAL]; /* what the forces give to ground group (3, n) and spins: z, λ, dampers */
     double *given_far;            /* (2, far): λ, dampers at the end */
@@ -142,6 +142,6 @@ void gk_couple_recall(gk_coupled *coupled);
 /* gk_form.c */
 void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                     gk_work *work, int e);
-void gk_form_rates(const gk_setup *setup, gk_work *work, int e,
-                   const gk_real *const modal_speed[], const double *ground_speed, const double *speed, double *rate);
+void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *const modal_speed[],
+                   const double *ground_speed, const double *speed, double *rate);
 #endif

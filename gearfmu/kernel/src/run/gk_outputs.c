@@ -311,8 +311,7 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
         if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
     double force[MAX_SUPPORTS];
     forces_by_motion(model, setup, tally->moved, tally->speed, force);
-    for (int s = 0; s < model->supports; s++)
-        data->support[s][V_FORCE_MEAN] = (force[s] + tally->support[s]) / H;
+    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = (force[s] + tally->support[s]) / H;
     for (int e = 0; e < model->engagements; e++) {
         data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
         data->mesh[e][V_FORCE_MAX] = tally->highest[e];

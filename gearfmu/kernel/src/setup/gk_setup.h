@@ -66,12 +66,12 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int set, n, count;
     int32_t *which; /* (n) their numbers in the model, −1: padding */
     int32_t *slot;  /* (all ground oscillators of the set) place among the dynamic ones, −1: not dynamic */
-    double *omega, *zeta, *omega2; /* (n), 0 in padding */
-    double *damper_rows;           /* (dampers, n) */
-    double *support_rows;          /* (supports, n): force on the support, kappa included */
-    double *port_rows;             /* (ports, n) */
-    double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
-    const double *moved[MAX_GEARS][SPACE]; /* the same as in a pose, from the part on that the gear reads */
+    double *omega, *zeta, *omega2;                    /* (n), 0 in padding */
+    double *damper_rows;                              /* (dampers, n) */
+    double *support_rows;                             /* (supports, n): force on the support, kappa included */
+    double *port_rows;                                /* (ports, n) */
+    double *centre[MAX_GEARS];                        /* (6, n): rigid motion of every gear at its mid-width */
+    const double *moved[MAX_GEARS][SPACE];            /* the same as in a pose, from the part on that the gear reads */
     int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], port_span[MAX_PORTS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
@@ -96,7 +96,7 @@ typedef struct gk_side {
                           that the whole of C is a parabola between nodes at every level; points: strips of the candidates */
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
-    gk_span held;    /* the supports that this side loads */
+    gk_span held;  /* the supports that this side loads */
     double *support; /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
     gk_real *far;    /* (nodes + 1, points, far): outward, of every ground oscillator that is not dynamic over Ω, then
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
@@ -105,13 +105,13 @@ typedef struct gk_side {
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
     gk_side side[2];
-    gk_span part[2]; /* parts of the ground group that its rows read: gear A's, gear B's; one where these meet */
-    int local;       /* their widths together */
-    int at[2];       /* where the part of either gear begins in such a row */
-    int joined;      /* both gears read the same oscillators: what a step does has no tables */
-    int ports, port[2];            /* ports whose rows stand in this engagement's system */
-    int spins, spin[6];            /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
-    int joint_spin[2][2];          /* inertia and disc of its ports among them, −1: none */
+    gk_span part[2];      /* parts of the ground group that its rows read: gear A's, gear B's; one where these meet */
+    int local;            /* their widths together */
+    int at[2];            /* where the part of either gear begins in such a row */
+    int joined;           /* both gears read the same oscillators: what a step does has no tables */
+    int ports, port[2];   /* ports whose rows stand in this engagement's system */
+    int spins, spin[6];   /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
+    int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
