@@ -270,7 +270,7 @@ gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *w
     }
     memcpy(work->outer_before, from, sizeof from);
     memcpy(work->outer, to, sizeof to);
-    gk_step_remember(model, setup, work, data);
+    for (int e = 0; e < model->engagements; e++) gk_step_remember(setup, &work->engaged[e], data, e);
     gk_rk45_angles(model, work, data);
     for (int e = 0; e < model->engagements; e++) { /* the mean over so short a time is its end */
         gk_system *s = &work->engaged[e].system;

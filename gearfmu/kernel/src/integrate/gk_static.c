@@ -1,7 +1,7 @@
 /* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): proximal points. Every spin may move by
  * mobility × torque (an implicit "step" of a viscous body), everything else is compliance: the dynamic oscillators too, by
  * κ = −1/ω². Repeated until nothing moves. The mobility is large against all compliances, so a few iterations suffice;
- * each is a monotone complementarity problem. */
+ * each is a monotone complementarity problem. Islands come to rest one after the other: they know nothing of each other. */
 #include "integrate/gk_integrate.h"
 
 static const double MOBILITY = 1e-4; /* s²: divided by the inertia of a spin, rad/(N m) */
@@ -22,7 +22,26 @@ typedef struct rest { /* a search for rest */
     int train[MAX_SPINS], trains,
         floats[MAX_ROTORS]; /* which spins turn together, −1: none; trains that nothing holds */
     double given[MAX_SPINS], before[MAX_SPINS];
+    int island; /* that comes to rest now */
 } rest;
+
+static int searched(const rest *r, int e) { return r->setup.mesh[e].island == r->island; }
+
+/* does a spin belong to the island that comes to rest now? */
+static int moves(const rest *r, int d)
+{
+    for (int e = 0; e < r->model->engagements; e++)
+        for (int l = 0; l < r->setup.mesh[e].spins && searched(r, e); l++)
+            if (r->setup.mesh[e].spin[l] == d) return 1;
+    return 0;
+}
+
+static int train_moves(const rest *r, int train)
+{
+    for (int d = 0; d < r->setup.spins; d++)
+        if (r->train[d] == train && moves(r, d)) return 1;
+    return 0;
+}
 
 /* ---- trains ------------------------------------------------------------------------------------------------------- */
 static int grounded(const rest *r, int p)
@@ -79,18 +98,18 @@ static void begin(rest *r)
     gk_data *data = r->data;
     double at[MAX_ROTORS] = {0};
     int known[MAX_ROTORS] = {0};
-    memset(data->x, 0, sizeof data->x);
     memset(r->work->rest_ground, 0, (size_t)r->setup.base.n * sizeof(double));
-    for (int e = 0; e < m->engagements; e++) data->meshing[e].pairs = 0;
+    for (int e = 0; e < m->engagements; e++)
+        if (searched(r, e)) data->meshing[e].pairs = 0;
     for (int p = 0; p < m->ports; p++) {
         const int rotor = m->port[p].rotor, train = r->train[rotor];
         if (r->boundary[p].kind == PORT_TORQUE || known[train]) continue;
         known[train] = 1, at[train] = r->boundary[p].phi / r->turn[rotor];
     }
     for (int d = 0; d < r->setup.spins; d++)
-        if (r->train[d] >= 0) data->x[d] = at[r->train[d]] * r->turn[d];
+        if (moves(r, d)) data->x[d] = r->train[d] >= 0 ? at[r->train[d]] * r->turn[d] : 0.0;
     for (int p = 0; p < m->ports; p++)
-        if (r->setup.chained[p]) data->x[gk_inertia_of(m, p)] = r->boundary[p].phi;
+        if (r->setup.chained[p] && moves(r, gk_inertia_of(m, p))) data->x[gk_inertia_of(m, p)] = r->boundary[p].phi;
 }
 
 /* torque on every spin by given torques and, after a first solution, by all rows */
@@ -114,7 +133,7 @@ static void balance_rotation(rest *r, int solved)
 {
     for (int t = 0; t < r->trains; t++) {
         double net = 0.0, inertia = 0.0;
-        if (!r->floats[t]) continue;
+        if (!r->floats[t] || !train_moves(r, t)) continue;
         for (int d = 0; d < r->setup.spins; d++) {
             if (r->train[d] != t) continue;
             net += r->turn[d] * torque_on(r, d, solved);
@@ -130,7 +149,7 @@ static void unroll(rest *r)
 {
     for (int t = 0; t < r->trains; t++) {
         double momentum = 0.0, inertia = 0.0;
-        if (!r->floats[t]) continue;
+        if (!r->floats[t] || !train_moves(r, t)) continue;
         for (int d = 0; d < r->setup.spins; d++) {
             if (r->train[d] != t) continue;
             momentum += r->turn[d] * (r->data->x[d] - r->before[d]) / r->setup.inverse_inertia[d];
@@ -199,13 +218,12 @@ static double relax(rest *r)
     for (int g = 0; g < r->model->gears; g++) work->y[g] = work->zero;
     work->ground_y = work->ground_zero;
     for (int e = 0; e < r->model->engagements; e++)
-        if (!form(r, e)) return NAN;
-    for (int i = 0; i < r->setup.islands; i++) {
-        gk_coupled coupled = {r->model, &r->setup, work, &r->k, i};
-        const gk_island island = gk_couple_island(&coupled);
-        gk_balance_plain(&island);
-    }
+        if (searched(r, e) && !form(r, e)) return NAN;
+    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island};
+    const gk_island island = gk_couple_island(&coupled);
+    gk_balance_plain(&island);
     for (int e = 0; e < r->model->engagements; e++) {
+        if (!searched(r, e)) continue;
         const gk_mesh *mesh = &r->setup.mesh[e];
         const gk_system *s = &work->engaged[e].system;
         stuck |= s->limit_reached;
@@ -215,13 +233,15 @@ static double relax(rest *r)
     double moved = settle_ground(r);
     memcpy(r->before, r->data->x, sizeof r->before);
     for (int d = 0; d < r->setup.spins; d++) {
+        if (!moves(r, d)) continue;
         r->data->x[d] = work->spin[d] + mobility * r->setup.inverse_inertia[d] * z[d];
         if (!gk_finite(r->data->x[d])) return NAN;
     }
     unroll(r);
     for (int d = 0; d < r->setup.spins; d++)
         moved = gk_max(moved, fabs(r->data->x[d] - r->before[d]) * arm_of(r, d < r->model->rotors ? d : 0));
-    gk_step_remember(r->model, &r->setup, work, r->data);
+    for (int e = 0; e < r->model->engagements; e++)
+        if (searched(r, e)) gk_step_remember(&r->setup, &work->engaged[e], r->data, e);
     return stuck ? gk_max(moved, 1.0) : moved;
 }
 
@@ -230,7 +250,7 @@ static double rest_limit(const rest *r)
 {
     double deepest = 0.0;
     for (int e = 0; e < r->model->engagements; e++)
-        for (int p = 0; p < r->work->engaged[e].places; p++)
+        for (int p = 0; p < r->work->engaged[e].places && searched(r, e); p++)
             deepest = gk_max(deepest, -r->work->engaged[e].place[p].gap);
     return AT_REST + ROUNDING * deepest;
 }
@@ -350,8 +370,13 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     set_joints(&r);
     set_compliance(&r);
     find_trains(&r);
-    if (!keep) begin(&r);
-    const int found = search(&r);
+    for (int e = 0; e < model->engagements; e++) gk_step_forget(&work->engaged[e]);
+    if (!keep) memset(data->x, 0, sizeof data->x);
+    int found = 1;
+    for (r.island = 0; r.island < r.setup.islands && found; r.island++) {
+        if (!keep) begin(&r);
+        found = search(&r);
+    }
     clear_compliance(&r);
     if (!found) return GK_NO_EQUILIBRIUM;
     spread(&r);

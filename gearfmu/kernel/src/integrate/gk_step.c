@@ -433,7 +433,7 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
     return gk_solve_stored(s) + held;
 }
 
-static void remember_engagement(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
+void gk_step_remember(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
 {
     const gk_system *s = &engaged->system;
     gk_meshing *meshing = &data->meshing[e];
@@ -460,9 +460,11 @@ static void remember_engagement(const gk_setup *setup, const gk_engaged *engaged
     meshing->owed = s->owed;
 }
 
-void gk_step_remember(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data)
+/* an engagement without rows */
+void gk_step_forget(gk_engaged *engaged)
 {
-    for (int e = 0; e < model->engagements; e++) remember_engagement(setup, &work->engaged[e], data, e);
+    engaged->places = 0;
+    engaged->system.n = engaged->system.contacts = engaged->system.stride = engaged->system.clutches = 0;
 }
 
 /* ---- the step ------------------------------------------------------------------------------------------------------------ */
@@ -534,7 +536,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     correct(model, setup, work, data, k);
     GK_LAP(work, PHASE_CORRECT);
     settle_accounts(model, work, data);
-    gk_step_remember(model, setup, work, data);
+    for (int e = 0; e < model->engagements; e++) gk_step_remember(setup, &work->engaged[e], data, e);
     data->expressed_h = h, data->expressed_gamma = gamma;
     data->steps++;
     GK_LAP(work, PHASE_REMEMBER);

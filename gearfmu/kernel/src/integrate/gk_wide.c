@@ -59,6 +59,7 @@
 #define gk_step_recall gk_step_recall_avx2
 #define gk_step_remembered gk_step_remembered_avx2
 #define gk_step_remember gk_step_remember_avx2
+#define gk_step_forget gk_step_forget_avx2
 #define gk_step_energy gk_step_energy_avx2
 #define gk_step_force gk_step_force_avx2
 #define gk_step_z gk_step_z_avx2
