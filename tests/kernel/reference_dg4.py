@@ -96,8 +96,13 @@ class State:
     late: np.ndarray
 
     @property
+    def sampled(self) -> np.ndarray:
+        """Contact forces at the end of the step, with what their dashpots do there."""
+        return self.force + self.late
+
+    @property
     def reported(self) -> np.ndarray:
-        """Contact forces to report: their sum times h is the impulse."""
+        """Contact forces whose sum times h is the impulse."""
         return self.force + 0.5 * self.eta
 
 

@@ -58,8 +58,8 @@ class Case:
 COMPARED = [Case(100, 100, 8, local=2.8e-12), Case(100, 300, 5, gap=2e-6, local=1e-12), Case(200, 100, 20, local=4e-12)]
 
 
-def kernel_forces(case: Case, library: Path, integrator: str) -> np.ndarray:
-    """Contact force at the end of every internal step; bar 1 starts with 1 m/s."""
+def kernel_forces(case: Case, library: Path, integrator: str, output: str = "mesh.force") -> np.ndarray:
+    """Contact force at the end of every internal step (or its mean); bar 1 starts with 1 m/s."""
     parameters = {
         "left.w_start": 1.0,
         "h": case.h,
@@ -72,7 +72,7 @@ def kernel_forces(case: Case, library: Path, integrator: str) -> np.ndarray:
     forces = np.empty(case.steps)
     for i in range(case.steps):
         kernel.step(i * case.h, case.h)
-        forces[i] = kernel.get("mesh.force")
+        forces[i] = kernel.get(output)
     assert kernel.get("solver.trouble") == 0
     return forces
 
@@ -90,7 +90,7 @@ def reference_forces(case: Case, integrator: str) -> np.ndarray:
     state, forces = reference.start(none, v, none), np.empty(case.steps)
     for i in range(case.steps):
         state = reference.step(state, none)
-        forces[i] = state.reported[0]
+        forces[i] = state.sampled[0]
     return forces
 
 
@@ -116,7 +116,7 @@ def test_exact_impact(system_library: Path, one: int, two: int, n: int) -> None:
     case, exact = Case(one, two, n), impact(one, two)
     force = kernel_forces(case, system_library, "dg4")
     bar1, bar2 = case.bars
-    impulse = force.sum() * case.h
+    impulse = kernel_forces(case, system_library, "dg4", "mesh.force_mean").sum() * case.h
     assert 1 - impulse / bar1.mass == pytest.approx(exact.v1, abs=0.02)
     assert impulse / bar2.mass == pytest.approx(exact.v2, abs=0.02)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], force > 0, [0]]).astype(int)))

@@ -90,7 +90,7 @@ def reference_forces(problem: Problem, two: tuple[FlatBody, FlatBody], gamma: fl
     state, record = reference.start(none, v, none), np.empty((STEPS, 2))
     for i in range(STEPS):
         state = reference.step(state, none)
-        record[i] = state.reported.sum(), reference.energy(state)
+        record[i] = state.sampled.sum(), reference.energy(state)
     assert reference.changes >= 2 and reference.failures == 0
     return record
 
