@@ -101,7 +101,7 @@ def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBo
         nodal_diameter=modes.nodal_diameter,
         part=modes.part,
         parity=modes.parity,
-        flank_rows=modes.flank_rows.reshape(2, ROLLS, FUNCTIONS, -1),
+        flank_rows=modes.flank_rows.reshape(2, len(points.rolls), points.functions, -1),
         bore_rows=modes.bore_rows,
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,

@@ -1,0 +1,143 @@
+"""CalculiX decks of two helical gears in static contact, both whole: as deck.py, but free along the axis, each bore held
+in the mean of all six motions, one contact pair for every layer of the width, so that its force can be printed."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.linalg as sl
+from ccx import reactions
+from deck import Placed, Problem, node_set, starts
+
+FORCE = re.compile(r"total surface force \(fx,fy,fz\)")
+PAIR = re.compile(r"statistics for slave set (\S+), master set (\S+) and time")
+
+
+@dataclass(frozen=True)
+class Tilted(Placed):
+    """A gear whose axis is turned about x and y through its mid-width by `tilt` (2,) rad, first order."""
+
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """(N, 3) m in the common frame."""
+        x, y = self.tilt
+        arm = super().nodes - [*self.centre, 0.0]
+        rotation = sl.expm(np.array([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]]))
+        return arm @ rotation.T + [*self.centre, 0.0]
+
+
+def write_spatial_deck(problem: Problem, path: Path) -> None:
+    """The deck of a problem whose solids have flanks by layers (helical_section.py)."""
+    lines = ["*NODE, NSET=ALL"]
+    for gear, (node, _) in zip(problem.gears, starts(problem), strict=True):
+        lines += [f"{node + k}, {x:.12g}, {y:.12g}, {z:.12g}" for k, (x, y, z) in enumerate(1e3 * gear.nodes)]
+    for gear, (node, element) in zip(problem.gears, starts(problem), strict=True):
+        lines += [f"*ELEMENT, TYPE={problem.element}, ELSET=E{gear.name}"]
+        for k, row in enumerate(gear.solid.elements + node):
+            text = [str(n) for n in row]
+            lines += [f"{element + k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
+        lines += node_set(f"BORE{gear.name}", gear.solid.bore + node)
+    lines += _surfaces(problem)
+    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * problem.youngs:.9g}, {problem.poisson:.9g}"]
+    for gear, dummies, (node, _) in zip(problem.gears, _dummies(problem), starts(problem), strict=True):
+        lines += [f"*SOLID SECTION, ELSET=E{gear.name}, MATERIAL=STEEL"]
+        lines += ["*NODE, NSET=ALL", *(f"{d}, 0, 0, 0" for d in dummies), *_averaging(gear, dummies, node)]
+    lines += ["*SURFACE INTERACTION, NAME=DRY", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
+    lines += [f"{1e-9 * problem.penalty:.9g}, 0.001"]
+    for slave, master in contact_pairs(problem):
+        lines += ["*CONTACT PAIR, INTERACTION=DRY, TYPE=SURFACE TO SURFACE", f"{slave}, {master}"]
+    path.write_text("\n".join(lines + _step(problem)) + "\n", encoding="ascii")
+
+
+def contact_pairs(problem: Problem) -> list[tuple[str, str]]:
+    """Slave and master surface of every tooth pair, layers in order."""
+    layers = len(next(iter(problem.gears[0].solid.patch.values())))
+    return [(_name("P", one, k), _name("W", other, None)) for one, other in problem.pairs for k in range(layers)]
+
+
+def _name(gear: str, tooth: int, layer: int | None) -> str:
+    return f"{gear}{'M' if tooth < 0 else ''}{abs(tooth)}" + ("" if layer is None else f"L{layer}")
+
+
+def _surfaces(problem: Problem) -> list[str]:
+    """The pinion's fine zones by layers, the wheel's whole flanks."""
+    lines = []
+    (first, (_, start)), (second, (_, other)) = zip(problem.gears, starts(problem), strict=True)
+    for tooth, layers in first.solid.patch.items():
+        for k, faces in enumerate(layers):
+            lines += [f"*SURFACE, NAME={_name('P', tooth, k)}, TYPE=ELEMENT"]
+            lines += [f"{start + e}, S{f}" for e, f in faces]
+    for tooth, layers in second.solid.flank.items():
+        lines += [f"*SURFACE, NAME={_name('W', tooth, None)}, TYPE=ELEMENT"]
+        lines += [f"{other + e}, S{f}" for e, f in layers.reshape(-1, 2)]
+    return lines
+
+
+def _dummies(problem: Problem) -> list[tuple[int, int]]:
+    """Numbers of either gear's nodes whose displacements are the bore's mean displacement and rotation × 1 mm."""
+    last = sum(len(gear.solid.nodes) for gear in problem.gears)
+    return [(last + 1, last + 2), (last + 3, last + 4)]
+
+
+def _averaging(gear: Placed, dummies: tuple[int, int], start: int) -> list[str]:
+    """Equations of the rigid motion that fits the bore's displacement best, reduced so that each has a dependent
+    displacement of its own."""
+    r = 1e3 * (gear.nodes[gear.solid.bore] - [*gear.centre, 0.0])
+    rigid = np.zeros((len(r), 3, 6))
+    rigid[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    rigid[:, 0, 4], rigid[:, 0, 5], rigid[:, 1, 3] = r[:, 2], -r[:, 1], -r[:, 2]
+    rigid[:, 1, 5], rigid[:, 2, 3], rigid[:, 2, 4] = r[:, 0], r[:, 1], -r[:, 0]
+    weighted = (gear.solid.weights[:, None, None] * rigid).reshape(-1, 6)
+    rows = np.linalg.solve(weighted.T @ rigid.reshape(-1, 6), weighted.T)
+    pivots = list(sl.qr(rows, pivoting=True, mode="economic")[2][:6])
+    inverse = np.linalg.inv(rows[:, pivots])
+    lines = []
+    for equation, (row, mean) in enumerate(zip(inverse @ rows, inverse, strict=True)):
+        others = [c for c in np.flatnonzero(np.abs(row) > 1e-12 * np.abs(row).max()) if c not in pivots]
+        columns = [pivots[equation], *others]
+        terms = [(start + gear.solid.bore[c // 3], c % 3 + 1, row[c]) for c in columns]
+        terms += [(dummies[k // 3], k % 3 + 1, -mean[k]) for k in range(6) if mean[k] != 0]
+        lines += ["*EQUATION", str(len(terms))]
+        text = [f"{node}, {axis}, {value:.14g}" for node, axis, value in terms]
+        lines += [", ".join(text[k : k + 4]) for k in range(0, len(text), 4)]
+    return lines
+
+
+def _step(problem: Problem) -> list[str]:
+    lines = ["*STEP, INC=100", "*STATIC, DIRECT", "1., 1.", "*BOUNDARY"]
+    for gear, (moved, turned) in zip(problem.gears, _dummies(problem), strict=True):
+        lines += [f"{moved}, 1, 3, 0", f"{turned}, 1, 2, 0", f"{turned}, 3, 3, {gear.turned:.12g}"]
+    for gear in problem.gears:
+        lines += [f"*NODE PRINT, NSET=BORE{gear.name}", "RF"]
+    for slave, master in contact_pairs(problem):
+        lines += [f"*CONTACT PRINT, SLAVE={slave}, MASTER={master}", "CF"]
+    return [*lines, "*END STEP"]
+
+
+def bore_loads(problem: Problem, path: Path) -> np.ndarray:
+    """(2, 6) force (N) and moment (N·m) about its mid-width that each bore exerts on its gear."""
+    sets, loads = reactions(path), []
+    for gear, (node, _) in zip(problem.gears, starts(problem), strict=True):
+        forces = sets[f"BORE{gear.name}"]
+        arm = gear.nodes[np.array(list(forces)) - node] - [*gear.centre, 0.0]
+        force = np.array(list(forces.values()))
+        loads.append(np.concatenate([force.sum(axis=0), np.cross(arm, force).sum(axis=0)]))
+    return np.array(loads)
+
+
+def layer_forces(problem: Problem, path: Path) -> np.ndarray:
+    """(pairs, layers) N: contact force of every tooth pair in every layer."""
+    found, current, lines = {}, None, path.read_text(encoding="ascii").splitlines()
+    for line, following in zip(lines, lines[1:] + [""], strict=True):
+        if head := PAIR.search(line):
+            current = head[1], head[2]
+        elif FORCE.search(line):
+            values = following.split() or lines[lines.index(line) + 2].split()
+            found[current] = float(np.linalg.norm([float(value) for value in values[:3]]))
+    forces = [found.get(pair, 0.0) for pair in contact_pairs(problem)]
+    return np.array(forces).reshape(len(problem.pairs), -1)
