@@ -131,4 +131,3 @@ def twisted(gear: GearGeometry, rolls: Mapping[int, float], levels: np.ndarray, 
         patch={tooth: faces[:, inside] for tooth, faces in flank.items()},
     )
     return Twisted(solid, plane)
-

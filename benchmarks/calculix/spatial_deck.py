@@ -1,5 +1,5 @@
-"""CalculiX decks of two helical gears in static contact, both whole: as deck.py, but free along the axis, each bore held
-in the mean of all six motions, one contact pair for every layer of the width, so that its force can be printed."""
+"""CalculiX decks of two helical gears in static contact, both whole: as deck.py with clamped bores, but free between them
+in all directions, with one contact pair for every layer of the width, so that its force can be printed."""
 
 from __future__ import annotations
 
@@ -44,9 +44,7 @@ def write_spatial_deck(problem: Problem, path: Path) -> None:
         lines += node_set(f"BORE{gear.name}", gear.solid.bore + node)
     lines += _surfaces(problem)
     lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{1e-6 * problem.youngs:.9g}, {problem.poisson:.9g}"]
-    for gear, dummies, (node, _) in zip(problem.gears, _dummies(problem), starts(problem), strict=True):
-        lines += [f"*SOLID SECTION, ELSET=E{gear.name}, MATERIAL=STEEL"]
-        lines += ["*NODE, NSET=ALL", *(f"{d}, 0, 0, 0" for d in dummies), *_averaging(gear, dummies, node)]
+    lines += [f"*SOLID SECTION, ELSET=E{gear.name}, MATERIAL=STEEL" for gear in problem.gears]
     lines += ["*SURFACE INTERACTION, NAME=DRY", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"]
     lines += [f"{1e-9 * problem.penalty:.9g}, 0.001"]
     for slave, master in contact_pairs(problem):
@@ -78,40 +76,13 @@ def _surfaces(problem: Problem) -> list[str]:
     return lines
 
 
-def _dummies(problem: Problem) -> list[tuple[int, int]]:
-    """Numbers of either gear's nodes whose displacements are the bore's mean displacement and rotation × 1 mm."""
-    last = sum(len(gear.solid.nodes) for gear in problem.gears)
-    return [(last + 1, last + 2), (last + 3, last + 4)]
-
-
-def _averaging(gear: Placed, dummies: tuple[int, int], start: int) -> list[str]:
-    """Equations of the rigid motion that fits the bore's displacement best, reduced so that each has a dependent
-    displacement of its own."""
-    r = 1e3 * (gear.nodes[gear.solid.bore] - [*gear.centre, 0.0])
-    rigid = np.zeros((len(r), 3, 6))
-    rigid[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    rigid[:, 0, 4], rigid[:, 0, 5], rigid[:, 1, 3] = r[:, 2], -r[:, 1], -r[:, 2]
-    rigid[:, 1, 5], rigid[:, 2, 3], rigid[:, 2, 4] = r[:, 0], r[:, 1], -r[:, 0]
-    weighted = (gear.solid.weights[:, None, None] * rigid).reshape(-1, 6)
-    rows = np.linalg.solve(weighted.T @ rigid.reshape(-1, 6), weighted.T)
-    pivots = list(sl.qr(rows, pivoting=True, mode="economic")[2][:6])
-    inverse = np.linalg.inv(rows[:, pivots])
-    lines = []
-    for equation, (row, mean) in enumerate(zip(inverse @ rows, inverse, strict=True)):
-        others = [c for c in np.flatnonzero(np.abs(row) > 1e-12 * np.abs(row).max()) if c not in pivots]
-        columns = [pivots[equation], *others]
-        terms = [(start + gear.solid.bore[c // 3], c % 3 + 1, row[c]) for c in columns]
-        terms += [(dummies[k // 3], k % 3 + 1, -mean[k]) for k in range(6) if mean[k] != 0]
-        lines += ["*EQUATION", str(len(terms))]
-        text = [f"{node}, {axis}, {value:.14g}" for node, axis, value in terms]
-        lines += [", ".join(text[k : k + 4]) for k in range(0, len(text), 4)]
-    return lines
-
-
 def _step(problem: Problem) -> list[str]:
     lines = ["*STEP, INC=100", "*STATIC, DIRECT", "1., 1.", "*BOUNDARY"]
-    for gear, (moved, turned) in zip(problem.gears, _dummies(problem), strict=True):
-        lines += [f"{moved}, 1, 3, 0", f"{turned}, 1, 2, 0", f"{turned}, 3, 3, {gear.turned:.12g}"]
+    for gear, (node, _) in zip(problem.gears, starts(problem), strict=True):
+        arm = 1e3 * (gear.nodes[gear.solid.bore] - [*gear.centre, 0.0])
+        for number, (x, y, _) in zip(node + gear.solid.bore, arm, strict=True):
+            lines += [f"{number}, 1, 1, {-gear.turned * y:.12g}", f"{number}, 2, 2, {gear.turned * x:.12g}"]
+        lines += [f"BORE{gear.name}, 3, 3"]
     for gear in problem.gears:
         lines += [f"*NODE PRINT, NSET=BORE{gear.name}", "RF"]
     for slave, master in contact_pairs(problem):
@@ -132,12 +103,12 @@ def bore_loads(problem: Problem, path: Path) -> np.ndarray:
 
 def layer_forces(problem: Problem, path: Path) -> np.ndarray:
     """(pairs, layers) N: contact force of every tooth pair in every layer."""
-    found, current, lines = {}, None, path.read_text(encoding="ascii").splitlines()
-    for line, following in zip(lines, lines[1:] + [""], strict=True):
+    found: dict[tuple[str, str], float] = {}
+    lines = [line for line in path.read_text(encoding="ascii").splitlines() if line.strip()]
+    for line, following in zip(lines, lines[1:], strict=False):
         if head := PAIR.search(line):
             current = head[1], head[2]
         elif FORCE.search(line):
-            values = following.split() or lines[lines.index(line) + 2].split()
-            found[current] = float(np.linalg.norm([float(value) for value in values[:3]]))
+            found[current] = float(np.linalg.norm([float(value) for value in following.split()[:3]]))
     forces = [found.get(pair, 0.0) for pair in contact_pairs(problem)]
     return np.array(forces).reshape(len(problem.pairs), -1)
