@@ -4,10 +4,11 @@
 
 The pair is `helical_demo` with 12 mm of width (overlap ratio 0.58) and without modifications. Both gears are whole and
 twisted, with quadratic elements and five layers across the width; fine zones follow the slanting lines of contact. Both
-codes have rigid bores that are held (`rigid_bores.py`). --tilted: the wheel's axis turned by 1 µm over 1 mm across the line
-of centres. The way to the torque asked is that of positions.py. Tables: helical.csv beside this file, one row a solution
-with the load share of every layer in both codes; what it has is not run again unless its position is named. `--compare`
-runs nothing. Needs CalculiX's ccx; some minutes a run.
+codes have rigid bores that are held (`rigid_bores.py`). --tilted: the wheel's axis turned by 1 µm over 1 mm across the
+line of centres. The way to the torque asked is that of positions.py. Table: helical.csv beside this file, one row a
+solution with the load share of every layer in both codes; what it has is not run again unless its position is named.
+The bodies are reduced into the work folder first (a quarter of an hour). `--compare` runs nothing. Needs CalculiX's
+ccx; a minute or two a run.
 """
 
 from __future__ import annotations

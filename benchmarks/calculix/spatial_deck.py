@@ -1,5 +1,5 @@
-"""CalculiX decks of two helical gears in static contact, both whole: as deck.py with clamped bores, but free between them
-in all directions, with one contact pair for every layer of the width, so that its force can be printed."""
+"""CalculiX decks of two helical gears in static contact, both whole: as deck.py with clamped bores, but free between
+them in all directions, with one contact pair for every layer of the width, so that its force can be printed."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def write_spatial_deck(problem: Problem, path: Path) -> None:
 
 def contact_pairs(problem: Problem) -> list[tuple[str, str]]:
     """Slave and master surface of every tooth pair, layers in order."""
-    layers = len(next(iter(problem.gears[0].solid.patch.values())))
+    layers = len(next(iter(problem.gears[0].solid.flank.values())))
     return [(_name("P", one, k), _name("W", other, None)) for one, other in problem.pairs for k in range(layers)]
 
 
@@ -63,10 +63,10 @@ def _name(gear: str, tooth: int, layer: int | None) -> str:
 
 
 def _surfaces(problem: Problem) -> list[str]:
-    """The pinion's fine zones by layers, the wheel's whole flanks."""
+    """The pinion's flanks by layers, the wheel's as one, tip edges included."""
     lines = []
     (first, (_, start)), (second, (_, other)) = zip(problem.gears, starts(problem), strict=True)
-    for tooth, layers in first.solid.patch.items():
+    for tooth, layers in first.solid.flank.items():
         for k, faces in enumerate(layers):
             lines += [f"*SURFACE, NAME={_name('P', tooth, k)}, TYPE=ELEMENT"]
             lines += [f"{start + e}, S{f}" for e, f in faces]

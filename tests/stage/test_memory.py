@@ -1,5 +1,5 @@
-"""A kernel stays within the memory that it asked for: ten slices in a spatial stage whose bodies store few modes, so that
-the tables of contacts are most of it."""
+"""A kernel stays within the memory that it asked for: ten slices in a spatial stage whose bodies store few modes, so
+that the tables of contacts are most of it."""
 
 from __future__ import annotations
 
