@@ -63,9 +63,9 @@ def write_deck(problem: Problem, path: Path) -> None:
         for k, row in enumerate(gear.solid.elements + node):
             text = [str(n) for n in row]
             lines += [f"{element + k}, " + ", ".join(text[:10]) + ",", ", ".join(text[10:])]
-        lines += _set(f"BORE{gear.name}", gear.solid.bore + node)
+        lines += node_set(f"BORE{gear.name}", gear.solid.bore + node)
         for side in ("low", "high"):
-            lines += _set(f"{side.upper()}{gear.name}", getattr(gear.solid, side) + node)
+            lines += node_set(f"{side.upper()}{gear.name}", getattr(gear.solid, side) + node)
         for tooth, faces in getattr(gear.solid, zone).items():
             lines += [f"*SURFACE, NAME={_tooth(gear, tooth)}, TYPE=ELEMENT"]
             lines += [f"{element + e}, S{f}" for e, f in faces]
@@ -89,7 +89,7 @@ def _tooth(gear: Placed, tooth: int) -> str:
     return f"T{gear.name}{tooth}".replace("-", "M")
 
 
-def _set(name: str, nodes: np.ndarray) -> list[str]:
+def node_set(name: str, nodes: np.ndarray) -> list[str]:
     return [f"*NSET, NSET={name}"] + [", ".join(map(str, nodes[k : k + 12])) + "," for k in range(0, len(nodes), 12)]
 
 

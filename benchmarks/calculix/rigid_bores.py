@@ -30,12 +30,13 @@ STIFF, INNER = 1e5, 0.7  # Young's modulus of the sleeve, parts of the gear's; i
 def rigid_bore_bodies(spec: StageSpec) -> list[ReducedBody]:
     """The stored bodies of a pair with the static tables of gears whose bores are rigid. Their modes stay as they were:
     of use at level rigid only."""
-    return [_rigid(spec, index, body) for index, body in enumerate(load_stage_bodies(spec))]
+    return [with_rigid_bore(spec, index, body) for index, body in enumerate(load_stage_bodies(spec))]
 
 
-def _rigid(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:
+def with_rigid_bore(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:
+    """The body of gear `index` with the static tables of a gear whose bore is rigid."""
     gear = spec.gears[index]
-    geometry = GearGeometry.of(gear, spec.pair)
+    geometry = GearGeometry.of(gear, spec.pair, (1, -1)[index])
     flank, points = tooth_flank(geometry, gear, False)
     body = SleevedBody(sleeved(gear_sector(geometry, gear.face_width, gear.body.mesh)), gear, flank, points)
     tables = static_tables(body, [], lambda what, share: None)
@@ -67,9 +68,10 @@ class SleevedBody(SectorBody):
         self.stiffness, self.mass_matrix = sp.csr_array(parts[0][0] + parts[1][0]), parts[0][1]
         self.spaces = sector_spaces(
             Sector(
-                mesh.nodes, mesh.elements, self.stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus
+                mesh.nodes, mesh.elements, self.stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
+                bool(flank.base_helix_angle),
             )
-        )
+        )  # fmt: skip
         self._inputs = [self._space_inputs(space) for space in self.spaces]
 
 

@@ -75,13 +75,19 @@ def lengths(gear: GearGeometry) -> tuple[float, float]:
 
 
 def surface_stations(gear: GearGeometry, centre: float | None, fine: Fineness) -> np.ndarray:
-    """Arc lengths (2F + 1,) of surface nodes, corner and mid: fine around the roll `centre` (m), `far_flank` equal
-    elements and one on the edge where that is None. The tip form point is always a corner."""
-    flank, total = lengths(gear)
-    if centre is None:
+    """`stations` of a gear's surface, fine around the roll `centre` (m)."""
+    middle = None
+    if centre is not None:
+        middle = float(involute.arc_length(centre, gear.r_b) - involute.arc_length(gear.s_form, gear.r_b))
+    return stations(*lengths(gear), middle, fine)
+
+
+def stations(flank: float, total: float, middle: float | None, fine: Fineness) -> np.ndarray:
+    """Arc lengths (2F + 1,) of surface nodes, corner and mid: fine around the arc length `middle` (m), `far_flank`
+    equal elements and one on the edge where that is None. The tip form point, at `flank`, is always a corner."""
+    if middle is None:
         corners = np.append(np.linspace(0, flank, fine.far_flank + 1), total)
     else:
-        middle = float(involute.arc_length(centre, gear.r_b) - involute.arc_length(gear.s_form, gear.r_b))
         low, high = max(middle - fine.patch, 0.0), min(middle + fine.patch, total)
         inner = np.linspace(low, high, max(2, round((high - low) / fine.size)) + 1)
         corners = np.concatenate([_outwards(low, 0.0, fine)[::-1], inner, _outwards(high, total, fine)])
@@ -143,17 +149,17 @@ def gear_plane(gear: GearGeometry, contacts: Mapping[int, float], teeth: range, 
     cells, bore, flank, patch = [], [], {}, {}
     for tooth in teeth:
         near = min(abs((tooth - loaded + gear.z // 2) % gear.z - gear.z // 2) for loaded in contacts) <= fine.toothed
-        turn = _turning(2 * math.pi * tooth / gear.z)
+        turn = turning(2 * math.pi * tooth / gear.z)
         stations = surface_stations(gear, contacts.get(tooth), fine)
         blocks = half_tooth(gear, stations, fine.root if tooth in contacts else fine.far_root, fine)
         upper = np.concatenate([quadrilaterals(block) for block in blocks[0 if near else 1 :]])
         cells += [upper @ turn, (upper * [1, -1])[:, [0, 3, 2, 1, 7, 6, 5, 4]] @ turn]
-        edge = _edges(blocks[2][-1])
+        edge = edges(blocks[2][-1])
         bore += [edge @ turn, (edge * [1, -1]) @ turn]
         if tooth in contacts:
-            flank[tooth] = _edges(surface(gear, stations)) @ turn
+            flank[tooth] = edges(surface(gear, stations)) @ turn
             patch[tooth] = flank[tooth][np.diff(stations[::2]) < 1.2 * fine.size]
-    nodes, (quads, bore_edges, *zones) = _joined(cells, bore, *flank.values(), *patch.values())
+    nodes, (quads, bore_edges, *zones) = joined(cells, bore, *flank.values(), *patch.values())
     return Plane(
         nodes=nodes,
         quads=quads,
@@ -163,7 +169,7 @@ def gear_plane(gear: GearGeometry, contacts: Mapping[int, float], teeth: range, 
     )
 
 
-def _joined(*groups: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+def joined(*groups: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
     """Nodes (N, 2), and each group's points (…, 2) as node numbers (…). Points within 10 nm of each other are one node;
     the bins are shifted off the axes, where the rounding of turned points has either sign."""
     groups = [np.concatenate(group) if isinstance(group, list) else group for group in groups]
@@ -175,11 +181,11 @@ def _joined(*groups: Sequence[np.ndarray] | np.ndarray) -> tuple[np.ndarray, lis
     return points[first], [part.reshape(group.shape[:-1]) for part, group in zip(parts, groups, strict=True)]
 
 
-def _turning(angle: float) -> np.ndarray:
+def turning(angle: float) -> np.ndarray:
     """points @ matrix turns points about the axis by `angle`."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, s], [-s, c]])
 
 
-def _edges(line: np.ndarray) -> np.ndarray:
+def edges(line: np.ndarray) -> np.ndarray:
     return np.stack([line[:-2:2], line[2::2], line[1::2]], axis=1)

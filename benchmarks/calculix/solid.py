@@ -40,7 +40,7 @@ def extruded(plane: Plane, levels: np.ndarray) -> Solid:
                    number[k + 1][corner]])
         for k in range(0, len(z) - 2, 2)
     ]  # fmt: skip
-    bore, weights = _bore(plane, number, z)
+    bore, weights = bore_nodes(plane, number, z)
     return Solid(
         nodes=np.column_stack([plane.nodes[node], z[level]]),
         elements=np.concatenate(elements),
@@ -48,12 +48,12 @@ def extruded(plane: Plane, levels: np.ndarray) -> Solid:
         weights=weights,
         low=number[0][number[0] >= 0],
         high=number[-1][number[-1] >= 0],
-        flank={tooth: _faces(plane, edges, len(levels) - 1) for tooth, edges in plane.flank.items()},
-        patch={tooth: _faces(plane, edges, len(levels) - 1) for tooth, edges in plane.patch.items()},
+        flank={tooth: faces_over(plane, edges, len(levels) - 1) for tooth, edges in plane.flank.items()},
+        patch={tooth: faces_over(plane, edges, len(levels) - 1) for tooth, edges in plane.patch.items()},
     )
 
 
-def _bore(plane: Plane, number: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bore_nodes(plane: Plane, number: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Bore nodes and ∫N dA/A of eight-node faces: −1/12 of a face at its corners, 1/3 at its mid nodes."""
     weight = np.zeros(number.max() + 1)
     start, end, middle = plane.bore.T
@@ -71,7 +71,7 @@ def _bore(plane: Plane, number: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, 
     return bore, weight[bore] / weight.sum()
 
 
-def _faces(plane: Plane, edges: np.ndarray, layers: int) -> np.ndarray:
+def faces_over(plane: Plane, edges: np.ndarray, layers: int) -> np.ndarray:
     """Element and face numbers over section edges, all layers."""
     wanted = {tuple(sorted(pair)) for pair in edges[:, :2].tolist()}
     found = [

@@ -38,6 +38,7 @@ from gearfmu.reduction.statics import static_tables
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.general import GeneralStage, gear_as_pair
 from gearfmu.spec.library import model_folder
+from gearfmu.spec.planetary import RingSpec
 from gearfmu.spec.stage import StageSpec, require_pair
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
@@ -109,7 +110,11 @@ def _gears(spec: Stage) -> list[tuple[Any, int]]:
 def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = None) -> ReducedBody:
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
-    geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
+    geometry: Geometry
+    if isinstance(gear, RingSpec):
+        geometry = InternalGearGeometry.of(gear, spec.pair)
+    else:
+        geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
     try:
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:

@@ -114,8 +114,8 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     from gearfmu.body.imported import imported_sector_mesh, imported_set_sector, pair_geometry, set_geometry
     from gearfmu.femesh import sector_mesh
     from gearfmu.femesh.carrier import carrier_sector
-    from gearfmu.geometry import GearGeometry
     from gearfmu.geometry.carrier import CarrierGeometry
+    from gearfmu.spec.shapes import gear_shape
 
     body = _body(spec, name)
     if spec.kind == "planetary_set" and getattr(body, "imported", None):
@@ -127,7 +127,7 @@ def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     if spec.kind == "planetary_set":
         geometry = set_geometry(spec, name)
     else:
-        geometry = pair_geometry(spec, name) if spec.kind == "external_pair" else GearGeometry.of(body, body, 1)
+        geometry = pair_geometry(spec, name) if spec.kind == "external_pair" else gear_shape(body)
     if getattr(body, "imported", None):
         return imported_sector_mesh(body, geometry), ()
     return sector_mesh(geometry, body.face_width, counts), (geometry.r_b, body.body.strip_half_width)

@@ -32,6 +32,11 @@ class RingMesh:
             raise ValueError("the centre distance is smaller than the difference of the base radii")
 
     @property
+    def gears(self) -> tuple[GearGeometry, InternalGearGeometry]:
+        """Planet and ring."""
+        return self.planet, self.ring
+
+    @property
     def length(self) -> float:
         """Distance (m) of the line of action's tangent points with the base circles, a sin α_wt."""
         base = self.ring.r_b - self.planet.r_b
@@ -51,7 +56,33 @@ class RingMesh:
     @property
     def contact_ratio(self) -> float:
         """Transverse contact ratio of the usable flanks."""
-        return (self.path["E"] - self.path["A"]) / (math.pi * self.planet.m * math.cos(self.planet.alpha))
+        return (self.path["E"] - self.path["A"]) / self.base_pitch
+
+    @property
+    def base_pitch(self) -> float:
+        """Base pitch p_b = π m cos α, m."""
+        return math.pi * self.planet.m * math.cos(self.planet.alpha)
+
+    def outer_single_contact(self, gear: int) -> float:
+        """Roll (m) of the point of single contact that is nearer to the tip of the planet (0) or of the ring (1)."""
+        return (self.path["A"] + self.base_pitch, self.path["E"] - self.base_pitch + self.length)[gear]
+
+    @property
+    def normal_backlash(self) -> float:
+        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_wt cos α_wt."""
+        return self.backlash * math.cos(self.alpha_wt)
+
+    def ring_phase(self, planet_angle: float, direction: float) -> float:
+        """Angle (rad) of the ring's space 0 at which its drive flank touches that of the planet's tooth 0 at the angle
+        `planet_angle`; direction (rad): that from the ring's axis to the planet's. The zero of the gap s_B − s_A − L.
+        """
+        t = direction - self.alpha_wt
+        roll = self.planet.r_b * (planet_angle + self.planet.psi_b - t)
+        return t - self.ring.psi_b + (roll + self.length) / self.ring.r_b
+
+    def planet_angle(self, ring_phase: float, direction: float) -> float:
+        """The inverse of `ring_phase` (rad)."""
+        return (ring_phase - self.ring_phase(0.0, direction)) * self.ring.r_b / self.planet.r_b
 
     @property
     def least_tip_radius(self) -> float:

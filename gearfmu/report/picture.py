@@ -46,6 +46,8 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
     sample = int(np.argmax(np.abs(trace[f"{mesh}.force"])))
     force = float(trace[f"{mesh}.force"][sample])
     pair = mesh_geometry(stage, engagement)
+    if not isinstance(pair, PairGeometry):
+        return None  # rings are not drawn yet
     sg = 1 if force >= 0 else -1
     (x, y), (u, v) = mesh_axes(stage, engagement)
     place = tooth_phases(stage)[engagement.gears[0]] - math.atan2(v - y, u - x)

@@ -7,6 +7,7 @@ import json
 from typing import Any
 
 from gearfmu.spec.imported import import_inputs
+from gearfmu.spec.planetary import RingSpec
 from gearfmu.spec.stage import StageSpec
 
 
@@ -20,6 +21,8 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
     contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
     """
     gear, pair = spec.gears[gear_index], spec.pair
+    if isinstance(gear, RingSpec):
+        return _ring_inputs(spec, gear)
     inputs: dict[str, Any] = {
         "kind": spec.kind,
         "teeth": gear.teeth,
@@ -38,6 +41,15 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
     }
     if gear.imported is not None:
         inputs["import"] = import_inputs(gear.imported, spec.source, f"gears.{gear.name}.import")
+        inputs["body"].pop("mesh")
+    return inputs
+
+
+def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:
+    """`body_inputs` of the ring of a general stage."""
+    inputs = {"kind": "ring"} | ring.model_dump(exclude={"name", "kind", "mounts", "imported"})
+    if ring.imported is not None:
+        inputs["import"] = import_inputs(ring.imported, spec.source, f"bodies.{ring.name}.import")
         inputs["body"].pop("mesh")
     return inputs
 

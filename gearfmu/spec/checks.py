@@ -29,7 +29,7 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
     found = [
         (f"gears.{gear.name}.{field}", value, remedy)
         for gear, shape in zip(gears, shapes, strict=True)
-        for field, value, remedy in _gear(gear, shape)
+        for field, value, remedy in gear_problems(gear, shape)
     ]
     sound = not found
     if pair.center_distance <= shapes[0].r_b + shapes[1].r_b:
@@ -52,7 +52,7 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
     ]
 
 
-def _gear(gear: GearSpec, shape: GearGeometry) -> Found:
+def gear_problems(gear: GearSpec, shape: GearGeometry) -> Found:
     """One gear by itself, from the rack outwards; later checks need earlier ones."""
     rack = _rack_problems(gear, shape)
     yield from rack

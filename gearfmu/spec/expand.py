@@ -5,7 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.spec.gear import GearSpec
-from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, PlacedPort, RotorSpec, ShaftBody, SupportSpec
+from gearfmu.spec.general import (
+    EngagementSpec,
+    GearBody,
+    GeneralStage,
+    PlacedPort,
+    RingBody,
+    RotorSpec,
+    ShaftBody,
+    SupportSpec,
+)
 from gearfmu.spec.stage import StageSpec
 
 
@@ -20,7 +29,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
     angles: dict[str, Any] = {"normal_module": pair.normal_module, "pressure_angle": pair.pressure_angle}
     pinion, wheel = spec.gears
-    bodies: dict[str, GearBody | ShaftBody] = {}
+    bodies: dict[str, GearBody | RingBody | ShaftBody] = {}
     for gear, hand in zip(spec.gears, (1, -1), strict=True):
         known = {name: getattr(gear, name) for name in GearSpec.model_fields} | {"bearing": None}
         bodies[gear.name] = GearBody(**known, **angles, helix_angle=hand * pair.helix_angle + 0.0)

@@ -13,7 +13,8 @@ from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size
-from gearfmu.spec.lead import Misalignment
+from gearfmu.spec.lead import LeadSpec, Misalignment
+from gearfmu.spec.planetary import MountsSpec, RingSpec
 from gearfmu.spec.ports import Frequency, LevelSpec, PortSpec
 
 Place = Annotated[float, Quantity("m")]
@@ -42,6 +43,49 @@ class GearBody(GearSpec):
         if value is not None:
             raise refuse("a body of a general stage has no bearing of its own: write it under [[supports]]")
         return value
+
+
+class RingBody(RingSpec):
+    """An internal gear: a RingSpec with its basic rack's module and pressure angle, spur. Its one node is the mean
+    motion of its rim; what holds it stands in `supports`, and a port holds its spin."""
+
+    name: Name
+    kind: Literal["ring"] = Field(description="kind of body")
+    normal_module: Length = Field(description="normal module m_n")
+    pressure_angle: Annotated[float, Quantity("rad", above=0.17, below=0.62)] = Field(
+        description="normal pressure angle of the basic rack"
+    )
+    mounts: MountsSpec | None = Field(default=None, description="not here: write [[supports]]")
+
+    @field_validator("mounts")
+    @classmethod
+    def _held_elsewhere(cls, value: Any) -> Any:
+        if value is not None:
+            raise refuse("a ring of a general stage has no mounts of its own: write it under [[supports]]")
+        return value
+
+    @property
+    def helix_angle(self) -> float:
+        """Rings are spur."""
+        return 0.0
+
+    @property
+    def tip_relief(self) -> None:
+        """No tip relief is declared for a ring yet."""
+        return None
+
+    @property
+    def lead(self) -> LeadSpec | None:
+        """No lead modification is declared for a ring yet."""
+        return None
+
+    @property
+    def index_deviation(self) -> dict[int, float]:
+        """No pitch errors are declared for a ring yet."""
+        return {}
+
+
+ToothedBody = GearBody | RingBody
 
 
 class ShaftSection(Spec):
@@ -84,10 +128,10 @@ class RotorSpec(Spec):
 
 
 class EngagementSpec(Spec):
-    """Two gears in mesh."""
+    """Two gears in mesh; a ring is gear B."""
 
     name: Name = Field(description="name of the mesh")
-    gears: tuple[Name, Name] = Field(description="gear A, gear B")
+    gears: tuple[Name, Name] = Field(description="gear A, gear B (the ring where there is one)")
     backlash: Size = Field(
         description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
     )
@@ -142,7 +186,7 @@ class GeneralStage(Spec):
     source: Path
     kind: Literal["general"] = Field(default="general", description="kind of stage")
     slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
-    bodies: dict[Name, Annotated[GearBody | ShaftBody, Field(discriminator="kind")]] = Field(
+    bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody, Field(discriminator="kind")]] = Field(
         description="bodies by name"
     )
     rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
@@ -162,14 +206,14 @@ class GeneralStage(Spec):
         }
 
     @property
-    def gears(self) -> tuple[GearBody, ...]:
+    def gears(self) -> tuple[ToothedBody, ...]:
         """Toothed bodies in the order of the file: the kernel's gear numbers."""
-        return tuple(body for body in self.bodies.values() if isinstance(body, GearBody))
+        return tuple(body for body in self.bodies.values() if isinstance(body, ToothedBody))
 
     @property
     def planar(self) -> bool:
         """Whether nothing tilts or moves along the axis: every rotor one spur gear, held radially at its mid-width."""
-        alone = all(isinstance(body, GearBody) and body.helix_angle == 0 for body in self.bodies.values())
+        alone = all(isinstance(body, ToothedBody) and body.helix_angle == 0 for body in self.bodies.values())
         alone = alone and all(len(rotor.bodies) == 1 for rotor in self.rotors.values())
         places = {name: place for rotor in self.rotors.values() for name, place in rotor.bodies.items()}
         return alone and all(
@@ -190,6 +234,10 @@ class GeneralStage(Spec):
         """Name of the rotor that a body belongs to."""
         return next(name for name, rotor in self.rotors.items() if body in rotor.bodies)
 
+    def internal(self, mesh: EngagementSpec) -> bool:
+        """Whether gear B of an engagement is a ring."""
+        return isinstance(self.bodies[mesh.gears[1]], RingBody)
+
     def place(self, body: str, at: float | None) -> float:
         """Place of a node on a body: as said, or the body's own."""
         return self.rotors[self.rotor_of(body)].bodies[body] if at is None else at
@@ -199,7 +247,7 @@ def gear_as_pair(stage: GeneralStage, name: str) -> Any:
     """What `body_inputs(…, 0)` reads of a stage, for one gear: the same gear has the same body, whatever stage it is
     in."""
     gear = stage.bodies[name]
-    assert isinstance(gear, GearBody)
+    assert isinstance(gear, ToothedBody)
     return _GearAlone(stage.source, gear)
 
 
@@ -208,5 +256,5 @@ class _GearAlone:
 
     kind = "external_pair"
 
-    def __init__(self, source: Path, gear: GearBody) -> None:
+    def __init__(self, source: Path, gear: ToothedBody) -> None:
         self.source, self.gears, self.pair = source, (gear,), gear

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from gearfmu.errors import Problem
-from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.spec.checks import geometry_problems, millimetres
 from gearfmu.spec.gear import PairSpec
-from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, ShaftBody
+from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, RingBody, ShaftBody, ToothedBody
+from gearfmu.spec.planetary_checks import RingPair, ring_pair_problems
+from gearfmu.spec.shapes import centre_distance, mesh_shape
 
 Found = Iterator[tuple[str, str, str]]
 _SAME_RACK = ("normal_module", "pressure_angle")
@@ -97,7 +98,7 @@ def _on_shaft(stage: GeneralStage, field: str, at: float | None) -> float | None
     if at is not None or not field.startswith("supports."):
         return at
     support = next(s for s in stage.supports if field == f"supports.{s.name}.at")
-    gears = [name for name in (support.body, support.to) if name and isinstance(stage.bodies[name], GearBody)]
+    gears = [name for name in (support.body, support.to) if name and isinstance(stage.bodies[name], ToothedBody)]
     return stage.place(gears[0], None) if gears else None
 
 
@@ -131,14 +132,21 @@ def _joined(stage: GeneralStage, bodies: list[str]) -> set[str]:
 def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]:
     """One engagement as the pair that it is; fields under their names here."""
     a, b = (stage.bodies[name] for name in mesh.gears)
-    assert isinstance(a, GearBody) and isinstance(b, GearBody)
+    assert isinstance(a, ToothedBody) and isinstance(b, ToothedBody)
     field = f"engagements.{mesh.name}"
+    if isinstance(a, RingBody):
+        return [
+            Problem(file, f"{field}.gears", ", ".join(mesh.gears), "a ring is gear B of its meshes: name it second")
+        ]
     if stage.rotor_of(a.name) == stage.rotor_of(b.name):
         return [Problem(file, f"{field}.gears", ", ".join(mesh.gears), "two gears of one rotor: name gears of two")]
     differ = [key for key in _SAME_RACK if not math.isclose(getattr(a, key), getattr(b, key), abs_tol=1e-12)]
     if differ:
         remedy = f"{a.name} and {b.name} differ in it: gears in mesh share the basic rack"
         return [Problem(file, f"bodies.{b.name}.{key}", f"{getattr(b, key):g}", remedy) for key in differ]
+    if isinstance(b, RingBody) and a.helix_angle != 0:
+        remedy = f"{b.name} is a ring, and rings are spur: write 0 deg"
+        return [Problem(file, f"bodies.{a.name}.helix_angle", f"{math.degrees(a.helix_angle):g} deg", remedy)]
     if not math.isclose(a.helix_angle, -b.helix_angle, abs_tol=1e-12):
         remedy = f"gears in mesh have opposite hands: write {math.degrees(-a.helix_angle):g} deg, as {a.name} asks"
         return [Problem(file, f"bodies.{b.name}.helix_angle", f"{math.degrees(b.helix_angle):g} deg", remedy)]
@@ -154,7 +162,11 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
     )  # fmt: skip
     axis = f"rotors.{stage.rotor_of(b.name)}.axis"
     names = {"pair.center_distance": axis, "pair.backlash": f"{field}.backlash"}
-    for problem in geometry_problems(file, pair, (a, b), mesh.torque_max):
+    if isinstance(b, RingBody):
+        problems = ring_pair_problems(file, RingPair(pair, a, b, mesh.torque_max))
+    else:
+        problems = geometry_problems(file, pair, (a, b), mesh.torque_max)
+    for problem in problems:
         name = names.get(problem.field, problem.field.replace("gears.", "bodies.", 1).replace("pair.", f"{field}.", 1))
         found.append(replace(problem, field=name))
     return found
@@ -169,17 +181,10 @@ def with_relief_rolls(stage: GeneralStage) -> GeneralStage:
             if not isinstance(gear, GearBody) or gear.tip_relief is None:
                 continue
             if isinstance(gear.tip_relief.start_roll, str):  # "outer_single_contact"
-                shapes = [GearGeometry.of(stage.bodies[other], stage.bodies[other], 1) for other in mesh.gears]
-                pair = PairGeometry((shapes[0], shapes[1]), centre_distance(stage, mesh), mesh.backlash)
-                relief = gear.tip_relief.model_copy(update={"start_roll": pair.outer_single_contact(index)})
+                start = mesh_shape(stage, mesh).outer_single_contact(index)
+                relief = gear.tip_relief.model_copy(update={"start_roll": start})
                 bodies[name] = gear.model_copy(update={"tip_relief": relief})
     return stage.model_copy(update={"bodies": bodies})
-
-
-def centre_distance(stage: GeneralStage, mesh: EngagementSpec) -> float:
-    """Distance (m) of the axes of an engagement."""
-    (x, y), (u, v) = (stage.rotors[stage.rotor_of(gear)].axis for gear in mesh.gears)
-    return math.hypot(u - x, v - y)
 
 
 def _unknown_body(stage: GeneralStage) -> str:

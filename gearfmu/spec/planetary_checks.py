@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from gearfmu.errors import Problem
@@ -18,7 +18,15 @@ from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.checks import STRIP_PER_HERTZ, Found, geometry_problems, millimetres, rounded_down, rounded_up
+from gearfmu.spec.checks import (
+    STRIP_PER_HERTZ,
+    Found,
+    gear_problems,
+    geometry_problems,
+    millimetres,
+    rounded_down,
+    rounded_up,
+)
 from gearfmu.spec.gear import PairSpec
 from gearfmu.spec.planetary import PlanetarySpec
 
@@ -39,9 +47,42 @@ def set_problems(file: str, spec: PlanetarySpec) -> list[Problem]:
         remedy = f"smaller than the difference of the base radii, {millimetres(base)}: check teeth and module"
         found.append(("set.center_distance", spec.set.center_distance, remedy))
     elif not any(field in ("ring.tip_diameter", "ring.fillet_radius") for field, *_ in alone):
-        found += _ring_mesh(spec, RingMesh(planet, ring, spec.set.center_distance, spec.set.backlash))
+        mesh = RingMesh(planet, ring, spec.set.center_distance, spec.set.backlash)
+        found += [*_ring_mesh(spec, mesh), *_ring_strips(spec, mesh, ring_half_width(spec, mesh))]
     shown = ((field, value if isinstance(value, str) else millimetres(value), text) for field, value, text in found)
     return problems + [Problem(file, *entry) for entry in shown]
+
+
+@dataclass(frozen=True)
+class RingPair:
+    """A pinion in a ring, by the names of a set. set: what they share (PairSpec); torque (N·m) on the pinion."""
+
+    set: PairSpec
+    planet: Any
+    ring: Any
+    torque: float
+
+
+def ring_pair_problems(file: str, pair: RingPair) -> list[Problem]:
+    """Everything that is wrong with a pinion in a ring, fields "gears.<name>.…" and "pair.…" as in a pair."""
+    pinion, ring = GearGeometry.of(pair.planet, pair.set), InternalGearGeometry.of(pair.ring, pair.set)
+    names = {"planet": f"gears.{pair.planet.name}", "ring": f"gears.{pair.ring.name}", "set": "pair"}
+    found = [(f"planet.{field}", value, remedy) for field, value, remedy in gear_problems(pair.planet, pinion)]
+    found += _ring(pair, ring)
+    distance, base = pair.set.center_distance, ring.r_b - pinion.r_b
+    if distance <= base or base <= 0:
+        remedy = f"smaller than the difference of the base radii, {millimetres(base)}: check teeth and module"
+        found.append(("set.center_distance", distance, remedy))
+    elif not found:
+        mesh = RingMesh(pinion, ring, distance, pair.set.backlash)
+        half_width = internal_half_width((pair.planet, pair.ring), mesh, pair.torque / pinion.r_b)
+        found += [*_ring_mesh(pair, mesh), *_ring_strips(pair, mesh, half_width)]
+    problems = []
+    for field, value, text in found:
+        part, _, rest = field.partition(".")
+        shown = value if isinstance(value, str) else millimetres(value)
+        problems.append(Problem(file, f"{names[part]}.{rest}", shown, text.replace("planet", "pinion")))
+    return problems
 
 
 def mesh_torque(spec: PlanetarySpec) -> float:
@@ -67,7 +108,7 @@ def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
     return found
 
 
-def _ring(spec: PlanetarySpec, shape: InternalGearGeometry) -> Found:
+def _ring(spec: PlanetarySpec | RingPair, shape: InternalGearGeometry) -> Found:
     """The ring by itself, from the root inwards."""
     fillet, tip = "ring.fillet_radius", "ring.tip_diameter"
     if shape.fillet_centre[1] <= 0:
@@ -90,8 +131,8 @@ def _ring(spec: PlanetarySpec, shape: InternalGearGeometry) -> Found:
         yield "ring.rim_diameter", spec.ring.rim_diameter, remedy
 
 
-def _ring_mesh(spec: PlanetarySpec, mesh: RingMesh) -> Found:
-    """Form circles, tips, contact ratio, backlash and load strip of the planet in the ring."""
+def _ring_mesh(spec: PlanetarySpec | RingPair, mesh: RingMesh) -> Found:
+    """Form circles, tips, contact ratio and backlash of the planet in the ring."""
     if mesh.ring.r_a < mesh.least_tip_radius:
         least = rounded_up(2 * mesh.least_tip_radius, 5)
         remedy = (
@@ -119,13 +160,13 @@ def _ring_mesh(spec: PlanetarySpec, mesh: RingMesh) -> Found:
             f"not the declared {millimetres(spec.set.backlash)}: correct it"
         )
         yield "ring.profile_shift", f"{spec.ring.profile_shift:g}", remedy
-    yield from _ring_strips(spec, mesh)
 
 
-def _ring_strips(spec: PlanetarySpec, mesh: RingMesh) -> Found:
-    least = STRIP_PER_HERTZ * ring_half_width(spec, mesh)
-    for gear, shape in ((spec.planet, mesh.planet), (spec.ring, mesh.ring)):
-        field, width = f"{gear.name}.body.strip_half_width", gear.body.strip_half_width
+def _ring_strips(spec: PlanetarySpec | RingPair, mesh: RingMesh, half_width: float) -> Found:
+    """Load strips; half_width (m): largest Hertz half-width."""
+    least = STRIP_PER_HERTZ * half_width
+    for part, gear, shape in (("planet", spec.planet, mesh.planet), ("ring", spec.ring, mesh.ring)):
+        field, width = f"{part}.body.strip_half_width", gear.body.strip_half_width
         flank = abs(float(involute.arc_length(shape.s_tip, shape.r_b) - involute.arc_length(shape.s_form, shape.r_b)))
         if width < least:
             remedy = f"too narrow for the ring's contact at torque_max: at least {millimetres(rounded_up(least, 3))}"
@@ -137,8 +178,13 @@ def _ring_strips(spec: PlanetarySpec, mesh: RingMesh) -> Found:
 def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
     """Largest Hertz half-width b (m) of planet and ring, one tooth pair carrying the most loaded planet's force."""
     sun_base = spec.sun.teeth * spec.set.normal_module / 2 * math.cos(spec.set.pressure_angle)
-    load = mesh_torque(spec) / sun_base / min(spec.planet.face_width, spec.ring.face_width)
-    materials = (spec.planet.material, spec.ring.material)
+    return internal_half_width((spec.planet, spec.ring), mesh, mesh_torque(spec) / sun_base)
+
+
+def internal_half_width(gears: tuple[Any, Any], mesh: RingMesh, force: float) -> float:
+    """Largest Hertz half-width b (m) of a pinion in a ring, one tooth pair carrying `force` (N)."""
+    load = force / min(gear.face_width for gear in gears)
+    materials = [gear.material for gear in gears]
     e_star = contact_modulus(
         (materials[0].youngs_modulus, materials[1].youngs_modulus),
         (materials[0].poisson_ratio, materials[1].poisson_ratio),

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import GearBody, GeneralStage
+from gearfmu.spec.general import GeneralStage, ToothedBody
 from gearfmu.spec.ports import PortSpec
 
 
@@ -42,7 +42,8 @@ def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
             for here, there in (mesh.gears, mesh.gears[::-1]):
                 known, other = stage.rotor_of(here), stage.rotor_of(there)
                 if known in found and other not in found:
-                    found[other] = -found[known] * Fraction(_teeth(stage, here), _teeth(stage, there))
+                    sense = 1 if stage.internal(mesh) else -1
+                    found[other] = sense * found[known] * Fraction(_teeth(stage, here), _teeth(stage, there))
     return found
 
 
@@ -65,7 +66,7 @@ def with_ports(spec: Any, ports: dict[str, PortSpec]) -> Any:
 
 def _teeth(stage: GeneralStage, gear: str) -> int:
     body = stage.bodies[gear]
-    assert isinstance(body, GearBody)
+    assert isinstance(body, ToothedBody)
     return body.teeth
 
 

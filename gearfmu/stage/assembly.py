@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import ModelError
-from gearfmu.geometry import GearGeometry
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.fields import order_sections
@@ -43,7 +43,7 @@ def assemble(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int =
 def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
     stage = as_general(spec)
-    shapes = [GearGeometry.of(gear, gear, 1) for gear in stage.gears]
+    shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
-from gearfmu.geometry import GearGeometry
-from gearfmu.spec.general import GearBody, GeneralStage, ShaftBody, SupportSpec
+from gearfmu.spec.general import GeneralStage, ShaftBody, SupportSpec, ToothedBody
+from gearfmu.spec.shapes import gear_shape
 from gearfmu.stage.free import FreeBody, free_gear, free_shaft
 from gearfmu.stage.groups import Layout, Support
 from gearfmu.stage.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
@@ -30,7 +30,7 @@ class Nodes:
     places: dict[str, list[float]]
 
     def find(self, stage: GeneralStage, body: str, at: float | None) -> tuple[int, int]:
-        """(body, node) at a place; a gear has one node, its bore."""
+        """(body, node) at a place; a gear has one node, its bore or its rim."""
         if body not in self.places:
             return self.numbers[body], 0
         wanted = stage.place(body, at)
@@ -54,7 +54,7 @@ def place_of(stage: GeneralStage, support: SupportSpec) -> float:
     if support.at is not None:
         return support.at
     names = [name for name in (support.body, support.to) if name]
-    gears = [name for name in names if isinstance(stage.bodies[name], GearBody)]
+    gears = [name for name in names if isinstance(stage.bodies[name], ToothedBody)]
     return stage.place((gears or names)[0], None)
 
 
@@ -76,8 +76,8 @@ def stage_layout(stage: GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS)
     return Layout(free, rotors, supports, stage.planar)
 
 
-def _gear(stage: GeneralStage, gear: GearBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
-    shape = GearGeometry.of(gear, gear, 1)
+def _gear(stage: GeneralStage, gear: ToothedBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
+    shape = gear_shape(gear)
     chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
     free = free_gear(body, chosen, degrees, resampling(body.roll, shape.s_form, shape.s_tip, rolls))
     return replace(free, name=gear.name)  # a body's file may come from another stage

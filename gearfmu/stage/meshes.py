@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import ModelError
-from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage
+from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.planetary import RingMesh
+from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.spec.shapes import MeshShape, mesh_shape
 
-EXTERNAL = 1
+EXTERNAL, INTERNAL = 1, -1
 H_MAX = 7.5e-6  # s: largest default step
 SAME_ANGLE = 1e-9  # rad
 
 
-def mesh_geometry(stage: GeneralStage, mesh: EngagementSpec) -> PairGeometry:
-    """The engagement as a pair by itself, A at the origin and B on +x."""
-    a, b = mesh_axes(stage, mesh)
-    return PairGeometry((_shape(stage, mesh.gears[0]), _shape(stage, mesh.gears[1])), math.dist(a, b), mesh.backlash)
+def mesh_geometry(stage: GeneralStage, mesh: EngagementSpec) -> MeshShape:
+    """The engagement by itself; of an external one A is at the origin and B on +x."""
+    return mesh_shape(stage, mesh)
 
 
 def mesh_axes(stage: GeneralStage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -31,7 +32,7 @@ def mesh_axes(stage: GeneralStage, mesh: EngagementSpec) -> tuple[tuple[float, f
 
 def tooth_phases(stage: GeneralStage) -> dict[str, float]:
     """Angle (rad) of tooth 0 of every gear at φ = 0: in every engagement the drive flanks of tooth 0 of both gears
-    touch.
+    touch; of a ring it is the flanks of space 0.
 
     A gear that no engagement before has placed has its tooth 0 on +x. With γ the direction from A to B, rolling both
     gears by equal lengths r_bA dα = −r_bB dβ from the pair by itself gives φ_B = γ + φ_B⁰ − (φ_A − γ) r_bA/r_bB.
@@ -40,13 +41,12 @@ def tooth_phases(stage: GeneralStage) -> dict[str, float]:
     phases: dict[str, float] = {}
     for mesh in stage.engagements:
         pair = mesh_geometry(stage, mesh)
-        (x, y), (u, v) = mesh_axes(stage, mesh)
-        gamma, ratio = math.atan2(v - y, u - x), pair.gears[0].r_b / pair.gears[1].r_b
+        gamma = _direction(pair, *mesh_axes(stage, mesh))
         a, b = mesh.gears
         if b in phases and a not in phases:
-            phases[a] = gamma - (phases[b] - gamma - pair.wheel_phase) / ratio
+            phases[a] = _phase_of_a(pair, phases[b], gamma)
         first = phases.setdefault(a, 0.0)
-        fitting = gamma + pair.wheel_phase - (first - gamma) * ratio
+        fitting = _phase_of_b(pair, first, gamma)
         pitch = 2 * math.pi / pair.gears[1].z
         off = math.remainder(phases.setdefault(b, fitting) - fitting, pitch)
         if abs(off) > SAME_ANGLE:
@@ -57,13 +57,33 @@ def tooth_phases(stage: GeneralStage) -> dict[str, float]:
     return {gear.name: phases.get(gear.name, 0.0) for gear in stage.gears}
 
 
+def _direction(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
+    """Angle (rad, in (−π, π]) from A's axis to B's; of a ring from its own to A's: the branch that the kernel takes."""
+    sense = -1 if isinstance(pair, RingMesh) else 1
+    return math.atan2(sense * (b[1] - a[1]), sense * (b[0] - a[0]))
+
+
+def _phase_of_b(pair: MeshShape, first: float, gamma: float) -> float:
+    """Angle (rad) of B that fits the angle `first` of A; gamma: `_direction`."""
+    if isinstance(pair, RingMesh):
+        return pair.ring_phase(first, gamma)
+    return gamma + pair.wheel_phase - (first - gamma) * pair.gears[0].r_b / pair.gears[1].r_b
+
+
+def _phase_of_a(pair: MeshShape, second: float, gamma: float) -> float:
+    """The inverse of `_phase_of_b`."""
+    if isinstance(pair, RingMesh):
+        return pair.planet_angle(second, gamma)
+    return gamma - (second - gamma - pair.wheel_phase) * pair.gears[1].r_b / pair.gears[0].r_b
+
+
 def stage_sections(stage: GeneralStage) -> dict[str, Any]:
     """Sections of names, limits and engagements."""
     gears = [gear.name for gear in stage.gears]
     engaged, numbers, periods = [], [], []
     for mesh in stage.engagements:
         pair, (a, b) = mesh_geometry(stage, mesh), mesh_axes(stage, mesh)
-        engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), EXTERNAL, _coast_shift(pair)])
+        engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
         force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
         numbers.append([*a, *b, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
         periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
@@ -88,15 +108,16 @@ def _tilt(mesh: EngagementSpec, a: Sequence[float], b: Sequence[float]) -> tuple
     return -y, x  # the axis e_z + (x, y) is e_z turned by (-y, x)
 
 
-def _shape(stage: GeneralStage, name: str) -> GearGeometry:
-    gear = stage.bodies[name]
-    assert isinstance(gear, GearBody)
-    return GearGeometry.of(gear, gear, 1)
+def kind_of(pair: MeshShape) -> int:
+    """The kernel's number of a kind of engagement."""
+    return INTERNAL if isinstance(pair, RingMesh) else EXTERNAL
 
 
-def _coast_shift(geometry: PairGeometry) -> int:
+def _coast_shift(geometry: MeshShape) -> int:
     """The wheel's tooth number that faces the coast flank of the pinion's tooth 0: the one whose gap is the nominal
-    backlash."""
+    backlash. In a ring tooth 0 stands in space 0."""
+    if not isinstance(geometry, PairGeometry):
+        return 0
     a, b = geometry.gears
     t = geometry.alpha_wt
     gaps = {

@@ -12,7 +12,7 @@ import numpy as np
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.spec.turning import turns
-from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.meshes import kind_of, mesh_geometry
 from gearfmu.stage.model import StageModel
 
 TANGENT = 1e-4
@@ -44,7 +44,7 @@ def loaded_te(
     **parameters: float,
 ) -> TeResult:
     """te = r_bA φ_A + r_bB φ_B of an engagement at positions i/N of one of its pitches (no end point): the output held
-    so that gear B, without load, would stand at −position · 2π/z_B.
+    so that gear A, without load, would stand at position · 2π/z_A. In a ring te = r_bA φ_A − r_bB φ_B.
 
     torques: N·m on the input (the first port; `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
     driving torque: the unloaded (kinematic) transmission error. rigid_bearings: the nodes on the axes are held. mesh:
@@ -73,7 +73,8 @@ def loaded_te(
 
 @dataclass(frozen=True)
 class MeshPlace:
-    """An engagement in its train. number: the kernel's; pitch: angle (rad) of the output for one pitch of gear B;
+    """An engagement in its train. number: the kernel's; pitch: angle (rad) by which the output turns back while gear A
+    turns on by one pitch;
     lever (m): input torque over mesh force; most: input torque (N·m) that is its torque_max on gear A."""
 
     number: int
@@ -94,9 +95,10 @@ def place_of(model: StageModel, mesh: str | None) -> MeshPlace:
     rotors = [stage.rotor_of(gear) for gear in engagement.gears]
     if any(rotor not in turning for rotor in rotors):
         raise ModelError(f"{model.name}: the engagement '{engagement.name}' does not turn with its ports: name another")
-    a, b = mesh_geometry(stage, engagement).gears
+    pair = mesh_geometry(stage, engagement)
+    a, b = pair.gears
     speed_a, speed_b = (float(turning[rotor]) for rotor in rotors)
-    pitch = 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
+    pitch = kind_of(pair) * 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
     return MeshPlace(number, pitch, a.r_b * speed_a, engagement.torque_max * abs(speed_a))
 
 

@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.geometry import GearGeometry
 from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.general import RingBody
+from gearfmu.spec.shapes import GearShape
 from gearfmu.stage.fields import gear_numbers
 
 SHARPEST_EDGE = 1e-6
 LEADS = 33  # places across the face width where a lead is given
 
 
-def gear_section(gear: GearSpec, shape: GearGeometry, phase: float, place: float) -> np.ndarray:
+def gear_section(gear: GearSpec | RingBody, shape: GearShape, phase: float, place: float) -> np.ndarray:
     """The section "gear" of a gear."""
     material, relief, edge = gear.material, gear.tip_relief, max(gear.tip_edge_radius, SHARPEST_EDGE)
     start = float(relief.start_roll) if relief else shape.s_a
@@ -43,7 +44,7 @@ def gear_section(gear: GearSpec, shape: GearGeometry, phase: float, place: float
     )
 
 
-def index_section(index: int, gear: GearSpec, shape: GearGeometry) -> dict[str, np.ndarray]:
+def index_section(index: int, gear: GearSpec | RingBody, shape: GearShape) -> dict[str, np.ndarray]:
     """Angles (2 flanks, z) rad by which the teeth are out of their places; no section when all are in place."""
     if not any(gear.index_deviation.values()):
         return {}
@@ -52,7 +53,7 @@ def index_section(index: int, gear: GearSpec, shape: GearGeometry) -> dict[str, 
     return {f"index{index}": angles}
 
 
-def lead_section(index: int, gear: GearSpec) -> dict[str, np.ndarray]:
+def lead_section(index: int, gear: GearSpec | RingBody) -> dict[str, np.ndarray]:
     """Depth (2 flanks, LEADS) m across the face width, in the transverse section; no section without modifications."""
     if gear.lead is None:
         return {}
@@ -66,7 +67,7 @@ def lead_section(index: int, gear: GearSpec) -> dict[str, np.ndarray]:
     return {f"lead{index}": np.stack([depth - turned, depth + turned])}
 
 
-def mismatches(gear: GearSpec, shape: GearGeometry, body: Any) -> list[str]:
+def mismatches(gear: GearSpec | RingBody, shape: GearShape, body: Any) -> list[str]:
     """What says that a reduced body is not that of a gear, one sentence each; empty when it is."""
     pairs = {
         "teeth": (gear.teeth, body.teeth),
@@ -79,9 +80,10 @@ def mismatches(gear: GearSpec, shape: GearGeometry, body: Any) -> list[str]:
         for what, (want, have) in pairs.items()
         if not math.isclose(want, have, rel_tol=1e-9)
     ]
-    if not shape.s_form - 1e-9 <= body.roll.min() <= body.roll.max() <= shape.s_tip + 1e-9:
+    low, high = sorted((shape.s_form, shape.s_tip))
+    if not low - 1e-9 <= body.roll.min() <= body.roll.max() <= high + 1e-9:
         found.append(
             f"body of {gear.name}: its rolls {body.roll.min():g} … {body.roll.max():g} m "
-            f"leave the flank {shape.s_form:g} … {shape.s_tip:g} m"
+            f"leave the flank {low:g} … {high:g} m"
         )
     return found

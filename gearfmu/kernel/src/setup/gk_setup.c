@@ -200,6 +200,7 @@ static size_t largest(const gk_model *model, gk_setup *setup)
     memset(setup, 0, sizeof *setup);
     setup->slices = MAX_SLICES;
     setup->strips = gk_strips_count(model, MAX_SLICES);
+    setup->spatial = model->spatial; /* tables of joint motion are wider then: gk_common */
     setup->on.tip_contact = 1;
     for (int g = 0; g < model->gears; g++) modes[g] = model->gear[g].modes;
     for (int s = 0; s < model->sets; s++)

@@ -1,0 +1,271 @@
+"""A pinion in a ring on fixed axes: unloaded geometry against two involutes, kinematics, balance of forces, the bodies
+on paper, and the table of an independent finite-element program."""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from by_hand import BORE, _at, slice_weights
+from scipy.optimize import minimize
+
+from gearfmu.body import ReducedBody
+from gearfmu.body.reduce import reduced_gear
+from gearfmu.errors import SpecError
+from gearfmu.geometry import involute
+from gearfmu.geometry.planetary import RingMesh
+from gearfmu.spec.gear import BodySpec, MeshSpec
+from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.shapes import gear_shape, mesh_shape
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.meshes import tooth_phases
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "kernel"))
+
+from inner import Inner, compile_inner  # noqa: E402  (found through the line above)
+
+STAGE = ROOT / "benchmarks" / "calculix" / "internal" / "stage.toml"
+COARSE = BodySpec(
+    strip_half_width=4.5e-4,
+    modes=24,
+    roll_points=8,
+    width_functions=3,
+    mesh=MeshSpec(flank=4, thickness=1, root=2, rim=2, width=2),
+)
+TORQUE = 100.0  # N·m on the pinion
+DRIVE, COAST = 0, 1
+
+
+@pytest.fixture(scope="module")
+def stage() -> GeneralStage:
+    """Pinion 18 in a ring 54, on coarse meshes."""
+    spec = load_stage(STAGE)
+    coarse = {name: body.model_copy(update={"body": COARSE}) for name, body in spec.bodies.items()}
+    return spec.model_copy(update={"bodies": coarse})
+
+
+@pytest.fixture(scope="module")
+def mesh(stage: GeneralStage) -> RingMesh:
+    found = mesh_shape(stage, stage.engagements[0])
+    assert isinstance(found, RingMesh)
+    return found
+
+
+@pytest.fixture(scope="module")
+def bodies(stage: GeneralStage) -> list[ReducedBody]:
+    return [reduced_gear(gear, gear_shape(gear), "0" * 64) for gear in stage.gears]
+
+
+@pytest.fixture(scope="module")
+def model(stage: GeneralStage, bodies: list[ReducedBody]) -> StageModel:
+    return assemble(stage, bodies)
+
+
+@pytest.fixture(scope="module")
+def inner(model: StageModel, tmp_path_factory: pytest.TempPathFactory) -> Inner:
+    return Inner(compile_inner(tmp_path_factory.mktemp("inner") / "inner.so"), model.blob)
+
+
+def rolling(mesh: RingMesh, phi: float, lead: float = 0.0) -> np.ndarray:
+    """Pose with the pinion at φ, the ring following without load and ahead by `lead` (m along the line of action)."""
+    return np.array([0.0, 0.0, phi, 0.0, 0.0, (mesh.planet.r_b * phi + lead) / mesh.ring.r_b])
+
+
+def flank_of(stage: GeneralStage, mesh: RingMesh, which: int, pose: np.ndarray, place: tuple[int, int]):
+    """Point (2,) m on a flank at a roll (m), in the stage: of gear `which` (0 pinion, 1 ring) at a pose. place: flank
+    and number of tooth or space."""
+    gear, name = mesh.gears[which], stage.gears[which].name
+    axis = np.array(stage.rotors[stage.rotor_of(name)].axis) + pose[3 * which : 3 * which + 2]
+    angle = pose[3 * which + 2] + tooth_phases(stage)[name] + 2 * math.pi * place[1] / gear.z
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    return lambda roll: axis + turn @ gear.flank_point(roll, 1 - 2 * place[0])
+
+
+@pytest.mark.parametrize("flank", [DRIVE, COAST])
+def test_gap_is_the_distance_of_two_involutes(stage: GeneralStage, mesh: RingMesh, inner: Inner, flank: int) -> None:
+    """At displaced axes and any angle; open flanks, so that the shortest distance is along the common normal. Thinner
+    teeth, which the declared backlash means, are an allowance on the coast side (docs/theory.md, 2.1)."""
+    rng, worst, count = np.random.default_rng(4), 0.0, 0
+    lead, allowance = (2e-5, 0.0) if flank == DRIVE else (-2e-5, mesh.normal_backlash)
+    for phi in rng.uniform(-20.0, 20.0, 6):
+        pose = rolling(mesh, phi, lead) + np.append(rng.uniform(-1e-5, 1e-5, 2), np.zeros(4))
+        for place in inner.places(pose, 2e-4):
+            if place.flank != flank:
+                continue
+            curves = [flank_of(stage, mesh, which, pose, (flank, place.tooth)) for which in (0, 1)]
+            near = minimize(
+                lambda rolls, curves=curves: 1e9 * np.sum((curves[0](rolls[0]) - curves[1](rolls[1])) ** 2),
+                np.array(place.roll) * (1 + 1e-4),
+                method="Nelder-Mead",
+                options={"xatol": 1e-12, "fatol": 1e-20, "maxiter": 4000},
+            )
+            distance = math.sqrt(near.fun / 1e9)
+            worst, count = max(worst, abs(distance - (place.gap - allowance))), count + 1
+            assert near.x[0] == pytest.approx(place.roll[0], abs=2e-6)
+    print(f"{count} places, largest difference {worst:.2e} m")
+    assert count >= 6 and worst < 1e-10
+
+
+def test_gradient_of_the_gap(mesh: RingMesh, inner: Inner) -> None:
+    step = 1e-7
+    for phi in (0.1, 1.3):
+        pose = rolling(mesh, phi, lead=1e-5)
+        for place in inner.places(pose):
+            for c in range(6):
+                ends = []
+                for sign in (-1, 1):
+                    moved = pose.copy()
+                    moved[c] += sign * step
+                    ends.append(
+                        next(p.gap for p in inner.places(moved) if (p.flank, p.tooth) == (place.flank, place.tooth))
+                    )
+                assert place.gradient[c] == pytest.approx((ends[1] - ends[0]) / (2 * step), abs=1e-7)
+
+
+def test_drive_flanks_touch_along_the_path_and_coast_flanks_leave_the_backlash(mesh: RingMesh, inner: Inner) -> None:
+    path, ratios = mesh.path, []
+    for phi in np.linspace(-40.0, 40.0, 101):
+        places = inner.places(rolling(mesh, phi))
+        drive = [p for p in places if p.flank == DRIVE]
+        ratios.append(len(drive))
+        assert drive and max(abs(p.gap) for p in drive) < 1e-13
+        for p in drive:
+            assert path["A"] - 1e-12 <= p.roll[0] <= path["E"] + 1e-12
+            assert p.roll[1] - p.roll[0] == pytest.approx(mesh.length, abs=1e-13)
+            assert p.curvature == pytest.approx(1 / p.roll[0] - 1 / p.roll[1], rel=1e-9)
+        coast = [p.gap for p in places if p.flank == COAST]
+        assert coast and np.allclose(coast, mesh.normal_backlash, atol=1e-12)
+    assert np.mean(ratios) == pytest.approx(mesh.contact_ratio, abs=0.03)
+
+
+def test_no_interference_over_a_pitch(mesh: RingMesh) -> None:
+    """Flanks and tip circle of the pinion's teeth stay in the ring's spaces while drive flanks touch."""
+    pinion, ring = mesh.gears
+    rolls = np.linspace(max(pinion.s_form, 0.0), pinion.s_a, 200)
+    tip = np.linspace(-pinion.tip_half_angle, pinion.tip_half_angle, 40)
+    tooth = np.concatenate(
+        [
+            pinion.flank_point(rolls, 1),
+            pinion.flank_point(rolls, -1),
+            pinion.r_a * np.stack([np.cos(tip), np.sin(tip)], 1),
+        ]
+    )
+    deepest = 0.0
+    for turn in np.linspace(0, 2 * math.pi / pinion.z, 9):
+        phase = mesh.ring_phase(turn, 0.0)
+        for k in range(-5, 6):
+            angle = turn + 2 * math.pi * k / pinion.z
+            c, s = math.cos(angle), math.sin(angle)
+            points = tooth @ np.array([[c, s], [-s, c]]) + [mesh.a, 0.0]
+            radius = np.hypot(*points.T)
+            there = np.arctan2(points[:, 1], points[:, 0]) - phase
+            off = np.abs(there - 2 * math.pi / ring.z * np.round(there * ring.z / (2 * math.pi)))
+            form = float(involute.radius_at_roll(ring.s_form, ring.r_b))
+            inside = (radius > ring.r_a + ring.tip_edge) & (radius < form)
+            over = (off[inside] - ring.space_angle(radius[inside])) * radius[inside]
+            deepest = max(deepest, float(over.max(initial=-1.0)))
+            assert radius.max() < ring.r_f
+    print(f"deepest {deepest:.2e} m")
+    assert deepest < 1e-9
+
+
+def test_pinion_and_ring_turn_alike_by_the_ratio_of_teeth(stage: GeneralStage, mesh: RingMesh, model) -> None:
+    assert model.shafts.ratio == pytest.approx(54 / 18)
+    kernel = model.kernel(level=0.0)
+    kernel.prepare()
+    free = [kernel.transmission(angle, 1e-3) for angle in (-0.3, 0.0, 0.2, 1.7)]
+    angles = np.array([state.phi for state in free])
+    assert np.allclose(angles, 3 * np.array([-0.3, 0.0, 0.2, 1.7]), atol=2e-6)
+
+
+@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
+def test_forces_and_torques_are_in_balance_and_along_the_line_of_action(mesh: RingMesh, model, torque: float) -> None:
+    """The ring's axis is the stage's origin, the pinion stands on +x."""
+    kernel = model.kernel(level=2.0)
+    kernel.set("pinion.tau", torque)
+    kernel.initialize()
+    normal = torque / mesh.planet.r_b
+    assert kernel.get("mesh.force") == pytest.approx(normal, rel=1e-9)
+    pinion, ring = (np.array([kernel.get(f"bearing.{name}.f{axis}") for axis in "xy"]) for name in ("pinion", "ring"))
+    side = math.copysign(1.0, torque)
+    along = np.array([side * math.sin(mesh.alpha_wt), math.cos(mesh.alpha_wt)]) * normal
+    print(pinion, ring, along, kernel.get("ring.tau"))
+    assert np.allclose(pinion, -ring, atol=1e-9 * abs(normal))
+    assert np.allclose(ring, along, atol=1e-3 * abs(normal))
+    moved = [np.array([kernel.get(f"{name}.gear.{axis}") for axis in "xy"]) for name in ("pinion", "ring")]
+    arm = np.array([mesh.a, 0.0]) + moved[0] - moved[1]
+    about = torque + arm[0] * -pinion[1] + arm[1] * pinion[0]  # of the pinion about the ring's axis
+    assert kernel.get("ring.tau") == pytest.approx(3 * torque, rel=1e-9)
+    assert about == pytest.approx(3 * torque, rel=1e-6)
+
+
+def test_an_equilibrium_stays(model: StageModel) -> None:
+    kernel = model.kernel(level=1.0)
+    kernel.set("pinion.tau", TORQUE)
+    kernel.initialize()
+    before = kernel.get("mesh.force"), kernel.get("mesh.te")
+    for i in range(20):
+        kernel.step(5e-5 * i, 5e-5)
+    assert kernel.get("mesh.force") == pytest.approx(before[0], rel=1e-6)
+    assert kernel.get("mesh.te") == pytest.approx(before[1], rel=1e-5)
+
+
+def test_te_of_one_tooth_pair_is_that_of_the_bodies_on_paper(stage, mesh: RingMesh, bodies, model) -> None:
+    """Both bodies' static tables with bore and rim held, and the local law with the relative curvature 1/s − 1/s'."""
+    result = loaded_te(model, [TORQUE], 8, rigid_bearings=True)
+    alone = int(np.argmax(result.te[0]))
+    roll = mesh.planet.r_b * (2 * math.pi / 18 * alone / 8 + mesh.planet.psi_b + mesh.alpha_wt)
+    fitting = [roll + k * mesh.base_pitch for k in range(-3, 4)]
+    (roll,) = (s for s in fitting if mesh.path["A"] <= s <= mesh.path["E"])
+    force, width = TORQUE / mesh.planet.r_b, stage.gears[0].face_width
+    total = sum(
+        held_compliance(body, s, hollow)
+        for body, s, hollow in zip(bodies, (roll, roll + mesh.length), (1, -1), strict=True)
+    )
+    steel = stage.gears[0].material
+    a = 2 * 2 * (1 - steel.poisson_ratio**2) / (math.pi * steel.youngs_modulus)
+    load = force / width
+    beta = 2 * a / (1 / roll - 1 / (roll + mesh.length))
+    local = load * (a * (math.log(4 * COARSE.strip_half_width) - 1) - 0.5 * a * math.log(beta * load))
+    print(f"te {1e6 * result.te[0, alone]:.3f} µm, on paper {1e6 * (force * total + local):.3f} µm")
+    assert result.te[0, alone] == pytest.approx(force * total + local, rel=4e-3)  # slices share unevenly
+
+
+def held_compliance(body: ReducedBody, roll: float, hollow: int) -> float:
+    """m/N of the drive flank of tooth 0 under a load uniform over the width, the bore (hollow −1: the rim) held."""
+    weights = slice_weights(5, body.flank_rows.shape[2])
+    flank = _at(body, roll, _at(body, roll, body.static_ff[DRIVE, DRIVE, 0]))
+    cross, bore = _at(body, roll, body.static_fb[DRIVE][:, :, BORE]), body.static_bb[np.ix_(BORE, BORE)]
+    t = body.psi_b - roll / body.r_b
+    held = -hollow * np.array([-math.sin(t), math.cos(t), body.r_b])
+    side = weights @ cross @ held
+    return float(np.mean(weights @ flank @ weights.T + side[:, None] + side[None, :] + held @ bore @ held))
+
+
+def test_a_ring_that_is_named_first_and_a_tip_that_interferes_are_told(tmp_path: Path) -> None:
+    text = STAGE.read_text(encoding="utf-8")
+    first = tmp_path / "first.toml"
+    first.write_text(text.replace('gears = ["pinion", "ring"]', 'gears = ["ring", "pinion"]'), encoding="utf-8")
+    with pytest.raises(SpecError, match="name it second"):
+        load_stage(first)
+    short = tmp_path / "short.toml"
+    short.write_text(text.replace('tip_diameter = "131 mm"', 'tip_diameter = "130 mm"'), encoding="utf-8")
+    with pytest.raises(SpecError, match="bodies.ring.tip_diameter.*interference"):
+        load_stage(short)
+
+
+def test_loaded_te_against_an_independent_program() -> None:
+    """The table beside the benchmark: mean within 3 %."""
+    with open(STAGE.parents[1] / "internal.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for torque in {row["torque_Nm"] for row in rows}:
+        here = [row for row in rows if row["torque_Nm"] == torque]
+        theirs, ours = (np.mean([float(row[name]) for row in here]) for name in ("te_um", "gearfmu_te_um"))
+        print(f"{torque} N·m, {len(here)} positions: {theirs:.3f} and {ours:.3f} µm")
+        assert len(here) >= 8 and ours == pytest.approx(theirs, rel=0.03)

@@ -1,0 +1,55 @@
+"""A kernel stays within the memory that it asked for: ten slices in a spatial stage whose bodies store few modes, so
+that the tables of contacts are most of it."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import replace
+
+import pytest
+
+from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.kernel import instance
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import assemble
+
+GUARD, PATTERN = 1 << 22, 0xA5
+
+
+@pytest.mark.parametrize("level", [0.0, 2.0])
+def test_nothing_is_written_beyond_the_buffers(monkeypatch: pytest.MonkeyPatch, level: float) -> None:
+    guards = []
+
+    def guarded(size: int) -> tuple[ctypes.Array, int]:
+        """`aligned`, with a pattern behind the `size` bytes."""
+        buffer = ctypes.create_string_buffer(size + 64 + GUARD)
+        address = ctypes.addressof(buffer) + (-ctypes.addressof(buffer)) % 64
+        ctypes.memset(address + size, PATTERN, GUARD)
+        guards.append((buffer, address + size))
+        return buffer, address
+
+    monkeypatch.setattr(instance, "aligned", guarded)
+    spec = load_stage("helical_demo")
+    kernel = assemble(spec, [of_few_modes(body) for body in load_stage_bodies(spec)]).kernel(level=level, slices=10.0)
+    kernel.initialize()
+    kernel.step(0.0, 1e-5)
+    kernel.transmission(0.0, 150.0)
+    assert len(guards) >= 5
+    for _, end in guards:
+        assert ctypes.string_at(end, GUARD) == bytes([PATTERN]) * GUARD
+
+
+def of_few_modes(body: ReducedBody) -> ReducedBody:
+    """The body with its first dozen modes."""
+    count = 12 if body.part[12] != 2 else 11
+    return replace(
+        body,
+        frequency=body.frequency[:count],
+        damping_ratio=body.damping_ratio[:count],
+        nodal_diameter=body.nodal_diameter[:count],
+        part=body.part[:count],
+        parity=body.parity[:count],
+        flank_rows=body.flank_rows[..., :count],
+        bore_rows=body.bore_rows[:, :count],
+        tangent=None,
+    )
