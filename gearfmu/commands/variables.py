@@ -20,6 +20,7 @@ WHEN = {
     "FIXED": "port `fixed`",
     "CHAIN": "port with a chain",
     "SPRING_OR_FIXED": "port `spring` or `fixed`",
+    "SLICES_DIFFER": "helical or tilting gears, slices of the stage file",
 }
 FIELDS = re.compile(r'\s*("(?:[^"\\]|\\.)*"|[^,]+?)\s*(?:,|$)')
 

@@ -173,9 +173,9 @@ def test_helix_angle_of_nothing_is_a_spur_gear(relief_spec: StageSpec, bodies: l
     assert found[1] == pytest.approx(found[0], rel=1e-9)
 
 
-def slices_at_rest(model: StageModel, torque: float) -> np.ndarray:
+def slices_at_rest(model: StageModel, torque: float, slices: int = 10) -> np.ndarray:
     """Force of every slice, all tooth pairs together, N."""
-    kernel = model.kernel(**{"level": 0.0, "slices": 10.0, "effect.tip_contact": 0.0})
+    kernel = model.kernel(**{"level": 0.0, "slices": slices, "effect.tip_contact": 0.0})
     kernel.prepare()
     forces = kernel.transmission(0.0, torque).forces
     return np.sum([of_pair for (flank, _), of_pair in forces.items() if flank == 0], axis=0)
@@ -221,6 +221,18 @@ def test_transmission_error_is_smooth_without_a_filter(
         f"mean {1e6 * te.mean():.2f}, peak to peak {1e6 * np.ptp(te):.3f}, above 12 {1e6 * harmonics[13:].max():.4f} µm"
     )
     assert harmonics[13:].max() < 0.05e-6
+
+
+def test_forces_of_the_slices_are_outputs(demo: SimpleNamespace, involute: StageModel) -> None:
+    """In motion they add up to the mesh force; at rest they are the slices that `te` finds."""
+    slices = [f"mesh.slice_{k + 1}" for k in range(demo.spec.contact.slices)]
+    trace = steady(assemble(demo.spec, demo.bodies))
+    assert np.stack([trace[name] for name in slices]).sum(axis=0) == pytest.approx(trace["mesh.force"], rel=1e-9)
+    assert f"mesh.slice_{len(slices) + 1}" not in involute.kernel().variables
+    kernel = at_rest(involute, TORQUE)
+    shares = np.array([kernel.get(name) for name in slices])
+    assert shares == pytest.approx(slices_at_rest(involute, TORQUE, len(slices)), rel=1e-3)
+    assert np.ptp(shares) > 0.2 * shares.mean()
 
 
 def test_energy_is_kept_in_motion(demo: SimpleNamespace) -> None:

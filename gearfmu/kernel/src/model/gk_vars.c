@@ -3,7 +3,7 @@
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
-typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN } gk_exists;
+typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER } gk_exists;
 enum { STAGE = SCOPE_STAGE, SHAFT = SCOPE_SHAFT, ROTOR = SCOPE_ROTOR, MESH = SCOPE_MESH, SUPPORT = SCOPE_SUPPORT };
 typedef struct gk_row {
     gk_scope scope;
@@ -47,6 +47,7 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     case FIXED: return port->kind == PORT_FIXED;
     case SPRING_OR_FIXED: return port->kind != PORT_TORQUE;
     case CHAIN: return port->chain > 0;
+    case SLICES_DIFFER: return model->spatial && row->place - V_SLICE_1 < model->slices; /* those of the stage file */
     }
     return 0;
 }

@@ -12,10 +12,13 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
     const gk_system *s = &engaged->system;
     double side[2] = {0, 0}, *v = data->mesh[e];
     int pairs = 0;
+    for (int i = 0; i < MAX_SLICES; i++) v[V_SLICE_1 + i] = 0.0;
     for (int p = 0; p < engaged->places; p++) {
+        const double sense = engaged->place[p].flank ? -1.0 : 1.0;
         int touches = 0;
         for (int i = p * s->strips; i < (p + 1) * s->strips; i++) {
             side[engaged->place[p].flank] += reported(s, i);
+            v[V_SLICE_1 + i % s->strips] += sense * reported(s, i);
             touches |= s->force[i] > 0.0;
         }
         pairs += touches;
