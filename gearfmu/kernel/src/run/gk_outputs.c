@@ -244,13 +244,14 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         data->stage[V_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
 }
 
-void gk_outputs_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                       gk_tally *tally)
 {
     const size_t size = (size_t)setup->base.n * sizeof(double);
     memset(tally, 0, offsetof(gk_tally, moved));
     memset(tally->moved, 0, size);
     memset(tally->speed, 0, size);
+    if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
     support_motion(setup, work, data, tally->last_moved, tally->last_speed);
     forces_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
     for (int s = 0; s < model->supports; s++) tally->last[s] = data->support[s][V_FORCE] - tally->last[s];

@@ -14,7 +14,7 @@ typedef struct gk_tally { /* integrals over a communication step */
 
 /* gk_outputs.c */
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
-void gk_outputs_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                       gk_tally *tally);
 void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data);
 void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
