@@ -90,8 +90,8 @@ def test_exported_symbols_are_the_two_interfaces():
     names = exported_symbols(library_path())
     kernel = {name for name in names if name.startswith("gk_")}
     assert names - kernel == fmi_functions() and len(fmi_functions()) == 34
-    header = (build.HERE / "src" / "gk.h").read_text(encoding="utf-8")
-    prototypes = [line for line in header.splitlines() if line.startswith("GK_API ")]
+    headers = [path.read_text(encoding="utf-8") for path in (build.HERE / "src").rglob("*.h")]
+    prototypes = [line for header in headers for line in header.splitlines() if line.startswith("GK_API ")]
     declared = {line.split("(")[0].split()[-1].lstrip("*") for line in prototypes}
     assert kernel == declared
 
