@@ -209,42 +209,41 @@ static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_s
     for (int k = 0; k < far; k++) out[k] -= low[k] + at->part * (high[k] - low[k]);
 }
 
-static void whole_far_row(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int i, double *row)
+/* Fills the rows of contacts and joints through which residuals of different engagements meet */
+void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e)
 {
-    const gk_engaged *engaged = &work->engaged[e];
+    gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    (void)model;
-    memset(row, 0, (size_t)setup->far * sizeof *row);
-    if (i < s->contacts)
-        for (int w = 0; w < 2; w++) far_row(setup, engaged, &setup->mesh[e].side[w], i, row);
-    else if (gk_rows_at_bore(setup, s, i))
-        memcpy(row, work->port_far + (size_t)s->port_of[i] * setup->far, (size_t)setup->far * sizeof *row);
+    const size_t size = (size_t)setup->far * sizeof(double);
+    for (int i = 0; i < s->n && size; i++) {
+        double *row = engaged->far + (size_t)i * setup->far;
+        memset(row, 0, size);
+        if (i < s->contacts)
+            for (int w = 0; w < 2; w++) far_row(setup, engaged, &setup->mesh[e].side[w], i, row);
+        else if (gk_rows_at_bore(setup, s, i))
+            memcpy(row, work->port_far + (size_t)s->port_of[i] * setup->far, size);
+    }
 }
 
-/* what the rows read through the residual that engagements share */
+/* what the rows read through the residual that engagements share: oscillators that are not dynamic add, supports take away */
 void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
                       double *read)
 {
-    const gk_system *s = &work->engaged[e].system;
-    double row[MAX_GROUND + MAX_SUPPORTS];
-    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
-    for (int i = 0; i < s->n && setup->far; i++) {
-        const int supports = setup->far - model->supports;
-        whole_far_row(model, setup, work, e, i, row);
-        for (int k = 0; k < setup->far; k++) read[i] += k < supports ? row[k] * far[k] : -row[k] * far[k];
-    }
+    const gk_engaged *engaged = &work->engaged[e];
+    const int oscillators = model->ground[setup->base.set].n, n = engaged->system.n;
+    double signed_far[MAX_GROUND + MAX_SUPPORTS + 4];
+    for (int i = 0; i < engaged->system.stride; i++) read[i] = 0.0;
+    for (int k = 0; k < setup->far; k++) signed_far[k] = k < oscillators ? far[k] : -far[k];
+    for (int i = 0; i < n && setup->far; i++)
+        read[i] = gk_dot_quads(engaged->far + (size_t)i * setup->far, signed_far, setup->far / 4);
 }
 
-void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *x,
-                      double *out)
+/* adds the forces x of the rows there */
+void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
 {
-    const gk_system *s = &work->engaged[e].system;
-    double row[MAX_GROUND + MAX_SUPPORTS];
-    for (int i = 0; i < s->n && setup->far; i++) {
-        if (x[i] == 0.0) continue;
-        whole_far_row(model, setup, work, e, i, row);
-        for (int k = 0; k < setup->far; k++) out[k] += x[i] * row[k];
-    }
+    const gk_engaged *engaged = &work->engaged[e];
+    for (int i = 0; i < engaged->system.n && setup->far; i++)
+        if (x[i] != 0.0) gk_axpy(x[i], engaged->far + (size_t)i * setup->far, out, 0, setup->far / 4);
 }
 
 typedef struct pushes { /* rows whose forces are not zero */

@@ -23,7 +23,7 @@ static void forces_of(const gk_system *s, double x[PARTS][MAX_STRIDE])
 }
 
 /* what an engagement's forces give to spins, ground group and the far part of the residual */
-static void give(const gk_model *model, const gk_setup *setup, gk_work *work, int e)
+static void give(const gk_setup *setup, gk_work *work, int e)
 {
     gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
@@ -37,8 +37,8 @@ static void give(const gk_model *model, const gk_setup *setup, gk_work *work, in
             engaged->given_spin[part][l] = gk_dot_quads(s->rigid[l], x[part], s->stride / 4);
     }
     memset(engaged->given_far, 0, 2 * (size_t)setup->far * sizeof *engaged->given_far);
-    gk_rows_push_far(model, setup, work, e, x[FORCE_PART], engaged->given_far);
-    gk_rows_push_far(model, setup, work, e, x[DAMPER_PART], engaged->given_far + setup->far);
+    gk_rows_push_far(setup, work, e, x[FORCE_PART], engaged->given_far);
+    gk_rows_push_far(setup, work, e, x[DAMPER_PART], engaged->given_far + setup->far);
 }
 
 /* sums over the other engagements of the island, weighed: what they do per unit row */
@@ -109,14 +109,14 @@ static void sweep(const gk_island *island)
     const gk_coupled *c = island->context;
     double change = INFINITY;
     for (int e = 0; e < c->model->engagements; e++)
-        if (c->setup->mesh[e].island == c->island) give(c->model, c->setup, c->work, e);
+        if (c->setup->mesh[e].island == c->island) give(c->setup, c->work, e);
     for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) {
         change = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {
             if (c->setup->mesh[e].island != c->island) continue;
             change = gk_max(change, take(c->model, c->setup, c->work, c->k, e));
             gk_solve_contacts(&c->work->engaged[e].system);
-            give(c->model, c->setup, c->work, e);
+            give(c->setup, c->work, e);
         }
     }
     if (!(change < TOLERANCE)) island->member[0]->limit_reached = 1;
@@ -135,7 +135,7 @@ gk_island gk_couple_island(gk_coupled *c)
 void gk_couple_recall(gk_coupled *c)
 {
     for (int e = 0; e < c->model->engagements; e++)
-        if (c->setup->mesh[e].island == c->island) give(c->model, c->setup, c->work, e);
+        if (c->setup->mesh[e].island == c->island) give(c->setup, c->work, e);
     for (int e = 0; e < c->model->engagements; e++) {
         gk_system *s = &c->work->engaged[e].system;
         if (c->setup->mesh[e].island != c->island) continue;

@@ -527,6 +527,7 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     s->L = s->J + size;
     s->B = s->L + size;
     gk_rows_form_ground(setup, work, e);
+    gk_rows_form_far(setup, work, e);
     between_contacts(setup, engaged, e, tables);
     take_paths(setup, engaged, e); /* entry by entry: long before quads of the same rows are read again */
     for (int w = 0; w < 2 && !tables; w++) gram(setup, work, engaged, &setup->mesh[e].side[w], k);

@@ -136,7 +136,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
     int of = -1;
     unit[rows[r].row] = 1.0;
     memset(work->far, 0, (size_t)setup->far * sizeof *work->far);
-    gk_rows_push_far(model, setup, work, rows[r].engagement, unit, work->far);
+    gk_rows_push_far(setup, work, rows[r].engagement, unit, work->far);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;

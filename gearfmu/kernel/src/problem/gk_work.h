@@ -56,6 +56,7 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *given_ground,
         given_spin[3][MAX_LOCAL]; /* what the forces give to ground group (3, n) and spins: z, λ, dampers */
     double *given_far;            /* (2, far): λ, dampers at the end */
+    double *far;                  /* (rows, far): rows of contacts and joints there */
     gk_step_side table[2];
     gk_system system;
 } gk_engaged;
@@ -127,8 +128,8 @@ void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e
 void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, double *out);
 void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
                       double *read);
-void gk_rows_push_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *x,
-                      double *out);
+void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out);
+void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e);
 /* gk_couple.c */
 typedef struct gk_coupled { /* an island in a step */
     const gk_model *model;

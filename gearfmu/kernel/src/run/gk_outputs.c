@@ -244,8 +244,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         data->stage[V_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
 }
 
-void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                      gk_tally *tally)
+void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)
 {
     const size_t size = (size_t)setup->base.n * sizeof(double);
     memset(tally, 0, offsetof(gk_tally, moved));

@@ -59,7 +59,7 @@ static void find_islands(const gk_model *model, gk_setup *setup)
                 }
         }
         setup->islands++;
-        if (members > 1) setup->far = model->ground[setup->base.set].n + model->supports;
+        if (members > 1) setup->far = (model->ground[setup->base.set].n + model->supports + 3) / 4 * 4;
     }
 }
 
@@ -154,6 +154,7 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
     engaged->matrix = doubles(b, 6 * rows * rows);
     engaged->given_ground = doubles(b, 3 * (size_t)setup->base.n);
     engaged->given_far = doubles(b, 2 * (size_t)setup->far);
+    engaged->far = doubles(b, rows * (size_t)setup->far);
 }
 
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)

@@ -465,6 +465,7 @@ void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *wor
     const gk_base *base = &setup->base;
     const gk_ground *ground = &model->ground[base->set];
     double *to = work->port_far + (size_t)port * setup->far;
+    memset(to, 0, (size_t)setup->far * sizeof *to);
     for (int k = 0; k < ground->n; k++)
         to[k] = base->slot[k] >= 0 || !setup->on.residual ? 0.0
                                                           : ground->port_rows[port * ground->n + k] / ground->omega[k];
