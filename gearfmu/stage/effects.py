@@ -97,7 +97,7 @@ EFFECTS: tuple[Effect, ...] = (
             "kHz on fzg_c)"
         ),
         off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
-        code="gk_setup.c (modes_below, fill_modes), gk_rows.c, gk_flow.c, gk_step.c (predict, correct_modes)",
+        code="gk_setup.c (modes_below, fill_modes), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, correct_damped)",
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
         off_setting={"level": 0.0},
         on_setting={"level": 1.0},
@@ -111,7 +111,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="1 (eq. 2)",
         matters="always: behind 400 modes a gear it still is a fifth of the pair's compliance (fzg_c)",
         off="truncated modes, as in the paper; allowed at level `paper` alone, with a warning",
-        code="gk_side.c (gk_table_residual, gk_table_for), gk_form.c (gk_system_form)",
+        code="gk_side.c (store_residual), gk_compliance.c (between_contacts, joint_rows)",
         switch="level `paper`; `effect.residual` = false is refused at every other level",
         off_setting={"level": 4.0, "integrator": 2.0},
         on_setting={"level": 3.0, "integrator": 2.0},
@@ -163,7 +163,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="2.5, 3.4",
         matters="level of the mesh resonance and its side bands; dissipation: never leave it out to save time",
         off="the mesh mode is damped by modal damping, bearings and ports alone",
-        code="gk_form.c (take_paths), gk_solve.c (limit_dashpots), gk_tangent.c",
+        code="gk_compliance.c (take_paths), gk_solve.c (limit_dashpots), gk_tangent.c",
     ),
     _switched(
         "tip_relief",

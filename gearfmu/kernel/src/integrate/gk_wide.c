@@ -30,6 +30,9 @@
 #define gk_rows_without_rigid gk_rows_without_rigid_avx2
 #define gk_rows_scatter gk_rows_scatter_avx2
 #define gk_side_step gk_side_step_avx2
+#define gk_compliance_form gk_compliance_form_avx2
+#define gk_compliance_mirror gk_compliance_mirror_avx2
+#define gk_ground_add gk_ground_add_avx2
 #define gk_form_system gk_form_system_avx2
 #define gk_form_rates gk_form_rates_avx2
 #define gk_law_set gk_law_set_avx2
@@ -75,6 +78,8 @@
 #include "force/gk_still.c"
 #include "force/gk_rows.c"
 #include "setup/gk_moves.c"
+#include "problem/gk_compliance.c"
+#include "problem/gk_ground.c"
 #include "problem/gk_form.c"
 #include "problem/gk_tangent.c"
 #include "problem/gk_solve.c"

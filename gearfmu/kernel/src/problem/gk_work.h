@@ -140,6 +140,14 @@ typedef struct gk_coupled { /* an island in a step */
 } gk_coupled;
 gk_island gk_couple_island(gk_coupled *coupled);
 void gk_couple_recall(gk_coupled *coupled);
+/* gk_compliance.c; columns of a row of D and A that are filled directly */
+static inline int gk_block_end(int i) { return i / 4 * 4 + 4; }
+void gk_compliance_form(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
+                        int tables);
+void gk_compliance_mirror(gk_system *s);
+/* gk_ground.c */
+void gk_ground_add(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
+                   int tables);
 /* gk_form.c */
 void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                     gk_work *work, int e);
