@@ -97,7 +97,7 @@ EFFECTS: tuple[Effect, ...] = (
             "kHz on fzg_c)"
         ),
         off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
-        code="gk_setup.c (modes_below, fill_modes), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, correct_damped)",
+        code="gk_setup.c (modes_below, fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, correct_damped)",
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
         off_setting={"level": 0.0},
         on_setting={"level": 1.0},
@@ -202,7 +202,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="1 (eq. 1)",
         matters="always; a switch for conservation tests",
         off="ζ = 0 for every elastic mode",
-        code="gk_flow.c (fill)",
+        code="gk_flow.c (oscillator_of)",
     ),
     _switched(
         "roll_motion",
