@@ -47,7 +47,7 @@ def main() -> None:
     options = parser.parse_args()
     found = {counts: diagonal(options.gear, counts) for counts in COUNTS[: -1 if options.quick else None]}
     reference = next(reversed(found.values()))[0]
-    print("flank/thickness/root/rim/width: largest difference by width function, %")
+    print("flank, thickness, root, rim, width: largest difference by width function, %")
     for counts, (values, cost) in found.items():
         difference = 100 * np.abs(values / reference - 1).max(axis=0)
         print(f"{'/'.join(map(str, counts)):>16} {cost}  " + " ".join(f"{d:6.2f}" for d in difference))

@@ -7,7 +7,10 @@ import re
 import shutil
 import subprocess
 import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from deck import Problem, starts
@@ -17,6 +20,7 @@ PRESSURES = re.compile(r"pressure ratio \(smallest/largest pressure over all con
 TENSION = 1e-3  # largest tensile contact pressure, parts of the largest pressure
 MOST_ITERATIONS = 40  # an increment; what converges took 7 to 26
 END_OF_LOG = 1500  # characters shown of a failed run
+T = TypeVar("T")
 
 
 def require_ccx() -> None:
@@ -83,3 +87,11 @@ def torques(problem: Problem, path: Path) -> np.ndarray:
         force = np.array(list(forces.values()))
         result.append(float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum()))
     return np.array(result)
+
+
+def first_solved(nudges: Sequence[float], attempt: Callable[[float], T]) -> T:
+    """What `attempt` returns for the first nudge that ccx solves. RuntimeError of the last when it solves none."""
+    for nudge in nudges[:-1]:
+        with suppress(RuntimeError):
+            return attempt(nudge)
+    return attempt(nudges[-1])

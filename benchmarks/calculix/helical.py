@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ccx import require_ccx, run_deck
+from ccx import first_solved, require_ccx, run_deck
 from deck import Problem
 from helical_section import Zone, twisted
 from positions import NUDGES, PENALTY, read, write
@@ -163,18 +163,14 @@ def solved(tilted: bool, gears: list[ReducedBody], torque: float, position: int,
     folder = work / f"helical_{position}_{torque:g}{'_tilted' if tilted else ''}"
     folder.mkdir(parents=True, exist_ok=True)
     deck = folder / "load_0.inp"
-    for nudge in NUDGES:
+
+    def attempt(nudge: float) -> tuple[float, Problem, float]:
         te = nudge * mine.te
         problem = problem_at(spec, torque, position, te)
         write_spatial_deck(problem, deck)
-        try:
-            seconds = run_deck(deck)
-        except RuntimeError as failure:
-            refused = failure
-        else:
-            break
-    else:
-        raise refused
+        return te, problem, run_deck(deck)
+
+    te, problem, seconds = first_solved(NUDGES, attempt)
     loads, layers = bore_loads(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
     moment = abs(loads[0, 5])
     share = layers.sum(axis=0) / layers.sum()

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from case import Case, Load
-from ccx import require_ccx, run_deck, torques
+from ccx import first_solved, require_ccx, run_deck, torques
 from deck import Placed, Problem, write_deck
 from positions import NUDGES, PATCH, PENALTY, SIZE, read, write
 from ring_section import ring_plane
@@ -117,18 +117,14 @@ def solved(pair: Pair, torque: float, position: int, work: Path) -> dict[str, An
     turn = 2 * math.pi / pair.mesh.planet.z * position / POSITIONS
     folder, expected = work / f"internal_{position:02d}_{torque:g}", pair.ours.te[number, position]
     folder.mkdir(parents=True, exist_ok=True)
-    for nudge in NUDGES:
+
+    def attempt(nudge: float) -> tuple[Load, Problem, Path, float]:
         load = Load(turn, nudge * expected)
         problem, deck = problem_of(case, pair, load), folder / "load_0.inp"
         write_deck(problem, deck)
-        try:
-            seconds = run_deck(deck)
-        except RuntimeError as failure:
-            refused = failure
-        else:
-            break
-    else:
-        raise refused
+        return load, problem, deck, run_deck(deck)
+
+    load, problem, deck, seconds = first_solved(NUDGES, attempt)
     base = np.array([gear.r_b for gear in pair.mesh.gears])
     force, ring = 2 * np.abs(torques(problem, deck.with_suffix(".dat"))) / base  # both halves of the width
     te = load.te + (torque / base[0] - force) / pair.ours.stiffness[number, position]

@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from case import Case, Load, solve
-from ccx import require_ccx
+from case import Case, Load, Solution, solve
+from ccx import first_solved, require_ccx
 from rigid_bores import rigid_bore_bodies
 from section import Fineness
 
@@ -81,17 +81,13 @@ def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path) -> dict[st
     pair, width, row = PairGeometry.of(spec), spec.gears[0].face_width, TORQUES.index(torque)
     turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
     folder = work / f"position_{position:02d}_{torque:g}{'' if place.bores == 'averaged' else '_clamped'}"
-    for nudge in NUDGES:
+    case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)
+
+    def attempt(nudge: float) -> tuple[Load, Solution]:
         load = Load(turn, nudge * ours.te[row, position], MARGIN)
-        try:
-            case = replace(case_at(spec, pair, torque, place.bores), increments=place.increments)
-            solution = solve(case, pair, width, [load], folder)
-        except RuntimeError as failure:
-            refused = failure
-        else:
-            break
-    else:
-        raise refused
+        return load, solve(case, pair, width, [load], folder)
+
+    load, solution = first_solved(NUDGES, attempt)
     force, wheel = solution.line_load[0] * width
     te = load.te + (torque / pair.gears[0].r_b - force) / ours.stiffness[row, position]
     return {

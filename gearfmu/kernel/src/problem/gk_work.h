@@ -52,7 +52,7 @@ typedef struct gk_engaged { /* an engagement in a step */
     gk_position position[2];
     gk_real *basis[2]; /* (contacts, n) rows of the contacts in the frame of the reference tooth */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
-    double *matrix;    /* D, A, Q, J, L, B */
+    double *matrix;    /* D, A, P, J, L, B */
     double *given_ground,
         given_spin[3][MAX_LOCAL]; /* what the forces give to ground group (3, n) and spins: z, λ, dampers */
     double *given_far;            /* (2, far): λ, dampers at the end */
