@@ -24,7 +24,11 @@ void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const dou
                   double *pose)
 {
     read_rigid(model, setup, e, ground, pose);
-    for (int w = 0; w < 2; w++) pose[SPACE * w + PHIA] += spin[model->gear[model->engagement[e].gear[w]].rotor];
+    const int frame = setup->mesh[e].frame;
+    for (int w = 0; w < 2; w++) {
+        const double turned = spin[model->gear[model->engagement[e].gear[w]].rotor];
+        pose[SPACE * w + PHIA] += frame < 0 ? turned : turned - spin[frame];
+    }
 }
 
 /* Fills the rows of the contacts on the gear groups */
@@ -282,6 +286,31 @@ static void contact_forces(const gk_setup *setup, const gk_engaged *work, const 
     int first = 0;
     for (; first + 4 <= width; first += 4) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 4);
     for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
+}
+
+/* adds the modal forces of the contacts' forces x to those of a gear group */
+void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, gk_real *out)
+{
+    const gk_engaged *engaged = &work->engaged[e];
+    const gk_side *side = &setup->mesh[e].side[which];
+    const gk_real *turned[2] = {work->turned, work->turned};
+    gk_real *sum[2] = {out, work->turned_next};
+    pushes p;
+    list_pushes(x, x, engaged->system.contacts, &p);
+    if (!GK_LANES(setup, side->gear) || !p.count) return;
+    contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
+    turn_forth(&setup->modal[side->gear], engaged->position[which].tooth, turned, sum);
+}
+
+/* adds what the contacts read of displacements y of a gear group */
+void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read)
+{
+    const gk_engaged *engaged = &work->engaged[e];
+    const int g = setup->mesh[e].side[which].gear, n = GK_LANES(setup, g);
+    const gk_real *row = engaged->basis[which];
+    if (!n || !engaged->system.contacts) return;
+    turn_back(&setup->modal[g], engaged->position[which].tooth, y, work->turned);
+    for (int i = 0; i < engaged->system.contacts; i++, row += n) read[i] -= gk_dot(row, work->turned, n);
 }
 
 /* adds Σ rows·x and Σ rows·y over `quads` of the ground group from `first` on */

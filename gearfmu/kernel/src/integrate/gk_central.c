@@ -113,7 +113,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
 {
     const double *ground = gk_ground_seen(data) + 2 * setup->base.n;
     double sum = 0.0;
-    for (int d = 0; d < setup->spins; d++) sum += data->f[d] * data->f[d] / setup->inverse_inertia[d];
+    for (int d = 0; d < setup->spins; d++) sum += 2.0 * gk_kinetic(setup, d, data->f[d]);
     for (int i = 0; i < setup->base.n; i++) sum += ground[i] * ground[i];
     for (int g = 0; g < model->gears; g++) {
         const int n = setup->modal[g].n;
@@ -176,8 +176,8 @@ static void spin_round(const gk_setup *setup, const gk_work *work, int e, shape 
         for (int i = 0; i < s->n; i++) force += s->rigid[l][i] * s->force[i], next += s->rigid[l][i] * s->z[i];
         of->next[d] = next * setup->inverse_inertia[d];
         of->up_stiff += r[d] * force;
-        of->down += r[d] * r[d] / setup->inverse_inertia[d];
-        of->size += of->next[d] * of->next[d] / setup->inverse_inertia[d];
+        of->down += 2.0 * gk_kinetic(setup, d, r[d]);
+        of->size += 2.0 * gk_kinetic(setup, d, of->next[d]);
     }
 }
 

@@ -3,6 +3,7 @@
  * κ = −1/ω². Repeated until nothing moves. The mobility is large against all compliances, so a few iterations suffice;
  * each is a monotone complementarity problem. Islands come to rest one after the other: they know nothing of each other. */
 #include "integrate/gk_integrate.h"
+#include "setup/gk_kinematics.h"
 
 static const double MOBILITY = 1e-4; /* s²: divided by the inertia of a spin, rad/(N m) */
 static const double SEE = 3e-3;      /* m: look this far for flanks */
@@ -18,9 +19,9 @@ typedef struct rest { /* a search for rest */
     gk_data *data;
     const gk_boundary *boundary;
     gk_coefficients k;
-    double turn[MAX_SPINS]; /* speed of a spin per unit speed of the train, without deformation */
-    int train[MAX_SPINS], trains,
-        floats[MAX_ROTORS]; /* which spins turn together, −1: none; trains that nothing holds */
+    gk_motions motion; /* of the spins without deformation, no two of those that float alike in kinetic energy */
+    int floats[MAX_ROTORS]; /* motions that nothing holds */
+    int leader[MAX_ROTORS]; /* port that decides where a motion begins, −1: none */
     double given[MAX_SPINS], before[MAX_SPINS];
     int island; /* that comes to rest now */
 } rest;
@@ -36,14 +37,14 @@ static int moves(const rest *r, int d)
     return 0;
 }
 
-static int train_moves(const rest *r, int train)
+static int any_moves(const rest *r, int motion)
 {
     for (int d = 0; d < r->setup.spins; d++)
-        if (r->train[d] == train && moves(r, d)) return 1;
+        if (r->motion.turn[motion][d] != 0.0 && moves(r, d)) return 1;
     return 0;
 }
 
-/* ---- trains ------------------------------------------------------------------------------------------------------- */
+/* ---- motions ------------------------------------------------------------------------------------------------------ */
 static int grounded(const rest *r, int p)
 {
     return r->boundary[p].kind != PORT_TORQUE && (!r->setup.chained[p] || r->setup.joint[p][JOINT_CLUTCH].live);
@@ -56,58 +57,88 @@ static double arm_of(const rest *r, int rotor)
     return 1.0;
 }
 
-/* which rotors turn together, and how fast */
-static void find_trains(rest *r)
+/* Σ J turn turn over the spins of two motions */
+static double inertia_of(const rest *r, int a, int b)
 {
-    const gk_model *m = r->model;
-    for (int d = 0; d < r->setup.spins; d++) r->train[d] = -1, r->turn[d] = 0.0;
-    for (int root = 0; root < m->rotors; root++) {
-        if (r->train[root] >= 0) continue;
-        r->train[root] = r->trains, r->turn[root] = 1.0;
-        for (int changed = 1; changed;) {
-            changed = 0;
-            for (int e = 0; e < m->engagements; e++) {
-                const gk_gear *gear[2] = {&m->gear[m->engagement[e].gear[0]], &m->gear[m->engagement[e].gear[1]]};
-                if (m->engagement[e].kind == MESH_FLAT) continue;
-                for (int w = 0; w < 2; w++) {
-                    const int from = gear[w]->rotor, to = gear[1 - w]->rotor;
-                    if (r->train[from] != r->trains || r->train[to] >= 0) continue;
-                    r->train[to] = r->trains, changed = 1;
-                    r->turn[to] = -m->engagement[e].kind * r->turn[from] * gear[w]->r_b / gear[1 - w]->r_b;
-                }
-            }
-        }
-        r->trains++;
-    }
-    for (int t = 0; t < r->trains; t++) r->floats[t] = 1;
-    for (int p = 0; p < m->ports; p++) {
-        const int train = r->train[m->port[p].rotor];
-        if (grounded(r, p)) r->floats[train] = 0;
-        if (r->setup.chained[p])
-            r->train[gk_disc_of(m, p)] = train, r->turn[gk_disc_of(m, p)] = r->turn[m->port[p].rotor];
-    }
-    for (int e = 0; e < m->engagements; e++)
-        if (m->engagement[e].kind == MESH_FLAT)
-            for (int w = 0; w < 2; w++) r->floats[r->train[m->gear[m->engagement[e].gear[w]].rotor]] = 0;
+    double sum = 0.0;
+    for (int d = 0; d < r->setup.spins; d++)
+        if (r->motion.turn[a][d] != 0.0 && r->motion.turn[b][d] != 0.0)
+            sum += r->motion.turn[a][d] * r->motion.turn[b][d] / r->setup.inverse_inertia[d];
+    return sum;
 }
 
-/* where to begin: a grounded port decides, the others of its train follow without load */
+/* takes away from a motion what it has of another */
+static void take_away(rest *r, int from, int other, double share)
+{
+    for (int d = 0; d < r->setup.spins && share != 0.0; d++) r->motion.turn[from][d] -= share * r->motion.turn[other][d];
+}
+
+/* a rotor whose angle is given decides one of the motions that turn it; the others leave it at rest */
+static int decide(rest *r, int rotor)
+{
+    int first = -1;
+    for (int t = 0; t < r->motion.count; t++) {
+        const double turn = r->motion.turn[t][rotor];
+        if (turn == 0.0 || r->leader[t] >= 0) continue;
+        if (first < 0)
+            first = t;
+        else
+            take_away(r, t, first, turn / r->motion.turn[first][rotor]);
+    }
+    return first;
+}
+
+/* the motions of the spins: which ones ports decide, which ones nothing holds */
+static void find_motions(rest *r)
+{
+    const gk_model *m = r->model;
+    gk_kinematics_find(m, &r->motion);
+    for (int t = 0; t < r->motion.count; t++) r->floats[t] = 1, r->leader[t] = -1;
+    for (int p = 0; p < m->ports; p++)
+        for (int t = 0; t < r->motion.count && r->setup.chained[p]; t++)
+            r->motion.turn[t][gk_disc_of(m, p)] = r->motion.turn[t][m->port[p].rotor];
+    for (int p = 0; p < m->ports; p++) {
+        const int motion = r->boundary[p].kind == PORT_TORQUE ? -1 : decide(r, m->port[p].rotor);
+        if (motion >= 0) r->leader[motion] = p;
+    }
+    for (int p = 0; p < m->ports; p++)
+        for (int t = 0; t < r->motion.count; t++)
+            if (grounded(r, p) && r->motion.turn[t][m->port[p].rotor] != 0.0) r->floats[t] = 0;
+    for (int e = 0; e < m->engagements; e++)
+        for (int t = 0; t < r->motion.count && m->engagement[e].kind == MESH_FLAT; t++)
+            for (int w = 0; w < 2; w++)
+                if (r->motion.turn[t][m->gear[m->engagement[e].gear[w]].rotor] != 0.0) r->floats[t] = 0;
+    for (int t = 0; t < r->motion.count; t++)
+        for (int other = 0; other < t; other++)
+            if (r->floats[t] && r->floats[other])
+                take_away(r, t, other, inertia_of(r, t, other) / inertia_of(r, other, other));
+}
+
+/* how far a motion has gone where it begins: by its leader, whose rotor later motions leave at rest */
+static double begins_at(const rest *r, int t)
+{
+    const int rotor = r->model->port[r->leader[t]].rotor;
+    double phi = r->boundary[r->leader[t]].phi;
+    for (int other = 0; other < r->motion.count; other++)
+        if (other != t && r->leader[other] >= 0 && r->motion.turn[other][rotor] != 0.0)
+            phi -= begins_at(r, other) * r->motion.turn[other][rotor];
+    return phi / r->motion.turn[t][rotor];
+}
+
+/* where to begin: ports decide, the other rotors follow without load */
 static void begin(rest *r)
 {
     const gk_model *m = r->model;
     gk_data *data = r->data;
-    double at[MAX_ROTORS] = {0};
-    int known[MAX_ROTORS] = {0};
     memset(r->work->rest_ground, 0, (size_t)r->setup.base.n * sizeof(double));
     for (int e = 0; e < m->engagements; e++)
         if (searched(r, e)) data->meshing[e].pairs = 0;
-    for (int p = 0; p < m->ports; p++) {
-        const int rotor = m->port[p].rotor, train = r->train[rotor];
-        if (r->boundary[p].kind == PORT_TORQUE || known[train]) continue;
-        known[train] = 1, at[train] = r->boundary[p].phi / r->turn[rotor];
+    for (int d = 0; d < r->setup.spins; d++) {
+        if (!moves(r, d)) continue;
+        data->x[d] = 0.0;
+        for (int t = 0; t < r->motion.count; t++)
+            if (r->leader[t] >= 0 && r->motion.turn[t][d] != 0.0) data->x[d] += begins_at(r, t) * r->motion.turn[t][d];
     }
-    for (int d = 0; d < r->setup.spins; d++)
-        if (moves(r, d)) data->x[d] = r->train[d] >= 0 ? at[r->train[d]] * r->turn[d] : 0.0;
     for (int p = 0; p < m->ports; p++)
         if (r->setup.chained[p] && moves(r, gk_inertia_of(m, p))) data->x[gk_inertia_of(m, p)] = r->boundary[p].phi;
 }
@@ -128,35 +159,33 @@ static double torque_on(const rest *r, int d, int solved)
     return sum;
 }
 
-/* when nothing holds the rotation of a train: take the net torque along it as inertial torques of a uniform acceleration */
+/* when nothing holds a motion: take the net torque along it as inertial torques of a uniform acceleration */
 static void balance_rotation(rest *r, int solved)
 {
-    for (int t = 0; t < r->trains; t++) {
-        double net = 0.0, inertia = 0.0;
-        if (!r->floats[t] || !train_moves(r, t)) continue;
-        for (int d = 0; d < r->setup.spins; d++) {
-            if (r->train[d] != t) continue;
-            net += r->turn[d] * torque_on(r, d, solved);
-            inertia += r->turn[d] * r->turn[d] / r->setup.inverse_inertia[d];
-        }
+    for (int t = 0; t < r->motion.count; t++) {
+        const double *turn = r->motion.turn[t];
+        double net = 0.0;
+        if (!r->floats[t] || !any_moves(r, t)) continue;
         for (int d = 0; d < r->setup.spins; d++)
-            if (r->train[d] == t) r->given[d] -= r->turn[d] * net / (inertia * r->setup.inverse_inertia[d]);
+            if (turn[d] != 0.0) net += turn[d] * torque_on(r, d, solved);
+        const double inertia = inertia_of(r, t, t);
+        for (int d = 0; d < r->setup.spins; d++)
+            if (turn[d] != 0.0) r->given[d] -= turn[d] * net / (inertia * r->setup.inverse_inertia[d]);
     }
 }
 
-/* a train that nothing holds stays where it is: take its common rotation out of the last move */
+/* what nothing holds stays where it is: take the motion out of the last move */
 static void unroll(rest *r)
 {
-    for (int t = 0; t < r->trains; t++) {
-        double momentum = 0.0, inertia = 0.0;
-        if (!r->floats[t] || !train_moves(r, t)) continue;
-        for (int d = 0; d < r->setup.spins; d++) {
-            if (r->train[d] != t) continue;
-            momentum += r->turn[d] * (r->data->x[d] - r->before[d]) / r->setup.inverse_inertia[d];
-            inertia += r->turn[d] * r->turn[d] / r->setup.inverse_inertia[d];
-        }
+    for (int t = 0; t < r->motion.count; t++) {
+        const double *turn = r->motion.turn[t];
+        double momentum = 0.0;
+        if (!r->floats[t] || !any_moves(r, t)) continue;
         for (int d = 0; d < r->setup.spins; d++)
-            if (r->train[d] == t) r->data->x[d] -= r->turn[d] * momentum / inertia;
+            if (turn[d] != 0.0) momentum += turn[d] * (r->data->x[d] - r->before[d]) / r->setup.inverse_inertia[d];
+        const double inertia = inertia_of(r, t, t);
+        for (int d = 0; d < r->setup.spins; d++)
+            if (turn[d] != 0.0) r->data->x[d] -= turn[d] * momentum / inertia;
     }
 }
 
@@ -369,7 +398,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     work->another = 0;
     set_joints(&r);
     set_compliance(&r);
-    find_trains(&r);
+    find_motions(&r);
     for (int e = 0; e < model->engagements; e++) gk_step_forget(&work->engaged[e]);
     if (!keep) memset(data->x, 0, sizeof data->x);
     int found = 1;
@@ -416,7 +445,9 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     const gk_gear *A = &model->gear[mesh->gear[0]], *B = &model->gear[mesh->gear[1]];
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    *out++ = A->r_b * angle[A->rotor] + mesh->kind * B->r_b * angle[B->rotor];
+    const int f = setup->mesh[e].frame;
+    const double frame = f < 0 ? 0.0 : angle[f];
+    *out++ = A->r_b * (angle[A->rotor] - frame) + mesh->kind * B->r_b * (angle[B->rotor] - frame);
     *out++ = angle[model->port[0].rotor];
     *places = engaged->places;
     for (int p = 0; p < *places; p++, out += 2 + setup->slices) {

@@ -36,7 +36,7 @@ static double dynamic_energy(const gk_model *model, const gk_setup *setup, const
     const gk_base *base = &setup->base;
     const double *x = gk_ground_seen(data), *v = x + base->n;
     double sum = ENERGY_SMALL;
-    for (int d = 0; d < setup->spins; d++) sum += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
+    for (int d = 0; d < setup->spins; d++) sum += gk_kinetic(setup, d, data->v[d]);
     for (int i = 0; i < base->n; i++)
         sum += 0.5 * k->ground.inverse_s2[i] * (v[i] * v[i] + base->omega2[i] * x[i] * x[i]);
     for (int g = 0; g < model->gears; g++) sum += modal_energy(setup, data, k, g);
@@ -154,7 +154,9 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2 && model->engagement[e].kind != MESH_FLAT; w++) {
             const gk_gear *gear = &model->gear[model->engagement[e].gear[w]];
-            if (!(fabs(work->spin[gear->rotor] - data->x[gear->rotor]) * gear->z < FARTHEST)) return 0;
+            const int frame = model->frame[gear->rotor];
+            const double turned = frame < 0 ? 0.0 : work->spin[frame] - data->x[frame];
+            if (!(fabs(work->spin[gear->rotor] - data->x[gear->rotor] - turned) * gear->z < FARTHEST)) return 0;
         }
     return 1;
 }

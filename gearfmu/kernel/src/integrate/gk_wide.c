@@ -49,6 +49,8 @@
 #define gk_rows_read_far gk_rows_read_far_avx2
 #define gk_rows_push_far gk_rows_push_far_avx2
 #define gk_rows_form_far gk_rows_form_far_avx2
+#define gk_rows_push_modes gk_rows_push_modes_avx2
+#define gk_rows_read_modes gk_rows_read_modes_avx2
 #define gk_solve_settle gk_solve_settle_avx2
 #define gk_solve_begin gk_solve_begin_avx2
 #define gk_solve_begin_dashpots gk_solve_begin_dashpots_avx2

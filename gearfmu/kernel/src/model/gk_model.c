@@ -91,6 +91,21 @@ static void read_names(reader *r, int field, int count, char (*out)[NAME_LENGTH]
     }
 }
 
+/* frames are moving rotors on the ground */
+static void read_frames(reader *r, gk_model *m)
+{
+    const int32_t *frame = take(r, F_MODEL_frame);
+    for (int i = 0; i < m->rotors; i++) {
+        m->frame[i] = -1;
+        if (!frame || r->outcome) continue;
+        demand(r, counted(frame + i, -1, m->rotors - 1) && frame[i] != i, "frames");
+        if (r->outcome) return;
+        m->frame[i] = frame[i];
+    }
+    for (int i = 0; i < m->rotors; i++)
+        if (m->frame[i] >= 0) demand(r, m->frame[m->frame[i]] < 0 && m->inertia[m->frame[i]] > 0.0, "frames");
+}
+
 static void read_stage(reader *r, gk_model *m)
 {
     const int32_t *degree = take(r, F_MODEL_degrees);
@@ -108,9 +123,10 @@ static void read_stage(reader *r, gk_model *m)
         m->degree[i] = degree[i];
     }
     for (int i = 0; i < m->rotors; i++) {
-        demand(r, between(inertia[i], 1e-12, 1e7), "moments of inertia");
+        demand(r, inertia[i] == 0.0 || between(inertia[i], 1e-12, 1e7), "moments of inertia");
         m->inertia[i] = inertia[i];
     }
+    read_frames(r, m);
 }
 
 static void read_port(reader *r, gk_model *m, int i, const int32_t *kind, const double *v)
@@ -296,6 +312,8 @@ static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, c
     if (e->kind != MESH_FLAT && !(squared_distance(e) > 1.0002 * reach * reach))
         refuse(r, "centre distance", "is smaller than the base radii allow");
     if (A->rotor == B->rotor) refuse(r, "engagements", "join gears of one rotor");
+    if (m->frame[A->rotor] != m->frame[B->rotor]) refuse(r, "engagements", "join gears that stand in different axes");
+    if (m->frame[A->rotor] == A->rotor || m->frame[A->rotor] == B->rotor) refuse(r, "frames", "turn in themselves");
     if (e->kind != MESH_FLAT && !(fabs(A->helix + e->kind * B->helix) < 1e-6))
         refuse(r, "helix angles", "do not fit each other");
     e->width = gk_min(A->width, B->width);

@@ -78,13 +78,35 @@ struct gk_model {
     int spatial; /* something moves along the axis or tilts, or the teeth are not the same all over the width */
     double cut[2], h_max, period_min;
     int degree[MAX_FUNCTIONS];
-    double inertia[MAX_ROTORS];
+    double inertia[MAX_ROTORS]; /* of the spin; 0: the rotor stands */
+    int frame[MAX_ROTORS];      /* rotor in whose axes this one stands and its supports rest, −1: the ground */
     gk_gear gear[MAX_GEARS];
     gk_engagement engagement[MAX_ENGAGEMENTS];
     gk_port port[MAX_PORTS];
     const double *port_residual, *port_support;
     gk_ground ground[SETS];
 };
+
+/* the frame of an engagement: both gears stand in it */
+static inline int gk_frame_of(const gk_model *model, const gk_engagement *e)
+{
+    return model->frame[model->gear[e->gear[0]].rotor];
+}
+
+/* the port of a rotor, −1: none */
+static inline int gk_port_on(const gk_model *model, int rotor)
+{
+    for (int p = 0; p < model->ports; p++)
+        if (model->port[p].rotor == rotor) return p;
+    return -1;
+}
+
+/* the port that a gear's flanks feel through bodies: that of its own rotor, else that of its frame's; −1: none */
+static inline int gk_port_of(const gk_model *model, int gear)
+{
+    const int rotor = model->gear[gear].rotor, own = gk_port_on(model, rotor);
+    return own >= 0 || model->frame[rotor] < 0 ? own : gk_port_on(model, model->frame[rotor]);
+}
 
 /* r_bA + r_bB of an external engagement, r_bB − r_bA of an internal one */
 static inline double gk_base_reach(const gk_model *model, const gk_engagement *e)

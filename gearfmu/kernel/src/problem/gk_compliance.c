@@ -148,7 +148,7 @@ GK_INLINE void joint_rows(const gk_model *model, const gk_setup *setup, gk_engag
             const double part = engaged->position[w].part;
             const int points = side->candidates * strips;
             double *A = s->A + r * s->stride;
-            if (model->gear[side->gear].rotor != model->port[s->port_of[r]].rotor) continue;
+            if (gk_port_of(model, side->gear) != s->port_of[r]) continue;
             const double *node = side->port + (size_t)engaged->position[w].node * points;
             for (int p = 0; p < engaged->places; p++, A += strips) {
                 const double *low = node + engaged->place[p].candidate[w] * strips, *high = low + points;

@@ -36,6 +36,14 @@ static void give(const gk_setup *setup, gk_work *work, int e)
         for (int l = 0; l < setup->mesh[e].spins; l++)
             engaged->given_spin[part][l] = gk_dot_quads(s->rigid[l], x[part], s->stride / 4);
     }
+    for (int w = 0; w < 2; w++) {
+        const int g = setup->mesh[e].side[w].gear;
+        const size_t n = (size_t)setup->modal[g].n;
+        if (setup->engagements_of[g] < 2) continue;
+        memset(engaged->given_modes[w], 0, PARTS * n * sizeof(gk_real));
+        for (int part = 0; part < PARTS; part++)
+            gk_rows_push_modes(setup, work, e, w, x[part], engaged->given_modes[w] + (size_t)part * n);
+    }
     memset(engaged->given_far, 0, 2 * (size_t)setup->far * sizeof *engaged->given_far);
     gk_rows_push_far(setup, work, e, x[FORCE_PART], engaged->given_far);
     gk_rows_push_far(setup, work, e, x[DAMPER_PART], engaged->given_far + setup->far);
@@ -78,6 +86,25 @@ static field others(const gk_model *model, const gk_setup *setup, gk_work *work,
     return f;
 }
 
+/* adds what the rows of an engagement read of a gear's modes under the forces of its other engagements */
+static void take_modes(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e,
+                       int which, double read[PARTS][MAX_STRIDE])
+{
+    const int g = setup->mesh[e].side[which].gear, n = setup->modal[g].n;
+    gk_real *sum = work->scaled;
+    for (int part = 0; part < PARTS; part++) {
+        const gk_real *by = part == D_PART ? k->flow[g].mobility : k->flow[g].kappa;
+        memset(sum, 0, (size_t)n * sizeof *sum);
+        for (int c = 0; c < model->engagements; c++)
+            for (int w = 0; w < 2 && c != e; w++) {
+                const gk_real *given = work->engaged[c].given_modes[w] + part * n;
+                for (int i = 0; i < n && setup->mesh[c].side[w].gear == g; i++) sum[i] += given[i];
+            }
+        for (int i = 0; i < n; i++) sum[i] *= by[i];
+        gk_rows_read_modes(setup, work, e, which, sum, read[part]);
+    }
+}
+
 /* what the others do to the rows of an engagement: gaps in the step (outer), deflection at once (beyond). Returns how much
  * that has changed, against the largest gap and deflection. */
 static double take(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e)
@@ -91,6 +118,8 @@ static double take(const gk_model *model, const gk_setup *setup, gk_work *work, 
         for (int l = 0; l < setup->mesh[e].spins; l++)
             gk_axpy(f.spin[part][setup->mesh[e].spin[l]], s->rigid[l], read[part], 0, s->stride / 4);
     }
+    for (int w = 0; w < 2; w++)
+        if (setup->engagements_of[setup->mesh[e].side[w].gear] > 1) take_modes(model, setup, work, k, e, w, read);
     for (int i = 0; i < 2; i++) gk_rows_read_far(model, setup, work, e, f.far[i], far[i]);
     for (int i = 0; i < s->n; i++) {
         const int clutch = s->kind[i] == ROW_CLUTCH;

@@ -105,6 +105,7 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
             const gk_point *point = gk_point_of(setup, &engaged->place[p], strip);
             s->g[i] += point->gap;
             s->rigid[0][i] = point->gradient[PHIA], s->rigid[1][i] = point->gradient[PHIB];
+            if (mesh->frame >= 0) s->rigid[2][i] = -point->gradient[PHIA] - point->gradient[PHIB];
         }
     for (int i = s->contacts; i < s->n; i++) {
         const int clutch = s->kind[i] == ROW_CLUTCH;

@@ -16,7 +16,7 @@ enum {
     MAX_ROWS = MAX_CONTACTS + MAX_JOINTS,
     MAX_STRIDE = (MAX_ROWS + 3) / 4 * 4,
     KINDS = 3,    /* of compliance: D, −K, Q */
-    MAX_LOCAL = 6 /* spins that an engagement's rows read */
+    MAX_LOCAL = 7 /* spins that an engagement's rows read */
 };
 /* λ ≥ 0; any λ; given torque; velocity-level friction */
 typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;

@@ -55,6 +55,7 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *matrix;    /* D, A, P, J, L, B */
     double *given_ground,
         given_spin[3][MAX_LOCAL]; /* what the forces give to ground group (3, n) and spins: z, λ, dampers */
+    gk_real *given_modes[2];      /* (3, n): the same to the gear groups that other engagements read too */
     double *given_far;            /* (2, far): λ, dampers at the end */
     double *far;                  /* (rows, far): rows of contacts and joints there */
     gk_step_side table[2];
@@ -117,6 +118,8 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
                   double *read);
 void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
                            const double *ground, double *read);
+void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, gk_real *out);
+void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
 void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
                      const double *(*y)(const gk_system *));
 /* does a joint pull at the bore of its port's rotor? */

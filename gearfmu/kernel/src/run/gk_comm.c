@@ -1,6 +1,7 @@
 /* Communication steps: start from equilibrium, inputs carried through the step (docs/theory.md, 5), guards around the
  * internal step. */
 #include "run/gk_run.h"
+#include "setup/gk_kinematics.h"
 
 static const double ULP = 2.220446049250313e-16;
 enum { HALVINGS = 3 };
@@ -40,25 +41,10 @@ static double start_speed(const gk_model *model, const gk_data *data, int p)
     return model->port[p].kind == PORT_TORQUE ? v[V_W_START] : model->port[p].kind == PORT_SPRING ? v[V_W_IN] : 0.0;
 }
 
-/* rotors without a port turn as their neighbours make them */
-static void follow(const gk_model *model, gk_data *data, int known[MAX_ROTORS])
-{
-    for (int changed = 1; changed;) {
-        changed = 0;
-        for (int e = 0; e < model->engagements; e++)
-            for (int w = 0; w < 2; w++) {
-                const gk_engagement *engagement = &model->engagement[e];
-                const gk_gear *from = &model->gear[engagement->gear[w]], *to = &model->gear[engagement->gear[1 - w]];
-                if (engagement->kind == MESH_FLAT || !known[from->rotor] || known[to->rotor]) continue;
-                data->v[to->rotor] = -engagement->kind * data->v[from->rotor] * from->r_b / to->r_b;
-                known[to->rotor] = changed = 1;
-            }
-    }
-}
-
 static void start_speeds(const gk_model *model, gk_data *data)
 {
-    int known[MAX_ROTORS] = {0};
+    int known[MAX_ROTORS];
+    for (int r = 0; r < model->rotors; r++) known[r] = model->inertia[r] == 0.0;
     memset(data->v, 0, sizeof data->v);
     for (int p = 0; p < model->ports; p++) {
         const gk_port *port = &model->port[p];
@@ -71,7 +57,7 @@ static void start_speeds(const gk_model *model, gk_data *data)
         data->v[port->rotor] = w;
         known[port->rotor] = 1;
     }
-    follow(model, data, known);
+    gk_kinematics_follow(model, known, data->v); /* rotors without a port */
 }
 
 static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data)

@@ -167,7 +167,10 @@ static double transmission_error(const gk_model *model, const gk_data *data, int
     const gk_engagement *engagement = &model->engagement[e];
     const gk_gear *A = &model->gear[engagement->gear[0]], *B = &model->gear[engagement->gear[1]];
     const double sense = engagement->kind == MESH_INTERNAL ? -1.0 : 1.0;
-    return A->r_b * data->rotor[A->rotor][V_GEAR_PHI] + sense * B->r_b * data->rotor[B->rotor][V_GEAR_PHI];
+    const int f = gk_frame_of(model, engagement);
+    const double frame = f < 0 ? 0.0 : data->x[f];
+    return A->r_b * (data->rotor[A->rotor][V_GEAR_PHI] - frame) +
+           sense * B->r_b * (data->rotor[B->rotor][V_GEAR_PHI] - frame);
 }
 
 static void outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h)
@@ -241,7 +244,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
     }
     data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
     for (int d = 0; d < setup->spins; d++)
-        data->stage[V_ENERGY] += 0.5 * data->v[d] * data->v[d] / setup->inverse_inertia[d];
+        data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
 }
 
 void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)

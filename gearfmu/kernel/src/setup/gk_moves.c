@@ -42,9 +42,8 @@ static int common_rows(const gk_model *model, const gk_setup *setup, const gk_si
     const int directions = gk_directions(setup);
     for (int c = 0; c < directions; c++) rows[c] = base->moved[side->gear][c];
     rows[directions] = nothing;
-    for (int p = 0; p < model->ports; p++)
-        if (model->port[p].rotor == model->gear[side->gear].rotor)
-            rows[directions] = base->port_rows + p * base->n + base->from[side->gear];
+    const int port = gk_port_of(model, side->gear);
+    if (port >= 0) rows[directions] = base->port_rows + port * base->n + base->from[side->gear];
     return directions + 1;
 }
 

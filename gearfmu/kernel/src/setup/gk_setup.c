@@ -34,7 +34,7 @@ static int share_rotor(const gk_model *model, const gk_engagement *a, const gk_e
     for (int i = 0; i < 2; i++)
         for (int j = 0; j < 2; j++)
             if (model->gear[a->gear[i]].rotor == model->gear[b->gear[j]].rotor) return 1;
-    return 0;
+    return gk_frame_of(model, a) >= 0 && gk_frame_of(model, a) == gk_frame_of(model, b);
 }
 
 /* Engagements that share a rotor belong to one island. Where one has more than one member, their residuals meet through the
@@ -61,6 +61,13 @@ static void find_islands(const gk_model *model, gk_setup *setup)
         setup->islands++;
         if (members > 1) setup->far = (model->ground[setup->base.set].n + model->supports + 3) / 4 * 4;
     }
+}
+
+static void count_engagements(const gk_model *model, gk_setup *setup)
+{
+    for (int g = 0; g < model->gears; g++) setup->engagements_of[g] = 0;
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++) setup->engagements_of[model->engagement[e].gear[w]]++;
 }
 
 /* ---- layout ------------------------------------------------------------------------------------------------------- */
@@ -146,6 +153,8 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
         const gk_side *side = &setup->mesh[e].side[w];
         const size_t points = (size_t)(side->candidates * setup->strips);
         engaged->basis[w] = reals(b, contacts * (size_t)setup->modal[side->gear].n);
+        const int shared = setup->engagements_of[side->gear] > 1;
+        engaged->given_modes[w] = reals(b, shared ? 3 * (size_t)setup->modal[side->gear].n : 0);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
     }
@@ -207,6 +216,7 @@ static size_t largest(const gk_model *model, gk_setup *setup)
     for (int s = 0; s < model->sets; s++)
         if (model->ground[s].n > ground) ground = model->ground[s].n, setup->base.set = s;
     find_islands(model, setup);
+    count_engagements(model, setup);
     ground = (ground + 3) / 4 * 4 + 4 * MAX_ROTORS; /* every rotor's part is padded */
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
@@ -408,7 +418,7 @@ static void fill_parts(const gk_model *model, const gk_base *base, gk_mesh *mesh
         const int g = mesh->side[w].gear;
         mesh->part[w] = (gk_span){base->from[g], base->width[g]};
         for (int p = 0; p < mesh->ports; p++)
-            if (model->port[mesh->port[p]].rotor == model->gear[g].rotor)
+            if (gk_port_of(model, g) == mesh->port[p])
                 mesh->part[w] = hull(mesh->part[w], base->port_span[mesh->port[p]]);
     }
     gk_span *a = &mesh->part[0], *b = &mesh->part[1];
@@ -462,7 +472,7 @@ static void fill_port_support(const gk_model *model, gk_setup *setup, int p)
 static void fill_ports(const gk_model *model, gk_setup *setup)
 {
     setup->spins = model->rotors + 2 * model->chains;
-    for (int r = 0; r < model->rotors; r++) setup->inverse_inertia[r] = 1.0 / model->inertia[r];
+    for (int r = 0; r < model->rotors; r++) setup->inverse_inertia[r] = model->inertia[r] > 0.0 ? 1.0 / model->inertia[r] : 0.0;
     for (int p = 0; p < model->ports; p++) {
         const gk_port *port = &model->port[p];
         const int torque = port->kind == PORT_TORQUE;
@@ -486,11 +496,13 @@ static void fill_spins(const gk_model *model, gk_mesh *mesh)
     const gk_engagement *e = &model->engagement[mesh->index];
     mesh->spins = 2;
     for (int w = 0; w < 2; w++) mesh->spin[w] = model->gear[e->gear[w]].rotor;
+    mesh->frame = gk_frame_of(model, e);
+    if (mesh->frame >= 0) mesh->spin[mesh->spins++] = mesh->frame;
     for (int p = 0; p < model->ports; p++) {
         int first = -1;
         for (int i = 0; i < model->engagements && first < 0; i++)
             for (int w = 0; w < 2; w++)
-                if (model->gear[model->engagement[i].gear[w]].rotor == model->port[p].rotor) first = i;
+                if (gk_port_of(model, model->engagement[i].gear[w]) == p) first = i;
         if (first != mesh->index || mesh->ports == 2) continue;
         const int slot = mesh->ports++;
         mesh->port[slot] = p;
@@ -599,6 +611,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
         for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
     }
     find_islands(model, setup);
+    count_engagements(model, setup);
     lay_out_setup(model, setup, behind(setup, sizeof *setup), modes, list_ground(model, setup, which));
     memset(work, 0, sizeof *work);
     lay_out_work(model, setup, work, behind(work, sizeof *work));

@@ -110,7 +110,8 @@ typedef struct gk_mesh { /* an engagement */
     int at[2];            /* where the part of either gear begins in such a row */
     int joined;           /* both gears read the same oscillators: what a step does has no tables */
     int ports, port[2];   /* ports whose rows stand in this engagement's system */
-    int spins, spin[6];   /* spins that its rows read: rotor of A, of B, chains' inertias and discs */
+    int spins, spin[7];   /* spins that its rows read: rotor of A, of B, of their frame, chains' inertias and discs */
+    int frame;            /* rotor of the frame, −1: the ground */
     int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
@@ -163,6 +164,7 @@ struct gk_setup {
     gk_effects on;
     int slices;
     int spatial; /* axial motion and tilt count, every strip has a gap of its own; else the strips of a tooth pair share it */
+    int engagements_of[MAX_GEARS];
     int strips; /* contact rows of a tooth pair: slices, or half of them where both halves of the face width do the same */
     int spins;
     double h, gamma_at[GAMMAS];
@@ -196,6 +198,11 @@ static inline const double *gk_ground_seen(const gk_data *data) { return data->o
 static inline const gk_real *gk_modal_seen(const gk_setup *setup, const gk_data *data, int g)
 {
     return (const gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
+}
+/* kinetic energy of a spin */
+static inline double gk_kinetic(const gk_setup *setup, int d, double speed)
+{
+    return setup->inverse_inertia[d] > 0.0 ? 0.5 * speed * speed / setup->inverse_inertia[d] : 0.0;
 }
 /* numbers of the spins of a port's chain */
 static inline int gk_inertia_of(const gk_model *model, int port)

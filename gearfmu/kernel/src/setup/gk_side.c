@@ -90,7 +90,7 @@ typedef struct node { /* what a node's tables are made from */
     double *support;     /* (points, supports): C_fs */
     double *port;        /* (points) */
     double *flexibility; /* (modes) 1/ω² of the dynamic ones */
-    int port_of;         /* port of this gear's rotor, −1: none */
+    int port_of;         /* the port that the gear feels, −1: none */
 } node;
 
 static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
@@ -486,9 +486,7 @@ static node begin_node(const gk_model *model, const gk_setup *setup, double *roo
     n.support = room, room += most * (size_t)model->supports;
     n.port = room, room += most;
     n.flexibility = room;
-    n.port_of = -1;
-    for (int p = 0; p < model->ports; p++)
-        if (model->port[p].rotor == n.gear->rotor) n.port_of = p;
+    n.port_of = gk_port_of(model, side->gear);
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
     gk_strips_rows(model, setup, n.e, side->gear, n.weight);
     return n;
