@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gearfmu.body.bodies import load_bodies, reduce_bodies
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
@@ -16,11 +17,13 @@ __all__ = [
     "ReducedBody",
     "body_path",
     "inspect_file",
+    "load_bodies",
     "load_body",
     "load_interface_body",
     "load_set_bodies",
     "load_stage_bodies",
     "mounted",
+    "reduce_bodies",
     "reduce_set",
     "reduce_stage",
 ]

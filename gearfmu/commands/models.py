@@ -27,18 +27,19 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    from gearfmu.body import reduce_stage
+    from gearfmu.body import reduce_bodies
 
     with progress_bar("reducing") as progress:
-        return spec, reduce_stage(spec, progress=by_text(progress))
+        return spec, reduce_bodies(spec, progress=by_text(progress))
 
 
 def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
-    """`bodies_of` for a verb that needs a model of the stage: a SpecError, before anything is reduced, for a stage that
-    has none yet."""
-    from gearfmu.spec.stage import load_stage, require_motion
+    """`bodies_of` for a verb that needs a model of the stage: a SpecError, before anything is reduced, for a set that
+    does not say all that it needs to move."""
+    from gearfmu.spec.expand import as_general
+    from gearfmu.spec.stage import load_stage
 
-    require_motion(load_stage(stage))
+    as_general(load_stage(stage))
     return bodies_of(stage)
 
 

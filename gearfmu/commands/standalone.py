@@ -31,7 +31,7 @@ def steady_run(
     model: StageModel, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None
 ) -> Trace:
     """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
-    from gearfmu.spec.turning import mesh_teeth
+    from gearfmu.spec.turning import meshings
     from gearfmu.stage import Steady, simulate
 
     driven = {name: model.stage.ports[name] for name in (model.shafts.input, model.shafts.output)}
@@ -49,7 +49,7 @@ def steady_run(
         H=drive["step"],
         settle=drive["settle"],
         scene="constant speed and load",
-        meshes={mesh: list(known) for mesh, known in mesh_teeth(model.stage).items()},
+        meshes={mesh: known.plain for mesh, known in meshings(model.stage).items()},
         torque=drive["torque"],
         speed=drive["speed"],
     )

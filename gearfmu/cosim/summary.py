@@ -12,7 +12,7 @@ from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.turning import mesh_teeth
+from gearfmu.spec.turning import meshings
 
 TORQUES = (
     "{}.shaft.tau",
@@ -43,7 +43,7 @@ def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
         "settle": scene.settle,
         "unit": "kernel" if source.fmu_path is None else "fmu",
         "chain_in_fmu": bool(scene.passenger_car and scene.passenger_car.chain_in_fmu),
-        "meshes": {mesh: list(known) for mesh, known in mesh_teeth(source.model.stage).items()},
+        "meshes": {mesh: known.plain for mesh, known in meshings(source.model.stage).items()},
     }
 
 

@@ -22,7 +22,7 @@ import scipy.linalg as sl
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
 from gearfmu.spec.general import ShaftBody
-from gearfmu.spec.turning import mesh_teeth, turns
+from gearfmu.spec.turning import meshings, turns
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly import mount_sets
 from gearfmu.stage.groups import Group
@@ -89,7 +89,7 @@ def full_kernel(model: StageModel) -> Kernel:
 def places_of(model: StageModel) -> list[MeshPlace]:
     """The engagements that turn with the ports."""
     turning = turns(model.stage, model.shafts.input)
-    return [place_of(model, name) for name, (rotor, _) in mesh_teeth(model.stage).items() if rotor in turning]
+    return [place_of(model, name) for name, meshing in meshings(model.stage).items() if meshing.rotor in turning]
 
 
 def largest_torque(model: StageModel) -> float:
@@ -100,14 +100,15 @@ def largest_torque(model: StageModel) -> float:
 def engagements_per_turn(model: StageModel) -> list[float]:
     """(E,): tooth engagements of every mesh in one revolution of the input, 0 where it does not turn with it."""
     turning = turns(model.stage, model.shafts.input)
-    return [abs(float(turning.get(rotor, 0))) * teeth for rotor, teeth in mesh_teeth(model.stage).values()]
+    found = meshings(model.stage).values()
+    return [abs(float(m.relative(turning))) * m.teeth if m.rotor in turning else 0.0 for m in found]
 
 
 def largest_speed(model: StageModel) -> float:
     """Speed of the input (rad/s) that brings no engagement beyond its speed_max."""
-    cycles, teeth = engagements_per_turn(model), mesh_teeth(model.stage)
+    cycles, known = engagements_per_turn(model), meshings(model.stage)
     meshes = zip(model.stage.engagements, cycles, strict=True)
-    return min(mesh.speed_max * teeth[mesh.name][1] / each for mesh, each in meshes if each)
+    return min(mesh.speed_max * known[mesh.name].teeth / each for mesh, each in meshes if each)
 
 
 def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:

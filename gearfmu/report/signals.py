@@ -10,7 +10,7 @@ import numpy as np
 
 from gearfmu.report.metrics import mesh_angle
 from gearfmu.spec.expand import as_general
-from gearfmu.spec.turning import mesh_teeth
+from gearfmu.spec.turning import Meshing, meshings
 from gearfmu.stage.trace import Trace
 
 GEAR_SPEED = ".gear.w"
@@ -45,11 +45,15 @@ def meshes(trace: Trace) -> list[str]:
 def mesh_angles(trace: Trace, spec: Any = None) -> dict[str, np.ndarray]:
     """Mesh angle (n,) rad of every engagement whose gear's speed and teeth are known, from the stage `spec` or the
     trace's meta "meshes"."""
-    known = mesh_teeth(as_general(spec)) if spec is not None else dict(trace.meta.get("meshes") or {})
+    if spec is not None:
+        known = meshings(as_general(spec))
+    else:
+        known = {mesh: Meshing.of_plain(own) for mesh, own in dict(trace.meta.get("meshes") or {}).items()}
+    speeds = {name.removesuffix(GEAR_SPEED): trace[name] for name in trace.channels if name.endswith(GEAR_SPEED)}
     return {
-        mesh: mesh_angle(trace.time, trace[rotor + GEAR_SPEED], int(teeth))
-        for mesh, (rotor, teeth) in known.items()
-        if rotor + GEAR_SPEED in trace
+        mesh: mesh_angle(trace.time, meshing.relative(speeds), meshing.teeth)
+        for mesh, meshing in known.items()
+        if {meshing.rotor, meshing.carrier} - {None} <= set(speeds)
     }
 
 

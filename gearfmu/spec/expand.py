@@ -1,11 +1,15 @@
-"""Builders: a pair file in the terms of any stage."""
+"""Builders: a pair file and a planetary set in the terms of any stage."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
-from gearfmu.spec.gear import GearSpec
+from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.gear import Bearing, GearSpec
 from gearfmu.spec.general import (
+    CarrierBody,
     EngagementSpec,
     GearBody,
     GeneralStage,
@@ -15,11 +19,16 @@ from gearfmu.spec.general import (
     ShaftBody,
     SupportSpec,
 )
+from gearfmu.spec.general_checks import with_relief_rolls
+from gearfmu.spec.planetary import CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec
+from gearfmu.spec.planetary_checks import mesh_torque
 from gearfmu.spec.stage import StageSpec
 
 
-def as_general(spec: StageSpec | GeneralStage) -> GeneralStage:
-    """The stage in the terms of any stage, whichever way its file is written."""
+def as_general(spec: StageSpec | GeneralStage | PlanetarySpec) -> GeneralStage:
+    """The stage in the terms of any stage, whichever way its file is written. SpecError: `expand_set`."""
+    if isinstance(spec, PlanetarySpec):
+        return expand_set(spec)
     return expand_pair(spec) if isinstance(spec, StageSpec) else spec
 
 
@@ -29,7 +38,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
     angles: dict[str, Any] = {"normal_module": pair.normal_module, "pressure_angle": pair.pressure_angle}
     pinion, wheel = spec.gears
-    bodies: dict[str, GearBody | RingBody | ShaftBody] = {}
+    bodies: dict[str, GearBody | RingBody | ShaftBody | CarrierBody] = {}
     for gear, hand in zip(spec.gears, (1, -1), strict=True):
         known = {name: getattr(gear, name) for name in GearSpec.model_fields} | {"bearing": None}
         bodies[gear.name] = GearBody(**known, **angles, helix_angle=hand * pair.helix_angle + 0.0)
@@ -65,3 +74,134 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
         ports={g.name: PlacedPort(**dict(spec.ports[g.name]), body=g.name) for g in spec.gears},
         levels=spec.levels,
     )
+
+
+def expand_set(spec: PlanetarySpec) -> GeneralStage:
+    """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
+    carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
+    springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim.
+
+    SpecError for what a set needs to move and does not say.
+    """
+    if problems := motion_problems(spec):
+        raise SpecError(problems)
+    assert spec.contact is not None
+    planets = [f"planet{k + 1}" for k in range(spec.set.planets)]
+    angles: dict[str, Any] = {"normal_module": spec.set.normal_module, "pressure_angle": spec.set.pressure_angle}
+    bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, "sun", angles)}
+    bodies |= {name: _set_gear(spec.planet, name, angles) for name in planets}
+    ring = {name: getattr(spec.ring, name) for name in RingSpec.model_fields} | {"mounts": None}
+    bodies["ring"] = RingBody(**ring, kind="ring", **angles)
+    carrier = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
+    bodies["carrier"] = CarrierBody(**carrier, name="carrier", kind="carrier")
+    stage = GeneralStage(
+        name=spec.name,
+        description=spec.description,
+        source=spec.source,
+        slices=spec.contact.slices,
+        bodies=bodies,
+        rotors=_set_rotors(spec, planets),
+        engagements=_set_meshes(spec, planets),
+        supports=_set_supports(spec, planets),
+        ports={
+            name: PlacedPort(**dict(port), body=name, node="bore" if name == "carrier" else None)
+            for name, port in spec.ports.items()
+        },
+        levels=spec.levels,
+    )
+    return with_relief_rolls(stage)
+
+
+def set_gears(spec: PlanetarySpec, bodies: Sequence[Any]) -> list[Any]:
+    """Sun, every planet, ring and carrier of the reduced bodies sun, planet, ring, carrier of a set."""
+    sun, planet, ring, carrier = bodies
+    return [sun, *[planet] * spec.set.planets, ring, carrier]
+
+
+def motion_problems(spec: PlanetarySpec) -> list[Problem]:
+    """What a set needs to move and does not say."""
+    example = 'stiffness = "3e8 N/m", axial = "1e8 N/m", tilt = "1e5 N*m/rad"'
+    given = {
+        "speed_max": (spec.speed_max, 'speed_max = "300 rad/s"'),
+        "contact": (spec.contact, 'damping = "50e3 N*s/m^2"'),
+        "ring.mounts": (spec.ring.mounts, 'points = 6, stiffness = "1e8 N/m"'),
+    }
+    held = {"sun": spec.sun.bearing, "planet": spec.planet.bearing, "carrier": spec.carrier.bearing}
+    given |= {f"{name}.bearing": (bearing, example) for name, bearing in held.items()}
+    for name, bearing in held.items():
+        for field in ("axial", "tilt") if bearing is not None else ():
+            given[f"{name}.bearing.{field}"] = (getattr(bearing, field), example)
+    found = [
+        Problem(str(spec.source), field, "missing", f"a set needs it to move: write {how}")
+        for field, (value, how) in given.items()
+        if value is None
+    ]
+    if set(spec.ports) != {"carrier", "sun"}:
+        remedy = 'a set is driven and loaded at its carrier and its sun: write [ports.carrier] and [ports.sun], e.g. kind'
+        found.append(Problem(str(spec.source), "ports", ", ".join(spec.ports) or "missing", f'{remedy} = "torque"'))
+    return found
+
+
+def _set_gear(gear: SetGearSpec, name: str, angles: dict[str, Any]) -> GearBody:
+    known = {field: getattr(gear, field) for field in SetGearSpec.model_fields}
+    return GearBody(**known | {"name": name, "bearing": None}, **angles)
+
+
+def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]:
+    rotors = {"sun": RotorSpec(axis=(0.0, 0.0), bodies={"sun": 0.0}, carried_by="carrier")}
+    for k, name in enumerate(planets):
+        angle = 2 * math.pi * k / spec.set.planets
+        c, s = math.cos(angle), math.sin(angle)
+        radial, tangential = spec.set.pin_errors.get(k, (0.0, 0.0))
+        rotors[name] = RotorSpec(
+            axis=(spec.set.center_distance * c, spec.set.center_distance * s),
+            offset=(radial * c - tangential * s, radial * s + tangential * c),
+            bodies={name: 0.0},
+            carried_by="carrier",
+        )
+    rotors["ring"] = RotorSpec(axis=(0.0, 0.0), bodies={"ring": 0.0}, carried_by="carrier", stands=True)
+    rotors["carrier"] = RotorSpec(axis=(0.0, 0.0), bodies={"carrier": 0.0})
+    return rotors
+
+
+def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
+    assert spec.contact is not None and spec.speed_max is not None
+    z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
+    common: dict[str, Any] = {"backlash": spec.set.backlash, "damping": spec.contact.damping}
+    torque, relative = mesh_torque(spec), spec.speed_max * z_r  # teeth past a planet in the carrier's axes
+    return tuple(
+        EngagementSpec(name=f"sun_{p}", gears=("sun", p), torque_max=torque, speed_max=relative / z_s, **common)
+        for p in planets
+    ) + tuple(
+        EngagementSpec(
+            name=f"ring_{p}", gears=(p, "ring"), torque_max=torque * z_p / z_s, speed_max=relative / z_p, **common
+        )
+        for p in planets
+    )
+
+
+def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec, ...]:
+    sun, pin, carrier, mounts = spec.sun.bearing, spec.planet.bearing, spec.carrier.bearing, spec.ring.mounts
+    assert sun and pin and carrier and mounts
+    all_mounts, radius = mounts.points * mounts.stiffness, spec.ring.rim_diameter / 2
+    return (
+        _held("sun", sun),
+        *(_held(name, pin, to="carrier", node=f"bolt{k}") for k, name in enumerate(planets)),
+        _held("carrier", carrier, node="bore"),
+        SupportSpec(
+            name="ring",
+            body="ring",
+            radial=all_mounts,
+            axial=all_mounts,
+            tilt=all_mounts * radius**2 / 2,
+            torsion=all_mounts * radius**2,
+            damping_ratio=mounts.damping_ratio,
+        ),
+    )
+
+
+def _held(body: str, bearing: Bearing, **where: Any) -> SupportSpec:
+    return SupportSpec(
+        name=body, body=body, radial=bearing.stiffness, axial=bearing.axial, tilt=bearing.tilt,
+        damping_ratio=bearing.damping_ratio, **where,
+    )  # fmt: skip

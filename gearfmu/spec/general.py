@@ -14,7 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size
 from gearfmu.spec.lead import LeadSpec, Misalignment
-from gearfmu.spec.planetary import MountsSpec, RingSpec
+from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
 from gearfmu.spec.ports import Frequency, LevelSpec, PortSpec
 
 Place = Annotated[float, Quantity("m")]
@@ -118,10 +118,26 @@ class ShaftBody(Spec):
         return sum(section.length for section in self.sections)
 
 
+class CarrierBody(CarrierSpec):
+    """A planet carrier. Its nodes are "bore" and "bolt0", "bolt1" …; builders write it, from a file of kind
+    planetary_set."""
+
+    name: Name = Field(description="name of the carrier")
+    kind: Literal["carrier"] = Field(description="kind of body")
+
+
 class RotorSpec(Spec):
     """Bodies that turn together about one axis."""
 
-    axis: tuple[Place, Place] = Field(description="x and y of the axis")
+    axis: tuple[Place, Place] = Field(description="x and y of the axis; of a carried rotor, in the carrier's axes")
+    offset: tuple[Place, Place] = Field(
+        default=(0.0, 0.0), description="deviation of the axis from that place: teeth stand as if there were none"
+    )
+    carried_by: Name | None = Field(
+        default=None,
+        description="rotor in whose axes this one and its supports stand, a planet carrier's; the ground when absent",
+    )
+    stands: bool = Field(default=False, description="it does not turn: supports with torsion hold it")
     bodies: Annotated[dict[Name, Place], Field(min_length=1)] = Field(
         description="place of every body along the axis: mid-width of a gear, beginning of a shaft"
     )
@@ -154,6 +170,7 @@ class SupportSpec(Spec):
     body: Name = Field(description="body that is held")
     to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
     at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+    node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
     radial: Spring | None = Field(default=None, description="stiffness along x and y")
     axial: Spring | None = Field(default=None, description="stiffness along the axis")
     tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
@@ -166,8 +183,6 @@ class SupportSpec(Spec):
     def _holds(self) -> SupportSpec:
         if all(value is None for value in (self.radial, self.axial, self.tilt, self.torsion)):
             raise refuse('a support needs a stiffness: radial, axial, tilt or torsion, e.g. radial = "3e8 N/m"')
-        if self.to is None and self.torsion is not None:
-            raise refuse("a support on the ground cannot hold the rotor's spin: take torsion away, or write a port")
         return self
 
 
@@ -176,6 +191,7 @@ class PlacedPort(PortSpec):
 
     body: Name = Field(description="body whose node is the port")
     at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
+    node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
 
 
 class GeneralStage(Spec):
@@ -186,7 +202,7 @@ class GeneralStage(Spec):
     source: Path
     kind: Literal["general"] = Field(default="general", description="kind of stage")
     slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
-    bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody, Field(discriminator="kind")]] = Field(
+    bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody, Field(discriminator="kind")]] = Field(
         description="bodies by name"
     )
     rotors: dict[Name, RotorSpec] = Field(description="rotors by name; every body in one of them")
@@ -229,6 +245,19 @@ class GeneralStage(Spec):
             and all(gear.lead is None for gear in self.gears)
             and all(mesh.misalignment is None for mesh in self.engagements)
         )
+
+    @property
+    def carriers(self) -> tuple[CarrierBody, ...]:
+        """Planet carriers in the order of the file."""
+        return tuple(body for body in self.bodies.values() if isinstance(body, CarrierBody))
+
+    def carrier_of(self, rotor: str) -> str | None:
+        """Name of the rotor in whose axes a rotor stands; None: the ground."""
+        return self.rotors[rotor].carried_by
+
+    def frame_of(self, mesh: EngagementSpec) -> str | None:
+        """Name of the rotor in whose axes an engagement rolls; None: the ground."""
+        return self.carrier_of(self.rotor_of(mesh.gears[0]))
 
     def rotor_of(self, body: str) -> str:
         """Name of the rotor that a body belongs to."""

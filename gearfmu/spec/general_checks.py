@@ -32,7 +32,12 @@ def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
 
 
 def _rotors(stage: GeneralStage) -> Found:
-    """Every body in exactly one rotor, and bodies that exist."""
+    """Every body in exactly one rotor, and bodies that exist; carriers only where builders write them."""
+    for carrier in stage.carriers:
+        yield f"bodies.{carrier.name}.kind", "carrier", "a carrier belongs to a set: write a file of kind planetary_set"
+    for name, rotor in stage.rotors.items():
+        if rotor.carried_by is not None:
+            yield f"rotors.{name}.carried_by", rotor.carried_by, "write a file of kind planetary_set"
     counts = Counter(name for rotor in stage.rotors.values() for name in rotor.bodies)
     for name, rotor in stage.rotors.items():
         for body in rotor.bodies:
@@ -106,6 +111,9 @@ def _held(stage: GeneralStage) -> Found:
     """What is held to what: bodies of one rotor with torsion, bodies of two without."""
     for support in stage.supports:
         if support.to is None:
+            if support.torsion is not None and not stage.rotors[stage.rotor_of(support.body)].stands:
+                remedy = "a support on the ground cannot hold a spin: take torsion away, write a port, or stands = true"
+                yield f"supports.{support.name}.torsion", f"{support.torsion}", remedy
             continue
         same = stage.rotor_of(support.body) == stage.rotor_of(support.to)
         if not same:

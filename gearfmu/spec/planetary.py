@@ -9,9 +9,11 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
-from gearfmu.spec.gear import BodySpec, Factor, Length, Material, RackSpec, Ratio, Size
+from gearfmu.spec.gear import Bearing, BodySpec, Factor, Length, Material, RackSpec, Ratio, Size, TipRelief
 from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
+from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
 
+Deviation = Annotated[float, Quantity("m", at_least=-1e-3, at_most=1e-3)]
 CouplingKind = Literal["rigid", "averaging"]
 
 
@@ -30,6 +32,9 @@ class SetSpec(Spec):
     backlash: Size = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")
     load_sharing: Annotated[float, Quantity(at_least=1, at_most=4)] = Field(
         default=1.35, description="mesh load factor K_gamma: most loaded planet over the mean (ISO 6336-1)"
+    )
+    pin_errors: dict[Annotated[Count, Field(ge=0, le=11)], tuple[Deviation, Deviation]] = Field(
+        default={}, description="deviation of single pins from their places: number of the planet → radial, tangential"
     )
 
 
@@ -51,6 +56,11 @@ class SetGearSpec(Spec):
     material: Material = Field(description="material")
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
     body: BodySpec = Field(description="mesh and reduction")
+    bearing: Bearing | None = Field(
+        default=None,
+        description="of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion",
+    )
+    tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
     imported: ImportSpec | None = Field(
         default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
     )
@@ -59,11 +69,6 @@ class SetGearSpec(Spec):
     def index_deviation(self) -> dict[int, float]:
         """No pitch errors are declared for a set yet."""
         return {}
-
-    @property
-    def tip_relief(self) -> None:
-        """No tip relief is declared for a set yet."""
-        return None
 
 
 class MountsSpec(Spec):
@@ -75,6 +80,7 @@ class MountsSpec(Spec):
     stiffness: Annotated[float, Quantity("N/m", above=0)] = Field(
         description="stiffness of one mount, the same in all three directions"
     )
+    damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m), of all mounts together")
 
 
 class RingSpec(Spec):
@@ -144,6 +150,7 @@ class CarrierSpec(Spec):
     )
     modes: Annotated[Count, Field(ge=24, le=2000)] = Field(default=120, description="number of oscillators stored")
     mesh: CarrierMeshSpec = Field(default_factory=CarrierMeshSpec, description="element counts")
+    bearing: Bearing | None = Field(default=None, description="between its bore and the ground; for motion")
     imported: CarrierImportSpec | None = Field(
         default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
     )
@@ -168,6 +175,12 @@ class PlanetarySpec(Spec):
     planet: SetGearSpec = Field(description="one planet; all are equal")
     ring: RingSpec = Field(description="ring")
     carrier: CarrierSpec = Field(description="carrier")
+    speed_max: Annotated[float, Quantity("rad/s", above=0)] | None = Field(
+        default=None, description="largest speed of the carrier; for motion"
+    )
+    contact: ContactSpec | None = Field(default=None, description="tooth contact; for motion")
+    ports: dict[Name, PortSpec] = Field(default={}, description="ports: carrier and sun, in the order input, output")
+    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
 
     @property
     def gears(self) -> tuple[SetGearSpec, SetGearSpec, RingSpec]:

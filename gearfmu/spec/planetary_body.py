@@ -11,7 +11,8 @@ SET_BODIES = ("sun", "planet", "ring", "carrier")
 
 
 def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
-    """Everything that shapes the body `name` of a set, in SI, and nothing else: not torque, backlash, load sharing.
+    """Everything that shapes the body `name` of a set, in SI, and nothing else: not torque, backlash, load sharing,
+    bearings, relief, contact, ports, levels.
 
     An imported body depends on the contents of its files, not on our element counts; SpecError when a file is missing.
     """
@@ -21,12 +22,14 @@ def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
     if name == "carrier":
         place = {"planets": s.planets, "center_distance": s.center_distance, "seat": spec.planet.face_width}
         couplings = ["bore", *(f"bolt{k}" for k in range(s.planets))]
-        carrier = spec.carrier.model_dump(exclude={"coupling", "imported"})
+        carrier = spec.carrier.model_dump(exclude={"coupling", "imported", "bearing"})
         if spec.carrier.imported is not None:
             carrier.pop("mesh")
             carrier["import"] = import_inputs(spec.carrier.imported, spec.source, "carrier.import")
         return common | place | carrier | {"coupling": {c: spec.carrier.coupling_of(c) for c in couplings}}
-    gear = spec.gears[SET_BODIES.index(name)].model_dump(exclude={"name", "imported"})
+    gear = spec.gears[SET_BODIES.index(name)].model_dump(exclude={"name", "imported", "bearing", "tip_relief"})
+    if gear.get("mounts"):
+        gear["mounts"].pop("damping_ratio")
     if name != "ring":
         gear["rack"].pop("addendum")  # the tip diameter says where the tooth ends
     if (imported := getattr(spec, name).imported) is not None:

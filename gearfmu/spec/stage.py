@@ -91,16 +91,6 @@ def require_pair(spec: Any) -> None:
         raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
 
 
-def require_motion(spec: Any) -> None:
-    """SpecError for a stage that has bodies, but no motion in time yet: a planetary set."""
-    if spec.kind == "planetary_set":
-        remedy = (
-            "planetary sets can be meshed, reduced and inspected so far, their motion in time is not built yet: name a "
-            "stage of kind external_pair or general, such as fzg_c or two_stage"
-        )
-        raise SpecError([Problem(str(spec.source), "kind", f'"{spec.kind}"', remedy)])
-
-
 def _load_pair(layers: Layers) -> StageSpec:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import GeneralStage, ToothedBody
+from gearfmu.spec.general import EngagementSpec, GeneralStage, ToothedBody
 from gearfmu.spec.ports import PortSpec
 
 
@@ -35,22 +36,63 @@ def shafts_of(stage: GeneralStage) -> Shafts:
 
 
 def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
-    """Speeds of the rotors that are geared to the rotor of `port`, itself among them, by name: per its unit speed."""
-    found = {stage.rotor_of(stage.ports[port].body): Fraction(1)}
-    for _ in stage.engagements:
+    """Speeds of the rotors that are geared to the rotor of `port`, itself among them, and of those that stand, by name:
+    per its unit speed. Engagements roll in the axes of the rotor that carries them (Willis)."""
+    found = {name: Fraction(0) for name, rotor in stage.rotors.items() if rotor.stands}
+    found[stage.rotor_of(stage.ports[port].body)] = Fraction(1)
+    for _ in range(len(stage.rotors)):
         for mesh in stage.engagements:
-            for here, there in (mesh.gears, mesh.gears[::-1]):
-                known, other = stage.rotor_of(here), stage.rotor_of(there)
-                if known in found and other not in found:
-                    sense = 1 if stage.internal(mesh) else -1
-                    found[other] = sense * found[known] * Fraction(_teeth(stage, here), _teeth(stage, there))
+            a, b = (stage.rotor_of(gear) for gear in mesh.gears)
+            frame = stage.frame_of(mesh)
+            unknown = [name for name in {a, b, frame} - {None} if name not in found]
+            if len(unknown) == 1 and unknown[0] is not None:
+                found[unknown[0]] = _speed_of(stage, mesh, unknown[0], found)
     return found
 
 
-def mesh_teeth(stage: GeneralStage) -> dict[str, tuple[str, int]]:
-    """Of every engagement by name: the rotor of its gear A and that gear's teeth. The mesh frequency is their speed
-    times their number."""
-    return {m.name: (stage.rotor_of(m.gears[0]), _teeth(stage, m.gears[0])) for m in stage.engagements}
+def _speed_of(stage: GeneralStage, mesh: EngagementSpec, rotor: str, known: dict[str, Fraction]) -> Fraction:
+    """Speed of the one rotor of an engagement that is not known: z_A (w_A − w_f) ± z_B (w_B − w_f) = 0."""
+    (a, b), frame = (stage.rotor_of(gear) for gear in mesh.gears), stage.frame_of(mesh)
+    z_a, z_b = (_teeth(stage, gear) for gear in mesh.gears)
+    z_b *= -1 if stage.internal(mesh) else 1
+    if rotor == frame:
+        return (z_a * known[a] + z_b * known[b]) / (z_a + z_b)
+    carried = known[frame] if frame is not None else Fraction(0)
+    other, ratio = (b, Fraction(z_b, z_a)) if rotor == a else (a, Fraction(z_a, z_b))
+    return carried - (known[other] - carried) * ratio
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """How often an engagement meets. rotor: of its gear A, carrier: that carries both gears (None: the ground), by
+    name; teeth: of gear A. Mesh frequency: (ω_rotor − ω_carrier)·teeth/2π."""
+
+    rotor: str
+    carrier: str | None
+    teeth: int
+
+    def relative(self, speeds: Mapping[str, Any]) -> Any:
+        """Speed of gear A in the axes that carry it, from speeds by rotor."""
+        return speeds[self.rotor] if self.carrier is None else speeds[self.rotor] - speeds[self.carrier]
+
+    @property
+    def plain(self) -> list[Any]:
+        """For a trace's meta: rotor, teeth, and the carrier where there is one."""
+        return [self.rotor, self.teeth, *([] if self.carrier is None else [self.carrier])]
+
+    @classmethod
+    def of_plain(cls, known: Sequence[Any]) -> Meshing:
+        """The inverse of `plain`."""
+        rotor, teeth, *carrier = known
+        return cls(str(rotor), str(carrier[0]) if carrier else None, int(teeth))
+
+
+def meshings(stage: GeneralStage) -> dict[str, Meshing]:
+    """The `Meshing` of every engagement by name."""
+    return {
+        m.name: Meshing(stage.rotor_of(m.gears[0]), stage.frame_of(m), _teeth(stage, m.gears[0]))
+        for m in stage.engagements
+    }
 
 
 def with_ports(spec: Any, ports: dict[str, PortSpec]) -> Any:

@@ -3,15 +3,18 @@ name."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.expand import as_general, set_gears
 from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
@@ -29,9 +32,9 @@ PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
 
-def assemble(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
-    """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; rolls: of the even grid along
-    a flank.
+def assemble(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
+    """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; of a set its sun, planet,
+    ring and carrier; rolls: of the even grid along a flank.
 
     ModelError when a body does not belong to its gear.
     """
@@ -40,17 +43,23 @@ def assemble(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int =
     return StageModel(spec, write_blob(sections), hashes)
 
 
-def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> dict[str, Any]:
+def general_sections(
+    spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any], rolls: int = ROLLS
+) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
-    stage = as_general(spec)
+    stage, carriers = as_general(spec), {}
+    if isinstance(spec, PlanetarySpec):
+        *bodies, carrier = set_gears(spec, bodies)
+        carriers = {stage.carriers[0].name: carrier}
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
-    layout = stage_layout(stage, bodies, rolls)
+    layout = stage_layout(stage, bodies, rolls, carriers)
+    nodes = port_nodes(stage, carriers)
     groups = mount_sets(layout)
     degrees = width_degrees(stage, bodies)
-    sections = stage_sections(stage) | _port_sections(stage, groups[0])
+    sections = stage_sections(stage) | _port_sections(stage, groups[0], nodes)
     sections |= {
         "counts": np.array(
             [MODEL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),
@@ -67,9 +76,9 @@ def general_sections(spec: StageSpec | GeneralStage, bodies: Sequence[Any], roll
         place = stage.place(gear.name, None)
         sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
         sections |= index_section(i, gear, shape) | lead_section(i, gear)
-        sections |= _gear_sections(stage, i, bodies[i], groups)
+        sections |= _gear_sections(stage, i, bodies[i], groups, nodes)
     for s, group in enumerate(groups):
-        sections |= set_sections(s, group, port_nodes(stage))
+        sections |= set_sections(s, group, nodes)
     return sections
 
 
@@ -82,7 +91,7 @@ def mount_sets(layout: Layout) -> list[Group]:
         return [mount(layout)]
 
 
-def _port_sections(stage: GeneralStage, group: Group) -> dict[str, Any]:
+def _port_sections(stage: GeneralStage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
     """Kinds, numbers and static compliances of the ports, in the order of the stage."""
     rotors = list(stage.rotors)
     numbers = [_port_numbers(port) for port in stage.ports.values()]
@@ -90,7 +99,7 @@ def _port_sections(stage: GeneralStage, group: Group) -> dict[str, Any]:
         [rotors.index(stage.rotor_of(port.body)), *own[:2]]
         for port, own in zip(stage.ports.values(), numbers, strict=True)
     ]
-    return port_compliances(group, port_nodes(stage)) | {
+    return port_compliances(group, nodes) | {
         "port_kinds": np.array(kinds).reshape(len(kinds), 3).astype(np.int32),
         "ports": np.array([own[2:] for own in numbers]).reshape(len(kinds), 6),
     }
@@ -120,13 +129,15 @@ def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str
     }
 
 
-def _gear_sections(stage: GeneralStage, index: int, body: Any, groups: Sequence[Group]) -> dict[str, Any]:
+def _gear_sections(
+    stage: GeneralStage, index: int, body: Any, groups: Sequence[Group], nodes: Sequence[tuple[int, int]]
+) -> dict[str, Any]:
     """Sections of gear `index`, of its scope and in every set of ground oscillators."""
     flank = groups[0].layout.bodies[index].flank
     assert flank is not None
     name, chosen = stage.gears[index].name, flank.chosen
     meshes = sum(name in mesh.gears for mesh in stage.engagements)
-    tables = flank_sections(index, groups, port_nodes(stage))
+    tables = flank_sections(index, groups, nodes)
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
     return tables | {
         f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
@@ -180,7 +191,9 @@ def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) ->
     }
 
 
-def port_nodes(stage: GeneralStage) -> list[tuple[int, int]]:
-    """(body, node) of every port, in the order of the stage."""
-    nodes = stage_nodes(stage)
-    return [nodes.find(stage, port.body, port.at) for port in stage.ports.values()]
+def port_nodes(
+    stage: GeneralStage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})
+) -> list[tuple[int, int]]:
+    """(body, node) of every port, in the order of the stage. carriers: reduced, by name."""
+    nodes = stage_nodes(stage, carriers)
+    return [nodes.find(stage, port.body, port.at, port.node) for port in stage.ports.values()]

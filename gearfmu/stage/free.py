@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.beam import BeamBody
+from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
 from gearfmu.stage.tables import OFFSETS, blend
 
 NODE_MEMBERS = np.array([1, 2, 0, 1, 2, 0])  # x, y and rx, ry are pairs, z and rz single
+NOISE = 1e-7  # of the static compliance of a carrier: smaller residuals are rounding of its Krylov vectors
 SILENT = 1e-6  # bore rows of patterns of nodal diameter 2 and more, relative: must vanish
 
 
@@ -47,7 +49,7 @@ class Flank:
 class FreeBody:
     """A free body on its axis. mass (6, 6) of the rigid motion x, y, z, rx, ry, rz about its origin on the axis (kg,
     kg·m, kg·m²); omega (n,) rad/s and zeta (n,) of its elastic modes; place (K,) m: interface nodes along the axis,
-    from the origin; rows (K, 6, n), kg^-½ and kg^-½/m: nodes in the modes; residual (6K, 6K), m/N …: nodes beyond the
+    from the origin, across (K, 2) m: beside it; rows (K, 6, n), kg^-½ and kg^-½/m: nodes in the modes; residual (6K, 6K), m/N …: nodes beyond the
     modes."""
 
     name: str
@@ -58,11 +60,15 @@ class FreeBody:
     rows: np.ndarray
     residual: np.ndarray
     flank: Flank | None = None
+    across: np.ndarray | None = None
 
     def rigid_rows(self, node: int) -> np.ndarray:
-        """(6, 6): rigid motion of the body → motion of a node on the axis."""
+        """(6, 6): rigid motion of the body → motion of a node."""
         rows = np.eye(6)
         rows[0, 4], rows[1, 3] = self.place[node], -self.place[node]
+        if self.across is not None:
+            x, y = self.across[node]
+            rows[0, 5], rows[1, 5], rows[2, 3], rows[2, 4] = -y, x, y, -x
         return rows
 
 
@@ -105,6 +111,29 @@ def free_shaft(name: str, beam: BeamBody, damping_ratio: float) -> FreeBody:
     """The FreeBody of a shaft, its origin the centre of mass; all its modes with one damping ratio."""
     zeta = np.full(beam.omega.size, damping_ratio)
     return FreeBody(name, beam.mass, beam.omega, zeta, beam.place, beam.rows, beam.residual)
+
+
+def free_carrier(body: InterfaceBody) -> FreeBody:
+    """The FreeBody of a carrier, its origin that of its own file; nodes in the order of its interfaces.
+
+    ModelError where an interface has not all six directions.
+    """
+    short = [i["name"] for i in body.interfaces if len(i["components"]) != 6]
+    if short:
+        raise ModelError(f"body '{body.name}': {', '.join(short)} must move in all six directions to hold planets")
+    omega, count = 2 * np.pi * body.frequency, len(body.interfaces)
+    residual = _symmetric(body.static - _products(body.rows / omega**2, body.rows))
+    scale = np.sqrt(np.abs(np.diag(body.static)))
+    return FreeBody(
+        name=body.name,
+        mass=body.rigid_mass,
+        omega=omega,
+        zeta=body.damping_ratio,
+        place=body.point[:, 2],
+        rows=body.rows.reshape(count, 6, -1),
+        residual=np.where(np.abs(residual) > NOISE * np.outer(scale, scale), residual, 0.0),
+        across=body.point[:, :2],
+    )
 
 
 def turn_tables(values: np.ndarray, member: np.ndarray) -> np.ndarray:

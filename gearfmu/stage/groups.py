@@ -21,8 +21,9 @@ C_fs: per unit force on the *first* body, and its reaction on the second. Elonga
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
 
 import numpy as np
 import scipy.linalg as sl
@@ -67,23 +68,44 @@ class Support:
 
 @dataclass(frozen=True)
 class Layout:
-    """Bodies, rotors (bodies that spin together, every body in one) and supports; planar: motion x and y alone."""
+    """Bodies, rotors (bodies that spin together, every body in one) and supports; planar: motion x and y alone.
+
+    stands: rotors that do not spin; carried: rotor → the rotor in whose axes it stands, and x and y (m) of its axis
+    there.
+    """
 
     bodies: Sequence[FreeBody]
     rotors: Sequence[tuple[int, ...]]
     supports: Sequence[Support]
     planar: bool
+    stands: frozenset[int] = frozenset()
+    carried: Mapping[int, tuple[int, float, float]] = field(default_factory=dict)
 
     def freedoms(self, body: int) -> tuple[int, ...]:
         """Rigid freedoms of a body among the unknowns: its own rotation too where other bodies share its spin."""
         if self.planar:
             return PLANAR
-        shared = any(body in rotor and len(rotor) > 1 for rotor in self.rotors)
-        return (*SPATIAL, SPIN) if shared else SPATIAL
+        rotor = next(r for r, own in enumerate(self.rotors) if body in own)
+        own_rotation = len(self.rotors[rotor]) > 1 or rotor in self.stands or rotor in self.frames
+        return (*SPATIAL, SPIN) if own_rotation else SPATIAL
+
+    @property
+    def frames(self) -> set[int]:
+        """Rotors that carry others."""
+        return {frame for frame, *_ in self.carried.values()}
 
     def inertia(self, rotor: int) -> float:
-        """Moment of inertia of a rotor about its axis, kg·m²."""
-        return float(sum(self.bodies[b].mass[SPIN, SPIN] for b in self.rotors[rotor]))
+        """Moment of inertia of a rotor about its axis, kg·m², the masses that it carries included; 0 where it
+        stands."""
+        if rotor in self.stands:
+            return 0.0
+        carried = sum(
+            self.bodies[b].mass[0, 0] * (x * x + y * y)
+            for r, (frame, x, y) in self.carried.items()
+            for b in self.rotors[r]
+            if frame == rotor
+        )
+        return float(sum(self.bodies[b].mass[SPIN, SPIN] for b in self.rotors[rotor]) + carried)
 
     def mass(self, body: int, direction: int) -> float:
         """Mass, or moments of inertia of the single bodies, of the rotor that a body belongs to, kg or kg·m²."""
@@ -279,24 +301,28 @@ def _eigenproblem(
 
 
 def _without_spins(layout: Layout, at: Sequence[slice], mass: np.ndarray) -> np.ndarray:
-    """(raw, n): basis of all motion that is orthogonal, in the mass metric, to the common rotation of every rotor."""
+    """(raw, n): basis of all motion that is orthogonal, in the mass metric, to the common rotation of every rotor and
+    of what it carries."""
     basis = np.eye(len(mass))
     drop = []
-    for rotor in layout.rotors:
-        if layout.planar or len(rotor) == 1:
+    for r, rotor in enumerate(layout.rotors):
+        if layout.planar or r in layout.stands or (len(rotor) == 1 and r not in layout.frames):
             continue
-        turns = [at[b].start + SPIN for b in rotor]
-        inertia = mass[turns] @ _indicator(len(mass), turns)
-        first = int(np.argmax(inertia))
-        for turn, own in zip(turns, inertia, strict=True):
-            basis[turns[first], turn] -= own / inertia[first]
-        drop.append(turns[first])
+        momentum = mass @ _rotation(layout, at, r, len(mass))
+        turns = np.flatnonzero(momentum)
+        first = int(turns[np.argmax(momentum[turns])])
+        basis[first, turns] -= momentum[turns] / momentum[first]
+        drop.append(first)
     return np.delete(basis, drop, axis=1)
 
 
-def _indicator(size: int, places: Sequence[int]) -> np.ndarray:
+def _rotation(layout: Layout, at: Sequence[slice], rotor: int, size: int) -> np.ndarray:
+    """(raw,): unit rotation of a rotor; the axes of what it carries move on, but do not turn."""
     vector = np.zeros(size)
-    vector[list(places)] = 1.0
+    vector[[at[b].start + SPIN for b in layout.rotors[rotor]]] = 1.0
+    for carried, (frame, x, y) in layout.carried.items():
+        for b in layout.rotors[carried] if frame == rotor else ():
+            vector[at[b].start : at[b].start + 2] = -y, x
     return vector
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
 from gearfmu.spec.general import GeneralStage, ShaftBody, SupportSpec, ToothedBody
 from gearfmu.spec.shapes import gear_shape
-from gearfmu.stage.free import FreeBody, free_gear, free_shaft
+from gearfmu.stage.free import FreeBody, free_carrier, free_gear, free_shaft
 from gearfmu.stage.groups import Layout, Support
 from gearfmu.stage.tables import MOST_FUNCTIONS, ROLLS, excited_modes, resampling, symmetric_functions
 
@@ -23,30 +25,35 @@ SEEN = 1e-9  # rows of a mode, relative to the largest: below it nothing excites
 
 @dataclass(frozen=True)
 class Nodes:
-    """Where bodies are held and driven. numbers: name of a body → its number, gears first in the order of the stage;
-    places: name of a shaft → places (K,) m of its nodes in the stage, ascending."""
+    """Where bodies are held and driven. numbers: name of a body → its number, gears first in the order of the stage,
+    then shafts and carriers; places: name of a shaft → places (K,) m of its nodes in the stage, ascending; names: of a
+    carrier → names of its nodes."""
 
     numbers: dict[str, int]
     places: dict[str, list[float]]
+    names: dict[str, list[str]]
 
-    def find(self, stage: GeneralStage, body: str, at: float | None) -> tuple[int, int]:
-        """(body, node) at a place; a gear has one node, its bore or its rim."""
+    def find(self, stage: GeneralStage, body: str, at: float | None, node: str | None = None) -> tuple[int, int]:
+        """(body, node) at a place; a gear has one node, its bore or its rim, a carrier those that have names."""
+        if body in self.names:
+            return self.numbers[body], self.names[body].index(node or "bore")
         if body not in self.places:
             return self.numbers[body], 0
         wanted = stage.place(body, at)
         return self.numbers[body], int(np.argmin(np.abs(np.array(self.places[body]) - wanted)))
 
 
-def stage_nodes(stage: GeneralStage) -> Nodes:
-    """The nodes of all bodies: those that supports and ports name."""
+def stage_nodes(stage: GeneralStage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> Nodes:
+    """The nodes of all bodies: those that supports and ports name. carriers: reduced, by name."""
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
-    ordered = [*(gear.name for gear in stage.gears), *(shaft.name for shaft in shafts)]
+    ordered = [body.name for body in (*stage.gears, *shafts, *stage.carriers)]
     places: dict[str, list[float]] = {}
     for shaft in shafts:
         wanted = [place_of(stage, s) for s in stage.supports if shaft.name in (s.body, s.to)]
         wanted += [stage.place(shaft.name, port.at) for port in stage.ports.values() if port.body == shaft.name]
         places[shaft.name] = _distinct(wanted)
-    return Nodes({name: i for i, name in enumerate(ordered)}, places)
+    names = {name: [str(i["name"]) for i in body.interfaces] for name, body in carriers.items()}
+    return Nodes({name: i for i, name in enumerate(ordered)}, places, names)
 
 
 def place_of(stage: GeneralStage, support: SupportSpec) -> float:
@@ -64,16 +71,33 @@ def width_degrees(stage: GeneralStage, bodies: Sequence[Any]) -> np.ndarray:
     return symmetric_functions(count) if stage.even else np.arange(min(count, MOST_FUNCTIONS))
 
 
-def stage_layout(stage: GeneralStage, bodies: Sequence[Any], rolls: int = ROLLS) -> Layout:
-    """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts."""
-    nodes, degrees = stage_nodes(stage), width_degrees(stage, bodies)
+def stage_layout(
+    stage: GeneralStage,
+    bodies: Sequence[Any],
+    rolls: int = ROLLS,
+    carriers: Mapping[str, InterfaceBody] = MappingProxyType({}),
+) -> Layout:
+    """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts and its reduced
+    `carriers`."""
+    nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
     free = [_gear(stage, gear, body, degrees, rolls) for gear, body in zip(stage.gears, bodies, strict=True)]
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
     free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
-    rotors = [tuple(nodes.numbers[name] for name in rotor.bodies) for rotor in stage.rotors.values()]
-    bare = Layout(free, rotors, [], stage.planar)
-    supports = [_support(stage, nodes, bare, support) for support in stage.supports]
-    return Layout(free, rotors, supports, stage.planar)
+    free += [replace(free_carrier(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
+    names = list(stage.rotors)
+    bare = Layout(
+        free,
+        [tuple(nodes.numbers[name] for name in rotor.bodies) for rotor in stage.rotors.values()],
+        [],
+        stage.planar,
+        frozenset(r for r, rotor in enumerate(stage.rotors.values()) if rotor.stands),
+        {
+            r: (names.index(rotor.carried_by), *rotor.axis)
+            for r, rotor in enumerate(stage.rotors.values())
+            if rotor.carried_by is not None
+        },
+    )
+    return replace(bare, supports=[_support(stage, nodes, bare, support) for support in stage.supports])
 
 
 def _gear(stage: GeneralStage, gear: ToothedBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
@@ -103,7 +127,7 @@ def _shaft(stage: GeneralStage, shaft: ShaftBody, places: Sequence[float]) -> Fr
 
 def _support(stage: GeneralStage, nodes: Nodes, layout: Layout, support: SupportSpec) -> Support:
     at, directions, compliance, damping = place_of(stage, support), [], [], []
-    first = nodes.find(stage, support.body, at)
+    first = nodes.find(stage, support.body, at, support.node if support.to is None else None)
     for field, own in STIFFNESS.items():
         stiffness = getattr(support, field)
         if stiffness is None:
@@ -115,13 +139,20 @@ def _support(stage: GeneralStage, nodes: Nodes, layout: Layout, support: Support
             compliance.append(0.0 if rigid else 1 / stiffness)
             damping.append(0.0 if rigid else 2 * support.damping_ratio * math.sqrt(stiffness * mass))
     return Support(
-        name=f"{'bearing' if support.to is None else 'seat'}.{support.name}",
+        name=f"{_kind(stage, support)}.{support.name}",
         first=first,
-        second=None if support.to is None else nodes.find(stage, support.to, at),
+        second=None if support.to is None else nodes.find(stage, support.to, at, support.node),
         directions=tuple(directions),
         compliance=np.diag(compliance),
         damping=np.array(damping),
     )
+
+
+def _kind(stage: GeneralStage, support: SupportSpec) -> str:
+    """What a support is called: a bearing on the ground, a pin between a carrier and what it carries, else a seat."""
+    if support.to is None:
+        return "bearing"
+    return "pin" if stage.rotor_of(support.body) != stage.rotor_of(support.to) else "seat"
 
 
 def _distinct(places: Sequence[float]) -> list[float]:

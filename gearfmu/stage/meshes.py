@@ -25,9 +25,15 @@ def mesh_geometry(stage: GeneralStage, mesh: EngagementSpec) -> MeshShape:
 
 
 def mesh_axes(stage: GeneralStage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Positions (x, y) m of A and B."""
+    """Positions (x, y) m of A and B, in the axes of what carries them, where their teeth are as they should be."""
     a, b = (stage.rotors[stage.rotor_of(name)].axis for name in mesh.gears)
     return a, b
+
+
+def _axes_as_they_are(stage: GeneralStage, mesh: EngagementSpec) -> list[float]:
+    """`mesh_axes` one after the other, with the deviations of the axes."""
+    rotors = [stage.rotors[stage.rotor_of(name)] for name in mesh.gears]
+    return [at + off for rotor in rotors for at, off in zip(rotor.axis, rotor.offset, strict=True)]
 
 
 def tooth_phases(stage: GeneralStage) -> dict[str, float]:
@@ -38,7 +44,14 @@ def tooth_phases(stage: GeneralStage) -> dict[str, float]:
     gears by equal lengths r_bA dα = −r_bB dβ from the pair by itself gives φ_B = γ + φ_B⁰ − (φ_A − γ) r_bA/r_bB.
     ModelError where a gear with several engagements cannot have all of them so: its axes do not fit its teeth.
     """
+    return _placed(stage)[0]
+
+
+def _placed(stage: GeneralStage) -> tuple[dict[str, float], list[int]]:
+    """`tooth_phases`, and of every engagement the tooth of B whose drive flank touches that of A's tooth 0: not 0 where
+    engagements close a loop, as those of sun, planets and ring."""
     phases: dict[str, float] = {}
+    shifts = []
     for mesh in stage.engagements:
         pair = mesh_geometry(stage, mesh)
         gamma = _direction(pair, *mesh_axes(stage, mesh))
@@ -48,13 +61,15 @@ def tooth_phases(stage: GeneralStage) -> dict[str, float]:
         first = phases.setdefault(a, 0.0)
         fitting = _phase_of_b(pair, first, gamma)
         pitch = 2 * math.pi / pair.gears[1].z
-        off = math.remainder(phases.setdefault(b, fitting) - fitting, pitch)
+        apart = phases.setdefault(b, fitting) - fitting
+        off = math.remainder(apart, pitch)
+        shifts.append(round((off - apart) / pitch))
         if abs(off) > SAME_ANGLE:
             raise ModelError(
                 f"engagement '{mesh.name}': with {a} and {b} where their other engagements put them, flanks "
                 f"miss each other by {1e3 * off * pair.gears[1].r_b:.3g} mm: move an axis"
             )
-    return {gear.name: phases.get(gear.name, 0.0) for gear in stage.gears}
+    return {gear.name: phases.get(gear.name, 0.0) for gear in stage.gears}, shifts
 
 
 def _direction(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
@@ -85,9 +100,12 @@ def stage_sections(stage: GeneralStage) -> dict[str, Any]:
         pair, (a, b) = mesh_geometry(stage, mesh), mesh_axes(stage, mesh)
         engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
         force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
-        numbers.append([*a, *b, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
+        place = _axes_as_they_are(stage, mesh)
+        numbers.append([*place, mesh.backlash, pair.nominal_backlash, mesh.damping, force, *_tilt(mesh, a, b)])
         periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
-    return {
+    shifts = _placed(stage)[1]
+    looped = {"tooth_shift": np.array(shifts, np.int32)} if any(shifts) else {}
+    return looped | _frame_section(stage) | {
         "name": stage.name,
         "rotor_names": "|".join(stage.rotors),
         "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
@@ -95,6 +113,14 @@ def stage_sections(stage: GeneralStage) -> dict[str, Any]:
         "engaged": np.array(engaged, np.int32),
         "engagement": np.array(numbers),
     }
+
+
+def _frame_section(stage: GeneralStage) -> dict[str, Any]:
+    """Rotors in whose axes the others stand; nothing where all stand on the ground."""
+    rotors, carriers = list(stage.rotors), [rotor.carried_by for rotor in stage.rotors.values()]
+    if not any(carriers):
+        return {}
+    return {"frame": np.array([-1 if name is None else rotors.index(name) for name in carriers], np.int32)}
 
 
 def _tilt(mesh: EngagementSpec, a: Sequence[float], b: Sequence[float]) -> tuple[float, float]:

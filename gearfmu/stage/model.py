@@ -9,6 +9,7 @@ from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, Variable
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.turning import Shafts, shafts_of
 from gearfmu.stage.blob import blob_hash
@@ -18,7 +19,7 @@ from gearfmu.stage.blob import blob_hash
 class StageModel:
     """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""
 
-    spec: StageSpec | GeneralStage
+    spec: StageSpec | GeneralStage | PlanetarySpec
     blob: bytes
     body_hashes: tuple[str, ...]
 
@@ -28,7 +29,7 @@ class StageModel:
 
     @cached_property
     def stage(self) -> GeneralStage:
-        """The stage in the terms of any stage: a pair file expanded."""
+        """The stage in the terms of any stage: a pair file or a set expanded."""
         return as_general(self.spec)
 
     @cached_property

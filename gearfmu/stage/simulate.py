@@ -11,6 +11,7 @@ import numpy as np
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
+from gearfmu.spec.turning import meshings, turns
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.te import statics_of
 from gearfmu.stage.trace import Channel, Trace
@@ -42,12 +43,13 @@ class Steady:
 
     @property
     def _pitch(self) -> float:
-        """Angle of the output (rad) over the longest pitch of the meshes on its rotor."""
-        stage = self.model.stage
-        rotor = stage.rotor_of(stage.ports[self.model.shafts.output].body)
-        gears = {name for mesh in stage.engagements for name in mesh.gears}
-        teeth = [g.teeth for g in stage.gears if g.name in gears and stage.rotor_of(g.name) == rotor]
-        return 2 * np.pi / min(teeth)
+        """Angle of the output (rad) over the longest pitch of the meshes that turn with it."""
+        stage, shafts = self.model.stage, self.model.shafts
+        speeds = turns(stage, shafts.output)
+        rotor = stage.rotor_of(stage.ports[shafts.output].body)
+        own = [m for m in meshings(stage).values() if m.rotor in speeds]
+        near = [m for mesh, m in zip(stage.engagements, own, strict=True) if rotor in map(stage.rotor_of, mesh.gears)]
+        return 2 * np.pi / min(abs(float(m.relative(speeds))) * m.teeth for m in near or own)
 
     def __call__(self, time: float) -> Mapping[str, float]:
         shafts, values = self.model.shafts, {}

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, TeState
+from gearfmu.spec.general import EngagementSpec, GeneralStage
 from gearfmu.spec.turning import turns
 from gearfmu.stage.meshes import kind_of, mesh_geometry
 from gearfmu.stage.model import StageModel
@@ -97,9 +98,19 @@ def place_of(model: StageModel, mesh: str | None) -> MeshPlace:
         raise ModelError(f"{model.name}: the engagement '{engagement.name}' does not turn with its ports: name another")
     pair = mesh_geometry(stage, engagement)
     a, b = pair.gears
-    speed_a, speed_b = (float(turning[rotor]) for rotor in rotors)
+    frame = stage.frame_of(engagement)
+    carried = float(turning[frame]) if frame is not None else 0.0
+    speed_a, speed_b = (float(turning[rotor]) - carried for rotor in rotors)
     pitch = kind_of(pair) * 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
-    return MeshPlace(number, pitch, a.r_b * speed_a, engagement.torque_max * abs(speed_a))
+    alike = _sharing(stage, engagement)
+    return MeshPlace(number, pitch, alike * a.r_b * speed_a, alike * engagement.torque_max * abs(speed_a))
+
+
+def _sharing(stage: GeneralStage, mesh: EngagementSpec) -> int:
+    """Among how many engagements the torque is shared out: those of the gear that meets several planets."""
+    if stage.frame_of(mesh) is None:
+        return 1
+    return max(sum(gear in other.gears for other in stage.engagements) for gear in mesh.gears)
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:

@@ -53,6 +53,8 @@ static line line_of_action(const pair *q, double sg)
     l.cosine = (dx * R + sg * dy * l.L) / a2;
     l.sine = (dy * R - sg * dx * l.L) / a2;
     l.t = gk_atan2(l.sine, l.cosine);
+    const double turned = l.t - q->mesh->action[sg < 0.0];
+    if (fabs(turned) > GK_PI) l.t += turned > 0.0 ? -2.0 * GK_PI : 2.0 * GK_PI; /* teeth are counted from there */
     l.nx = -sg * l.sine;
     l.ny = sg * l.cosine;
     const double radial = -sg * R / (a2 * l.L); /* ∂t = ∂arg d − sg R/(a L) ∂a */
@@ -178,7 +180,7 @@ typedef struct flank_side { /* one side of the teeth: base angles and lengths of
 static flank_side side_of(const pair *q, int flank)
 {
     const double sg = flank ? -1.0 : 1.0;
-    flank_side s = {.flank = flank, .shift = flank ? q->e->coast_shift : 0, .sg = sg, .l = line_of_action(q, sg)};
+    flank_side s = {.flank = flank, .shift = q->e->shift[flank], .sg = sg, .l = line_of_action(q, sg)};
     s.step = internal(q) ? 1 : -1;
     for (int i = 0; i < 2; i++) {
         const gk_gear *gear = q->gear[i];
@@ -217,7 +219,7 @@ static void place_sides(const pair *q, const gk_mesh *mesh, const flank_side *dr
         gk_position *at = &position[w];
         const gk_side *side = &mesh->side[w];
         const double u = drive->roll[w] / side->pitch, whole = gk_floor(u), x = (u - whole) * side->nodes;
-        at->reference = -(int64_t)whole;
+        at->reference = (w ? drive->shift : 0) - (int64_t)whole;
         at->tooth = modulo(at->reference, q->gear[w]->z);
         at->node = (int)x < side->nodes ? (int)x : side->nodes - 1;
         at->part = x - at->node;
@@ -379,6 +381,16 @@ static int find_flat(const pair *q, double reach, gk_position position[2], gk_pl
     return p->gap < reach;
 }
 
+/* t of both flanks where the gears stand without load: not cut at ±π, so that both count teeth alike */
+static void nominal_action(const pair *q, gk_mesh *mesh)
+{
+    const double turn = internal(q) ? -1.0 : 1.0;
+    double d[2];
+    apart(q, d);
+    const double towards = gk_atan2(turn * d[1], turn * d[0]), alpha = gk_acos(reach_of(q) / mesh->distance);
+    mesh->action[0] = towards - alpha, mesh->action[1] = towards + alpha;
+}
+
 /* Gaps of both flanks of a tooth together depend on the centre distance alone: straight but for its square */
 static const double BENDS = 20.0, SURE = 1e-6; /* of it per centre distance; m */
 
@@ -389,6 +401,7 @@ void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *m
     const double step = 1e-5;
     apart(&q, d);
     mesh->distance = sqrt(d[0] * d[0] + d[1] * d[1]);
+    nominal_action(&q, mesh);
     for (int i = 0; i < 2; i++) {
         for (int c = 0; c < 2; c++) pose[XB + c] = i * step * d[c] / mesh->distance;
         const flank_side drive = side_of(&q, 0), coast = side_of(&q, 1);

@@ -1,16 +1,23 @@
-/* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): proximal points. Every spin may move by
- * mobility × torque (an implicit "step" of a viscous body), everything else is compliance: the dynamic oscillators too, by
- * κ = −1/ω². Repeated until nothing moves. The mobility is large against all compliances, so a few iterations suffice;
- * each is a monotone complementarity problem. Islands come to rest one after the other: they know nothing of each other. */
+/* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): the potential energy of a stage at rest is
+ * least. Outer unknowns are the spins and the dynamic oscillators of the ground group; at given ones each engagement has
+ * its contact problem, everything else being compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces
+ * that are left, with the tangents of the engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W; islands come to rest one after the
+ * other: they know nothing of each other. */
 #include "integrate/gk_integrate.h"
 #include "setup/gk_kinematics.h"
 
-static const double MOBILITY = 1e-4; /* s²: divided by the inertia of a spin, rad/(N m) */
-static const double SEE = 3e-3;      /* m: look this far for flanks */
-static const double AT_REST = 1e-11; /* m: movement at MOBILITY that counts as none: some 1e-8 N are left … */
-static const double ROUNDING =
-    2e-7; /* … and what single precision of the rows leaves undecided of the deepest deflection */
-enum { REST_ITERATIONS = 150 };
+static const double MOBILITY = 1e-11; /* s²: divided by the inertia of a spin, rad/(N m): what a spin yields within an
+                                         engagement's problem, so that no row of it is without compliance */
+static const double LOOSE = 1e-4;     /* s²: the same of a motion that nothing holds, in the tangent */
+static const double FLOATS = 1e-11;   /* s²: of a motion that must not be moved */
+static const double TRUST = 2e-4; /* m: a move is not longer, twice that after every one that need not turn round … */
+static const double MOST_TRUST = 3e-3; /* … up to here */
+static const double OVERSHOT = 0.1;    /* of the force along a move: what may be left where it has turned round */
+static const double SEE = 3e-3;        /* m: look this far for flanks */
+static const double AT_REST = 1e-15, EXACT = 1e-11; /* m; of the deepest deflection: a move that is none */
+static const double ENOUGH = 1e-11,
+                    ROUNDING = 2e-7; /* the same where single precision of the rows leaves it undecided */
+enum { REST_ITERATIONS = 100, BACK = 60 };
 
 typedef struct rest { /* a search for rest */
     const gk_model *model;
@@ -19,11 +26,15 @@ typedef struct rest { /* a search for rest */
     gk_data *data;
     const gk_boundary *boundary;
     gk_coefficients k;
-    gk_motions motion; /* of the spins without deformation, no two of those that float alike in kinetic energy */
+    gk_motions motion;      /* of the spins without deformation, no two of those that float alike in kinetic energy */
     int floats[MAX_ROTORS]; /* motions that nothing holds */
     int leader[MAX_ROTORS]; /* port that decides where a motion begins, −1: none */
     double given[MAX_SPINS], before[MAX_SPINS];
-    int island; /* that comes to rest now */
+    int island;           /* that comes to rest now */
+    int unknowns;         /* spins, then lanes of the ground group */
+    double *force, *move; /* of them */
+    double *tangent;      /* (unknowns, unknowns) */
+    double trust;         /* m: how far the next move may go */
 } rest;
 
 static int searched(const rest *r, int e) { return r->setup.mesh[e].island == r->island; }
@@ -70,7 +81,8 @@ static double inertia_of(const rest *r, int a, int b)
 /* takes away from a motion what it has of another */
 static void take_away(rest *r, int from, int other, double share)
 {
-    for (int d = 0; d < r->setup.spins && share != 0.0; d++) r->motion.turn[from][d] -= share * r->motion.turn[other][d];
+    for (int d = 0; d < r->setup.spins && share != 0.0; d++)
+        r->motion.turn[from][d] -= share * r->motion.turn[other][d];
 }
 
 /* a rotor whose angle is given decides one of the motions that turn it; the others leave it at rest */
@@ -194,14 +206,11 @@ static int form(rest *r, int e)
 {
     gk_work *work = r->work;
     gk_engaged *engaged = &work->engaged[e];
-    double here[POSE], spun[POSE], moved[POSE];
-    gk_rows_pose(r->model, &r->setup, e, work->spin, work->ground_zero, spun);
+    double here[POSE], moved[POSE];
     gk_rows_pose(r->model, &r->setup, e, work->spin, work->rest_ground, engaged->pose);
     gk_rows_pose(r->model, &r->setup, e, r->data->x, work->rest_ground, here);
-    for (int d = 0; d < POSE;
-         d++) /* given torques move the pose, not the place; rigid motion by the oscillators is part of
-                                      the compliance */
-        moved[d] = spun[d] - here[d];
+    for (int d = 0; d < POSE; d++)
+        moved[d] = engaged->pose[d] - here[d]; /* given torques move the pose, not the place */
     engaged->places = gk_flank_find(r->model, &r->setup, &r->setup.mesh[e], here, SEE, engaged->position,
                                     engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
@@ -216,72 +225,195 @@ static int form(rest *r, int e)
     return 1;
 }
 
-/* the dynamic ground oscillators under the forces of the rows: returns how far their gears move by it */
-static double settle_ground(rest *r)
-{
-    const gk_base *base = &r->setup.base;
-    gk_work *work = r->work;
-    double moved = 0.0, change[MAX_GROUND + 4];
-    gk_rows_scatter(r->model, &r->setup, work, gk_step_force, gk_step_force);
-    for (int i = 0; i < base->n; i++) {
-        const double x = base->omega2[i] > 0.0 ? work->ground_force[i] / base->omega2[i] : 0.0;
-        change[i] = x - work->rest_ground[i];
-        work->rest_ground[i] = x;
-    }
-    for (int g = 0; g < r->model->gears && base->n; g++)
-        for (int c = 0; c < 2; c++)
-            moved = gk_max(moved, fabs(gk_dot_quads(base->centre[g] + c * base->n, change, base->n / 4)));
-    return moved;
-}
-
-static double relax(rest *r)
+/* all engagements of the island at the present spins and ground oscillators; 0: meaningless poses */
+static int press(rest *r)
 {
     gk_work *work = r->work;
-    const double mobility = r->k.rigid_mobility;
-    double z[MAX_SPINS] = {0};
-    int stuck = 0;
     for (int d = 0; d < r->setup.spins; d++) {
-        work->spin[d] = r->data->x[d] + mobility * r->setup.inverse_inertia[d] * r->given[d];
+        work->spin[d] = r->data->x[d] + MOBILITY * r->setup.inverse_inertia[d] * r->given[d];
         work->speed[d] = 2.0 * work->spin[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
     for (int g = 0; g < r->model->gears; g++) work->y[g] = work->zero;
-    work->ground_y = work->ground_zero;
+    work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
-        if (searched(r, e) && !form(r, e)) return NAN;
+        if (searched(r, e) && !form(r, e)) return 0;
     gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
-    for (int e = 0; e < r->model->engagements; e++) {
-        if (!searched(r, e)) continue;
-        const gk_mesh *mesh = &r->setup.mesh[e];
-        const gk_system *s = &work->engaged[e].system;
-        stuck |= s->limit_reached;
-        for (int l = 0; l < mesh->spins; l++)
-            for (int i = 0; i < s->n; i++) z[mesh->spin[l]] += s->rigid[l][i] * s->z[i];
-    }
-    double moved = settle_ground(r);
-    memcpy(r->before, r->data->x, sizeof r->before);
-    for (int d = 0; d < r->setup.spins; d++) {
-        if (!moves(r, d)) continue;
-        r->data->x[d] = work->spin[d] + mobility * r->setup.inverse_inertia[d] * z[d];
-        if (!gk_finite(r->data->x[d])) return NAN;
-    }
-    unroll(r);
-    for (int d = 0; d < r->setup.spins; d++)
-        moved = gk_max(moved, fabs(r->data->x[d] - r->before[d]) * arm_of(r, d < r->model->rotors ? d : 0));
-    for (int e = 0; e < r->model->engagements; e++)
-        if (searched(r, e)) gk_step_remember(&r->setup, &work->engaged[e], r->data, e);
-    return stuck ? gk_max(moved, 1.0) : moved;
+    return 1;
 }
 
-/* movement at MOBILITY below which the solution cannot be told from rest */
-static double rest_limit(const rest *r)
+/* the forces that are left */
+static void find_forces(rest *r)
+{
+    const gk_base *base = &r->setup.base;
+    const int spins = r->setup.spins;
+    for (int d = 0; d < spins; d++) r->force[d] = r->given[d];
+    for (int e = 0; e < r->model->engagements; e++) {
+        const gk_mesh *mesh = &r->setup.mesh[e];
+        const gk_system *s = &r->work->engaged[e].system;
+        for (int l = 0; l < mesh->spins && searched(r, e); l++)
+            r->force[mesh->spin[l]] += gk_dot_quads(s->rigid[l], s->z, s->stride / 4);
+    }
+    for (int d = 0; d < spins; d++)
+        if (!moves(r, d)) r->force[d] = 0.0;
+    gk_rows_scatter(r->model, &r->setup, r->work, gk_step_force, gk_step_force);
+    for (int i = 0; i < base->n; i++)
+        r->force[spins + i] = r->work->ground_force[i] - base->omega2[i] * r->work->rest_ground[i];
+}
+
+/* what the rows of an engagement have to do with unknown number `local` of its own: a spin or a lane of its part of the
+ * ground group. Returns its number among all, and which it is in `column` (0 in rows that are not active). */
+static int own_unknown(const rest *r, int e, int local, double *column)
+{
+    const gk_mesh *mesh = &r->setup.mesh[e];
+    const gk_engaged *engaged = &r->work->engaged[e];
+    const gk_system *s = &engaged->system;
+    const int spin = local < mesh->spins, lane = local - mesh->spins, width = mesh->part[0].width;
+    for (int i = 0; i < s->n; i++)
+        column[i] = !s->active[i] ? 0.0 : spin ? s->rigid[local][i] : engaged->ground[(size_t)i * mesh->local + lane];
+    for (int i = s->n; i < s->stride; i++) column[i] = 0.0;
+    if (spin) return mesh->spin[local];
+    return r->setup.spins + (lane < width ? mesh->part[0].from + lane : mesh->part[1].from + lane - width);
+}
+
+/* adds Wᵀ J⁻¹ W of an engagement */
+static void add_tangent(rest *r, int e)
+{
+    gk_system *s = &r->work->engaged[e].system;
+    const int own = r->setup.mesh[e].spins + r->setup.mesh[e].local;
+    double column[MAX_STRIDE], other[MAX_STRIDE];
+    if (!s->n) return;
+    gk_tangent_factorise(s);
+    for (int a = 0; a < own; a++) {
+        const int i = own_unknown(r, e, a, column);
+        gk_tangent_solve(s, column);
+        for (int b = 0; b <= a; b++) {
+            const int j = own_unknown(r, e, b, other);
+            const double k = gk_dot_quads(column, other, s->stride / 4);
+            r->tangent[(size_t)i * r->unknowns + j] += k;
+            if (a != b) r->tangent[(size_t)j * r->unknowns + i] += k;
+        }
+    }
+}
+
+static void find_tangent(rest *r)
+{
+    const int n = r->unknowns, spins = r->setup.spins;
+    memset(r->tangent, 0, (size_t)(n * n) * sizeof *r->tangent);
+    for (int d = 0; d < spins; d++) {
+        const double inverse = r->setup.inverse_inertia[d];
+        r->tangent[(size_t)d * n + d] = moves(r, d) && inverse > 0.0 ? 1.0 / (LOOSE * inverse) : 1.0;
+    }
+    for (int i = 0; i < r->setup.base.n; i++)
+        r->tangent[(size_t)(spins + i) * n + spins + i] = r->setup.base.omega2[i] > 0.0 ? r->setup.base.omega2[i] : 1.0;
+    for (int e = 0; e < r->model->engagements; e++)
+        if (searched(r, e)) add_tangent(r, e);
+    for (int t = 0; t < r->motion.count; t++) { /* what nothing holds */
+        const double *turn = r->motion.turn[t];
+        if (!r->floats[t] || !any_moves(r, t)) continue;
+        const double stiff = 1.0 / (FLOATS * inertia_of(r, t, t));
+        for (int a = 0; a < spins; a++)
+            for (int b = 0; b < spins && turn[a] != 0.0; b++)
+                if (turn[b] != 0.0)
+                    r->tangent[(size_t)a * n + b] += stiff * turn[a] * turn[b] /
+                                                     (r->setup.inverse_inertia[a] * r->setup.inverse_inertia[b]);
+    }
+    for (int d = 0; d < spins; d++) { /* what stands */
+        if (moves(r, d) && r->setup.inverse_inertia[d] > 0.0) continue;
+        for (int i = 0; i < n; i++) r->tangent[(size_t)d * n + i] = r->tangent[(size_t)i * n + d] = i == d;
+        r->force[d] = 0.0;
+    }
+}
+
+/* m: the longest way of a gear or a chain's inertia in a move */
+static double length_of(const rest *r, const double *move)
+{
+    const gk_base *base = &r->setup.base;
+    double longest = 0.0;
+    for (int d = 0; d < r->setup.spins; d++)
+        longest = gk_max(longest, fabs(move[d]) * arm_of(r, d < r->model->rotors ? d : 0));
+    for (int g = 0; g < r->model->gears && base->n; g++)
+        for (int c = 0; c < 3; c++)
+            longest = gk_max(longest,
+                             fabs(gk_dot_quads(base->centre[g] + c * base->n, move + r->setup.spins, base->n / 4)));
+    return longest;
+}
+
+static void go(rest *r, double share)
+{
+    const int spins = r->setup.spins;
+    for (int d = 0; d < spins; d++) r->data->x[d] += share * r->move[d];
+    for (int i = 0; i < r->setup.base.n; i++) r->work->rest_ground[i] += share * r->move[spins + i];
+}
+
+static double along(const rest *r)
+{
+    double sum = 0.0;
+    for (int i = 0; i < r->unknowns; i++) sum += r->force[i] * r->move[i];
+    return sum;
+}
+
+static int stuck(const rest *r)
+{
+    for (int e = 0; e < r->model->engagements; e++)
+        if (searched(r, e) && r->work->engaged[e].system.limit_reached) return 1;
+    return 0;
+}
+
+/* Goes along a move; where the force along it turns round, back to where it is gone (regula falsi, Illinois): contacts
+ * that close on the way are closed there, and the next tangent knows them. 0: meaningless poses. */
+static int go_along(rest *r)
+{
+    const double pull = along(r);
+    double from = 0.0, behind = pull, to = 1.0, at = 1.0, ahead = 0.0;
+    int back = 0;
+    go(r, 1.0);
+    for (; back <= BACK; back++) {
+        if (!press(r)) return 0;
+        find_forces(r);
+        const double left = along(r);
+        if (fabs(left) < OVERSHOT * pull || (!back && !(left < 0.0)) || back == BACK) break;
+        if (left < 0.0) {
+            if (back && ahead < 0.0) behind *= 0.5;
+            to = at, ahead = left;
+        } else {
+            ahead *= 0.5;
+            from = at, behind = left;
+        }
+        const double chord = behind / (behind - ahead), next = from + (to - from) * (back % 3 == 2 ? 0.5 : chord);
+        go(r, next - at);
+        at = next;
+    }
+    r->trust = back ? gk_max(0.5 * r->trust, TRUST) : gk_min(2.0 * r->trust, MOST_TRUST);
+    return 1;
+}
+
+/* One move, the problem solved before and after it. Returns how long it would have been, NAN where there is none. */
+static double relax(rest *r)
+{
+    memcpy(r->before, r->data->x, sizeof r->before);
+    find_forces(r);
+    find_tangent(r);
+    memcpy(r->move, r->force, (size_t)r->unknowns * sizeof *r->move);
+    if (!gk_limit_cholesky(r->tangent, r->unknowns)) return NAN;
+    gk_limit_solve(r->tangent, r->move, r->unknowns);
+    const double length = length_of(r, r->move), least = gk_min(1.0, r->trust / gk_max(length, 1e-300));
+    if (!gk_finite(length)) return NAN;
+    for (int i = 0; i < r->unknowns; i++) r->move[i] *= least;
+    if (!go_along(r)) return NAN;
+    unroll(r);
+    return stuck(r) ? gk_max(length, 1.0) : length;
+}
+
+/* m: how deep teeth overlap without deformation */
+static double deepest_of(const rest *r)
 {
     double deepest = 0.0;
     for (int e = 0; e < r->model->engagements; e++)
         for (int p = 0; p < r->work->engaged[e].places && searched(r, e); p++)
             deepest = gk_max(deepest, -r->work->engaged[e].place[p].gap);
-    return AT_REST + ROUNDING * deepest;
+    return deepest;
 }
 
 /* oscillators take the static share of the forces that hold the equilibrium */
@@ -321,7 +453,7 @@ static void spread(rest *r)
 }
 
 /* ---- the search -------------------------------------------------------------------------------------------------------- */
-/* κ = −1/ω² puts the dynamic oscillators into C′ too */
+/* κ = −1/ω² puts the dynamic modes of the gear groups into C′ too */
 static void set_compliance(rest *r)
 {
     r->k = r->work->explicit_rows;
@@ -332,15 +464,13 @@ static void set_compliance(rest *r)
         for (int i = 0; i < m->n; i++)
             r->k.flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
     }
-    for (int i = 0; i < r->setup.base.n; i++)
-        r->k.ground.kappa[i] = r->setup.base.omega2[i] > 0.0 ? -1.0 / r->setup.base.omega2[i] : 0.0;
+    r->k.rigid_mobility = MOBILITY;
 }
 
 static void clear_compliance(rest *r)
 {
     for (int g = 0; g < r->model->gears; g++)
         memset(r->k.flow[g].kappa, 0, (size_t)r->setup.modal[g].n * sizeof(gk_real));
-    memset(r->k.ground.kappa, 0, (size_t)r->setup.base.n * sizeof(double));
 }
 
 /* joints as the boundary wants them: no dampers; a clutch that slips at the start gives its friction torque */
@@ -365,21 +495,19 @@ static void set_joints(rest *r)
 
 static int search(rest *r)
 {
-    int solved = 0;
-    balance_rotation(r, solved);
-    /* where the linearised gaps lead in circles, once more with smaller moves */
-    for (double mobility = MOBILITY; mobility > 1e-4 * MOBILITY; mobility *= 0.01) {
-        double moved = INFINITY;
-        r->k.rigid_mobility = mobility;
-        for (int i = 0; i < REST_ITERATIONS && moved > 1e-14; i++) {
-            moved = relax(r);
-            if (!gk_finite(moved)) return 0;
-            balance_rotation(r, solved = 1);
-        }
-        if (moved * (MOBILITY / mobility) <= rest_limit(r)) return 1;
-        if (moved * (MOBILITY / mobility) > SEE) begin(r); /* out of sight of all flanks: from the start again */
+    double length = INFINITY;
+    r->trust = TRUST;
+    balance_rotation(r, 0);
+    if (!press(r)) return 0;
+    for (int i = 0; i < REST_ITERATIONS; i++) {
+        balance_rotation(r, 1);
+        length = relax(r);
+        if (!gk_finite(length)) return 0;
+        if (length <= AT_REST + EXACT * deepest_of(r)) break;
     }
-    return 0;
+    for (int e = 0; e < r->model->engagements; e++)
+        if (searched(r, e)) gk_step_remember(&r->setup, &r->work->engaged[e], r->data, e);
+    return length <= ENOUGH + ROUNDING * deepest_of(r);
 }
 
 /* Equilibrium under the given boundary: for each port a spring of stiffness k at angle phi, a held angle (PORT_FIXED, k =
@@ -389,6 +517,8 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
                            const gk_boundary *boundary, int bare, int keep)
 {
     rest r = {.model = model, .setup = *setup, .work = work, .data = data, .boundary = boundary};
+    r.unknowns = setup->spins + setup->base.n;
+    r.force = work->rest, r.move = r.force + r.unknowns, r.tangent = r.move + r.unknowns;
     for (int p = 0; p < model->ports && bare; p++) {
         r.setup.chained[p] = 0;
         r.setup.joint[p][JOINT_SHAFT].live = r.setup.joint[p][JOINT_CLUTCH].live = 0;

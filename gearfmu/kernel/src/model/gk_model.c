@@ -289,7 +289,7 @@ static double squared_distance(const gk_engagement *e)
     return x * x + y * y;
 }
 
-static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, const double *v)
+static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, int shift, const double *v)
 {
     gk_engagement *e = &m->engagement[i];
     demand(r,
@@ -297,7 +297,8 @@ static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, c
                counted(who + 2, -1, 1) && counted(who + 3, -4, 4),
            "engagements");
     if (r->outcome) return;
-    e->gear[0] = who[0], e->gear[1] = who[1], e->kind = (gk_mesh_kind)who[2], e->coast_shift = who[3];
+    e->gear[0] = who[0], e->gear[1] = who[1], e->kind = (gk_mesh_kind)who[2];
+    e->shift[0] = shift, e->shift[1] = shift + who[3];
     memcpy(e->position, v, sizeof e->position);
     e->backlash = v[4], e->nominal_backlash = v[5], e->damping = v[6], e->force_max = v[7];
     e->tilt[0] = v[8], e->tilt[1] = v[9];
@@ -324,11 +325,13 @@ static void read_engagements(reader *r, gk_model *m)
 {
     char names[MAX_ENGAGEMENTS][NAME_LENGTH];
     const int32_t *who = take(r, F_MODEL_engaged);
+    const int32_t *shift = take(r, F_MODEL_tooth_shift);
     const double *v = take(r, F_MODEL_engagement);
     read_names(r, F_MODEL_engagement_names, m->engagements, names);
     for (int i = 0; i < m->engagements && !r->outcome; i++) {
         memcpy(m->engagement[i].name, names[i], NAME_LENGTH);
-        read_engagement(r, m, i, who + 4 * i, v + 10 * i);
+        demand(r, !shift || counted(shift + i, -10000, 10000), "engagements");
+        if (!r->outcome) read_engagement(r, m, i, who + 4 * i, shift ? shift[i] : 0, v + 10 * i);
     }
 }
 

@@ -46,7 +46,7 @@ typedef struct gk_engagement {
     char name[NAME_LENGTH];
     gk_mesh_kind kind;
     int gear[2];
-    int coast_shift;       /* B's tooth of A's tooth k: −k on the drive flank, coast_shift − k on the coast flank */
+    int shift[2];          /* B's tooth of A's tooth k: shift − k, in a ring shift + k, by flank */
     double position[2][2]; /* x, y of both gears */
     double backlash, nominal_backlash, damping, force_max; /* backlash j_wt: of the pair; of the teeth as they are */
     double width;                                          /* common face width */

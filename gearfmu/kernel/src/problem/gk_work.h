@@ -87,8 +87,8 @@ struct gk_work {
     double run_h, run_gamma;     /* γ of the internal step of the run */
     gk_engaged *engaged;         /* (engagements) */
     /* statics (gk_static.c): every oscillator is compliance */
-    double *rest_ground;    /* (all ground oscillators) their displacement */
-    double *rest_rows;      /* (MAX_ROWS, all ground oscillators) */
+    double *rest_ground;    /* displacement of the ground group */
+    double *rest;           /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
     double *columns;        /* room for a node's rows and their products */
     double *far, *port_far; /* sums of an island: (3, n of ground) and (2, far); (ports, far) rows of the bore angles */
     uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */

@@ -243,8 +243,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         data->meshing[e].apart = v[V_CONTACT] == 0.0;
     }
     data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
-    for (int d = 0; d < setup->spins; d++)
-        data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
+    for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
 }
 
 void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)

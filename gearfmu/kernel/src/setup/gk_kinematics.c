@@ -21,11 +21,11 @@ static int unknown_of(const int rotor[3], const int known[MAX_ROTORS])
     return found;
 }
 
-static double speed_of(const gk_model *model, const gk_engagement *e, const int rotor[3], int which, const double *speed)
+static double speed_of(const gk_model *model, const gk_engagement *e, const int rotor[3], int which,
+                       const double *speed)
 {
     const double r_a = model->gear[e->gear[0]].r_b, r_b = model->gear[e->gear[1]].r_b;
-    if (which == 2)
-        return (r_a * speed[rotor[0]] + e->kind * r_b * speed[rotor[1]]) / (r_a + e->kind * r_b);
+    if (which == 2) return (r_a * speed[rotor[0]] + e->kind * r_b * speed[rotor[1]]) / (r_a + e->kind * r_b);
     const double here = which ? r_b : r_a, there = which ? r_a : r_b;
     if (rotor[2] < 0) return -e->kind * speed[rotor[1 - which]] * there / here;
     return speed[rotor[2]] - e->kind * (speed[rotor[1 - which]] - speed[rotor[2]]) * there / here;

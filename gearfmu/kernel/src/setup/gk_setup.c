@@ -169,7 +169,7 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
 {
     bump b = {base, 0};
-    size_t widest = 0, all = 0;
+    size_t widest = 0;
     const size_t ground = (size_t)setup->base.n;
     for (int g = 0; g < model->gears; g++) {
         const size_t n = (size_t)setup->modal[g].n;
@@ -194,9 +194,9 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         gk_engaged counted;
         lay_out_engaged(&b, setup, work->engaged ? &work->engaged[e] : &counted, e);
     }
-    for (int s = 0; s < model->sets; s++) all = (size_t)model->ground[s].n > all ? (size_t)model->ground[s].n : all;
-    work->rest_ground = doubles(&b, all);
-    work->rest_rows = doubles(&b, MAX_ROWS * all);
+    work->rest_ground = doubles(&b, ground);
+    const size_t unknowns = (size_t)(model->rotors + 2 * model->chains) + ground;
+    work->rest = doubles(&b, (2 + unknowns) * unknowns);
     work->columns = doubles(&b, gk_side_scratch(model));
     work->far = doubles(&b, 3 * ground + 2 * (size_t)setup->far);
     work->port_far = doubles(&b, (size_t)(model->ports * setup->far));
@@ -472,7 +472,8 @@ static void fill_port_support(const gk_model *model, gk_setup *setup, int p)
 static void fill_ports(const gk_model *model, gk_setup *setup)
 {
     setup->spins = model->rotors + 2 * model->chains;
-    for (int r = 0; r < model->rotors; r++) setup->inverse_inertia[r] = model->inertia[r] > 0.0 ? 1.0 / model->inertia[r] : 0.0;
+    for (int r = 0; r < model->rotors; r++)
+        setup->inverse_inertia[r] = model->inertia[r] > 0.0 ? 1.0 / model->inertia[r] : 0.0;
     for (int p = 0; p < model->ports; p++) {
         const gk_port *port = &model->port[p];
         const int torque = port->kind == PORT_TORQUE;

@@ -113,6 +113,7 @@ typedef struct gk_mesh { /* an engagement */
     int spins, spin[7];   /* spins that its rows read: rotor of A, of B, of their frame, chains' inertias and discs */
     int frame;            /* rotor of the frame, −1: the ground */
     int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
+    double action[2];     /* t of the line of action of both flanks at the nominal axes (gk_flank.c) */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
