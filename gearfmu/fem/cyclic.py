@@ -93,8 +93,8 @@ class SectorSpace:
 
 
 class Harmonic:
-    """One nodal diameter of one parity: a free body in complex coordinates (interior, minus cut, amplitudes of the rigid
-    surface), real for ν = 0, z/2.
+    """One nodal diameter of one parity: a free body in complex coordinates (interior, minus cut, amplitudes of the
+    rigid surface), real for ν = 0, z/2.
 
     Quantities are those of one sector: φᴴ M φ of a vector is its mass product over one sector.
     rigid : (size, r) rigid motions of this harmonic, mass-normalised over one sector; r = 0 for ν ≥ 2.
