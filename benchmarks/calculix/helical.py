@@ -4,7 +4,7 @@
 
 The pair is `helical_demo` with 12 mm of width (overlap ratio 0.58) and without modifications. Both gears are whole and
 twisted, with quadratic elements and five layers across the width; fine zones follow the slanting lines of contact. Both
-codes have rigid bores that are held (`rigid_bores.py`). --tilted: the wheel's axis turned by 1 µm over 1 mm across the
+codes have rigid bores that are held. --tilted: the wheel's axis turned by 1 µm over 1 mm across the
 line of centres. The way to the torque asked is that of positions.py. Table: helical.csv beside this file, one row a
 solution with the load share of every layer in both codes; what it has is not run again unless its position is named.
 The bodies are reduced into the work folder first (a quarter of an hour). `--compare` runs nothing. Needs CalculiX's
@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,6 @@ from ccx import first_solved, require_ccx, run_deck
 from deck import Problem
 from helical_section import Zone, twisted
 from positions import NUDGES, PENALTY, read, write
-from rigid_bores import with_rigid_bore
 from section import Fineness
 from spatial_deck import Tilted, bore_loads, layer_forces, write_spatial_deck
 
@@ -69,7 +68,7 @@ def stage(tilted: bool) -> StageSpec:
     gears = []
     for gear in demo.gears:
         body = gear.body.model_copy(update={"mesh": MESH, "roll_points": ROLLS, "width_functions": FUNCTIONS})
-        changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body}
+        changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body, "bore_coupling": "rigid"}
         gears.append(gear.model_copy(update=changes))
     pair = demo.pair.model_copy(update={"misalignment": error})
     return demo.model_copy(update={"gears": tuple(gears), "pair": pair})
@@ -80,32 +79,14 @@ def bodies(work: Path) -> list[ReducedBody]:
     files, spec = [work / f"helical_{name}.h5" for name in ("pinion", "wheel")], stage(False)
     if not all(file.exists() for file in files):
         work.mkdir(parents=True, exist_ok=True)
-        for index, (body, file) in enumerate(zip(bodies_of(spec), files, strict=True)):
-            save_body(with_rigid_bore(spec, index, body), file)
-    return [_static(load_body(file)) for file in files]
-
-
-def _static(body: ReducedBody) -> ReducedBody:
-    """The body without its modes of nodal diameter 0 and 1, those of a gear whose bore yields: at level rigid, where
-    all flexibility is static, no mode counts."""
-    kept = body.nodal_diameter > 1
-    return replace(
-        body,
-        frequency=body.frequency[kept],
-        damping_ratio=body.damping_ratio[kept],
-        nodal_diameter=body.nodal_diameter[kept],
-        part=body.part[kept],
-        parity=body.parity[kept],
-        flank_rows=body.flank_rows[..., kept],
-        bore_rows=np.zeros((6, int(kept.sum()))),
-    )
+        for body, file in zip(bodies_of(spec), files, strict=True):
+            save_body(body, file)
+    return [load_body(file) for file in files]
 
 
 def ours(spec: StageSpec, gears: list[ReducedBody], torque: float, position: int) -> Ours:
     """The kernel's answer at a position (of POSITIONS) with bores held."""
-    with np.errstate(invalid="ignore"):  # bore rows relative to their largest, 0
-        model = assemble(spec, gears)
-    kernel = statics_of(model, **{"effect.bearings": 0.0, "slices": float(SLICES)})
+    kernel = statics_of(assemble(spec, gears), **{"effect.bearings": 0.0, "slices": float(SLICES)})
     at = -position / POSITIONS * place_of(model, None).pitch
     state = kernel.transmission(at, torque)
     ends = [kernel.transmission(at, torque * (1 + sign * TANGENT)).te for sign in (-1, 1)]
