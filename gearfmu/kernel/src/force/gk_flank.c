@@ -10,6 +10,7 @@
 #include "problem/gk_work.h"
 
 typedef struct pair { /* the gears of an engagement at their poses */
+    const gk_model *model;
     const gk_setup *setup;
     const gk_engagement *e;
     const gk_mesh *mesh;
@@ -27,7 +28,7 @@ typedef struct line {              /* line of action of one side */
 static pair pair_of(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
-    return (pair){setup, e, mesh, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
+    return (pair){model, setup, e, mesh, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
 }
 
 static int internal(const pair *q) { return q->e->kind == MESH_INTERNAL; }
@@ -253,27 +254,8 @@ static int section(const pair *q, const flank_side *s, const double beta[2], dou
 }
 
 /* ---- slices of helical or tilted teeth ------------------------------------------------------------------------------ */
-static const double LEAN = 0.2e-3;                   /* m: what tilts may close of a gap */
-static const double LEAST_SHARE = 0.02, OPEN = 1e-3; /* of a strip that has left its flanks; m */
-
-/* Where a strip touches: the middle of its part that lies on both flanks, or its end next to them. A roll at z is s + sg z
- * tan β_b, β_b of its own gear. */
-static double covered(const pair *q, const flank_side *s, const double roll[2], int strip, double *share)
-{
-    const double half = 0.5 * q->e->width / q->setup->slices, middle = q->mesh->strip_middle[strip];
-    double from = middle - half, to = middle + half;
-    for (int w = 0; w < 2; w++) {
-        const double slope = s->sg * q->mesh->helix[w];
-        if (slope == 0.0) continue;
-        const double end = (q->gear[w]->s_tip - roll[w]) / slope;
-        if ((slope > 0.0) == (w == 0 || !internal(q)))
-            to = gk_min(to, end);
-        else
-            from = gk_max(from, end);
-    }
-    *share = gk_max((to - from) / (2.0 * half), LEAST_SHARE);
-    return gk_clamp(0.5 * (from + to), middle - half, middle + half);
-}
+static const double LEAN = 0.2e-3; /* m: what tilts may close of a gap */
+static const double OPEN = 1e-3;   /* m: gap of a strip that has left its flanks */
 
 /* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves along its
  * axis or tilts about its mid-width moves the point of contact along it. Both gears have the point halfway between their
@@ -308,7 +290,9 @@ static int strips_of(const pair *q, const flank_side *s, const double beta[2], c
     place->gap = OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
-        const double z = covered(q, s, roll, i, &p->share);
+        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
+        const double z = part.middle;
+        p->share = part.share;
         double here[2];
         for (int w = 0; w < 2; w++) {
             p->roll[w] = roll[w] + s->sg * z * q->mesh->helix[w];

@@ -102,6 +102,10 @@ typedef struct gk_side {
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
 } gk_side;
 
+typedef struct gk_part {            /* the part of a strip that carries, z (m) in the engagement's width */
+    double from, to, middle, share; /* share: of the strip's length */
+} gk_part;
+
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
     gk_side side[2];
@@ -215,6 +219,9 @@ const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma
 /* gk_strips.c */
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
+gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
+                       const double roll[2], int strip);
+void gk_strips_row(const gk_model *model, int g, double from, double to, double *out);
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
 /* Σ of a row over its span, and its multiple added there */
 static inline double gk_dot_span(gk_span span, const double *row, const double *x)

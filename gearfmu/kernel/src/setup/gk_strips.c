@@ -32,16 +32,53 @@ static double legendre_integral(int degree, double x)
     return (now - minus) / (2.0 * degree + 1.0);
 }
 
+/* the same of a part of the width, −1 … 1 of the half-width of gear g, from … to */
+static void row_over(const gk_model *model, double from, double to, double *out)
+{
+    for (int a = 0; a < model->functions; a++) {
+        const int d = model->degree[a];
+        out[a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+    }
+}
+
+void gk_strips_row(const gk_model *model, int g, double from, double to, double *out)
+{
+    const double per_half = 2.0 / model->gear[g].width;
+    row_over(model, per_half * from, per_half * to, out);
+}
+
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out)
 {
     const double edge = e->width / model->gear[g].width;
     for (int s = 0; s < setup->strips; s++)
-        for (int a = 0; a < model->functions; a++) {
-            const double from = edge * (2.0 * s / setup->slices - 1.0),
-                         to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
-            const int d = model->degree[a];
-            out[s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
-        }
+        row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
+}
+
+/* The part of a strip that lies on both flanks, whose rolls at mid-width are `roll`; of a strip that has left them the end
+ * next to them. A roll at z is s + sg z tan β_b, β_b of its own gear. */
+gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
+                       const double roll[2], int strip)
+{
+    static const double LEAST_SHARE = 0.02; /* of a strip that has left its flanks */
+    const gk_engagement *e = &model->engagement[mesh->index];
+    const double half = 0.5 * e->width / setup->slices, middle = mesh->strip_middle[strip];
+    gk_part part = {.from = middle - half, .to = middle + half};
+    for (int w = 0; w < 2; w++) {
+        const double slope = sg * mesh->helix[w];
+        if (slope == 0.0) continue;
+        const double end = (model->gear[e->gear[w]].s_tip - roll[w]) / slope;
+        if ((slope > 0.0) == (w == 0 || e->kind != MESH_INTERNAL))
+            part.to = gk_min(part.to, end);
+        else
+            part.from = gk_max(part.from, end);
+    }
+    part.share = gk_max((part.to - part.from) / (2.0 * half), LEAST_SHARE);
+    part.middle = gk_clamp(0.5 * (part.from + part.to), middle - half, middle + half);
+    if (part.share >= 1.0) return part;
+    const double inside = half * part.share; /* half the length of the part */
+    const double centre = gk_clamp(part.middle, middle - half + inside, middle + half - inside);
+    part.from = centre - inside, part.to = centre + inside;
+    return part;
 }
 
 /* mean of a gear's lead over −1 … 1 of its half-width, from … to */
