@@ -102,8 +102,8 @@ typedef struct gk_side {
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
 } gk_side;
 
-typedef struct gk_part {            /* the part of a strip that carries, z (m) in the engagement's width */
-    double from, to, middle, share; /* share: of the strip's length */
+typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
+    double middle, share; /* share: of the strip's length, never 0 */
 } gk_part;
 
 typedef struct gk_mesh { /* an engagement */
@@ -119,6 +119,7 @@ typedef struct gk_mesh { /* an engagement */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
+    double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
         log_high; /* bounds of b² in the local law, and their ln */

@@ -241,8 +241,11 @@ static void find_part(const node *n, const gk_mesh *mesh, place *p, int strip)
     roll[1 - own] = internal ? p->middle + (own ? -n->length : n->length) : n->length - p->middle;
     const gk_part part = gk_strips_part(n->model, n->setup, mesh, p->flank ? -1.0 : 1.0, roll, strip);
     if (part.share >= 1.0) return;
+    const double slice = n->e->width / n->setup->slices, half = 0.5 * part.share * slice;
+    const double low = mesh->strip_middle[strip] - 0.5 * slice + half, high = low + slice - 2.0 * half;
+    const double middle = gk_clamp(part.middle, low, high);
     p->z = part.middle;
-    gk_strips_row(n->model, n->side->gear, part.from, part.to, p->width);
+    gk_strips_row(n->model, n->side->gear, middle - half, middle + half, p->width);
 }
 
 static void gather_node(node *n, double position)
