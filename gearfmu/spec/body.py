@@ -50,7 +50,7 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
 def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:
     """`body_inputs` of the ring of a general stage."""
     inputs = {"kind": "ring"} | ring.model_dump(exclude={"name", "kind", "mounts", "imported", "rim_coupling"})
-    if ring.rigid_bore:
+    if getattr(ring, "rigid_bore", False):  # a ring of a general stage
         inputs["rim_coupling"] = "rigid"
     if ring.imported is not None:
         inputs["import"] = import_inputs(ring.imported, spec.source, f"bodies.{ring.name}.import")
