@@ -87,7 +87,8 @@ def bodies_of(spec: StageSpec) -> list[ReducedBody]:
 
 def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBody:
     flank, points = tooth_flank(shape, gear)
-    body = SectorBody(gear_sector(shape, gear.face_width, gear.body.mesh), gear.material, flank, points)
+    sector = gear_sector(shape, gear.face_width, gear.body.mesh)
+    body = SectorBody(sector, gear.material, flank, points, gear.rigid_bore)
     statics, modes = static_tables(body, []), elastic_modes(body, MODES)
     return replace(
         stored,

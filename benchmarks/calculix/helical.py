@@ -1,14 +1,15 @@
 """Helical gears against CalculiX: loaded transmission error, load over the width, one pair with a tilted axis.
 
-    python benchmarks/calculix/helical.py [POSITION …] [--torque T …] [--tilted] [--work DIR] [--compare]
+    python benchmarks/calculix/helical.py [POSITION …] [--torque T …] [--tilted] [--fine] [--work DIR] [--compare]
 
 The pair is `helical_demo` with 12 mm of width (overlap ratio 0.58) and without modifications. Both gears are whole and
 twisted, with quadratic elements and five layers across the width; fine zones follow the slanting lines of contact. Both
-codes have rigid bores that are held (`rigid_bores.py`). --tilted: the wheel's axis turned by 1 µm over 1 mm across the
+codes have rigid bores that are held. --tilted: the wheel's axis turned by 1 µm over 1 mm across the
 line of centres. The way to the torque asked is that of positions.py. Table: helical.csv beside this file, one row a
 solution with the load share of every layer in both codes; what it has is not run again unless its position is named.
-The bodies are reduced into the work folder first (a quarter of an hour). `--compare` runs nothing. Needs CalculiX's
-ccx; a minute or two a run.
+--fine: layers have elements of 0.6 mm where a line of contact ends at a tip edge inside the width (table:
+helical_fine.csv). The bodies are reduced into the work folder first (some minutes). `--compare` runs nothing. Needs
+CalculiX's ccx; a minute or two a run, fine ones up to five.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ from ccx import first_solved, require_ccx, run_deck
 from deck import Problem
 from helical_section import Zone, twisted
 from positions import NUDGES, PENALTY, read, write
-from rigid_bores import with_rigid_bore
 from section import Fineness
 from spatial_deck import Tilted, bore_loads, layer_forces, write_spatial_deck
 
@@ -50,6 +50,7 @@ MARGIN = 0.4e-3  # m beyond the ends of the path where tooth pairs are still in 
 PATCH, ZONE = 1.5, Zone()  # half length of the fine zones in Hertz half-widths, elements
 MESH = MeshSpec(flank=14, thickness=4, root=5, rim=3, width=6)
 ROLLS, FUNCTIONS = 20, 6
+FINE = {0: (1, 2, 4, 4, 1), 1: (1,) * 5, 2: (1, 2, 4, 4, 1), 3: (4, 3, 1, 2, 4)}  # elements of each layer, by position
 TABLE = Path(__file__).with_suffix(".csv")
 
 
@@ -69,7 +70,7 @@ def stage(tilted: bool) -> StageSpec:
     gears = []
     for gear in demo.gears:
         body = gear.body.model_copy(update={"mesh": MESH, "roll_points": ROLLS, "width_functions": FUNCTIONS})
-        changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body}
+        changes = {"face_width": WIDTH, "tip_relief": None, "lead": None, "body": body, "bore_coupling": "rigid"}
         gears.append(gear.model_copy(update=changes))
     pair = demo.pair.model_copy(update={"misalignment": error})
     return demo.model_copy(update={"gears": tuple(gears), "pair": pair})
@@ -80,31 +81,14 @@ def bodies(work: Path) -> list[ReducedBody]:
     files, spec = [work / f"helical_{name}.h5" for name in ("pinion", "wheel")], stage(False)
     if not all(file.exists() for file in files):
         work.mkdir(parents=True, exist_ok=True)
-        for index, (body, file) in enumerate(zip(bodies_of(spec), files, strict=True)):
-            save_body(with_rigid_bore(spec, index, body), file)
-    return [_static(load_body(file)) for file in files]
-
-
-def _static(body: ReducedBody) -> ReducedBody:
-    """The body without its modes of nodal diameter 0 and 1, those of a gear whose bore yields: at level rigid, where
-    all flexibility is static, no mode counts."""
-    kept = body.nodal_diameter > 1
-    return replace(
-        body,
-        frequency=body.frequency[kept],
-        damping_ratio=body.damping_ratio[kept],
-        nodal_diameter=body.nodal_diameter[kept],
-        part=body.part[kept],
-        parity=body.parity[kept],
-        flank_rows=body.flank_rows[..., kept],
-        bore_rows=np.zeros((6, int(kept.sum()))),
-    )
+        for body, file in zip(bodies_of(spec), files, strict=True):
+            save_body(body, file)
+    return [load_body(file) for file in files]
 
 
 def ours(spec: StageSpec, gears: list[ReducedBody], torque: float, position: int) -> Ours:
     """The kernel's answer at a position (of POSITIONS) with bores held."""
-    with np.errstate(invalid="ignore"):  # bore rows relative to their largest, 0
-        model = assemble(spec, gears)
+    model = assemble(spec, gears)
     kernel = statics_of(model, **{"effect.bearings": 0.0, "slices": float(SLICES)})
     at = -position / POSITIONS * place_of(model, None).pitch
     state = kernel.transmission(at, torque)
@@ -125,7 +109,14 @@ def touching(pair: PairGeometry, turn: float) -> dict[tuple[int, int], tuple[flo
     return {(k, -k): (roll, pair.length - roll) for k, roll in rolls.items()}
 
 
-def problem_at(spec: StageSpec, torque: float, position: int, te: float) -> Problem:
+def levels_of(divisions: tuple[int, ...]) -> np.ndarray:
+    """Corner levels z (m) of the elements, each layer divided by its number."""
+    ends = np.linspace(-WIDTH / 2, WIDTH / 2, LAYERS + 1)
+    inner = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends, ends[1:], divisions, strict=False)]
+    return np.concatenate([*inner, ends[-1:]])
+
+
+def problem_at(spec: StageSpec, torque: float, position: int, te: float, divisions: tuple[int, ...]) -> Problem:
     """The contact problem of a place."""
     pair = PairGeometry.of(spec)
     turn = 2 * math.pi / pair.gears[0].z * position / POSITIONS
@@ -137,7 +128,7 @@ def problem_at(spec: StageSpec, torque: float, position: int, te: float) -> Prob
     fine = Fineness(
         patch=PATCH * wide, growth=2.0, thickness=2, depth_growth=2.6, rim=2, root=2, far_root=1, far_flank=1
     )
-    levels = np.linspace(-WIDTH / 2, WIDTH / 2, LAYERS + 1)
+    levels = levels_of(divisions)
     solids = [
         twisted(gear, {teeth[g]: rolls[g] for teeth, rolls in contacts.items()}, levels, fine, ZONE).solid
         for g, gear in enumerate(pair.gears)
@@ -156,9 +147,10 @@ def problem_at(spec: StageSpec, torque: float, position: int, te: float) -> Prob
     )
 
 
-def solved(tilted: bool, gears: list[ReducedBody], torque: float, position: int, work: Path) -> dict[str, Any]:
-    """The table's row of one place; te is moved by up to 2 % where ccx does not settle."""
-    spec = stage(tilted)
+def solved(chosen: Any, gears: list[ReducedBody], torque: float, position: int) -> dict[str, Any]:
+    """The table's row of one place; te is moved by up to 2 % where ccx does not settle. chosen: tilted, fine, work."""
+    spec, tilted, work = stage(chosen.tilted), chosen.tilted, chosen.work
+    divisions = FINE[position] if chosen.fine else (1,) * LAYERS
     mine, r_b = ours(spec, gears, torque, position), PairGeometry.of(spec).gears[0].r_b
     folder = work / f"helical_{position}_{torque:g}{'_tilted' if tilted else ''}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -166,14 +158,14 @@ def solved(tilted: bool, gears: list[ReducedBody], torque: float, position: int,
 
     def attempt(nudge: float) -> tuple[float, Problem, float]:
         te = nudge * mine.te
-        problem = problem_at(spec, torque, position, te)
+        problem = problem_at(spec, torque, position, te, divisions)
         write_spatial_deck(problem, deck)
         return te, problem, run_deck(deck)
 
     te, problem, seconds = first_solved(NUDGES, attempt)
     loads, layers = bore_loads(problem, deck.with_suffix(".dat")), layer_forces(problem, deck.with_suffix(".dat"))
     moment = abs(loads[0, 5])
-    share = layers.sum(axis=0) / layers.sum()
+    share = np.add.reduceat(layers.sum(axis=0), np.cumsum((0, *divisions[:-1]))) / layers.sum()
     row = {
         "case": "tilted" if tilted else "parallel",
         "torque_Nm": f"{torque:g}",
@@ -213,10 +205,12 @@ def main() -> None:
     parser.add_argument("positions", nargs="*", type=int, metavar="POSITION", help=f"0 … {POSITIONS - 1}")
     parser.add_argument("--torque", type=float, action="append", choices=TORQUES, help="N·m on the pinion; may repeat")
     parser.add_argument("--tilted", action="store_true")
+    parser.add_argument("--fine", action="store_true")
     parser.add_argument("--work", type=Path, default=Path("out/calculix"), help="bodies, decks, logs and results")
-    parser.add_argument("--out", type=Path, default=TABLE)
+    parser.add_argument("--out", type=Path)
     parser.add_argument("--compare", action="store_true")
     chosen = parser.parse_args()
+    chosen.out = chosen.out or (TABLE.with_stem("helical_fine") if chosen.fine else TABLE)
     rows = read(chosen.out)
     if chosen.compare:
         return compare(rows)
@@ -226,7 +220,7 @@ def main() -> None:
     for torque in chosen.torque or TORQUES:
         for position in chosen.positions or [k for k in range(POSITIONS) if (case, torque, k) not in done]:
             try:
-                fresh = solved(chosen.tilted, gears, torque, position, chosen.work)
+                fresh = solved(chosen, gears, torque, position)
             except RuntimeError as failure:
                 failed.append(f"{torque:g} N·m, position {position}: {failure}")
                 continue

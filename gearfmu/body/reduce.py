@@ -171,7 +171,9 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
 def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Points], report: Progress) -> Parts:
     """A gear meshed here, reduced by cyclic symmetry."""
     flank, points = load_points
-    body = SectorBody(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.material, flank, points)
+    sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
+    rigid = getattr(gear, "rigid_bore", False)  # sun, planet and ring of a set are averaged
+    body = SectorBody(sector, gear.material, flank, points, rigid)
     modes = elastic_modes(body, gear.body.modes, report)
     statics = static_tables(body, pictured_loads(points), report)
     report("frequency response", 0.0)

@@ -13,9 +13,12 @@ if TYPE_CHECKING:
     from gearfmu.stage import StageModel
 
 
-def model_of(stage: str, port_kinds: Mapping[str, str] | None = None) -> StageModel:
-    """The StageModel of STAGE, with other kinds of port where `port_kinds` (port → kind) says so."""
-    spec, bodies = bodies_for_motion(stage)
+def model_of(stage: str, port_kinds: Mapping[str, str] | None = None, bores: str | None = None) -> StageModel:
+    """The StageModel of STAGE, with other kinds of port where `port_kinds` (port → kind) says so.
+
+    bores : coupling of every bore, "averaging" or "rigid"; as the stage file says when None.
+    """
+    spec, bodies = bodies_for_motion(stage) if bores is None else _with_other_bores(stage, bores)
     from gearfmu.stage import assemble
 
     return assemble(of_other_kinds(spec, port_kinds or {}), bodies)
@@ -41,6 +44,26 @@ def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
 
     as_general(load_stage(stage))
     return bodies_of(stage)
+
+
+def _with_other_bores(stage: str, coupling: str) -> tuple[Any, list[Any]]:
+    """`bodies_for_motion` with every bore coupled so. Bodies that are not those of the stage file lie in the folder
+    `bores_<coupling>` beside it: the stage's own stay as they are."""
+    from gearfmu.spec.stage import load_stage, require_motion
+
+    own = load_stage(stage)
+    require_motion(own)
+    from gearfmu.body import reduce_stage
+    from gearfmu.spec.bores import with_bores
+    from gearfmu.spec.library import model_folder
+
+    spec = with_bores(own, coupling)
+    folder = None if spec == own else model_folder(own) / f"bores_{coupling}"
+    with progress_bar(f"reducing, bores {coupling}") as progress:
+        bodies = reduce_stage(spec, folder, progress=by_text(progress))
+    if folder is not None:
+        click.echo(f"bodies with bores {coupling}: {folder}")
+    return spec, bodies
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:

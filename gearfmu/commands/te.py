@@ -31,17 +31,25 @@ from gearfmu.commands.shared import Quantity
 )
 @click.option("--rigid-bearings", is_flag=True, help="Hold the axes.")
 @click.option(
+    "--bore",
+    type=click.Choice(["averaging", "rigid"]),
+    help="Bores of all gears: averaging (they may deform about their mean motion) or rigid (on stiff shafts); as the "
+    "stage file says when not given. Other bodies than the stage's are reduced once, into a folder beside it.",
+)
+@click.option(
     "--out",
     type=click.Path(path_type=Path),
     default=Path("te.csv"),
     show_default=True,
     help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
 )
-def te(stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, out: Path) -> None:
+def te(
+    stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, bore: str | None, out: Path
+) -> None:
     """Loaded transmission error of STAGE over one pitch, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of every mesh.
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
-    model = model_of(stage)
+    model = model_of(stage, bores=bore)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.trace import write_columns

@@ -8,6 +8,11 @@ so that each harmonic costs a dense system of the size of one cut. S_ν is singu
 motions, which are known. A sector that is its own mirror image about mid-width (z → −z) splits once more, exactly,
 into symmetric and antisymmetric fields; one of a helical gear is not and has one space of all fields. Source: Thomas,
 Int. J. Numer. Meth. Eng. 14 (1979) 81 (cyclic symmetry).
+
+A surface may be rigid (a bore on a stiff shaft): its nodes are eliminated for the rigid motions of that surface, which
+join the cuts as unknowns of the condensed system. Seen from sector j a motion q of the whole surface turns back by
+2πj/z: ν = 0 has translation along and rotation about the axis, ν = 1 translation across it and tilts, as amplitudes a
+of (q_x, q_y) = (1, i) a, and for ν ≥ 2 the surface stands still.
 """
 
 from __future__ import annotations
@@ -21,7 +26,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from gearfmu.errors import MeshError
-from gearfmu.fem.coupling import rigid_modes
+from gearfmu.fem.coupling import rigid_fields, rigid_modes
 from gearfmu.fem.factor import Factor
 
 _MATCH = 1e-7  # of the mesh's size: nodes that should coincide
@@ -32,7 +37,8 @@ class Sector:
     """Finite-element model of one sector, in its own frame.
 
     nodes (N, 3), m; elements (E, 20); stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired
-    nodes. helical: no mirror at mid-width is looked for.
+    nodes. helical: no mirror at mid-width is looked for. rigid (r,): nodes of a surface that moves as one rigid body
+    over all sectors; None or empty: there is none.
     """
 
     nodes: np.ndarray
@@ -43,6 +49,7 @@ class Sector:
     cut_minus: np.ndarray
     cut_plus: np.ndarray
     helical: bool = False
+    rigid: np.ndarray | None = None
 
 
 class SectorSpace:
@@ -50,7 +57,8 @@ class SectorSpace:
 
     parity : +1 symmetric about mid-width (u_x, u_y even, u_z odd in z), −1 antisymmetric, 0 for a sector without that
     symmetry.
-    to_nodes : (3N, n) sparse with orthonormal columns; columns ordered interior, minus cut, plus cut.
+    to_nodes : (3N, n) sparse; columns ordered interior, minus cut, plus cut (orthonormal), and the motions of the rigid
+    surface, rotations as the displacement at its largest radius.
     """
 
     def __init__(self, sector: Sector, mirror: np.ndarray, parity: int):
@@ -59,10 +67,15 @@ class SectorSpace:
         minus, plus, interior = _split(owner, sector)
         self.interior, self.cut = len(interior), len(minus)
         self.to_nodes = sp.csc_array(_turn_plus(sector) @ basis[:, np.concatenate([interior, minus, plus])])
+        self.motions, length, moved = _rigid_surface(sector, parity)
+        if len(self.motions):
+            self.to_nodes = sp.csc_array(sp.hstack([self.to_nodes, sp.csc_array(moved)]))
         self.from_nodes = sp.csr_array(self.to_nodes.T)
         stiffness = sp.csr_array(self.from_nodes @ sector.stiffness @ self.to_nodes)
         self.mass_matrix = sp.csr_array(self.from_nodes @ sector.mass @ self.to_nodes)
         self.rigid = self.from_nodes @ rigid_modes(sector.nodes)
+        if len(self.motions):
+            self.rigid[self.interior + 2 * self.cut :] = (np.eye(6) * length)[self.motions]
         inside, border = slice(0, self.interior), slice(self.interior, None)
         inner = owner[interior] // 3
         self._factor = Factor(stiffness[inside, inside], _cells(sector.elements, mirror, inner), inner)
@@ -80,7 +93,8 @@ class SectorSpace:
 
 
 class Harmonic:
-    """One nodal diameter of one parity: a free body in complex coordinates (interior, minus cut), real for ν = 0, z/2.
+    """One nodal diameter of one parity: a free body in complex coordinates (interior, minus cut, amplitudes of the
+    rigid surface), real for ν = 0, z/2.
 
     Quantities are those of one sector: φᴴ M φ of a vector is its mass product over one sector.
     rigid : (size, r) rigid motions of this harmonic, mass-normalised over one sector; r = 0 for ν ≥ 2.
@@ -92,10 +106,22 @@ class Harmonic:
         self.is_real = nodal_diameter == 0 or 2 * nodal_diameter == space.teeth
         self.phase = float(round(np.cos(angle))) if self.is_real else complex(np.cos(angle), np.sin(angle))
         self.dtype = float if self.is_real else complex
-        self.size = space.interior + space.cut
+        self._surface = self._surface_motions()
+        self.size = space.interior + space.cut + self._surface.shape[1]
         self.rigid = self._rigid_motions()
         self._mass_rigid = self.mass(self.rigid)
         self.elastic = self.size - self.rigid.shape[1]
+
+    def _surface_motions(self) -> np.ndarray:
+        """Motions of the rigid surface that belong to this harmonic, as columns: (motions of the space, amplitudes)."""
+        patterns: dict[int, list[dict[int, complex]]] = {0: [{2: 1}, {5: 1}], 1: [{0: 1, 1: 1j}, {3: 1, 4: 1j}]}
+        motions = list(self.space.motions)
+        mine = [p for p in patterns.get(self.nodal_diameter, []) if set(p) <= set(motions)]
+        columns = np.zeros((len(motions), len(mine)), self.dtype)
+        for k, pattern in enumerate(mine):
+            for motion, value in pattern.items():
+                columns[motions.index(motion), k] = value if np.iscomplexobj(columns) else value.real
+        return columns
 
     def _rigid_motions(self) -> np.ndarray:
         r, nu = self.space.rigid, self.nodal_diameter
@@ -105,21 +131,43 @@ class Harmonic:
             fields = np.stack([r[:, 0] + 1j * r[:, 1], r[:, 3] + 1j * r[:, 4]], axis=1)
         else:
             return np.zeros((self.size, 0), self.dtype)
-        fields = fields[: self.size]
+        fields = self._without_plus(fields)
         fields = fields[:, np.linalg.norm(fields, axis=0) > 1e-9 * np.linalg.norm(r)]
         gram = fields.conj().T @ self.mass(fields)
         return sl.solve_triangular(np.linalg.cholesky(gram), fields.conj().T, lower=True).conj().T
 
-    def reduce(self, sector_loads: np.ndarray) -> np.ndarray:
-        """Loads on the sector's coordinates (interior, minus, plus) → loads on this harmonic's coordinates."""
+    def _without_plus(self, fields: np.ndarray) -> np.ndarray:
+        """Fields of this harmonic in the sector's coordinates → in this harmonic's."""
         interior, cut = self.space.interior, self.space.cut
-        loads = sector_loads[: interior + cut].astype(np.result_type(sector_loads, self.dtype))
-        loads[interior:] += np.conj(self.phase) * sector_loads[interior + cut :]
-        return loads
+        kept = fields[: interior + cut]
+        if not self._surface.shape[1]:
+            return kept
+        return np.concatenate([kept, np.linalg.pinv(self._surface) @ fields[interior + 2 * cut :]])
+
+    def reduce(self, sector_loads: np.ndarray) -> np.ndarray:
+        """Loads on the sector's coordinates (interior, minus, plus, rigid surface) → on this harmonic's coordinates."""
+        interior, cut = self.space.interior, self.space.cut
+        plus = interior + cut
+        loads = sector_loads[:plus].astype(np.result_type(sector_loads, self.dtype))
+        loads[interior:] += np.conj(self.phase) * sector_loads[plus : plus + cut]
+        return self._with_surface(loads, sector_loads[plus + cut :])
+
+    def _with_surface(self, loads: np.ndarray, on_surface: np.ndarray) -> np.ndarray:
+        if not self._surface.shape[1]:
+            return loads
+        return np.concatenate([loads, self._surface.conj().T @ on_surface])
 
     def expand(self, vectors: np.ndarray) -> np.ndarray:
-        """This harmonic's coordinates → the sector's coordinates (interior, minus, plus)."""
-        return np.concatenate([vectors, self.phase * vectors[self.space.interior :]])
+        """This harmonic's coordinates → the sector's coordinates (interior, minus, plus, rigid surface)."""
+        return np.concatenate([vectors[: self.space.interior], self._expand_border(vectors[self.space.interior :])])
+
+    def _expand_border(self, border: np.ndarray) -> np.ndarray:
+        """(minus, amplitudes) → (minus, plus, rigid surface)."""
+        cut = border[: self.space.cut]
+        both = [cut, self.phase * cut]
+        if len(self.space.motions):
+            both.append(self._surface @ border[self.space.cut :])
+        return np.concatenate(both)
 
     def mass(self, vectors: np.ndarray) -> np.ndarray:
         """M v over one sector."""
@@ -129,12 +177,17 @@ class Harmonic:
     def _cut_solver(self) -> tuple[np.ndarray, np.ndarray]:
         """LU of S_ν; its rigid null space is filled up, which changes nothing for balanced loads."""
         cut, schur = self.space.cut, self.space.schur
+        minus, plus, surface = slice(0, cut), slice(cut, 2 * cut), slice(2 * cut, None)
         s = (
-            schur[:cut, :cut]
-            + schur[cut:, cut:]
-            + self.phase * schur[:cut, cut:]
-            + np.conj(self.phase) * schur[cut:, :cut]
+            schur[minus, minus]
+            + schur[plus, plus]
+            + self.phase * schur[minus, plus]
+            + np.conj(self.phase) * schur[plus, minus]
         )
+        if self._surface.shape[1]:
+            mixed = (schur[minus, surface] + np.conj(self.phase) * schur[plus, surface]) @ self._surface
+            own = self._surface.conj().T @ schur[surface, surface] @ self._surface
+            s = np.block([[s, mixed], [mixed.conj().T, own]])
         rigid = self.rigid[self.space.interior :]
         if rigid.shape[1]:
             rigid = np.linalg.qr(rigid)[0]
@@ -162,9 +215,13 @@ class Harmonic:
         space, interior, cut = self.space, self.space.interior, self.space.cut
         balanced = self.balance(loads)
         carried = _real_times_any(space.influence.T, balanced[:interior])
-        on_cut = balanced[interior:] - carried[:cut] - np.conj(self.phase) * carried[cut:]
+        on_border = balanced[interior:]
+        on_cut = on_border[:cut] - carried[:cut] - np.conj(self.phase) * carried[cut : 2 * cut]
+        if self._surface.shape[1]:
+            on_surface = on_border[cut:] - self._surface.conj().T @ carried[2 * cut :]
+            on_cut = np.concatenate([on_cut, on_surface])
         moved = sl.cho_solve(self._cut_solver, on_cut)
-        border = np.concatenate([moved, self.phase * moved])
+        border = self._expand_border(moved)
         if held is None:
             inside = space.solve_held(balanced[:interior] - _real_times_any(space.coupling, border))
         else:
@@ -237,8 +294,21 @@ def _check_cuts(sector: Sector) -> None:
         raise MeshError(f"cut faces differ by up to {np.abs(gap).max():.3g} m after a turn by 2π/{sector.teeth}")
 
 
+def _rigid_surface(sector: Sector, parity: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Motions of the rigid surface with this parity (0 … 5: translation x, y, z, rotation x, y, z), the factors (6,)
+    from rigid motion to their coordinates, and their displacement (3N, motions) per unit; no motions without one."""
+    if sector.rigid is None or not len(sector.rigid):
+        return np.empty(0, int), np.ones(6), np.zeros((sector.nodes.size, 0))
+    motions = {1: np.array([0, 1, 5]), -1: np.array([2, 3, 4]), 0: np.arange(6)}[parity]
+    points = sector.nodes[sector.rigid]
+    length = np.repeat([1.0, np.hypot(points[:, 0], points[:, 1]).max()], 3)
+    moved = np.zeros((len(sector.nodes), 3, 6))
+    moved[sector.rigid] = rigid_fields(points) / length
+    return motions, length, moved.reshape(-1, 6)[:, motions]
+
+
 def _split(owner: np.ndarray, sector: Sector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns on the minus cut, on the plus cut in the same order, and inside."""
+    """Columns on the minus cut, on the plus cut in the same order, and inside; without those of the rigid surface."""
     column = np.full(sector.nodes.size, -1)
     column[owner] = np.arange(len(owner))
     pairs = np.stack([(3 * cut[:, None] + np.arange(3)).ravel() for cut in (sector.cut_minus, sector.cut_plus)])
@@ -246,7 +316,11 @@ def _split(owner: np.ndarray, sector: Sector) -> tuple[np.ndarray, np.ndarray, n
     if np.any((minus < 0) != (plus < 0)):
         raise MeshError("the two cut faces have different node order about mid-width")
     minus, plus = minus[minus >= 0], plus[plus >= 0]
-    return minus, plus, np.setdiff1d(np.arange(len(owner)), np.concatenate([minus, plus]))
+    inside = np.setdiff1d(np.arange(len(owner)), np.concatenate([minus, plus]))
+    if sector.rigid is None:
+        return minus, plus, inside
+    elastic = ~np.isin(owner // 3, sector.rigid)
+    return minus[elastic[minus]], plus[elastic[plus]], inside[elastic[inside]]
 
 
 def _turn_plus(sector: Sector) -> sp.csr_array:

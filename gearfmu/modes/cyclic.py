@@ -30,20 +30,28 @@ class _Family:
 
 
 def cyclic_modes(
-    name: str, mesh: FeMesh, material: hex20.Material, count: int, progress: Progress | None = None
+    name: str,
+    mesh: FeMesh,
+    material: hex20.Material,
+    count: int,
+    progress: Progress | None = None,
+    rigid: np.ndarray | None = None,
 ) -> BodyModes:
     """The `count` lowest elastic modes of the free body (one more where that would split a pair); damping is NaN.
 
-    mesh : one sector. The cyclic index of a mode is its nodal diameter, unless there are so few sectors that another
-    diameter with the same index (ν ± kN) carries more of its energy. Raises MeshError when the cuts do not match, and
-    ModesError.
+    mesh : one sector. rigid : nodes of a surface that moves as one rigid body. The cyclic index of a mode is its nodal
+    diameter, unless there are so few sectors that another diameter with the same index (ν ± kN) carries more of its
+    energy. Raises MeshError when the cuts do not match, and ModesError.
     """
     stiffness, mass = hex20.assemble(mesh.nodes, mesh.elements, material)
     if progress:
         progress("finite elements", 0.2)
     spaces = sector_spaces(
-        Sector(mesh.nodes, mesh.elements, stiffness, mass, mesh.teeth, mesh.cut_minus, mesh.cut_plus, bool(mesh.twist))
-    )
+        Sector(
+            mesh.nodes, mesh.elements, stiffness, mass, mesh.teeth, mesh.cut_minus, mesh.cut_plus, bool(mesh.twist),
+            rigid,
+        )
+    )  # fmt: skip
     faces, index = outer_faces(mesh), [mesh.sector_nodes(tooth) for tooth in range(mesh.teeth)]
     used, local = np.unique(np.concatenate([numbers[faces] for numbers in index]), return_inverse=True)
     nodes, scalar_mass = mesh.full().nodes, mass[::3, ::3]

@@ -32,7 +32,8 @@ def gear_modes(
         mesh = gear_sector(geometry, gear.face_width, gear.body.mesh)
     else:
         mesh = imported_sector_mesh(gear, geometry)
-    found = cyclic_modes(gear.name, mesh, gear.material, min(count, stored.modes), progress)
+    rigid = mesh.sets["bore"] if gear.rigid_bore else None
+    found = cyclic_modes(gear.name, mesh, gear.material, min(count, stored.modes), progress, rigid)
     return as_stored(found, stored.frequency, stored.damping_ratio)
 
 

@@ -47,17 +47,20 @@ class SectorBody:
     """A free gear body: finite elements of one sector, flank loads of tooth 0 and the averaging node of the bore.
 
     mesh : FeMesh of a gear sector; one with the set "rim" instead of "bore" is an internal gear's. material : SI.
-    flank : ToothFlank. points : where the flanks are loaded.
+    flank : ToothFlank. points : where the flanks are loaded. rigid_bore : the surface of the bore (of a ring: of the
+    rim) moves as one rigid body, as on a stiff shaft; else it deforms about its mean motion.
     Raises MeshError when cuts, flanks or bore of the mesh are not as they should be.
     """
 
-    def __init__(self, mesh: Any, material: hex20.Material, flank: ToothFlank, points: Points):
+    def __init__(
+        self, mesh: Any, material: hex20.Material, flank: ToothFlank, points: Points, rigid_bore: bool = False
+    ):
         self.mesh, self.flank, self.points, self.teeth = mesh, flank, points, mesh.teeth
         stiffness, self.mass_matrix = hex20.assemble(mesh.nodes, mesh.elements, material)
         self.stiffness, self.internal = stiffness, "rim" in mesh.sets
         sector = Sector(
             mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
-            bool(flank.base_helix_angle),
+            bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
         )  # fmt: skip
         self.spaces = sector_spaces(sector)
         self._inputs = [self._space_inputs(space) for space in self.spaces]

@@ -42,8 +42,8 @@ def ring_full_order(spec: Any, scale: float = RING_SCALE, mounted: bool = True) 
 
 
 def gear_full_order(spec: Any, name: str, scale: float = GEAR_SCALE) -> FullOrder:
-    """The gear `name` ("sun", "planet") of a PlanetarySpec, or of a StageSpec, with one input node a tooth and the
-    averaging node of its bore, which is the ground when it is judged."""
+    """The gear `name` ("sun", "planet") of a PlanetarySpec, or of a StageSpec, with one input node a tooth and the node
+    of its bore (averaging, or rigid where the gear says so), which is the ground when it is judged."""
     if spec.kind == "planetary_set":
         gears = (spec.sun, spec.planet)
         shapes = tuple(GearGeometry.of(gear, spec.set) for gear in gears)
@@ -53,7 +53,8 @@ def gear_full_order(spec: Any, name: str, scale: float = GEAR_SCALE) -> FullOrde
     counts = gear.body.mesh
     sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, gear.material)
-    bore = Coupling("bore", "averaging", sector.full().sets["bore"], np.zeros(3))
+    kind = "rigid" if getattr(gear, "rigid_bore", False) else "averaging"
+    bore = Coupling("bore", kind, sector.full().sets["bore"], np.zeros(3))
     return full_order(name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
 
 

@@ -39,6 +39,8 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
         "modal_damping": gear.modal_damping,
         "body": gear.body.model_dump(),
     }
+    if gear.rigid_bore:
+        inputs["bore_coupling"] = gear.bore_coupling
     if gear.imported is not None:
         inputs["import"] = import_inputs(gear.imported, spec.source, f"gears.{gear.name}.import")
         inputs["body"].pop("mesh")
@@ -47,7 +49,9 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
 
 def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:
     """`body_inputs` of the ring of a general stage."""
-    inputs = {"kind": "ring"} | ring.model_dump(exclude={"name", "kind", "mounts", "imported"})
+    inputs = {"kind": "ring"} | ring.model_dump(exclude={"name", "kind", "mounts", "imported", "rim_coupling"})
+    if getattr(ring, "rigid_bore", False):  # a ring of a general stage
+        inputs["rim_coupling"] = "rigid"
     if ring.imported is not None:
         inputs["import"] = import_inputs(ring.imported, spec.source, f"bodies.{ring.name}.import")
         inputs["body"].pop("mesh")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, refuse
 from gearfmu.spec.imported import ImportSpec
@@ -18,6 +18,7 @@ Factor = Annotated[float, Quantity(above=0)]
 Deviation = Annotated[float, Quantity("m")]
 Ratio = Annotated[float, Quantity(at_least=0, below=1)]
 Grading = Annotated[float, Quantity(at_least=0.2, at_most=5)]
+SurfaceCoupling = Literal["averaging", "rigid"]
 
 
 LARGEST_HELIX_ANGLE = 35  # degrees: steeper flanks are beyond what the sector mesh was made for
@@ -160,6 +161,10 @@ class GearSpec(Spec):
     tip_diameter: Length = Field(description="tip diameter d_a")
     face_width: Length = Field(description="face width b")
     bore_diameter: Length = Field(description="diameter of the bore")
+    bore_coupling: SurfaceCoupling = Field(
+        default="averaging",
+        description="how the bore meets its node: averaging (RBE3, the bore may deform) or rigid (RBE2, a stiff shaft)",
+    )
     tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
     rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
     material: Material = Field(description="material")
@@ -178,3 +183,14 @@ class GearSpec(Spec):
     imported: ImportSpec | None = Field(
         default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
     )
+
+    @model_validator(mode="after")
+    def _one_coupling(self) -> GearSpec:
+        if self.imported is not None and self.rigid_bore:
+            raise refuse('finite elements made elsewhere have their own: write bore_coupling = "rigid" under import')
+        return self
+
+    @property
+    def rigid_bore(self) -> bool:
+        """Whether the bore's surface moves as one rigid body."""
+        return self.bore_coupling == "rigid"

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
-from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size
+from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size, SurfaceCoupling
 from gearfmu.spec.lead import LeadSpec, Misalignment
 from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
 from gearfmu.spec.ports import Frequency, LevelSpec, PortSpec
@@ -56,6 +56,21 @@ class RingBody(RingSpec):
         description="normal pressure angle of the basic rack"
     )
     mounts: MountsSpec | None = Field(default=None, description="not here: write [[supports]]")
+    rim_coupling: SurfaceCoupling = Field(
+        default="averaging",
+        description="how the rim meets its node: averaging (RBE3, the rim may deform) or rigid (RBE2, a stiff housing)",
+    )
+
+    @model_validator(mode="after")
+    def _own_mesh(self) -> RingBody:
+        if self.imported is not None and self.rigid_bore:
+            raise refuse('finite elements made elsewhere have an averaging rim only: write rim_coupling = "averaging"')
+        return self
+
+    @property
+    def rigid_bore(self) -> bool:
+        """Whether the rim's surface, in place of the bore, moves as one rigid body."""
+        return self.rim_coupling == "rigid"
 
     @field_validator("mounts")
     @classmethod

@@ -43,6 +43,7 @@ SHAPING = [
     ("gears.0.tip_diameter", 82e-3),
     ("gears.0.face_width", 15e-3),
     ("gears.0.bore_diameter", 31e-3),
+    ("gears.0.bore_coupling", "rigid"),
     ("gears.0.tip_edge_radius", 0.1e-3),
     ("gears.0.rack.dedendum", 1.3),
     ("gears.0.rack.fillet_radius", 0.3),

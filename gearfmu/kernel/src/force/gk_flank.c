@@ -10,6 +10,7 @@
 #include "problem/gk_work.h"
 
 typedef struct pair { /* the gears of an engagement at their poses */
+    const gk_model *model;
     const gk_setup *setup;
     const gk_engagement *e;
     const gk_mesh *mesh;
@@ -24,10 +25,16 @@ typedef struct line {              /* line of action of one side */
     double dt_x, dt_y;             /* ∂t/∂(C_B − C_A) */
 } line;
 
+/* Where a transverse section touches: direction of the force on B, and the point halfway between the teeth from the axis
+ * of either gear, the same for both */
+typedef struct touch {
+    double n[2], at[2][2];
+} touch;
+
 static pair pair_of(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
-    return (pair){setup, e, mesh, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
+    return (pair){model, setup, e, mesh, {&model->gear[e->gear[0]], &model->gear[e->gear[1]]}, pose, mesh->allowance};
 }
 
 static int internal(const pair *q) { return q->e->kind == MESH_INTERNAL; }
@@ -101,10 +108,22 @@ static void flank_contact(const pair *q, const line *l, double g, gk_point *p)
     }
 }
 
+static void flank_touch(const pair *q, const line *l, const gk_point *p, touch *t)
+{
+    const double halfway = 0.5 * (internal(q) ? p->roll[1] - p->roll[0] - l->L : l->L - p->roll[0] - p->roll[1]);
+    t->n[0] = l->nx, t->n[1] = l->ny;
+    for (int w = 0; w < 2; w++) {
+        const int ring = w && internal(q);
+        const double side = w && !ring ? -1.0 : 1.0, roll = p->roll[w] + (ring ? -halfway : halfway);
+        t->at[w][0] = side * (q->gear[w]->r_b * l->cosine + roll * l->nx);
+        t->at[w][1] = side * (q->gear[w]->r_b * l->sine + roll * l->ny);
+    }
+}
+
 /* Eq. 6: tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l =
  * line of action. Returns 0 when the edge's centre lies inside the base circle of o: no involute there. All formulas
  * for c = 0; for c = 1 the roles and the direction of n swap, which the signs below say. */
-static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_point *p)
+static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_point *p, touch *t)
 {
     const int o = 1 - c, on = GK_ON(q->setup, tip_relief);
     const gk_gear *tip = q->gear[c], *other = q->gear[o];
@@ -148,6 +167,12 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
     }
     p->roll[c] = tip->s_tip;
     p->roll[o] = s;
+    if (t) {
+        const double out = c == 0 ? -1.0 : 1.0, middle = 0.5 * (s + length - tip->edge);
+        t->n[0] = out * mx, t->n[1] = out * my;
+        t->at[o][0] = other->r_b * ct + middle * mx, t->at[o][1] = other->r_b * st + middle * my;
+        t->at[c][0] = rx + (middle - length) * mx, t->at[c][1] = ry + (middle - length) * my;
+    }
     double blend = gk_clamp(over / tip->strip, 0.0,
                             1.0); /* the contact patch leaves the flank over about the strip's half-width */
     blend = blend * blend * (3.0 - 2.0 * blend);
@@ -239,60 +264,38 @@ static int in_tables(const gk_mesh *mesh, const gk_position position[2], gk_plac
 }
 
 /* The transverse section of a tooth pair where its base angles are β and its rolls are in p; 0 where the flanks have
- * ended. A loaded pair reaches past the end by its deflection. */
-static int section(const pair *q, const flank_side *s, const double beta[2], double closer, gk_point *p)
+ * ended. A loaded pair reaches past the end by its deflection. t: where it touches, NULL: not asked for. */
+static int section(const pair *q, const flank_side *s, const double beta[2], double closer, gk_point *p, touch *t)
 {
     const int tip_b = internal(q) ? p->roll[1] < q->gear[1]->s_tip : p->roll[1] > q->gear[1]->s_tip;
     const int corner = p->roll[0] > q->gear[0]->s_tip ? 0 : tip_b ? 1 : -1;
     if (corner >= 0 && (internal(q) || !GK_ON(q->setup, tip_contact))) return 0;
     if (corner < 0) {
         flank_contact(q, &s->l, s->gap - closer, p);
+        if (t) flank_touch(q, &s->l, p, t);
         return 1;
     }
-    if (!corner_contact(q, &s->l, corner, beta, p)) return 0;
+    if (!corner_contact(q, &s->l, corner, beta, p, t)) return 0;
     p->gap += s->allowance;
     return 1;
 }
 
 /* ---- slices of helical or tilted teeth ------------------------------------------------------------------------------ */
-static const double LEAN = 0.2e-3;                   /* m: what tilts may close of a gap */
-static const double LEAST_SHARE = 0.02, OPEN = 1e-3; /* of a strip that has left its flanks; m */
-
-/* Where a strip touches: the middle of its part that lies on both flanks, or its end next to them. A roll at z is s + sg z
- * tan β_b, β_b of its own gear. */
-static double covered(const pair *q, const flank_side *s, const double roll[2], int strip, double *share)
-{
-    const double half = 0.5 * q->e->width / q->setup->slices, middle = q->mesh->strip_middle[strip];
-    double from = middle - half, to = middle + half;
-    for (int w = 0; w < 2; w++) {
-        const double slope = s->sg * q->mesh->helix[w];
-        if (slope == 0.0) continue;
-        const double end = (q->gear[w]->s_tip - roll[w]) / slope;
-        if ((slope > 0.0) == (w == 0 || !internal(q)))
-            to = gk_min(to, end);
-        else
-            from = gk_max(from, end);
-    }
-    *share = gk_max((to - from) / (2.0 * half), LEAST_SHARE);
-    return gk_clamp(0.5 * (from + to), middle - half, middle + half);
-}
+static const double LEAN = 0.2e-3; /* m: what tilts may close of a gap */
+static const double OPEN = 1e-3;   /* m: gap of a strip that has left its flanks */
 
 /* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves along its
  * axis or tilts about its mid-width moves the point of contact along it. Both gears have the point halfway between their
- * flanks, so that contact forces are in balance with their moments. */
-static void lean(const pair *q, const line *l, double z, gk_point *p)
+ * teeth, so that contact forces are in balance with their moments. */
+static void lean(const pair *q, double sg, const touch *t, double z, gk_point *p)
 {
     const gk_mesh *mesh = q->mesh;
-    const double nx = mesh->cosine * l->nx, ny = mesh->cosine * l->ny, nz = -l->sg * mesh->sine;
-    const double halfway = 0.5 * (internal(q) ? p->roll[1] - p->roll[0] - l->L : l->L - p->roll[0] - p->roll[1]);
+    const double nx = mesh->cosine * t->n[0], ny = mesh->cosine * t->n[1], nz = -sg * mesh->sine;
     p->gap *= mesh->cosine;
     p->curvature *= mesh->cosine;
     for (int w = 0; w < 2; w++) {
-        const int ring = w && internal(q);
-        const double side = w && !ring ? -1.0 : 1.0, sense = w ? 1.0 : -1.0;
-        const double roll = p->roll[w] + (ring ? -halfway : halfway), *pose = q->pose + SPACE * w;
-        const double x = side * (q->gear[w]->r_b * l->cosine + roll * l->nx), up = z - pose[ZA];
-        const double y = side * (q->gear[w]->r_b * l->sine + roll * l->ny);
+        const double sense = w ? 1.0 : -1.0, *pose = q->pose + SPACE * w;
+        const double x = t->at[w][0], y = t->at[w][1], up = z - pose[ZA];
         double *gradient = p->gradient + SPACE * w;
         for (int c = 0; c < PLANE; c++) gradient[c] *= mesh->cosine;
         gradient[ZA] = sense * nz;
@@ -303,23 +306,34 @@ static void lean(const pair *q, const line *l, double z, gk_point *p)
     }
 }
 
-/* every strip by itself; 0 when none comes within `reach` */
+/* one transverse section of a strip, in space */
+static void section_at(const pair *q, const flank_side *s, const double beta[2], const double roll[2], double closer,
+                       double z, gk_point *p)
+{
+    double here[2];
+    touch t;
+    for (int w = 0; w < 2; w++) {
+        p->roll[w] = roll[w] + s->sg * z * q->mesh->helix[w];
+        here[w] = beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
+    }
+    if (!section(q, s, here, closer, p, &t)) {
+        flank_contact(q, &s->l, s->gap - closer + OPEN, p);
+        flank_touch(q, &s->l, p, &t);
+    }
+    lean(q, s->sg, &t, z, p);
+}
+
+/* every strip by itself, in the middle of its part that carries; 0 when none comes within `reach` */
 static int strips_of(const pair *q, const flank_side *s, const double beta[2], const double roll[2], double closer,
                      double reach, gk_place *place)
 {
     place->gap = OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
-        const double z = covered(q, s, roll, i, &p->share);
-        double here[2];
-        for (int w = 0; w < 2; w++) {
-            p->roll[w] = roll[w] + s->sg * z * q->mesh->helix[w];
-            here[w] = beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
-        }
-        const int there = section(q, s, here, closer, p);
-        if (!there) flank_contact(q, &s->l, s->gap - closer + OPEN, p);
-        p->gap += q->mesh->lead[s->flank][i];
-        lean(q, &s->l, z, p);
+        const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
+        section_at(q, s, beta, roll, closer, part.middle, p);
+        p->share = part.share;
+        p->gap += q->mesh->cosine * q->mesh->lead[s->flank][i];
         place->gap = gk_min(place->gap, p->gap);
     }
     return place->gap < reach;
@@ -338,7 +352,7 @@ static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, g
     if (q->setup->spatial) return strips_of(q, s, beta, roll, closer, reach, p);
     p->point[0].share = 1.0;
     p->point[0].roll[0] = roll[0], p->point[0].roll[1] = roll[1];
-    if (!section(q, s, beta, closer, &p->point[0])) return 0;
+    if (!section(q, s, beta, closer, &p->point[0], NULL)) return 0;
     p->gap = p->point[0].gap;
     return p->gap < reach;
 }

@@ -102,6 +102,10 @@ typedef struct gk_side {
                                Lᵀ C_fs, κ = L Lᵀ; where another engagement shares the rotor */
 } gk_side;
 
+typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
+    double middle, share; /* share: of the strip's length, never 0 */
+} gk_part;
+
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
     gk_side side[2];
@@ -117,6 +121,7 @@ typedef struct gk_mesh { /* an engagement */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
+    double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
         log_high; /* bounds of b² in the local law, and their ln */
@@ -223,6 +228,9 @@ const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma
 /* gk_strips.c */
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
+gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
+                       const double roll[2], int strip);
+void gk_strips_row(const gk_model *model, int g, double from, double to, double *out);
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
 /* Σ of a row over its span, and its multiple added there */
 static inline double gk_dot_span(gk_span span, const double *row, const double *x)

@@ -72,7 +72,8 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
 typedef struct place { /* a candidate's strip at a node */
     int flank, offset, index;
     double weight[4], middle, nominal,
-        roll; /* length of roll on the line of action at mid-width, here; where contact is */
+        roll;                       /* length of roll on the line of action at mid-width, here; where contact is */
+    double z, width[MAX_FUNCTIONS]; /* middle of the part that carries; its weights on the width functions */
 } place;
 
 typedef struct node { /* what a node's tables are made from */
@@ -84,6 +85,7 @@ typedef struct node { /* what a node's tables are made from */
     int points;                            /* candidates × strips */
     place at[MAX_CANDIDATES * MAX_SLICES]; /* points */
     gk_strip_weights weight;
+    double length;       /* of the line of action between the base circles, nominal */
     double *rows;        /* (points, modes): all stored modes, tooth offset included */
     double *ground;      /* (points, reads): outward, rigid motion included, of every ground oscillator */
     double *rigid;       /* (points, reads): the part of it that is rigid motion */
@@ -128,14 +130,14 @@ static void grid(const gk_model *model, const gk_gear *gear, place *p)
 }
 
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
-static void blend(const node *n, const double *table, const place *p, int strip, int width, double *out)
+static void blend(const node *n, const double *table, const place *p, int width, double *out)
 {
     const int A = n->model->functions;
     const double *t = table + (size_t)((p->flank * n->model->rolls + p->index) * A) * width;
     for (int k = 0; k < width; k++) out[k] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < A; a++, t += width) {
-            const double w = p->weight[i] * n->weight[strip][a];
+            const double w = p->weight[i] * p->width[a];
             for (int k = 0; k < width; k++) out[k] += w * t[k];
         }
 }
@@ -162,7 +164,7 @@ typedef struct direction { /* in ground axes, at the nominal place of contact */
     double n[3], arm[3];   /* outward normal; point of contact from the gear's centre × normal */
 } direction;
 
-static direction direction_of(const node *n, const place *p, int strip)
+static direction direction_of(const node *n, const place *p)
 {
     const gk_engagement *e = n->e;
     const double dx = e->position[1][0] - e->position[0][0], dy = e->position[1][1] - e->position[0][1];
@@ -180,19 +182,18 @@ static direction direction_of(const node *n, const place *p, int strip)
     d.n[0] = helix_cosine * nx, d.n[1] = helix_cosine * ny, d.n[2] = -hollow * sg * helix_sine;
     const double x = facing * r_b * cosine + hollow * p->nominal * nx,
                  y = facing * r_b * sine + hollow * p->nominal * ny;
-    const double z = n->setup->mesh[e - n->model->engagement].strip_middle[strip];
-    d.arm[0] = y * d.n[2] - z * d.n[1];
-    d.arm[1] = z * d.n[0] - x * d.n[2];
+    d.arm[0] = y * d.n[2] - p->z * d.n[1];
+    d.arm[1] = p->z * d.n[0] - x * d.n[2];
     d.arm[2] = helix_cosine * hollow * sg * r_b;
     return d;
 }
 
 /* what the ground oscillators of the gear move at a point, outward; C_fs there */
-static void ground_point(const node *n, const place *p, int strip, double *row, double *rigid, double *support)
+static void ground_point(const node *n, const place *p, double *row, double *rigid, double *support)
 {
     const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
     const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
-    const direction d = direction_of(n, p, strip);
+    const direction d = direction_of(n, p);
     const double *centre = n->gear->ground[set].centre,
                  along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
     double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
@@ -204,9 +205,9 @@ static void ground_point(const node *n, const place *p, int strip, double *row, 
     }
     for (int s = 0; s < supports; s++) support[s] = 0.0;
     for (int c = 0; c < 3; c++) {
-        blend(n, n->gear->ground[set].rows + c * size * reads, p, strip, reads, part);
+        blend(n, n->gear->ground[set].rows + c * size * reads, p, reads, part);
         for (int k = 0; k < reads; k++) row[k] += trig[c] * part[k];
-        blend(n, n->gear->support_residual + c * size * supports, p, strip, supports, part);
+        blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
         for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
     }
 }
@@ -228,6 +229,25 @@ static double corner_roll(const node *n, const place *p)
     return l2 > 0.0 ? sqrt(l2) - tip->edge : 0.0;
 }
 
+/* Where a strip carries at the nominal centre distance: its part on both flanks, with a length of its own */
+static void find_part(const node *n, const gk_mesh *mesh, place *p, int strip)
+{
+    p->z = mesh->strip_middle[strip];
+    memcpy(p->width, n->weight[strip], sizeof p->width);
+    if (n->e->kind == MESH_FLAT || n->gear->helix == 0.0) return;
+    const int own = n->side->which, internal = n->e->kind == MESH_INTERNAL;
+    double roll[2];
+    roll[own] = p->middle;
+    roll[1 - own] = internal ? p->middle + (own ? -n->length : n->length) : n->length - p->middle;
+    const gk_part part = gk_strips_part(n->model, n->setup, mesh, p->flank ? -1.0 : 1.0, roll, strip);
+    if (part.share >= 1.0) return;
+    const double slice = n->e->width / n->setup->slices, half = 0.5 * part.share * slice;
+    const double low = mesh->strip_middle[strip] - 0.5 * slice + half, high = low + slice - 2.0 * half;
+    const double middle = gk_clamp(part.middle, low, high);
+    p->z = part.middle;
+    gk_strips_row(n->model, n->side->gear, middle - half, middle + half, p->width);
+}
+
 static void gather_node(node *n, double position)
 {
     const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
@@ -239,15 +259,16 @@ static void gather_node(node *n, double position)
         p->flank = c >= n->side->count[0];
         p->offset = n->side->first[p->flank] + n->side->step * (p->flank ? c - n->side->count[0] : c);
         p->middle = n->e->kind == MESH_FLAT ? n->gear->s_form : roll_at(n->side, p->flank, position, p->offset);
-        p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * mesh->strip_middle[strip] * tan_of(n->gear->helix);
+        find_part(n, mesh, p, strip);
+        p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * tan_of(n->gear->helix);
         p->roll = corner_roll(n, p);
         grid(n->model, n->gear, p);
-        blend(n, n->gear->rows, p, strip, modes, n->rows + (size_t)i * modes);
+        blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
         if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
-        blend(n, n->gear->port_residual, p, strip, n->model->ports, ports);
+        blend(n, n->gear->port_residual, p, n->model->ports, ports);
         n->port[i] = n->port_of >= 0 ? ports[n->port_of] : 0.0;
         if (n->e->kind != MESH_FLAT)
-            ground_point(n, p, strip, n->ground + (size_t)i * n->gear->ground[set].reads,
+            ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
                          n->rigid + (size_t)i * n->gear->ground[set].reads,
                          n->support + (size_t)i * n->model->supports);
     }
@@ -300,7 +321,8 @@ static int tabulated(const node *n, int first, int second, double *out)
         for (int t = 0; t < strips; t++) {
             if (n->setup->spatial || s + t == 0) /* else all strips have the same rolls */
                 tabulate(n, &n->at[first * strips + s], &n->at[second * strips + t], cell);
-            for (int a = 0; a < A; a++) out[s * strips + t] += n->weight[s][a] * dot(cell + a * A, n->weight[t], A);
+            const double *of_s = n->at[first * strips + s].width, *of_t = n->at[second * strips + t].width;
+            for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * dot(cell + a * A, of_t, A);
         }
     return 1;
 }
@@ -489,6 +511,9 @@ static node begin_node(const gk_model *model, const gk_setup *setup, double *roo
     n.port_of = gk_port_of(model, side->gear);
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
     gk_strips_rows(model, setup, n.e, side->gear, n.weight);
+    const double x = n.e->position[1][0] - n.e->position[0][0], y = n.e->position[1][1] - n.e->position[0][1];
+    const double R = gk_base_reach(model, n.e);
+    n.length = sqrt(gk_max(x * x + y * y - R * R, 0.0));
     return n;
 }
 

@@ -32,16 +32,61 @@ static double legendre_integral(int degree, double x)
     return (now - minus) / (2.0 * degree + 1.0);
 }
 
+/* the same of a part of the width, −1 … 1 of the half-width of gear g, from … to */
+static void row_over(const gk_model *model, double from, double to, double *out)
+{
+    for (int a = 0; a < model->functions; a++) {
+        const int d = model->degree[a];
+        out[a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
+    }
+}
+
+void gk_strips_row(const gk_model *model, int g, double from, double to, double *out)
+{
+    const double per_half = 2.0 / model->gear[g].width;
+    row_over(model, per_half * from, per_half * to, out);
+}
+
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out)
 {
     const double edge = e->width / model->gear[g].width;
     for (int s = 0; s < setup->strips; s++)
-        for (int a = 0; a < model->functions; a++) {
-            const double from = edge * (2.0 * s / setup->slices - 1.0),
-                         to = edge * (2.0 * (s + 1) / setup->slices - 1.0);
-            const int d = model->degree[a];
-            out[s][a] = (2.0 * d + 1.0) * (legendre_integral(d, to) - legendre_integral(d, from)) / (to - from);
-        }
+        row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
+}
+
+/* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks and
+ * past their ends by no more than `past`; of a strip that has left them the end next to them. A roll at z is s + sg z tan
+ * β_b, β_b of its own gear. */
+gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
+                       const double roll[2], int strip)
+{
+    static const double LEAST_SHARE = 0.02; /* of a strip that has left its flanks */
+    const gk_engagement *e = &model->engagement[mesh->index];
+    const double half = 0.5 * e->width / setup->slices, middle = mesh->strip_middle[strip];
+    double from = middle - half, to = middle + half;
+    for (int w = 0; w < 2; w++) {
+        const double slope = sg * mesh->helix[w], last = model->gear[e->gear[w]].s_tip + mesh->past[w];
+        if (slope == 0.0) continue;
+        const double end = (last - roll[w]) / slope;
+        if ((slope > 0.0) == (w == 0 || e->kind != MESH_INTERNAL))
+            to = gk_min(to, end);
+        else
+            from = gk_max(from, end);
+    }
+    return (gk_part){
+        .middle = gk_clamp(0.5 * (from + to), middle - half, middle + half),
+        .share = gk_max((to - from) / (2.0 * half), LEAST_SHARE),
+    };
+}
+
+/* The tip edge carries a line of contact on past the end of its flank: by the half-width of the load strip, over which the
+ * contact patch leaves the flank; farther where a slice spans less roll than that, without end for spur teeth, whose strips
+ * leave the flank as a whole. Longer parts of coarse slices would carry at the gap of their middle alone. */
+static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_gear *gear, double helix)
+{
+    if (!GK_ON(setup, tip_contact) || e->kind != MESH_EXTERNAL) return 0.0;
+    const double span = fabs(helix) * e->width / setup->slices, least = 1e-6;
+    return gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
 }
 
 /* mean of a gear's lead over −1 … 1 of its half-width, from … to */
@@ -77,6 +122,7 @@ void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
                 mesh->lead[flank][s] += lead_over(gear, flank, edge * (2.0 * s / setup->slices - 1.0),
                                                   edge * (2.0 * (s + 1) / setup->slices - 1.0));
         mesh->helix[w] = tan_of(gear->helix);
+        mesh->past[w] = past_end(setup, e, gear, mesh->helix[w]);
         mesh->strip_term += gear->local * (gk_log(4.0 * gear->strip) - 1.0);
     }
 }
