@@ -137,7 +137,9 @@ def motion_problems(spec: PlanetarySpec) -> list[Problem]:
         if value is None
     ]
     if set(spec.ports) != {"carrier", "sun"}:
-        remedy = 'a set is driven and loaded at its carrier and its sun: write [ports.carrier] and [ports.sun], e.g. kind'
+        remedy = (
+            "a set is driven and loaded at its carrier and its sun: write [ports.carrier] and [ports.sun], e.g. kind"
+        )
         found.append(Problem(str(spec.source), "ports", ", ".join(spec.ports) or "missing", f'{remedy} = "torque"'))
     return found
 

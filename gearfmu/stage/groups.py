@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-
 import numpy as np
 import scipy.linalg as sl
 from scipy.sparse.csgraph import connected_components

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
+from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.spec.general import GeneralStage, ShaftBody, SupportSpec, ToothedBody
 from gearfmu.spec.shapes import gear_shape
 from gearfmu.stage.free import FreeBody, free_carrier, free_gear, free_shaft

@@ -105,14 +105,18 @@ def stage_sections(stage: GeneralStage) -> dict[str, Any]:
         periods.append(2 * math.pi / (mesh.speed_max * pair.gears[0].z))
     shifts = _placed(stage)[1]
     looped = {"tooth_shift": np.array(shifts, np.int32)} if any(shifts) else {}
-    return looped | _frame_section(stage) | {
-        "name": stage.name,
-        "rotor_names": "|".join(stage.rotors),
-        "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
-        "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
-        "engaged": np.array(engaged, np.int32),
-        "engagement": np.array(numbers),
-    }
+    return (
+        looped
+        | _frame_section(stage)
+        | {
+            "name": stage.name,
+            "rotor_names": "|".join(stage.rotors),
+            "engagement_names": "|".join(mesh.name for mesh in stage.engagements),
+            "limits": np.array([stage.levels.fast_cut, stage.levels.standard_cut, H_MAX, min(periods)]),
+            "engaged": np.array(engaged, np.int32),
+            "engagement": np.array(numbers),
+        }
+    )
 
 
 def _frame_section(stage: GeneralStage) -> dict[str, Any]:
