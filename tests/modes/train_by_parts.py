@@ -1,6 +1,6 @@
-"""A train of helical gears on elastic shafts at rest in mesh, put together in numpy from its spec, its reduced gears and
-finite-element shafts: equation (29) in six freedoms a body, gears in their unloaded places. Of the kernel it takes which
-slices carry load, and how much.
+"""A train of helical gears on elastic shafts at rest in mesh, put together in numpy from its spec, its reduced gears
+and finite-element shafts: equation (29) in six freedoms a body, gears in their unloaded places. Of the kernel it takes
+which slices carry load, and how much.
 
 Every body has its rigid motion x, y, z, r_x, r_y, r_z in the axes of the stage and elastic coordinates; a shaft has the
 unknowns of its finite elements instead. Links are loaded slices, seats, bearings and ports: with their elongations R q
@@ -66,7 +66,8 @@ class Touch:
 
 def touch(stage: GeneralStage, mesh: EngagementSpec, load: Load, turned: tuple[float, float]) -> Touch:
     """Of a slice of an engagement whose gears have turned by `turned` (rad) since the drive flanks of tooth 0 touched,
-    tooth 0 of gear A on +x."""
+    tooth 0 of gear A on +x. A slice that has partly left a flank touches in the middle of what is left of it; what
+    bodies yield there is that of the whole slice, read at its middle, or at the end of the flank."""
     pair = mesh_shape(stage, mesh)
     assert isinstance(pair, PairGeometry)
     a, b = pair.gears
@@ -82,18 +83,20 @@ def touch(stage: GeneralStage, mesh: EngagementSpec, load: Load, turned: tuple[f
     other = round(facing / pitch)  # tooth of B
     across = b.r_b * (free[1] + sense * (zero[1] - gamma - math.pi + other * pitch))
     slope = sense * math.tan(a.beta_b)
-    edges = (np.array([load.slice, load.slice + 1]) / stage.slices - 0.5) * width
-    if slope:  # of the slice, what lies on both flanks
-        edges = np.clip(edges, *sorted([(a.s_tip - middle) / slope, (across - b.s_tip) / slope]))
-    z = float(edges.mean())
-    rolls = (middle + slope * z, across - slope * z)
+    whole = (np.array([load.slice, load.slice + 1]) / stage.slices - 0.5) * width
+    ends = sorted([(a.s_tip - middle) / slope, (across - b.s_tip) / slope]) if slope else (-width, width)
+    left = np.clip(whole, *ends)  # of the slice, what lies on both flanks
+    z, touching = float(whole.mean()), float(left.mean())
     normal = np.array([math.sin(pair.alpha_wt), sense * math.cos(pair.alpha_wt)])
-    point = a.r_b * np.array([math.cos(pair.alpha_wt), -sense * math.sin(pair.alpha_wt)]) + rolls[0] * normal
+    foot = a.r_b * np.array([math.cos(pair.alpha_wt), -sense * math.sin(pair.alpha_wt)])
+    point = np.append(foot + (middle + slope * touching) * normal, touching)
     n = np.append(normal * math.cos(a.beta_b), -sense * math.sin(a.beta_b))
     turn = np.kron(np.eye(2), _about_z(gamma))
-    rigid = [turn @ np.concatenate([n, np.cross(np.append(point - centre, z), n)]) for centre in ((0, 0), (pair.a, 0))]
-    length = float(np.diff(edges)[0]) / math.cos(a.beta_b)
-    law = _tangent(stage, mesh, math.cos(a.beta_b) * (1 / rolls[0] + 1 / rolls[1]), load.force / length) / length
+    rigid = [turn @ np.concatenate([n, np.cross(point - (x, 0, 0), n)]) for x in (0, pair.a)]
+    curvature = math.cos(a.beta_b) * (1 / (middle + slope * touching) + 1 / (across - slope * touching))
+    length = float(np.diff(left)[0]) / math.cos(a.beta_b)
+    law = _tangent(stage, mesh, curvature, load.force / length) / length
+    rolls = (min(middle + slope * z, a.s_tip), min(across - slope * z, b.s_tip))
     return Touch(rolls, law, zero, (load.tooth, other), (rigid[0], -rigid[1]))
 
 

@@ -22,7 +22,8 @@ typedef struct rest { /* a search for rest */
     int train[MAX_SPINS], trains,
         floats[MAX_ROTORS]; /* which spins turn together, −1: none; trains that nothing holds */
     double given[MAX_SPINS], before[MAX_SPINS];
-    int island; /* that comes to rest now */
+    int island;     /* that comes to rest now */
+    int32_t status; /* of the run before that */
 } rest;
 
 static int searched(const rest *r, int e) { return r->setup.mesh[e].island == r->island; }
@@ -240,6 +241,7 @@ static double relax(rest *r)
     unroll(r);
     for (int d = 0; d < r->setup.spins; d++)
         moved = gk_max(moved, fabs(r->data->x[d] - r->before[d]) * arm_of(r, d < r->model->rotors ? d : 0));
+    r->data->status = r->status; /* what an iteration on the way saw is not what is at rest */
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e)) gk_step_remember(&r->setup, &work->engaged[e], r->data, e);
     return stuck ? gk_max(moved, 1.0) : moved;
@@ -375,6 +377,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     int found = 1;
     for (r.island = 0; r.island < r.setup.islands && found; r.island++) {
         if (!keep) begin(&r);
+        r.status = data->status;
         found = search(&r);
     }
     clear_compliance(&r);
