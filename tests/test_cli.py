@@ -153,11 +153,12 @@ def test_bodies_of_a_planetary_set_mesh_and_tell_their_facts(
     assert code == 0 and "ring_least_tip_radius" in out and "0.065362" in out
 
 
-@pytest.mark.parametrize("kind", ["stage", "planetary", "scene"])
+@pytest.mark.parametrize("kind", ["stage", "general", "planetary", "scene"])
 def test_schema_is_json_and_knows_the_fields(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("schema", kind, "--out", tmp_path / "s.json", capsys=capsys)[0] == 0
     made = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))
-    assert {"stage": "gears", "planetary": "carrier", "scene": "coupling"}[kind] in made["properties"]
+    known = {"stage": "gears", "general": "engagements", "planetary": "carrier", "scene": "coupling"}
+    assert known[kind] in made["properties"]
 
 
 def test_variables_page_in_docs_is_the_kernels_table(capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,7 +35,7 @@ from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.modal import elastic_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import static_tables
-from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.body import body_hash, body_inputs, gear_table
 from gearfmu.spec.general import GeneralStage, gear_as_pair
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.planetary import RingSpec
@@ -118,7 +118,7 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
     try:
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
-        raise MeshError(f"{spec.source}: gears.{gear.name}: {error}") from error
+        raise MeshError(f"{spec.source}: {gear_table(spec, gear.name)}: {error}") from error
 
 
 def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progress | None = None) -> ReducedBody:

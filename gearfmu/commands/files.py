@@ -25,11 +25,11 @@ def inspect(path: Path, as_json: bool) -> None:
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["stage", "planetary", "scene", "variables", "effects"]))
+@click.argument("kind", type=click.Choice(["stage", "general", "planetary", "scene", "variables", "effects"]))
 @click.option("--out", type=click.Path(path_type=Path), help="File to write; standard output when not given.")
 def schema(kind: str, out: Path | None) -> None:
-    """JSON schema of the stage.toml of a pair or a planetary set, or of scene.toml; or the table of FMU variables
-    (docs/variables.md) or effects (docs/effects.md)."""
+    """JSON schema of the stage.toml of a pair (stage), a general stage or a planetary set, or of scene.toml; or the
+    table of FMU variables (docs/variables.md) or effects (docs/effects.md)."""
     from gearfmu.files import write_text
 
     text = _schema_text(kind)
@@ -49,10 +49,15 @@ def _schema_text(kind: str) -> str:
 
         return effects_page()
     from gearfmu.spec.scene import SceneSpec
-    from gearfmu.spec.schema import file_schema, set_schema, stage_schema
+    from gearfmu.spec.schema import file_schema, general_schema, set_schema, stage_schema
 
-    made = {"stage": stage_schema, "planetary": set_schema, "scene": lambda: file_schema(SceneSpec)}[kind]()
-    return json.dumps(made, indent=2, ensure_ascii=False) + "\n"
+    made = {
+        "stage": stage_schema,
+        "general": general_schema,
+        "planetary": set_schema,
+        "scene": lambda: file_schema(SceneSpec),
+    }
+    return json.dumps(made[kind](), indent=2, ensure_ascii=False) + "\n"
 
 
 def facts_of(path: Path) -> dict[str, Any]:

@@ -38,7 +38,8 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if gear is None or gear not in names:
         raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
     echo_pairs(body_facts(spec, gear, str(file), options))
-    place = gear if spec.kind == "planetary_set" else f"gears.{gear}"
+    table = "bodies" if spec.kind == "general" else "gears"
+    place = gear if spec.kind == "planetary_set" else f"{table}.{gear}"
     click.echo("\n" + section(file, place, options))
 
 

@@ -49,10 +49,11 @@ def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
 def _with_other_bores(stage: str, coupling: str) -> tuple[Any, list[Any]]:
     """`bodies_for_motion` with every bore coupled so. Bodies that are not those of the stage file lie in the folder
     `bores_<coupling>` beside it: the stage's own stay as they are."""
-    from gearfmu.spec.stage import load_stage, require_motion
+    from gearfmu.spec.stage import load_stage
 
     own = load_stage(stage)
-    require_motion(own)
+    if own.kind == "planetary_set":
+        raise click.UsageError("--bore: the gears of a planetary set keep averaging bores; leave it away")
     from gearfmu.body import reduce_stage
     from gearfmu.spec.bores import with_bores
     from gearfmu.spec.library import model_folder

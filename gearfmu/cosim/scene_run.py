@@ -17,13 +17,13 @@ from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
-from gearfmu.errors import CouplingError, Problem, SpecError
+from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.spec.turning import shafts_of, with_ports
+from gearfmu.spec.turning import require_two_driven, shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.trace import Trace
 
@@ -75,12 +75,7 @@ def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec
     """The stage with the ports that the scene's drivetrain needs. SpecError where more than its input and output would
     have to be driven."""
     shafts = shafts_of(as_general(spec))
-    for name, port in spec.ports.items():
-        if name not in (shafts.input, shafts.output) and port.kind == "spring":
-            remedy = (
-                f"a scene drives {shafts.input} and {shafts.output} only: make this port one of kind torque or fixed"
-            )
-            raise SpecError([Problem(str(spec.source), f"ports.{name}.kind", '"spring"', remedy)])
+    require_two_driven(spec, shafts, "a scene")
     return with_ports(spec, stage_ports(scene, shafts))
 
 

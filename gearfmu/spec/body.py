@@ -42,9 +42,14 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
     if gear.rigid_bore:
         inputs["bore_coupling"] = gear.bore_coupling
     if gear.imported is not None:
-        inputs["import"] = import_inputs(gear.imported, spec.source, f"gears.{gear.name}.import")
+        inputs["import"] = import_inputs(gear.imported, spec.source, f"{gear_table(spec, gear.name)}.import")
         inputs["body"].pop("mesh")
     return inputs
+
+
+def gear_table(spec: Any, name: str) -> str:
+    """The table of a gear in its stage file: "gears.pinion", in a general stage "bodies.pinion"."""
+    return f"{getattr(spec, 'tables', 'gears')}.{name}"
 
 
 def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:

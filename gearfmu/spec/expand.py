@@ -121,7 +121,7 @@ def set_gears(spec: PlanetarySpec, bodies: Sequence[Any]) -> list[Any]:
 def motion_problems(spec: PlanetarySpec) -> list[Problem]:
     """What a set needs to move and does not say."""
     example = 'stiffness = "3e8 N/m", axial = "1e8 N/m", tilt = "1e5 N*m/rad"'
-    given = {
+    given: dict[str, tuple[Any, str]] = {
         "speed_max": (spec.speed_max, 'speed_max = "300 rad/s"'),
         "contact": (spec.contact, 'damping = "50e3 N*s/m^2"'),
         "ring.mounts": (spec.ring.mounts, 'points = 6, stiffness = "1e8 N/m"'),

@@ -299,6 +299,7 @@ class _GearAlone:
     """One gear as a stage of kind external_pair shows it."""
 
     kind = "external_pair"
+    tables = "bodies"
 
     def __init__(self, source: Path, gear: ToothedBody) -> None:
         self.source, self.gears, self.pair = source, (gear,), gear

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.spec.base import Spec
+from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 
@@ -38,6 +39,24 @@ def set_schema() -> dict[str, Any]:
     return _with_base(schema)
 
 
+def general_schema() -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of the stage.toml of a general stage: a table for every body by its name."""
+    schema = file_schema(GeneralStage)
+    schema["title"] = "gearfmu general stage"
+    schema["required"] = [*(name for name in schema["required"] if name != "source"), "kind"]
+    here = {"GearBody": {"name", "bearing"}, "RingBody": {"name", "mounts"}, "ShaftBody": {"name"}}
+    for part, elsewhere in here.items():
+        body = schema["$defs"][part]
+        body["properties"] = {key: value for key, value in body["properties"].items() if key not in elsewhere}
+        body["required"] = [name for name in body["required"] if name not in elsewhere]
+    for name in ("Bearing", "MountsSpec"):
+        schema["$defs"].pop(name, None)
+    del schema["properties"]["source"]
+    for name in ("bodies", "rotors", "ports"):
+        schema["properties"][name]["additionalProperties"] = False
+    return _with_base(schema)
+
+
 def _with_base(schema: dict[str, Any]) -> dict[str, Any]:
     """A file that begins with `base` need not say everything."""
     schema["properties"]["base"] = {"type": "string", "description": "file that says everything this one does not"}
@@ -61,6 +80,8 @@ def _as_in_file(part: Any) -> Any:
     choices = [choice for choice in part.get("anyOf", []) if choice != {"type": "null"}]
     if part.get("anyOf") and len(choices) == 1:
         part = {key: value for key, value in part.items() if key not in ("anyOf", "default")} | choices[0]
+    elif part.get("anyOf"):
+        part = part | {"anyOf": choices}
     if "default" in part and part["default"] is None:
         part = {key: value for key, value in part.items() if key != "default"}
     if "unit" in part and isinstance(part.get("default"), (int, float)):

@@ -106,6 +106,15 @@ def with_ports(spec: Any, ports: dict[str, PortSpec]) -> Any:
     return spec.model_copy(update={"ports": own})
 
 
+def require_two_driven(stage: Any, shafts: Shafts, by: str) -> None:
+    """SpecError where a spring port beside input and output would have to be driven, which `by` ("a scene") does not
+    do."""
+    for name, port in stage.ports.items():
+        if name not in (shafts.input, shafts.output) and port.kind == "spring":
+            remedy = f"{by} drives {shafts.input} and {shafts.output} only: make this port one of kind torque or fixed"
+            raise SpecError([Problem(str(stage.source), f"ports.{name}.kind", '"spring"', remedy)])
+
+
 def _teeth(stage: GeneralStage, gear: str) -> int:
     body = stage.bodies[gear]
     assert isinstance(body, ToothedBody)

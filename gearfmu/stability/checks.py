@@ -24,11 +24,20 @@ def finding(
     facts: Mapping[str, float] | None = None,
     energy: float = ENERGY,
 ) -> Finding:
-    """The finding of a recorded run; complaints: the scene's own. energy: limit of the energy residual."""
+    """The finding of a recorded run of a pair; complaints: the scene's own. energy: limit of the energy residual."""
     depth = overlap(record, pair)
+    said = deep(record, depth, record["mesh.force_max"] / SOFTEST + CLEARANCE)
+    return judged(record, float(depth.max()), [*said, *complaints], facts or {}, energy)
+
+
+def judged(
+    record: Record, penetration: float, complaints: Iterable[str], facts: Mapping[str, float], energy: float = ENERGY
+) -> Finding:
+    """The finding of a recorded run of any stage: finite everywhere, energy balance closed, no step unsolved, and the
+    scene's own complaints. penetration: m."""
     found = lost(record)
     found |= {"trouble": float(record["solver.trouble"][-1]), "status": float(record["solver.status"][-1])}
-    said = [*common(record, depth, energy), *at_most("number of steps left unsolved", found["trouble"], 0), *complaints]
+    said = [*common(record, energy), *at_most("number of steps left unsolved", found["trouble"], 0), *complaints]
     outcome = record.outcome
     if outcome != COMPLETED:
         outcome = f"{outcome}@{record.time[-1]:.6g}"
@@ -38,30 +47,40 @@ def finding(
         outcome,
         record.h,
         record.energy_residual,
-        float(depth.max()),
+        penetration,
         record.realtime_factor,
         tuple(said),
-        found | dict(facts or {}),
+        found | dict(facts),
     )
 
 
-def common(record: Record, depth: np.ndarray, energy: float) -> list[str]:
-    """Finite everywhere, energy balance closed, flanks at no sample deeper in each other than the largest force of its
-    communication step presses them. depth (n,): m."""
+def common(record: Record, energy: float) -> list[str]:
+    """Finite everywhere, energy balance closed."""
     said = [f"{name} is not finite" for name, values in record.values.items() if not np.all(np.isfinite(values))]
     if not record.energy_residual <= energy:
         said.append(f"energy balance leaves {record.energy_residual:.2g} of the exchanged energy (limit {energy:g})")
-    pressed = record["mesh.force_max"] / SOFTEST + CLEARANCE
-    worst = int(np.argmax(depth - pressed))
-    if not depth[worst] <= pressed[worst]:
-        limit = f"its force presses {1e6 * pressed[worst]:.1f} µm at most"
-        said.append(f"flanks overlap by {1e6 * depth[worst]:.1f} µm at {record.time[worst]:.6g} s, where {limit}")
     return said
 
 
+def deep(record: Record, depth: np.ndarray, pressed: np.ndarray, flanks: str = "flanks") -> list[str]:
+    """Flanks at no sample deeper in each other, depth (n,) m, than the largest force of its communication step
+    presses them, pressed (n,) m."""
+    worst = int(np.argmax(depth - pressed))
+    if depth[worst] <= pressed[worst]:
+        return []
+    limit = f"its force presses {1e6 * pressed[worst]:.1f} µm at most"
+    return [f"{flanks} overlap by {1e6 * depth[worst]:.1f} µm at {record.time[worst]:.6g} s, where {limit}"]
+
+
 def lost(record: Record) -> dict[str, float]:
-    """Contact-loss share and impacts per second."""
-    return {"open_share": record.open_share, "impact_rate": record.impact_rate} if record.time.size > 1 else {}
+    """Contact-loss share and impacts per second, of a train by engagement."""
+    found: dict[str, float] = {}
+    for mesh in (name.removesuffix(".open_time") for name in record.values if name.endswith(".open_time")):
+        if record.time.size > 1:
+            prefix = "" if mesh == "mesh" else f"{mesh}."
+            found[f"{prefix}open_share"] = record.open_share(mesh)
+            found[f"{prefix}impact_rate"] = record.impact_rate(mesh)
+    return found
 
 
 def near(what: str, value: float, wanted: float, relative: float) -> list[str]:

@@ -18,7 +18,7 @@ HEAD = """# Hard cases
 This page is made from the table that `make stability` writes, by `python -m gearfmu.stability.page`.
 
 ```
-gearfmu stability                                            # everything; a quarter of an hour of one core
+gearfmu stability                                            # everything; half an hour of one core
 gearfmu stability --level fast --h default                   # what continuous integration runs
 gearfmu stability --scene rollbacks --h "5 us" --out my.csv  # one scene, another step; a later call goes on with my.csv
 ```

@@ -15,13 +15,36 @@ from gearfmu.kernel import Kernel
 from gearfmu.stability.case import COMPLETED
 
 MESH = ("pairs", "force_mean", "force_max", "force_drive", "force_coast", "te", "contact", "impacts", "open_time")
-NAMES = (
-    *(f"mesh.{name}" for name in MESH),
-    *(f"energy.{name}" for name in ("stored", "work", "dissipated")),
-    *(f"solver.{name}" for name in ("steps", "trouble", "status", "h")),
-    *(f"{shaft}.gear.{name}" for shaft in ("pinion", "wheel") for name in ("phi", "x", "y", "w")),
-)
-OPTIONAL = ("pinion.tau_mean", "wheel.tau_mean", "pinion.clutch.locked", "pinion.clutch.slip", "pinion.w", "wheel.w")
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What is recorded of a stage: names of its engagements, of its ports and of the single gears whose place in the
+    plane is wanted."""
+
+    meshes: tuple[str, ...]
+    ports: tuple[str, ...]
+    gears: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Outputs that the stage has whatever its ports are."""
+        return (
+            *(f"{mesh}.{name}" for mesh in self.meshes for name in MESH),
+            *(f"energy.{name}" for name in ("stored", "work", "dissipated")),
+            *(f"solver.{name}" for name in ("steps", "trouble", "status", "h")),
+            *(f"{gear}.gear.{name}" for gear in self.gears for name in ("phi", "x", "y", "w")),
+        )
+
+    @property
+    def optional(self) -> tuple[str, ...]:
+        """Outputs that some kinds of ports have."""
+        clutch = tuple(f"{self.ports[0]}.clutch.{name}" for name in ("locked", "slip"))
+        return (*(f"{port}.tau_mean" for port in self.ports), *clutch, *(f"{port}.w" for port in self.ports))
+
+
+PAIR = Watched(("mesh",), ("pinion", "wheel"), ("pinion", "wheel"))
+NAMES = PAIR.names
 
 Inputs = Callable[[float], Mapping[str, float]]
 
@@ -66,15 +89,13 @@ class Record:
         """CPU seconds per simulated second, reading of the outputs included."""
         return float(self.cpu_s / self.time[-1]) if self.time[-1] else 0.0
 
-    @property
-    def open_share(self) -> float:
+    def open_share(self, mesh: str = "mesh") -> float:
         """Part of the time without any contact."""
-        return float(np.ptp(self["mesh.open_time"]) / np.ptp(self.time))
+        return float(np.ptp(self[f"{mesh}.open_time"]) / np.ptp(self.time))
 
-    @property
-    def impact_rate(self) -> float:
+    def impact_rate(self, mesh: str = "mesh") -> float:
         """Impacts per second."""
-        return float(np.ptp(self["mesh.impacts"]) / np.ptp(self.time))
+        return float(np.ptp(self[f"{mesh}.impacts"]) / np.ptp(self.time))
 
 
 class Stopped(Exception):
@@ -88,9 +109,9 @@ class Stopped(Exception):
 class Run:
     """One instance under way: `advance` steps it, `record` ends it. The loop of every scene."""
 
-    def __init__(self, kernel: Kernel, capacity: int) -> None:
+    def __init__(self, kernel: Kernel, capacity: int, watched: Watched = PAIR) -> None:
         self.kernel = kernel
-        self.names = [*NAMES, *(name for name in OPTIONAL if name in kernel.variables)]
+        self.names = [*watched.names, *(name for name in watched.optional if name in kernel.variables)]
         memory = (ctypes.c_double * len(self.names))()
         self._cells = [ctypes.c_double.from_buffer(memory, 8 * k) for k in range(len(self.names))]
         self._references = [kernel.variables[name].reference for name in self.names]
@@ -126,15 +147,15 @@ class Run:
         return Record(time, values, passed, outcome, cpu_s)
 
 
-def run(kernel: Kernel, inputs: Inputs, duration: float, step: float) -> Record:
+def run(kernel: Kernel, inputs: Inputs, duration: float, step: float, watched: Watched = PAIR) -> Record:
     """From static equilibrium at t = 0 over `duration` with communication steps `step` (s). Stopped, with the samples
     so far, when the kernel gives up."""
-    return run_times(kernel, inputs, np.arange(round(duration / step) + 1) * step)
+    return run_times(kernel, inputs, np.arange(round(duration / step) + 1) * step, watched)
 
 
-def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarray) -> Record:
+def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarray, watched: Watched = PAIR) -> Record:
     """`run` with communication points `times` (s), the first of which is the start."""
-    going, outcome, started = Run(kernel, len(times)), COMPLETED, clock.process_time()
+    going, outcome, started = Run(kernel, len(times), watched), COMPLETED, clock.process_time()
     speeds = np.full((len(times), 2), 0.0)
     going.set(inputs(times[0]))
     kernel.initialize(times[0])
@@ -143,24 +164,24 @@ def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarra
         for i in range(len(times) - 1):
             values = inputs(times[i])
             going.set(values)
-            speeds[i] = values.get("pinion.w", 0.0), values.get("wheel.w", 0.0)
+            speeds[i] = [values.get(f"{port}.w", 0.0) for port in watched.ports]
             kernel.step(times[i], times[i + 1] - times[i])
             going.take(times[i + 1])
     except SimulationError as error:
         outcome = error.outcome
     cpu = clock.process_time() - started
-    made = going.record(outcome, cpu, _powers(going.record(outcome, cpu), speeds, inputs))
+    made = going.record(outcome, cpu, _powers(going.record(outcome, cpu), speeds, inputs, watched.ports))
     if outcome != COMPLETED:
         raise Stopped(made)
     return made
 
 
-def _powers(made: Record, speeds: np.ndarray, inputs: Inputs) -> np.ndarray:
+def _powers(made: Record, speeds: np.ndarray, inputs: Inputs, ports: Sequence[str]) -> np.ndarray:
     """Σ |power| of both ports in every step: of a spring port mean torque × speed of its outer end, of a torque port
     torque × speed of the gear."""
     n = made.time.size - 1
     total = np.zeros(n)
-    for column, shaft in enumerate(("pinion", "wheel")):
+    for column, shaft in enumerate(ports):
         if f"{shaft}.tau_mean" in made.values:
             total += np.abs(made[f"{shaft}.tau_mean"][1:] * speeds[:n, column])
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gearfmu.stability import clutches, loads, speeds, stepping
+from gearfmu.stability import clutches, loads, speeds, stepping, trains
 from gearfmu.stability.case import Case, Finding
 
 SCENES: dict[str, Callable[[Case], Finding]] = {
@@ -18,6 +18,9 @@ SCENES: dict[str, Callable[[Case], Finding]] = {
         stepping.rollbacks,
         clutches.clutch_dump,
         clutches.clutch_hundred_times,
+        trains.train_closing_clutch,
+        trains.train_reversal,
+        trains.train_torque_step,
         loads.hardly_any_load,
         loads.start_in_mid_backlash,
         loads.torque_reversal,

@@ -23,9 +23,10 @@ from gearfmu.stability.checks import finding
 from gearfmu.stability.clutches import DUMP
 from gearfmu.stability.record import Stopped
 from gearfmu.stability.scenes import SCENES
+from gearfmu.stability.trains import CLOSING, train
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
-JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping")
+JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains")
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
@@ -119,7 +120,9 @@ def fingerprint() -> str:
     digest = hashlib.sha256(library_path().read_bytes())
     for stage in (PLAIN, RELIEVED):
         digest.update(model(Variant(stage)).blob)
-    digest.update(scene_path(DUMP).read_bytes())
+    digest.update(train().blob)
+    for scene in (DUMP, CLOSING):
+        digest.update(scene_path(scene).read_bytes())
     for name in JUDGES:
         digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
     return digest.hexdigest()[:12]

@@ -49,8 +49,8 @@ class Flank:
 class FreeBody:
     """A free body on its axis. mass (6, 6) of the rigid motion x, y, z, rx, ry, rz about its origin on the axis (kg,
     kg·m, kg·m²); omega (n,) rad/s and zeta (n,) of its elastic modes; place (K,) m: interface nodes along the axis,
-    from the origin, across (K, 2) m: beside it; rows (K, 6, n), kg^-½ and kg^-½/m: nodes in the modes; residual (6K, 6K), m/N …: nodes beyond the
-    modes."""
+    from the origin, across (K, 2) m: beside it; rows (K, 6, n), kg^-½ and kg^-½/m: nodes in the modes; residual (6K,
+    6K), m/N …: nodes beyond the modes."""
 
     name: str
     mass: np.ndarray

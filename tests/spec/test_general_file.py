@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gearfmu.errors import SpecError
+from gearfmu.body.reduce import reduce_gear
+from gearfmu.errors import MeshError, SpecError
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.expand import expand_pair
 from gearfmu.spec.general import gear_as_pair
@@ -58,7 +59,7 @@ def test_the_two_stage_train_is_read():
         (('torsion = "rigid"', ""), "rotors.input.bodies.input_shaft", "with torsion"),
         (('pinion2 = "90 mm", ', ""), "bodies.pinion2", "one [rotors.…]"),
         (('pinion2 = "90 mm", ', 'pinion2 = "80 mm", '), "engagements.stage2.gears", "10 mm apart"),
-        (('axis = ["96.75 mm", "0 mm"]', 'axis = ["92 mm", "0 mm"]'), "rotors.intermediate.axis", ""),
+        (('axis = ["103 mm", "0 mm"]', 'axis = ["98 mm", "0 mm"]'), "rotors.intermediate.axis", ""),
         (('torque_max = "300 N*m"', 'torque_max = "3000 N*m"'), "bodies.pinion1.body.strip_half_width", "1.5 Hertz"),
         (('name = "input_left"', 'name = "input_right"'), "supports.input_right.name", "used twice"),
         (
@@ -66,6 +67,7 @@ def test_the_two_stage_train_is_read():
             "bodies.wheel2.normal_module",
             "share the basic rack",
         ),
+        (('helix_angle = "-20 deg"', 'helix_angle = "20 deg"'), "bodies.wheel1.helix_angle", "opposite hands"),
         (('to = "input_shaft"', 'to = "output_shaft"'), "supports.pinion1.to", "two rotors"),
         (('kind = "gear"', 'kind = "gera"'), "bodies.pinion1", "gear"),
         (('radial = "2.5e8 N/m"', 'radial = "2.5e8 N*m"'), "supports.input_left.radial", "N/m"),
@@ -100,6 +102,17 @@ def test_a_pair_expands_into_two_rotors_and_keeps_its_bodies(name):
         assert body_hash(same) == body_hash(body_inputs(pair, index))
         assert stage.bodies[gear.name].tip_relief == gear.tip_relief
         assert stage.ports[gear.name].k == pair.ports[gear.name].k
+
+
+def test_a_gear_that_cannot_be_meshed_is_named_by_its_table(monkeypatch):
+    def fail(*_):
+        raise MeshError("the rim is too thin")
+
+    monkeypatch.setattr("gearfmu.body.reduce.reduced_gear", fail)
+    train = load_stage("two_stage")
+    for gear, table in ((gear_as_pair(train, "wheel1"), "bodies.wheel1"), (load_pair("fzg_c"), "gears.pinion")):
+        with pytest.raises(MeshError, match=f": {table}: the rim"):
+            reduce_gear(gear, 0)
 
 
 def test_a_gear_that_is_held_elsewhere_has_no_bearing(tmp_path):

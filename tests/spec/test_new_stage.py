@@ -13,7 +13,7 @@ from gearfmu.errors import SpecError
 from gearfmu.spec.base import read_toml
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.new import new_stage
-from gearfmu.spec.schema import stage_schema
+from gearfmu.spec.schema import general_schema, stage_schema
 from gearfmu.spec.stage import load_stage
 
 
@@ -74,16 +74,25 @@ def fits(schema: dict, part: dict, value: object) -> bool:
     part = resolve(schema, part)
     if "anyOf" in part:
         return any(fits(schema, choice, value) for choice in part["anyOf"])
+    if "oneOf" in part:
+        return sum(fits(schema, choice, value) for choice in part["oneOf"]) == 1
     if "enum" in part or "const" in part:
         return value in part.get("enum", [part.get("const")])
-    kinds = {"object": dict, "string": str, "integer": int, "number": (int, float)}
+    kinds = {"object": dict, "string": str, "integer": int, "number": (int, float), "array": list}
     if not isinstance(value, kinds[part["type"]]):
         return False
     if part["type"] == "string":
         return re.search(part.get("pattern", ""), value) is not None
+    if part["type"] == "array":
+        items = part.get("prefixItems", [part.get("items")] * len(value))
+        return part.get("minItems", 0) <= len(value) == len(items) and all(
+            fits(schema, item, entry) for item, entry in zip(items, value, strict=True)
+        )
     if part["type"] != "object":
         return part.get("minimum", value) <= value <= part.get("maximum", value)
     properties, other = part.get("properties", {}), part.get("additionalProperties", False)
+    for pattern, named in part.get("patternProperties", {}).items():
+        properties = properties | {key: named for key in value if re.search(pattern, key)}
     known = all(key in properties or isinstance(other, dict) for key in value)
     return (
         known
@@ -100,6 +109,21 @@ def test_schema_accepts_the_shipped_files_and_refuses_slips() -> None:
     assert fits(schema, schema, read_toml(find_stage("fzg_c/stage_relief")) | {"gears": raw["gears"]})
     for slip in ({"torque_max": 600}, {"torque_max": "600"}, {"torqe": "1 N*m"}, {"levels": {"fast_cut": 5}}):
         assert not fits(schema, schema, raw | slip)
+
+
+def test_schema_of_a_general_stage_accepts_the_train_and_refuses_slips() -> None:
+    """Bodies are told apart by their kind; what stands in `supports` is no field of a body."""
+    schema = json.loads(json.dumps(general_schema()))
+    raw = read_toml(find_stage("two_stage"))
+    assert fits(schema, schema, raw) and set(schema["else"]["required"]) <= set(raw)
+    assert '"null"' not in json.dumps(schema) and "source" not in schema["properties"]
+    gear = raw["bodies"]["pinion1"]
+    wrong = ({"kind": "shaft"}, {"helix_angle": 20}, {"bearing": {"stiffness": "3e8 N/m"}}, {"name": "pinion1"})
+    slips = [{"bodies": raw["bodies"] | {"pinion1": gear | slip}} for slip in (*wrong, {"lenght": "1 m"})]
+    slips += [{"bodies": raw["bodies"] | {"Pinion": gear}}, {"engagements": []}, {"slices": 11}]
+    slips += [{"supports": [raw["supports"][0] | {"radial": "stiff"}]}, {"rotors": {"input": {"axis": ["0 mm"]}}}]
+    for slip in slips:
+        assert not fits(schema, schema, raw | slip), slip
 
 
 def test_schema_shows_units_meanings_and_defaults_as_in_a_file() -> None:

@@ -187,7 +187,8 @@ static int find_alpha(const gk_island *island, balance b)
 }
 
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
- * quasi-static part's energy change equal its work. */
+ * quasi-static part's energy change equal its work. Contacts that hardly move cannot repay what the steps before left:
+ * then the defect waits, as it does in a step without change of status. */
 void gk_balance_solve(const gk_island *island)
 {
     int curved = 0;
@@ -204,5 +205,9 @@ void gk_balance_solve(const gk_island *island)
         for (int m = 0; m < island->count; m++) choose_direction(island->member[m], all_rows);
         if (find_alpha(island, b)) return;
     }
-    for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
+    gk_balance_plain(island);
+    const balance b = defect_of_all(island);
+    leave(island, &b);
+    if (open_balance(&b, STEADY_BALANCE))
+        for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }
