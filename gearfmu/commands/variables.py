@@ -21,6 +21,7 @@ WHEN = {
     "CHAIN": "port with a chain",
     "SPRING_OR_FIXED": "port `spring` or `fixed`",
     "SLICES_DIFFER": "helical or tilting gears, slices of the stage file",
+    "CARRIED": "a carrier that carries other rotors",
 }
 FIELDS = re.compile(r'\s*("(?:[^"\\]|\\.)*"|[^,]+?)\s*(?:,|$)')
 

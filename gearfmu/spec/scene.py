@@ -35,6 +35,8 @@ class Effects(Spec):
     bearings: Switch = True
     modal_damping: Switch = True
     roll_motion: Switch = True
+    coriolis: Switch = True
+    centrifugal: Switch = True
 
     @property
     def off(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@ name."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -71,6 +72,7 @@ def general_sections(
         "degrees": degrees.astype(np.int32),
         "inertia": np.array([layout.inertia(r) for r in range(len(layout.rotors))]),
     }  # fmt: skip
+    sections |= _carried_sections(layout)
     phases = tooth_phases(stage)
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         place = stage.place(gear.name, None)
@@ -80,6 +82,26 @@ def general_sections(
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)
     return sections
+
+
+def _carried_sections(layout: Layout) -> dict[str, Any]:
+    """Bodies in turning axes and their places; nothing where there are none."""
+    bodies = layout.in_turning_axes
+    if not bodies:
+        return {}
+    roots = [math.sqrt(layout.bodies[body].mass[0, 0]) for body, *_ in bodies]
+    turn = [
+        2 * layout.frame_of(support.first[0]) + (direction in (1, 4))
+        if support.second is None and direction in (0, 1, 3, 4)
+        else -1
+        for support in layout.supports
+        for direction in support.directions
+    ]
+    return {
+        "support_turn": np.array([max(entry, -1) for entry in turn], np.int32),
+        "carried": np.array([frame for _, frame, *_ in bodies], np.int32),
+        "carried_place": np.array([[m * x, m * y] for m, (*_, x, y) in zip(roots, bodies, strict=True)]),
+    }
 
 
 def mount_sets(layout: Layout) -> list[Group]:
@@ -176,7 +198,8 @@ def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[in
 
 def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
-    return {
+    carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
+    return carried | {
         f"omega_ground{number}": group.omega,
         f"zeta_ground{number}": group.zeta,
         f"rigid_share{number}": group.rigid_share,

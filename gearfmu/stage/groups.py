@@ -21,6 +21,7 @@ C_fs: per unit force on the *first* body, and its reaction on the second. Elonga
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -93,6 +94,20 @@ class Layout:
         """Rotors that carry others."""
         return {frame for frame, *_ in self.carried.values()}
 
+    def frame_of(self, body: int) -> int:
+        """The turning rotor in whose axes a body stands, −1: the ground."""
+        return next((frame for own, frame, *_ in self.in_turning_axes if own == body), -1)
+
+    @property
+    def in_turning_axes(self) -> list[tuple[int, int, float, float]]:
+        """Bodies that stand in the axes of a turning rotor: number, that rotor, x and y (m) of their axis there."""
+        found = []
+        for r, rotor in enumerate(self.rotors):
+            frame, x, y = self.carried.get(r, (r, 0.0, 0.0))
+            if r in self.carried or r in self.frames:
+                found += [(body, frame, x, y) for body in rotor]
+        return sorted(found)
+
     def inertia(self, rotor: int) -> float:
         """Moment of inertia of a rotor about its axis, kg·m², the masses that it carries included; 0 where it
         stands."""
@@ -143,6 +158,15 @@ class Group:
     damper: np.ndarray
     at: Sequence[slice]
     owner: np.ndarray
+
+    def carried_rows(self) -> np.ndarray:
+        """(c, 2, n): motion x and y of the centre of mass of every body of `Layout.in_turning_axes`, times the root of
+        its mass."""
+        rows = np.zeros((len(self.layout.in_turning_axes), 2, self.omega.size))
+        for i, (body, *_) in enumerate(self.layout.in_turning_axes):
+            mass = self.layout.bodies[body].mass
+            rows[i] = mass[:2] @ self.rigid(body) / math.sqrt(mass[0, 0])
+        return rows
 
     def rigid(self, body: int) -> np.ndarray:
         """(6, n): rigid motion of a body about its origin."""

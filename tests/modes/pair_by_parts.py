@@ -90,7 +90,11 @@ def gear_at(
 
 def slice_weights(slices: int, degrees: np.ndarray) -> np.ndarray:
     """(slices, A): (2a + 1) × mean of P_a over each slice of the face width, for loading and reading."""
-    edges = np.linspace(-1, 1, slices + 1)
+    return weights_between(np.linspace(-1, 1, slices + 1), degrees)
+
+
+def weights_between(edges: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """The same between ascending `edges` on −1 … 1."""
     columns = []
     for a in degrees:
         integral = Legendre.basis(int(a)).integ()(edges)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
-from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, slice_weights
+from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, weights_between
 
 from gearfmu.body import ReducedBody
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
@@ -55,19 +55,19 @@ class Part:
 @dataclass(frozen=True)
 class Touch:
     """Where a slice touches: tangent δ′ (m/N) of the local law; of A and B roll (m), direction of tooth 0 (rad), number
-    of the tooth, and the row (6,) of rigid motion that closes the gap."""
+    of the tooth, and the row (6,) of rigid motion that closes the gap; part (2,): of the width, −1 … 1."""
 
     rolls: tuple[float, float]
     law: float
     zero: tuple[float, float]
     teeth: tuple[int, int]
     rigid: tuple[np.ndarray, np.ndarray]
+    part: np.ndarray
 
 
 def touch(stage: GeneralStage, mesh: EngagementSpec, load: Load, turned: tuple[float, float]) -> Touch:
     """Of a slice of an engagement whose gears have turned by `turned` (rad) since the drive flanks of tooth 0 touched,
-    tooth 0 of gear A on +x. A slice that has partly left a flank touches in the middle of what is left of it; what
-    bodies yield there is that of the whole slice, read at its middle, or at the end of the flank."""
+    tooth 0 of gear A on +x. A slice that has partly left a flank touches, loads and reads what is left of it."""
     pair = mesh_shape(stage, mesh)
     assert isinstance(pair, PairGeometry)
     a, b = pair.gears
@@ -86,7 +86,7 @@ def touch(stage: GeneralStage, mesh: EngagementSpec, load: Load, turned: tuple[f
     whole = (np.array([load.slice, load.slice + 1]) / stage.slices - 0.5) * width
     ends = sorted([(a.s_tip - middle) / slope, (across - b.s_tip) / slope]) if slope else (-width, width)
     left = np.clip(whole, *ends)  # of the slice, what lies on both flanks
-    z, touching = float(whole.mean()), float(left.mean())
+    touching = float(left.mean())
     normal = np.array([math.sin(pair.alpha_wt), sense * math.cos(pair.alpha_wt)])
     foot = a.r_b * np.array([math.cos(pair.alpha_wt), -sense * math.sin(pair.alpha_wt)])
     point = np.append(foot + (middle + slope * touching) * normal, touching)
@@ -96,8 +96,8 @@ def touch(stage: GeneralStage, mesh: EngagementSpec, load: Load, turned: tuple[f
     curvature = math.cos(a.beta_b) * (1 / (middle + slope * touching) + 1 / (across - slope * touching))
     length = float(np.diff(left)[0]) / math.cos(a.beta_b)
     law = _tangent(stage, mesh, curvature, load.force / length) / length
-    rolls = (min(middle + slope * z, a.s_tip), min(across - slope * z, b.s_tip))
-    return Touch(rolls, law, zero, (load.tooth, other), (rigid[0], -rigid[1]))
+    rolls = (middle + slope * touching, across - slope * touching)
+    return Touch(rolls, law, zero, (load.tooth, other), (rigid[0], -rigid[1]), 2 * left / width)
 
 
 def _about_z(angle: float) -> np.ndarray:
@@ -125,13 +125,13 @@ def gear_part(stage: GeneralStage, body: ReducedBody, touches: Sequence[tuple[Lo
     second = np.flatnonzero(body.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     chosen, degrees, turn = np.flatnonzero(seen), np.arange(count), np.kron(np.eye(2), _about_z(zero))
-    weights = slice_weights(stage.slices, degrees)
+    weights = [weights_between(t.part, degrees)[0] for _, t, _ in touches]
     places = [resampling(body.roll, t.rolls[side], t.rolls[side], 1)[0] for _, t, side in touches]
     teeth = [t.teeth[side] for _, t, side in touches]
     modal, rigid = [turn @ body.bore_rows[:, chosen]], [np.eye(6)]
-    for (load, t, side), place, tooth in zip(touches, places, teeth, strict=True):
+    for (load, t, side), place, tooth, weight in zip(touches, places, teeth, weights, strict=True):
         table = body.flank_rows[load.flank][:, degrees][..., chosen]
-        row = np.einsum("r,a,ran->n", place, weights[load.slice], table)
+        row = np.einsum("r,a,ran->n", place, weight, table)
         modal.append(on_tooth(row, body, chosen, tooth)[None])
         rigid.append(t.rigid[side][None])
     rows, omega = np.vstack(modal), 2 * np.pi * body.frequency[chosen]
@@ -139,14 +139,12 @@ def gear_part(stage: GeneralStage, body: ReducedBody, touches: Sequence[tuple[Lo
     static[:6, :6] = turn @ body.static_bb @ turn.T
     for i, (load, _, _) in enumerate(touches):
         own = np.kron(np.eye(2), _about_z(zero + 2 * math.pi * teeth[i] / body.teeth))
-        to_bore = np.einsum("r,a,rak->k", places[i], weights[load.slice], body.static_fb[load.flank][:, degrees])
+        to_bore = np.einsum("r,a,rak->k", places[i], weights[i], body.static_fb[load.flank][:, degrees])
         static[6 + i, :6] = static[:6, 6 + i] = own @ to_bore
         for j, (other, _, _) in enumerate(touches):
             offset = (teeth[j] - teeth[i]) % body.static_ff.shape[2]
             block = body.static_ff[load.flank, other.flank, offset][:, :, :count, :count]
-            static[6 + i, 6 + j] = np.einsum(
-                "r,s,a,b,rsab->", places[i], places[j], weights[load.slice], weights[other.slice], block
-            )
+            static[6 + i, 6 + j] = np.einsum("r,s,a,b,rsab->", places[i], places[j], weights[i], weights[j], block)
     return Part(
         stiffness=np.diag(np.concatenate([np.zeros(6), omega**2])),
         mass=sl.block_diag(body.mass * np.eye(3), body.inertia, np.eye(omega.size)),

@@ -302,11 +302,17 @@ def _load_step(ratio: float) -> Callable[[float], dict[str, float]]:
     return torques
 
 
+OF_SETS = {"coriolis", "centrifugal"}
+
+
 def test_the_table_has_every_switch_of_the_kernel(plain: StageModel) -> None:
-    """Every effect.* variable is an effect that a scene can switch, and every one says the same of itself."""
+    """Every effect.* variable is an effect that a scene can switch, and every one says the same of itself. Those that
+    only sets have are not in the table yet."""
     variables = {name.removeprefix("effect.") for name in plain.kernel().variables if name.startswith("effect.")}
     names = [effect.name for effect in EFFECTS]
-    assert len(set(names)) == len(names) and variables <= set(names) and set(Effects.model_fields) == variables
+    assert (
+        len(set(names)) == len(names) and variables <= set(names) and set(Effects.model_fields) - OF_SETS == variables
+    )
     for effect in EFFECTS:
         kernel = plain.kernel(**effect.off_setting)
         kernel.prepare()

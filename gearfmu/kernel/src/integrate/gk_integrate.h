@@ -23,6 +23,12 @@ void gk_step_forget(gk_engaged *engaged);
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
 const double *gk_step_force(const gk_system *s);
 const double *gk_step_z(const gk_system *s);
+/* gk_frame.c */
+void gk_frame_turn(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
+                   double *v);
+double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
+                      double *v);
+void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force);
 /* gk_rk45.c */
 int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,
                      const double *outer);

@@ -258,6 +258,7 @@ static void find_forces(rest *r)
     for (int d = 0; d < spins; d++)
         if (!moves(r, d)) r->force[d] = 0.0;
     gk_rows_scatter(r->model, &r->setup, r->work, gk_step_force, gk_step_force);
+    gk_frame_load(r->model, &r->setup, r->data, r->work->ground_force);
     for (int i = 0; i < base->n; i++)
         r->force[spins + i] = r->work->ground_force[i] - base->omega2[i] * r->work->rest_ground[i];
 }
@@ -426,10 +427,11 @@ static void spread(rest *r)
     double *x = gk_ground_of(data);
     data->state_h = data->state_gamma = 0.0;
     gk_rows_scatter(r->model, setup, work, gk_step_force, gk_step_force);
+    memcpy(x + 2 * n, work->ground_force, (size_t)n * sizeof *x);
+    gk_frame_load(r->model, setup, data, work->ground_force);
     for (int i = 0; i < n; i++) {
         x[i] = setup->base.omega2[i] > 0.0 ? work->ground_force[i] / setup->base.omega2[i] : 0.0;
         x[n + i] = 0.0;
-        x[2 * n + i] = work->ground_force[i];
     }
     for (int g = 0; g < r->model->gears; g++) {
         const gk_modal *m = &setup->modal[g];

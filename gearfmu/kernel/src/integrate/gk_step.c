@@ -120,6 +120,8 @@ static double predict_ground(const gk_model *model, const gk_setup *setup, gk_wo
     double *v = work->ground_start;
     memcpy(v, x + n, (size_t)n * sizeof *v);
     const double taken = damp_supports(model, setup, k, v);
+    gk_frame_turn(model, setup, k, data, v);
+    work->pressed = gk_frame_press(model, setup, k, data, v);
     const gk_quad *x4 = SEEN_QUADS(x), *v4 = SEEN_QUADS(v), *f4 = SEEN_QUADS(f);
     const gk_quad *d11 = SEEN_QUADS(w->d11), *a12 = SEEN_QUADS(w->a12), *b0q = SEEN_QUADS(w->b0q);
     const gk_quad *a21 = SEEN_QUADS(w->a21), *d22 = SEEN_QUADS(w->d22), *b0v = SEEN_QUADS(w->b0v);
@@ -355,6 +357,8 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
         f4[i] = next[i];
     }
     const double taken = damped ? 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3])) : 0.0;
+    data->ledger.work += work->pressed + gk_frame_press(model, setup, k, data, v);
+    gk_frame_turn(model, setup, k, data, v);
     return taken + damp_supports(model, setup, k, v);
 }
 

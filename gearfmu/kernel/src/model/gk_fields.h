@@ -24,6 +24,7 @@ typedef enum gk_symbol {
     SYMBOL_modes,
     SYMBOL_reads,
     SYMBOL_ground,
+    SYMBOL_carried,
     SYMBOLS
 } gk_symbol;
 

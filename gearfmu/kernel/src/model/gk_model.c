@@ -102,6 +102,19 @@ static void read_frames(reader *r, gk_model *m)
         if (r->outcome) return;
         m->frame[i] = frame[i];
     }
+    m->support_turn = take(r, F_MODEL_support_turn);
+    for (int i = 0; m->support_turn && i < m->supports; i++) {
+        const int32_t *turn = m->support_turn + i;
+        demand(r, counted(turn, -1, 2 * m->rotors - 1), "axes of supports");
+        if (*turn >= 0 && *turn % 2 == 0) demand(r, i + 1 < m->supports && turn[1] == turn[0] + 1, "axes of supports");
+    }
+    m->carried = (int)length_of(r, F_MODEL_carried);
+    demand(r, m->carried <= MAX_CARRIED, "carried bodies");
+    r->shape.size[SYMBOL_carried] = (uint64_t)m->carried;
+    m->carried_frame = take(r, F_MODEL_carried);
+    m->carried_place = bounded(r, F_MODEL_carried_place, 1e3);
+    for (int i = 0; i < m->carried && !r->outcome; i++)
+        demand(r, counted(m->carried_frame + i, 0, m->rotors - 1), "carried bodies");
     for (int i = 0; i < m->rotors; i++)
         if (m->frame[i] >= 0) demand(r, m->frame[m->frame[i]] < 0 && m->inertia[m->frame[i]] > 0.0, "frames");
 }
@@ -275,6 +288,7 @@ static void read_ground(reader *r, gk_model *m, int set)
     g->support_rows = bounded(r, F_SET_support_rows, 1e6), g->kappa = bounded(r, F_SET_kappa, 1e16);
     g->support_compliance = bounded(r, F_SET_support_compliance, 1e3);
     g->port_rows = bounded(r, F_SET_port_rows, 1e6);
+    g->carried_rows = bounded(r, F_SET_carried_rows, 1e6);
     for (int k = 0; k < g->n && !r->outcome; k++) {
         demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "ground oscillators");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "ground oscillators", "are not sorted");

@@ -12,7 +12,8 @@ enum {
     MAX_SUPPORTS = 64, /* directions */
     MAX_SLICES = 10,
     MAX_FUNCTIONS = 8,
-    LEADS = 33, /* places across the face width where a lead is given */
+    LEADS = 33,       /* places across the face width where a lead is given */
+    MAX_CARRIED = 32, /* bodies in the axes of turning rotors */
     MAX_MODES = 6000,
     MAX_GROUND = 2000,
     OFFSETS = 7, /* tooth offsets −3 … 3 of the residual */
@@ -66,7 +67,7 @@ typedef struct gk_port {
 typedef struct gk_ground {
     int n;
     const double *omega, *zeta, *rigid_share, *damper_rows, *damper, *support_rows, *support_compliance, *kappa,
-        *port_rows;
+        *port_rows, *carried_rows;
 } gk_ground;
 
 struct gk_model {
@@ -79,7 +80,12 @@ struct gk_model {
     double cut[2], h_max, period_min;
     int degree[MAX_FUNCTIONS];
     double inertia[MAX_ROTORS]; /* of the spin; 0: the rotor stands */
-    int frame[MAX_ROTORS];      /* rotor in whose axes this one stands and its supports rest, −1: the ground */
+    const int32_t
+        *support_turn; /* (supports) 2 rotor, + 1 for the second of a pair, whose axes they are kept in; −1; NULL */
+    int carried;       /* bodies that stand in the axes of a turning rotor */
+    const int32_t *carried_frame; /* (carried) that rotor */
+    const double *carried_place;  /* (carried, 2) place of their axes there times √m */
+    int frame[MAX_ROTORS];        /* rotor in whose axes this one stands and its supports rest, −1: the ground */
     gk_gear gear[MAX_GEARS];
     gk_engagement engagement[MAX_ENGAGEMENTS];
     gk_port port[MAX_PORTS];

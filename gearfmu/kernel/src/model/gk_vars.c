@@ -3,7 +3,7 @@
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
-typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER } gk_exists;
+typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED } gk_exists;
 enum { STAGE = SCOPE_STAGE, SHAFT = SCOPE_SHAFT, ROTOR = SCOPE_ROTOR, MESH = SCOPE_MESH, SUPPORT = SCOPE_SUPPORT };
 typedef struct gk_row {
     gk_scope scope;
@@ -48,6 +48,7 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     case SPRING_OR_FIXED: return port->kind != PORT_TORQUE;
     case CHAIN: return port->chain > 0;
     case SLICES_DIFFER: return model->spatial && row->place - V_SLICE_1 < model->slices; /* those of the stage file */
+    case CARRIED: return model->carried > 0;
     }
     return 0;
 }
@@ -231,8 +232,9 @@ gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference
 gk_effects gk_effects_of(const gk_data *data)
 {
     const double *v = data->stage;
-    const gk_effects on = {v[V_E_ELASTIC] != 0,       v[V_E_RESIDUAL] != 0,   v[V_E_LOCAL] != 0,  v[V_E_COAST] != 0,
-                           v[V_E_DAMPING] != 0,       v[V_E_RELIEF] != 0,     v[V_E_CORNER] != 0, v[V_E_BEARING] != 0,
-                           v[V_E_MODAL_DAMPING] != 0, v[V_E_ROLL_MOTION] != 0};
+    const gk_effects on = {v[V_E_ELASTIC] != 0,     v[V_E_RESIDUAL] != 0, v[V_E_LOCAL] != 0,
+                           v[V_E_COAST] != 0,       v[V_E_DAMPING] != 0,  v[V_E_RELIEF] != 0,
+                           v[V_E_CORNER] != 0,      v[V_E_BEARING] != 0,  v[V_E_MODAL_DAMPING] != 0,
+                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0};
     return on;
 }

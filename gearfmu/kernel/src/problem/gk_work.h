@@ -69,7 +69,8 @@ struct gk_work {
     /* of every gear group: predicted state, modal force of the rows, of the ground group the same in double */
     gk_real *qp[MAX_GEARS], *vp[MAX_GEARS], *force[MAX_GEARS], *next[MAX_GEARS];
     double *ground_q, *ground_v, *ground_force, *ground_next, *ground_reading,
-        *ground_start;           /* speeds after half a step of the supports' dashpots */
+        *ground_start;           /* speeds after half a step of the supports' dashpots and of turning axes */
+    double pressed;              /* work of centrifugal loads in the first half */
     gk_real *reading[MAX_GEARS]; /* read_q q + read_v v where that is not q */
     const gk_real *y[MAX_GEARS]; /* displacement that the rows read: qp, reading, or zero */
     const double *ground_y;

@@ -83,8 +83,9 @@ static void forces_by_motion(const gk_model *model, const gk_setup *setup, const
     }
 }
 
-/* adds the forces on the supports that contacts and joints make directly, beside the oscillators */
-static void add_direct_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, double *out)
+/* adds the forces on the supports that contacts, joints and turning axes make directly, beside the oscillators */
+static void add_direct_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                              double *out)
 {
     for (int e = 0; e < model->engagements; e++) {
         const gk_engaged *engaged = &work->engaged[e];
@@ -111,6 +112,9 @@ static void add_direct_forces(const gk_model *model, const gk_setup *setup, cons
                 for (int s = 0; s < model->supports; s++)
                     out[s] += force[i] * setup->port_support[system->port_of[i]][s];
     }
+    for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
+        for (int i = 0; i < model->supports; i++)
+            out[i] += data->v[r] * data->v[r] * setup->base.outward_support[r * model->supports + i];
 }
 
 /* forces on the supports at the end of the step */
@@ -120,7 +124,20 @@ static void support_forces(const gk_model *model, const gk_setup *setup, const g
     double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS];
     support_motion(setup, work, data, moved, speed);
     forces_by_motion(model, setup, moved, speed, out);
-    add_direct_forces(model, setup, work, out);
+    add_direct_forces(model, setup, work, data, out);
+}
+
+/* forces on the ground that are kept in the axes of a carrier, turned into those of the ground (sense 1), or back (−1) */
+static void turn_supports(const gk_model *model, const gk_data *data, double sense, double *force)
+{
+    for (int s = 0; model->support_turn && s < model->supports; s++) {
+        const int turn = model->support_turn[s];
+        double sine, cosine;
+        if (turn < 0 || turn % 2) continue;
+        gk_sincos(sense * data->x[turn / 2], &sine, &cosine);
+        const double x = force[s], y = force[s + 1];
+        force[s] = cosine * x - sine * y, force[s + 1] = sine * x + cosine * y;
+    }
 }
 
 static void support_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, const double *force)
@@ -185,6 +202,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     }
     for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, h);
     support_forces(model, setup, work, data, force);
+    turn_supports(model, data, 1.0, force);
     support_outputs(model, setup, data, force);
     for (int e = 0; e < model->engagements; e++) data->mesh[e][V_TE] = transmission_error(model, data, e);
     for (int g = 0; g < model->gears; g++) dynamic += setup->modal[g].count;
@@ -255,7 +273,10 @@ void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *wor
     if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
     support_motion(setup, work, data, tally->last_moved, tally->last_speed);
     forces_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
-    for (int s = 0; s < model->supports; s++) tally->last[s] = data->support[s][V_FORCE] - tally->last[s];
+    double now[MAX_SUPPORTS];
+    for (int s = 0; s < model->supports; s++) now[s] = data->support[s][V_FORCE];
+    turn_supports(model, data, -1.0, now);
+    for (int s = 0; s < model->supports; s++) tally->last[s] = now[s] - tally->last[s];
 }
 
 static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h, gk_tally *tally)
@@ -302,7 +323,7 @@ void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_wor
     integrate(tally->moved, tally->last_moved, moved, setup->base.n, h);
     integrate(tally->speed, tally->last_speed, speed, setup->base.n, h);
     memset(direct, 0, (size_t)model->supports * sizeof *direct);
-    add_direct_forces(model, setup, work, direct);
+    add_direct_forces(model, setup, work, data, direct);
     for (int s = 0; s < model->supports; s++) {
         tally->support[s] += 0.5 * h * (tally->last[s] + direct[s]);
         tally->last[s] = direct[s];
@@ -316,7 +337,9 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
         if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
     double force[MAX_SUPPORTS];
     forces_by_motion(model, setup, tally->moved, tally->speed, force);
-    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = (force[s] + tally->support[s]) / H;
+    for (int s = 0; s < model->supports; s++) force[s] = (force[s] + tally->support[s]) / H;
+    turn_supports(model, data, 1.0, force);
+    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = force[s];
     for (int e = 0; e < model->engagements; e++) {
         data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
         data->mesh[e][V_FORCE_MAX] = tally->highest[e];

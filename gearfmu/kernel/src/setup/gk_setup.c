@@ -97,6 +97,9 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     base->damper_rows = doubles(b, n * (size_t)model->dampers);
     base->support_rows = doubles(b, n * (size_t)model->supports);
     base->port_rows = doubles(b, n * (size_t)model->ports);
+    base->carried_rows = doubles(b, 2 * n * (size_t)model->carried);
+    base->outward = doubles(b, model->carried ? n * (size_t)model->rotors : 0);
+    base->outward_support = doubles(b, (size_t)(model->carried ? model->rotors * model->supports : 0));
     for (int g = 0; g < model->gears; g++) base->centre[g] = doubles(b, 6 * n);
 }
 
@@ -144,6 +147,9 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
                         &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
     f->pulls = doubles(b, (size_t)model->dampers * (size_t)setup->base.n);
+    f->turns = doubles(b, 2 * (size_t)model->carried * (size_t)setup->base.n);
+    f->turned = doubles(b, 2 * (size_t)model->carried * (size_t)setup->base.n);
+    f->coupling = doubles(b, 4 * (size_t)(model->carried * model->carried));
 }
 
 static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged, int e)
@@ -375,6 +381,28 @@ static gk_span span_of(const double *row, int n)
     return from < to ? (gk_span){from / 4 * 4, (to + 3) / 4 * 4 - from / 4 * 4} : (gk_span){0, 0};
 }
 
+/* what turns with rotors: rows of the masses, and the load outward */
+static void fill_carried(const gk_model *model, gk_base *base)
+{
+    const gk_ground *ground = &model->ground[base->set];
+    if (!model->carried) return;
+    select_rows(base, ground->carried_rows, 2 * model->carried, ground->n, base->carried_rows);
+    memset(base->outward, 0, (size_t)(model->rotors * base->n) * sizeof *base->outward);
+    for (int i = 0; i < 2 * model->carried; i++)
+        gk_axpy(model->carried_place[i], base->carried_rows + i * base->n,
+                base->outward + model->carried_frame[i / 2] * base->n, 0, base->n / 4);
+    memset(base->outward_support, 0, (size_t)(model->rotors * model->supports) * sizeof *base->outward_support);
+    for (int k = 0; k < ground->n; k++)
+        for (int i = 0; i < 2 * model->carried && base->slot[k] < 0; i++) {
+            const double q = model->carried_place[i] * ground->carried_rows[i * ground->n + k] /
+                             (ground->omega[k] * ground->omega[k]);
+            double *to = base->outward_support + model->carried_frame[i / 2] * model->supports;
+            for (int s = 0; s < model->supports && q != 0.0; s++)
+                for (int t = 0; t < model->supports; t++)
+                    to[s] += ground->kappa[s * model->supports + t] * ground->support_rows[t * ground->n + k] * q;
+        }
+}
+
 static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *which)
 {
     gk_base *base = &setup->base;
@@ -389,6 +417,7 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
     for (int i = 0; i < base->n; i++) base->omega2[i] = base->omega[i] * base->omega[i];
     select_rows(base, ground->damper_rows, model->dampers, ground->n, base->damper_rows);
     select_rows(base, ground->port_rows, model->ports, ground->n, base->port_rows);
+    fill_carried(model, base);
     for (int s = 0; s < model->supports; s++) /* the force there: κ times the displacement */
         for (int k = 0; k < base->n; k++) {
             double sum = 0.0;

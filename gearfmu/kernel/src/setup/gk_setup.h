@@ -15,7 +15,7 @@ enum {
 
 typedef struct gk_effects {
     int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping,
-        roll_motion;
+        roll_motion, coriolis, centrifugal;
 } gk_effects;
 
 /* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
@@ -37,7 +37,9 @@ enum {
     EFFECT_bearings,
     EFFECT_modal_damping,
     EFFECT_roll_motion,
-    EFFECT_pitch_errors
+    EFFECT_pitch_errors,
+    EFFECT_coriolis,
+    EFFECT_centrifugal
 };
 #define GK_EFFECT(name) EFFECT_##name
 #define GK_EFFECT_OF(name) GK_EFFECT(name)
@@ -66,11 +68,14 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int set, n, count;
     int32_t *which; /* (n) their numbers in the model, −1: padding */
     int32_t *slot;  /* (all ground oscillators of the set) place among the dynamic ones, −1: not dynamic */
-    double *omega, *zeta, *omega2;                    /* (n), 0 in padding */
-    double *damper_rows;                              /* (dampers, n) */
-    double *support_rows;                             /* (supports, n): force on the support, kappa included */
-    double *port_rows;                                /* (ports, n) */
-    double *centre[MAX_GEARS];                        /* (6, n): rigid motion of every gear at its mid-width */
+    double *omega, *zeta, *omega2; /* (n), 0 in padding */
+    double *damper_rows;           /* (dampers, n) */
+    double *support_rows;          /* (supports, n): force on the support, kappa included */
+    double *port_rows;             /* (ports, n) */
+    double *carried_rows;          /* (2 carried, n) √m x, √m y of carried bodies */
+    double *outward;               /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
+    double *outward_support;       /* (rotors, supports) what it does at once to the forces on supports */
+    double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
     const double *moved[MAX_GEARS][SPACE];            /* the same as in a pose, from the part on that the gear reads */
     int motions[MAX_GEARS], motion[MAX_GEARS][SPACE]; /* those that are not zero */
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], port_span[MAX_PORTS];
@@ -143,7 +148,9 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
 
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
-    double *pulls;                                  /* (dampers, n) s²e/n of a dashpot */
+    double *pulls;          /* (dampers, n) s²e/n of a dashpot */
+    double *turns, *turned; /* (2 carried, n) carried_rows on the invariant's speeds, and what these do to speeds */
+    double *coupling;       /* (2 carried, 2 carried) their products */
     double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
 } gk_ground_flow;
 

@@ -1,0 +1,85 @@
+"""The planetary set in motion: energy through changes of contact in eight meshes, and what the carrier's turning axes do
+to the masses in them (docs/theory.md, 3.9)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearfmu.body import load_bodies
+from gearfmu.kernel import Kernel
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble
+
+CONSERVING = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0, "effect.roll_motion": 0.0}
+H, STEP = 5e-6, 2e-5
+PLANETS = range(1, 5)
+
+
+@pytest.fixture(scope="module")
+def model() -> StageModel:
+    spec = load_stage("planetary54")
+    return assemble(spec, load_bodies(spec))
+
+
+def started(model: StageModel, torque: float, carrier: float, sun: float, **parameters: float) -> Kernel:
+    """At rest under `torque` (N·m) on the carrier, the sun's in balance, then at these speeds (rad/s)."""
+    kernel = model.kernel(**{"level": 0.0, "h": H, **parameters})
+    for name, value in (("carrier.tau", torque), ("sun.tau", -torque / 4)):
+        kernel.set(name, value)
+    kernel.set("carrier.w_start", carrier)
+    kernel.set("sun.w_start", sun)
+    kernel.initialize(0.0)
+    return kernel
+
+
+def stepped(kernel: Kernel, steps: int, *names: str) -> np.ndarray:
+    """(steps, names) after every step."""
+    found = np.empty((steps, len(names)))
+    for i in range(steps):
+        kernel.step(i * STEP, STEP)
+        found[i] = [kernel.get(name) for name in names]
+    return found
+
+
+@pytest.mark.parametrize(("torque", "carrier", "sun"), [(0.0, 0.5, -1.0), (600.0, 0.0, 0.5)])
+def test_energy_is_kept_through_changes_of_contact(
+    model: StageModel, torque: float, carrier: float, sun: float
+) -> None:
+    """Rattle of all planets, and the loaded set knocked: nothing but the supports' dashpots takes energy."""
+    kernel = started(model, torque, carrier, sun, **CONSERVING)
+    found = stepped(kernel, 150, "energy.stored", "energy.residual", "energy.dissipated")
+    impacts = sum(kernel.get(f"sun_planet{k}.impacts") for k in PLANETS)
+    assert np.abs(found[:, 1]).max() < 1e-6 * found[:, 0].max()
+    assert kernel.get("solver.trouble") == 0 and np.all(np.diff(found[:, 2]) > -1e-12)
+    assert impacts >= 4 if torque == 0 else impacts == 0
+
+
+def test_pins_hold_the_planets_against_their_centrifugal_load(model: StageModel) -> None:
+    """m a Ω² outward, at once and exactly: the set is unloaded, no mesh touches."""
+    planet, radius, speed = load_bodies(load_stage("planetary54"))[1], 0.045, 85.0
+    load = planet.mass * radius * speed**2
+    for on in (1.0, 0.0):
+        kernel = started(model, 0.0, speed, 4 * speed, **{"effect.centrifugal": on})
+        outward = [kernel.get("pin.planet1.fx"), kernel.get("pin.planet2.fy"), -kernel.get("pin.planet3.fx")]
+        assert outward == pytest.approx([on * load] * 3, rel=1e-9, abs=1e-9)
+        across = [kernel.get("pin.planet1.fy"), kernel.get("pin.planet2.fx")]
+        assert across == pytest.approx([0.0, 0.0], abs=1e-6 * load)
+
+
+def test_coriolis_forces_do_no_work(model: StageModel) -> None:
+    """A loaded run with and without: another motion, the same balance of energy."""
+    names = ("energy.residual", "energy.stored", "sun_planet1.force")
+    runs = [stepped(started(model, 600.0, 85.0, 340.0, **{"effect.coriolis": on}), 50, *names) for on in (1.0, 0.0)]
+    assert runs[0][-1, 0] == pytest.approx(runs[1][-1, 0], abs=1e-5 * runs[0][-1, 1])
+    moved = np.abs(runs[0][:, 2] - runs[1][:, 2]).max() / np.abs(runs[0][:, 2]).mean()
+    assert 1e-6 < moved < 1e-2
+
+
+def test_speeds_and_forces_are_those_of_the_set(model: StageModel) -> None:
+    """85 rad/s of the carrier: sun 4, planets −2 times that; mean mesh force T/(N r_b) within 1 %."""
+    names = [*("carrier.w", "sun.w", "planet1.gear.w"), *(f"sun_planet{k}.force_mean" for k in PLANETS)]
+    found = stepped(started(model, 600.0, 85.0, 340.0), 100, *names)[20:].mean(axis=0)
+    assert found[:3] / 85.0 == pytest.approx([1.0, 4.0, -2.0], rel=5e-3)
+    force = 150.0 / 4 / model.stage.gears[0].teeth / (2.5e-3 / 2 * np.cos(np.radians(20)))
+    assert -found[3:].mean() == pytest.approx(force, rel=1e-2)
