@@ -1,5 +1,5 @@
-"""The planetary set in motion: energy through changes of contact in eight meshes, and what the carrier's turning axes do
-to the masses in them (docs/theory.md, 3.9)."""
+"""The planetary set in motion: energy through changes of contact in eight meshes, and what the turning axes of the
+carrier do to the masses in them (docs/theory.md, 3.9)."""
 
 from __future__ import annotations
 

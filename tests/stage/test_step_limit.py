@@ -52,7 +52,8 @@ def standing(library: Path, model: StageModel, level: int, h: float) -> tuple[st
 
 @pytest.mark.parametrize("level", ["fast", "standard"])
 def test_both_sides_of_the_limit(library: Path, relieved: StageModel, level: str) -> None:
-    """μ′ is the worst over the pitch: where the pair stands the limit may lie some way beyond 1."""
+    """μ′ is the worst over the pitch: where the pair stands the limit may lie some way beyond 1. Beyond it a knock that
+    dies out below grows a thousandfold: until the run is stopped, or contacts that let go bound the swing."""
     number = LEVELS[level]
     probe = Inner(library, relieved.blob, {"level": number, **UNDAMPED})
     steps = np.arange(15e-6, 60e-6, 0.5e-6)
@@ -61,7 +62,8 @@ def test_both_sides_of_the_limit(library: Path, relieved: StageModel, level: str
     outcome, te = standing(library, relieved, number, below)
     assert outcome == "ok" and np.ptp(te[-200:]) <= np.ptp(te[:200]) < 1e-8
     outcome, te = standing(library, relieved, number, above)
-    assert outcome != "ok" and len(te) < STEPS, f"μ′ = 1.5 at {1e6 * above:.1f} µs did not fail"
+    swing = np.ptp(te[-200:]) if len(te) else np.inf
+    assert outcome != "ok" or swing > 1e-6, f"μ′ = 1.5 at {1e6 * above:.1f} µs did not grow: {swing:.1e} m"
 
 
 @pytest.mark.parametrize("level", LEVELS)
