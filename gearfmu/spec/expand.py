@@ -79,7 +79,8 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
 def expand_set(spec: PlanetarySpec) -> GeneralStage:
     """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
     carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
-    springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim.
+    springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
+    its own the ring turns in them, held by the port.
 
     SpecError for what a set needs to move and does not say.
     """
@@ -136,9 +137,10 @@ def motion_problems(spec: PlanetarySpec) -> list[Problem]:
         for field, (value, how) in given.items()
         if value is None
     ]
-    if set(spec.ports) != {"carrier", "sun"}:
+    if set(spec.ports) - {"ring"} != {"carrier", "sun"}:
         remedy = (
-            "a set is driven and loaded at its carrier and its sun: write [ports.carrier] and [ports.sun], e.g. kind"
+            "a set is driven and loaded at carrier and sun, and may be held at the ring: write [ports.carrier] and "
+            "[ports.sun], e.g. kind"
         )
         found.append(Problem(str(spec.source), "ports", ", ".join(spec.ports) or "missing", f'{remedy} = "torque"'))
     return found
@@ -161,7 +163,9 @@ def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]
             bodies={name: 0.0},
             carried_by="carrier",
         )
-    rotors["ring"] = RotorSpec(axis=(0.0, 0.0), bodies={"ring": 0.0}, carried_by="carrier", stands=True)
+    rotors["ring"] = RotorSpec(
+        axis=(0.0, 0.0), bodies={"ring": 0.0}, carried_by="carrier", stands="ring" not in spec.ports
+    )
     rotors["carrier"] = RotorSpec(axis=(0.0, 0.0), bodies={"carrier": 0.0})
     return rotors
 
@@ -196,7 +200,7 @@ def _set_supports(spec: PlanetarySpec, planets: list[str]) -> tuple[SupportSpec,
             radial=all_mounts,
             axial=all_mounts,
             tilt=all_mounts * radius**2 / 2,
-            torsion=all_mounts * radius**2,
+            torsion=None if "ring" in spec.ports else all_mounts * radius**2,
             damping_ratio=mounts.damping_ratio,
         ),
     )

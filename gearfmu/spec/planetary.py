@@ -179,7 +179,10 @@ class PlanetarySpec(Spec):
         default=None, description="largest speed of the carrier; for motion"
     )
     contact: ContactSpec | None = Field(default=None, description="tooth contact; for motion")
-    ports: dict[Name, PortSpec] = Field(default={}, description="ports: carrier and sun, in the order input, output")
+    ports: dict[Name, PortSpec] = Field(
+        default={},
+        description="ports: carrier and sun, input first; a third, ring, holds the ring, which stands without it",
+    )
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
 
     @property

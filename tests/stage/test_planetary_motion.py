@@ -8,6 +8,7 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel import Kernel
+from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 
@@ -83,3 +84,21 @@ def test_speeds_and_forces_are_those_of_the_set(model: StageModel) -> None:
     assert found[:3] / 85.0 == pytest.approx([1.0, 4.0, -2.0], rel=5e-3)
     force = 150.0 / 4 / model.stage.gears[0].teeth / (2.5e-3 / 2 * np.cos(np.radians(20)))
     assert -found[3:].mean() == pytest.approx(force, rel=1e-2)
+
+
+def test_a_ring_on_a_port_is_the_ring_that_its_mounts_hold(model: StageModel) -> None:
+    """The same stiffness against turning, as a spin with a port or as an oscillator: the same statics. What a gear's
+    bore yields beyond all modes reaches the engagement that has the port's row alone: 4e-5 of the carrier's angle."""
+    spec = load_stage("planetary54")
+    mounts = spec.ring.mounts
+    k = mounts.points * mounts.stiffness * (spec.ring.rim_diameter / 2) ** 2
+    ports = spec.ports | {"ring": PortSpec(kind="spring", k=k, c=0.0)}
+    turning = assemble(spec.model_copy(update={"ports": ports}), load_bodies(spec))
+    found = []
+    for one in (model, turning):
+        assert one.shafts.ratio == 0.25
+        kernel = one.kernel(level=0.0)
+        kernel.prepare()
+        state = kernel.transmission(0.0, 600.0, 4)
+        found.append([state.phi, sum(map(sum, state.forces.values()))])
+    assert found[0] == pytest.approx(found[1], rel=5e-5)

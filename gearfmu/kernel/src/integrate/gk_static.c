@@ -557,6 +557,13 @@ static double driven_angle(const gk_model *model, const gk_work *work)
     return angle;
 }
 
+/* a port beyond input and output: free, but where carriers turn its spring holds it */
+static gk_boundary further(const gk_model *model, int p)
+{
+    const int held = model->carried && model->port[p].kind != PORT_TORQUE;
+    return held ? (gk_boundary){PORT_SPRING, 0.0, 0.0, model->port[p].k} : (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
+}
+
 /* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out, other
  * ports free; what chains the ports have is left out. out: te (m) of engagement e, angle (rad) of the first port's bore,
  * then for every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 2 + MAX_PAIRS·(2 + MAX_SLICES)
@@ -567,7 +574,7 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     gk_boundary b[MAX_PORTS] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_out, 0.0}};
     double angle[MAX_ROTORS];
     if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;
-    for (int p = 2; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
+    for (int p = 2; p < model->ports; p++) b[p] = further(model, p);
     gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
     if (outcome) return outcome;
     for (int r = 0; r < model->rotors; r++) angle[r] = data->x[r];
