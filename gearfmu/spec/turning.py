@@ -37,8 +37,8 @@ def shafts_of(stage: GeneralStage) -> Shafts:
 
 def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
     """Speeds of the rotors that are geared to the rotor of `port`, itself among them, and of those that stand, by name:
-    per its unit speed. Engagements roll in the axes of the rotor that carries them (Willis). Where a stage has carriers,
-    ports beyond input and output stand."""
+    per its unit speed. Engagements roll in the axes of the rotor that carries them (Willis). Where a stage has
+    carriers, ports beyond input and output stand."""
     found = {name: Fraction(0) for name, rotor in stage.rotors.items() if rotor.stands}
     if stage.carriers:
         found |= {stage.rotor_of(held.body): Fraction(0) for held in list(stage.ports.values())[2:]}
