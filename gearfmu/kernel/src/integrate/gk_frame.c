@@ -62,3 +62,18 @@ void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
         if (carries(model, r)) gk_axpy(data->v[r] * data->v[r], base->outward + r * base->n, force, 0, base->n / 4);
 }
+
+/* the accelerations of both, for explicit integrators: speeds of the spins and v of the ground group */
+void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v, double *a)
+{
+    const gk_base *base = &setup->base;
+    const int n = base->n;
+    for (int b = 0; b < model->carried && GK_ON(setup, coriolis); b++) {
+        const double *x = base->carried_rows + 2 * b * n, *y = x + n, twice = 2.0 * spin[model->carried_frame[b]];
+        const double along = gk_dot_quads(x, v, n / 4), across = gk_dot_quads(y, v, n / 4);
+        gk_axpy(twice * across, x, a, 0, n / 4);
+        gk_axpy(-twice * along, y, a, 0, n / 4);
+    }
+    for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
+        if (carries(model, r)) gk_axpy(spin[r] * spin[r], base->outward + r * n, a, 0, n / 4);
+}

@@ -28,6 +28,7 @@ void gk_frame_turn(const gk_model *model, const gk_setup *setup, const gk_coeffi
                    double *v);
 double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
                       double *v);
+void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v, double *a);
 void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force);
 /* gk_rk45.c */
 int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,

@@ -122,6 +122,7 @@ static void ground_rates(const gk_model *model, const gk_setup *setup, gk_work *
         const double force = model->ground[base->set].damper[d] * (n ? gk_dot_quads(e, speed, n / 4) : 0.0);
         for (int j = 0; j < n; j++) a[j] -= force * e[j];
     }
+    gk_frame_rates(model, setup, work->speed, speed, a);
 }
 
 /* forces and accelerations at the trial state; 0 when they are not finite; outer ends given; result in stage i */
