@@ -113,6 +113,7 @@ static void read_frames(reader *r, gk_model *m)
     r->shape.size[SYMBOL_carried] = (uint64_t)m->carried;
     m->carried_frame = take(r, F_MODEL_carried);
     m->carried_place = bounded(r, F_MODEL_carried_place, 1e3);
+    if (m->carried && !m->carried_place) refuse(r, "places of carried bodies", "are missing");
     for (int i = 0; i < m->carried && !r->outcome; i++)
         demand(r, counted(m->carried_frame + i, 0, m->rotors - 1), "carried bodies");
     for (int i = 0; i < m->rotors; i++)
@@ -167,6 +168,8 @@ static void read_ports(reader *r, gk_model *m)
     for (int i = 0; i < m->ports; i++)
         for (int j = 0; j < i; j++)
             if (m->port[i].rotor == m->port[j].rotor) refuse(r, "ports", "share a rotor");
+    for (int i = 0; i < m->ports && !r->outcome; i++)
+        if (m->inertia[m->port[i].rotor] == 0.0) refuse(r, "ports", "sit on a rotor that stands");
 }
 
 static void read_numbers(reader *r, gk_gear *g)
@@ -289,6 +292,7 @@ static void read_ground(reader *r, gk_model *m, int set)
     g->support_compliance = bounded(r, F_SET_support_compliance, 1e3);
     g->port_rows = bounded(r, F_SET_port_rows, 1e6);
     g->carried_rows = bounded(r, F_SET_carried_rows, 1e6);
+    if (m->carried && !g->carried_rows) refuse(r, "motion of carried bodies", "is missing");
     for (int k = 0; k < g->n && !r->outcome; k++) {
         demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "ground oscillators");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "ground oscillators", "are not sorted");
