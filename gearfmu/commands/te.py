@@ -75,7 +75,9 @@ def te(
 
 def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bool, out: Path) -> None:
     if rigid_bearings:
-        raise click.BadParameter("a planetary set shares its load by what its bearings yield", param_hint="--rigid-bearings")
+        raise click.BadParameter(
+            "a planetary set shares its load by what its bearings yield", param_hint="--rigid-bearings"
+        )
     from gearfmu.report.te import write_set_plot
     from gearfmu.stage.set_te import set_te
     from gearfmu.stage.trace import write_columns
