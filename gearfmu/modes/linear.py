@@ -31,7 +31,7 @@ from gearfmu.stage.te import MeshPlace, place_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 FULL = 3.0  # level at which every oscillator is dynamic
-RIGID_HZ = 3.0  # below it a mode is rigid rotation of the stage, which rolls along tip reliefs at frozen position
+RIGID_HZ = 1.0  # below it a mode is rigid rotation of the stage
 
 
 @dataclass(frozen=True)

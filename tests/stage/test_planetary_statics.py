@@ -15,9 +15,11 @@ from gearfmu import cli
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
+from gearfmu.kernel.linear import SPIN
+from gearfmu.modes.linear import linearised
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.turning import turns
+from gearfmu.spec.turning import turns, with_ports
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.set_te import SetTeResult, set_te
 from gearfmu.stage.te import place_of, statics_of
@@ -118,6 +120,7 @@ def test_the_next_mesh_period_is_the_same(model: StageModel, ideal: SetTeResult)
         assert error == pytest.approx(ideal.te[0, 3], abs=1e-11)
 
 
+@pytest.mark.full
 def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: PlanetarySpec) -> None:
     """Its zero lies in the middle: ± j cos α, to what of the mesh is relieved everywhere (0.12 µm); loaded, it grows
     with the torque."""
@@ -128,6 +131,7 @@ def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: 
     assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh
 
 
+@pytest.mark.full
 def test_a_pin_that_stands_forward_carries_more(
     model: StageModel, spec: PlanetarySpec, parts: list[Any], ideal: SetTeResult
 ) -> None:
@@ -143,10 +147,16 @@ def test_a_pin_that_stands_forward_carries_more(
     assert np.allclose(behind.sharing.mean(axis=1)[0, :, 2] - 1, -shift[1][:, 0], atol=5e-3)
 
 
-def test_torques_on_the_set_balance(at_rest: Kernel) -> None:
-    """On carrier, on sun and from the ring's mounts."""
-    mounts = at_rest.get("bearing.ring.mz")
-    assert abs(mounts) == pytest.approx(0.75 * TORQUE, rel=2e-3)
+def test_torques_on_the_set_balance(spec: PlanetarySpec, parts: list[Any]) -> None:
+    """On the carrier, what holds the sun, and from the ring's mounts; the ratio is that of the teeth but for the slope
+    of the tip relief."""
+    held = spec.ports["sun"].model_copy(update={"kind": "fixed"})
+    kernel = assemble(with_ports(spec, {"sun": held}), parts).kernel(**{"level": 0.0})
+    kernel.set("carrier.tau", TORQUE)
+    kernel.initialize()
+    sun, mounts = kernel.get("sun.tau"), kernel.get("bearing.ring.mz")
+    assert sun + mounts == pytest.approx(TORQUE, rel=1e-9)
+    assert sun == pytest.approx(TORQUE / 4, rel=1e-3)
 
 
 def test_a_pin_carries_what_the_meshes_press_on_its_planet(at_rest: Kernel) -> None:
@@ -168,6 +178,23 @@ def test_a_pin_carries_what_the_meshes_press_on_its_planet(at_rest: Kernel) -> N
 def test_forces_of_symmetric_planets_cancel_in_the_bearings(at_rest: Kernel) -> None:
     for name in ("sun", "ring", "carrier"):
         assert np.linalg.norm(force(at_rest, f"bearing.{name}")[:2]) < 1e-3 * MEAN, name
+
+
+@pytest.mark.parametrize("relief", [0.0, 1.0])
+def test_one_natural_motion_is_rigid_rotation(model: StageModel, relief: float) -> None:
+    """The standing ring has no spin among the coordinates; all together turn freely, but that a frozen mesh rolls along
+    the tip relief. Next come motions of some kHz."""
+    kernel = model.kernel(**{"level": 0.0, "effect.tip_relief": relief, "effect.tip_contact": relief})
+    kernel.prepare()
+    system = linearised(model, TORQUE, 0.3, kernel)
+    linear = system.linear
+    assert (linear.group == SPIN).sum() == 6 and np.all(np.isfinite(linear.mass))
+    scale = 1 / np.sqrt(linear.mass)
+    squared, shapes = np.linalg.eigh(scale[:, None] * system.stiffness * scale)
+    assert np.sqrt(np.abs(squared[0])) / 2 / np.pi < (20 if relief else 1e-2)
+    assert np.all(squared[1:] > (2 * np.pi * 1000) ** 2)
+    turned = (scale * shapes[:, 0])[linear.group == SPIN]  # in the order of the rotors, the ring left out
+    assert np.allclose(turned / turned[-1], [4, -2, -2, -2, -2, 1], rtol=1e-3)
 
 
 def between_rings_teeth(model: StageModel, level: float) -> float:
@@ -207,6 +234,7 @@ def test_a_pair_is_no_set(model: StageModel) -> None:
         set_te(replace(model, spec=model.stage), [TORQUE], 2)
 
 
+@pytest.mark.full
 def test_the_verb_writes_a_tidy_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "te.csv"
     arguments = ["te", "planetary54", "--torque", "600 N*m", "--positions", "4", "--out", str(out)]
