@@ -194,7 +194,7 @@ def test_one_natural_motion_is_rigid_rotation(model: StageModel, relief: float) 
     assert np.sqrt(np.abs(squared[0])) / 2 / np.pi < (20 if relief else 1e-2)
     assert np.all(squared[1:] > (2 * np.pi * 1000) ** 2)
     turned = (scale * shapes[:, 0])[linear.group == SPIN]  # in the order of the rotors, the ring left out
-    assert np.allclose(turned / turned[-1], [4, -2, -2, -2, -2, 1], rtol=1e-3)
+    assert np.allclose(turned / turned[-1], [4, -2, -2, -2, -2, 1], rtol=5e-3)
 
 
 def between_rings_teeth(model: StageModel, level: float) -> float:
