@@ -48,8 +48,13 @@ def te(
 ) -> None:
     """Loaded transmission error of STAGE over one pitch, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of every mesh.
 
+    Of a planetary set te_um = 1e6·r_b,s (φ_s − (1 + z_r/z_s) φ_c) over one mesh period, and how its planets share the
+    load at sun and ring: normal force over the mean of all planets, and the mesh load factor K_γ (ISO 6336-1).
+
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage, bores=bore)
+    if model.spec.kind == "planetary_set":
+        return _of_set(model, list(torques), positions, rigid_bearings, out)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.trace import write_columns
@@ -66,6 +71,41 @@ def te(
             click.echo(mesh)
         _tell(result, held)
         click.echo(f"{path}, {picture}")
+
+
+def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bool, out: Path) -> None:
+    if rigid_bearings:
+        raise click.BadParameter(
+            "a planetary set shares its load by what its bearings yield", param_hint="--rigid-bearings"
+        )
+    from gearfmu.report.te import write_set_plot
+    from gearfmu.stage.set_te import set_te
+    from gearfmu.stage.trace import write_columns
+
+    result = set_te(model, torques, positions)
+    write_columns(out, set_te_columns(result))
+    picture = out.with_suffix(".png")
+    write_set_plot(result, picture)
+    for line in set_te_lines(result, model.spec.set.load_sharing):
+        click.echo(line)
+    click.echo(f"{out}, {picture}")
+
+
+def set_te_lines(result: Any, load_sharing: float) -> list[str]:
+    """Of a set: for every torque the error, K_γ at sun and ring, and the mean share of each planet."""
+    lines = []
+    for torque, row, stiffness, factor, sharing in zip(
+        result.torque, result.te, result.stiffness, result.load_factor, result.sharing, strict=True
+    ):
+        lines.append(
+            f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, stiffness at "
+            f"the sun's base circle {1e-6 * stiffness.mean():.1f} N/µm"
+        )
+        for gear, most, shares in zip(("sun", "ring"), factor, sharing.mean(axis=0), strict=True):
+            means = " ".join(f"{share:.3f}" for share in shares)
+            above = f", above load_sharing = {load_sharing:g} of the stage file" if most > load_sharing else ""
+            lines.append(f"{'':14}{gear}: K_gamma {most:.3f}{above}; means of planets 1 … {len(shares)}: {means}")
+    return lines
 
 
 def _tell(result: Any, held: Any) -> None:
@@ -88,4 +128,20 @@ def te_columns(result: Any) -> dict[str, np.ndarray]:
         "mesh_stiffness_N_per_um": 1e-6 * result.stiffness.ravel(),
     }
     columns |= {f"share_{k + 1}": result.shares[:, :, k].ravel() for k in range(result.shares.shape[2])}
+    return columns
+
+
+def set_te_columns(result: Any) -> dict[str, np.ndarray]:
+    """Columns of a set's te.csv, torques one below the other: torque_Nm, position, te_um, stiffness_N_per_um,
+    sun_force_N and ring_force_N of the mean planet, sun_share_1 …, ring_share_1 …"""
+    rows, positions = result.te.shape
+    columns = {
+        "torque_Nm": np.repeat(result.torque, positions),
+        "position": np.tile(result.position, rows),
+        "te_um": 1e6 * result.te.ravel(),
+        "stiffness_N_per_um": 1e-6 * result.stiffness.ravel(),
+    }
+    columns |= {f"{gear}_force_N": result.force[:, :, g].ravel() for g, gear in enumerate(("sun", "ring"))}
+    for g, gear in enumerate(("sun", "ring")):
+        columns |= {f"{gear}_share_{k + 1}": result.sharing[:, :, g, k].ravel() for k in range(result.sharing.shape[3])}
     return columns

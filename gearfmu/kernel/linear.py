@@ -80,8 +80,11 @@ def room_for(info: LinearInfo) -> dict[str, np.ndarray]:
 
 
 def linear_model(info: LinearInfo, arrays: dict[str, np.ndarray]) -> LinearModel:
-    """The model with the rows that were found."""
+    """The model with the rows that were found, without the spins of rotors that stand."""
     shapes = {name: shape.split() for name, (_, shape) in ARRAYS.items()}
     cut = {name: tuple(slice(info.found if c == "room" else None) for c in shape) for name, shape in shapes.items()}
-    found = {name: array[cut[name]].copy() for name, array in arrays.items()}
+    moves = np.isfinite(arrays["mass"])
+    found = {name: array[cut[name]] for name, array in arrays.items()}
+    for name, shape in shapes.items():
+        found[name] = np.compress(moves, found[name], axis=-1) if shape[-1] == "coordinates" else found[name].copy()
     return LinearModel(**found, engagements=info.engagements)

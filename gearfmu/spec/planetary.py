@@ -33,8 +33,10 @@ class SetSpec(Spec):
     load_sharing: Annotated[float, Quantity(at_least=1, at_most=4)] = Field(
         default=1.35, description="mesh load factor K_gamma: most loaded planet over the mean (ISO 6336-1)"
     )
-    pin_errors: dict[Annotated[Count, Field(ge=0, le=11)], tuple[Deviation, Deviation]] = Field(
-        default={}, description="deviation of single pins from their places: number of the planet → radial, tangential"
+    pin_errors: dict[Annotated[int, Field(ge=0, le=11)], tuple[Deviation, Deviation]] = Field(
+        default={},
+        description="deviation of single pins from their places: number of the bolt (planet1 is on bolt 0) → radial, "
+        "tangential",
     )
 
 

@@ -205,6 +205,9 @@ def _assembly(spec: PlanetarySpec, planet: GearGeometry) -> Found:
     if room <= 2 * planet.r_a:
         remedy = f"neighbouring planets touch: their axes are {millimetres(room)} apart, the tip diameter is "
         yield "set.planets", str(planets), f"{remedy}{millimetres(2 * planet.r_a)}; fewer or smaller planets"
+    for pin in spec.set.pin_errors:
+        if pin >= planets:
+            yield f"set.pin_errors.{pin}", str(pin), f"no such pin: the {planets} are 0 to {planets - 1}"
 
 
 def _mounts(spec: PlanetarySpec) -> Found:

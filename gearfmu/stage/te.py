@@ -4,14 +4,16 @@ contact routine of the step."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, TeState
-from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.spec.general import EngagementSpec
 from gearfmu.spec.turning import turns
 from gearfmu.stage.meshes import kind_of, mesh_geometry
 from gearfmu.stage.model import StageModel
@@ -100,17 +102,28 @@ def place_of(model: StageModel, mesh: str | None) -> MeshPlace:
     a, b = pair.gears
     frame = stage.frame_of(engagement)
     carried = float(turning[frame]) if frame is not None else 0.0
-    speed_a, speed_b = (float(turning[rotor]) - carried for rotor in rotors)
+    speed_b = float(turning[rotors[1]]) - carried
     pitch = kind_of(pair) * 2 * math.pi / b.z / (speed_b * model.shafts.ratio)
-    alike = _sharing(stage, engagement)
-    return MeshPlace(number, pitch, alike * a.r_b * speed_a, alike * engagement.torque_max * abs(speed_a))
+    if frame is None:
+        speed = float(turning[rotors[0]])
+        return MeshPlace(number, pitch, a.r_b * speed, engagement.torque_max * abs(speed))
+    lever = _lever_of_planets(model, engagement, turning)
+    return MeshPlace(number, pitch, lever, engagement.torque_max / a.r_b * abs(lever))
 
 
-def _sharing(stage: GeneralStage, mesh: EngagementSpec) -> int:
-    """Among how many engagements the torque is shared out: those of the gear that meets several planets."""
-    if stage.frame_of(mesh) is None:
-        return 1
-    return max(sum(gear in other.gears for other in stage.engagements) for gear in mesh.gears)
+def _lever_of_planets(model: StageModel, engagement: EngagementSpec, turning: Mapping[str, Any]) -> float:
+    """`MeshPlace.lever` of a mesh that rolls in the axes of a carrier, planets sharing the load alike: power comes
+    through the central gear that turns. A planet between two meshes turns the sign round."""
+    stage = model.stage
+    meshes = [mesh for mesh in stage.engagements if stage.frame_of(mesh) == stage.frame_of(engagement)]
+    count = Counter(gear for mesh in meshes for gear in mesh.gears)
+    planets = max(count.values())
+    central = (gear for gear in count if count[gear] == planets and turning[stage.rotor_of(gear)])
+    mesh, gear = next((mesh, gear) for gear in central for mesh in meshes if gear in mesh.gears)
+    rotor, shape = stage.rotor_of(gear), mesh_geometry(stage, mesh).gears[mesh.gears.index(gear)]
+    drives = rotor == stage.rotor_of(stage.ports[model.shafts.input].body)
+    lever = planets * shape.r_b * float(turning[rotor]) * (1 if drives else -1)
+    return lever if gear in engagement.gears else -lever
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:

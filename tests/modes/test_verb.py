@@ -68,7 +68,6 @@ def test_a_train(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("fzg_c", "--body", "pinion", "--torque", "1 N*m"), 100, "know no torque"),
         (("fzg_c", "--torque", "0 N*m"), 100, "must not be 0"),
         (("fzg_c", "--torque", "302"), 100, "--torque"),
-        (("planetary54",), 1, "not built yet"),
     ],
 )
 def test_messages(

@@ -9,6 +9,7 @@ import pytest
 
 from gearfmu.errors import SpecError
 from gearfmu.spec.base import read_toml
+from gearfmu.spec.expand import as_general, motion_problems
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.new import new_stage
 from gearfmu.spec.planetary_body import set_body_inputs
@@ -82,6 +83,35 @@ def test_all_problems_come_at_once(tmp_path):
     )  # fmt: skip
     wanted = {"ring.tip_diameter", "set.planets", "ring.mounts.points", "carrier.bolt_diameter", "sun.tip_diameter"}
     assert wanted <= set(found)
+
+
+def test_what_a_set_needs_to_move_is_told_all_at_once(tmp_path):
+    spec = load_stage("planetary54")
+    bare = spec.model_copy(
+        update={
+            "speed_max": None,
+            "contact": None,
+            "ports": {"carrier": spec.ports["carrier"]},
+            "sun": spec.sun.model_copy(update={"bearing": None}),
+            "planet": spec.planet.model_copy(update={"bearing": spec.planet.bearing.model_copy(update={"tilt": None})}),
+            "ring": spec.ring.model_copy(update={"mounts": None}),
+        }
+    )
+    with pytest.raises(SpecError) as error:
+        as_general(bare)
+    found = {problem.field: problem.remedy for problem in error.value.problems}
+    assert set(found) == {"speed_max", "contact", "ports", "sun.bearing", "planet.bearing.tilt", "ring.mounts"}
+    assert 'write speed_max = "300 rad/s"' in found["speed_max"] and "[ports.sun]" in found["ports"]
+    assert motion_problems(spec) == []
+
+
+def test_pin_errors_move_the_axes_of_planets(tmp_path):
+    old = "# pin_errors = { 0 ="
+    spec = load_stage(written(tmp_path, (old, "pin_errors = { 1 =")))
+    assert spec.set.pin_errors == {1: (0.0, pytest.approx(12e-6))}
+    rotors = as_general(spec).rotors
+    assert rotors["planet2"].offset == pytest.approx((-12e-6, 0.0)) and rotors["planet1"].offset == (0.0, 0.0)
+    assert "the 4 are 0 to 3" in problems(tmp_path, (old, "pin_errors = { 4 ="))["set.pin_errors.4"]
 
 
 def test_a_verb_that_needs_a_pair_says_so():

@@ -1,0 +1,93 @@
+"""Quasi-static transmission error and load sharing of a planetary set over one mesh period, by the contact routine of
+the step.
+
+In the axes of the carrier everything repeats after one mesh period: sun and ring have moved on by one tooth each, and
+the mounts of the ring are smeared round its rim. Where pins stand in their places, a planet does a part of the period
+later what the others do: its mean share over the period is 1.
+
+What one planet's mesh does to the others' through the modes of sun and ring is not part of these statics, which are at
+level rigid: above all the ovalisation of the ring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearfmu.errors import ModelError
+from gearfmu.kernel import Kernel, TeState
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.model import StageModel
+from gearfmu.stage.te import LEAST, TANGENT, place_of, statics_of
+
+GEARS = ("sun", "ring")  # whose meshes with the planets share the load
+
+
+@dataclass(frozen=True)
+class SetTeResult:
+    """torque (T,) N·m · position (P,) in mesh periods · te (T, P) m · stiffness (T, P) N/m, tangent d(T_s/r_bs)/dte ·
+    sharing (T, P, 2, N): normal force of each planet over the mean of all, at the sun and at the ring · force (T, P, 2)
+    N, that mean."""
+
+    torque: np.ndarray
+    position: np.ndarray
+    te: np.ndarray
+    stiffness: np.ndarray
+    sharing: np.ndarray
+    force: np.ndarray
+
+    @property
+    def load_factor(self) -> np.ndarray:
+        """(T, 2): mesh load factor K_γ (ISO 6336-1) at sun and ring, the largest share at any position."""
+        return self.sharing.max(axis=(1, 3))
+
+
+def set_te(model: StageModel, torques: Sequence[float], positions: int = 41, **parameters: float) -> SetTeResult:
+    """te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), angles of the bores of sun and carrier, at positions i/N of one mesh period
+    (no end point), the output held. Without load it is ± the mean backlash of the two meshes along the line of action.
+
+    torques: N·m on the input, the first port; 0 is the limit of a vanishing positive torque. parameters: of the kernel,
+    e.g. slices=10. ModelError where the stage is no planetary set; SimulationError(no_equilibrium) where there is none.
+    """
+    if not isinstance(model.spec, PlanetarySpec):
+        raise ModelError(f"{model.name} is no planetary set: its meshes have transmission errors of their own")
+    kernel, place = statics_of(model, **parameters), place_of(model, f"{GEARS[0]}_planet1")
+    least, position = LEAST * place.most, np.arange(positions) / positions
+    planets = model.spec.set.planets
+    te, stiffness = np.empty((2, len(torques), positions))
+    force = np.empty((len(torques), positions, len(GEARS), planets))
+    for i, torque in enumerate(torques):
+        carried = torque if abs(torque) >= least else math.copysign(least, torque)
+        for j, part in enumerate(position):
+            at = -part * place.pitch
+            error = _error(model, kernel, at, carried)
+            force[i, j] = _forces(kernel, at, carried, planets)
+            ends = [_error(model, kernel, at, carried * (1 + sign * TANGENT), keep=True) for sign in (-1, 1)]
+            tangent = 2 * TANGENT * carried / (ends[1] - ends[0])
+            te[i, j] = error + (torque - carried) / tangent
+            stiffness[i, j] = abs(tangent / place.lever) * planets
+    mean = force.mean(axis=3)
+    return SetTeResult(np.asarray(torques, float), position, te, stiffness, force / mean[..., None], mean)
+
+
+def _error(model: StageModel, kernel: Kernel, at: float, torque: float, keep: bool = False) -> float:
+    """te (m), the output's bore at an angle (rad)."""
+    spec, shafts = model.spec, model.shafts
+    assert isinstance(spec, PlanetarySpec)
+    phi = {shafts.input: kernel.transmission(at, torque, keep=keep).phi, shafts.output: at}
+    sun = mesh_geometry(model.stage, model.stage.engagements[0]).gears[0]
+    return float(sun.r_b * (phi["sun"] - (1 + spec.ring.teeth / spec.sun.teeth) * phi["carrier"]))
+
+
+def _forces(kernel: Kernel, at: float, torque: float, planets: int) -> np.ndarray:
+    """(2, N): normal forces at sun and ring, going on from the last equilibrium; engagements are those of the sun, then
+    those of the ring."""
+    states = [kernel.transmission(at, torque, mesh, keep=True) for mesh in range(len(GEARS) * planets)]
+    return np.array([_total(state) for state in states]).reshape(len(GEARS), planets)
+
+
+def _total(state: TeState) -> float:
+    return sum(sum(slices) for slices in state.forces.values())
