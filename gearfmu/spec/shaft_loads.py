@@ -48,9 +48,7 @@ class ShaftLoad(Spec):
 def load_problems(loads: dict[str, ShaftLoad], file: str) -> Iterator[Problem]:
     """What no single field of [shaft_loads] shows."""
     if not loads:
-        yield Problem(
-            file, "shaft_loads", "", 'no shaft has a load: write e.g. [shaft_loads.sun] constant = "9 N*m"'
-        )
+        yield Problem(file, "shaft_loads", "", 'no shaft has a load: write e.g. [shaft_loads.sun] constant = "9 N*m"')
     for name, load in loads.items():
         if all(value is None for _, value in load):
             parts = ", ".join(ShaftLoad.model_fields)
