@@ -165,7 +165,7 @@ def energy(trace: Trace) -> Plot | None:
         picture = svg(figure, "energy")
     through = sum(float(np.ptp(trace[name])) for name in works)
     left = float(np.ptp(trace["energy.residual"])) / through if through else 0.0
-    caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts."
+    caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts (sum of magnitudes)."
     return Plot("energy", "Energy", caption, picture, columns(trace, [*works, *ENERGIES]))
 
 
