@@ -1,7 +1,7 @@
 """What a planet pin in the wrong place does to the load of the planets.
 
-The scene `planetary_paper` for 5 ms with rigid bodies on their pins and bearings, once with all pins in place and once
-with one 12 µm too far on. Run: python examples/planetary_sharing.py
+The scene `planetary_paper` for 5 ms at level rigid (bodies yield, but do not vibrate by themselves), once with all
+pins in place and once with one 12 µm too far on. Run: python examples/planetary_sharing.py
 """
 
 from __future__ import annotations
