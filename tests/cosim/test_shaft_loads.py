@@ -220,3 +220,11 @@ def test_the_set_runs_under_its_torques_with_rigid_bodies(planetary: StageModel)
 @pytest.mark.full
 def test_the_set_runs_under_its_torques_at_level_fast(planetary: StageModel) -> None:
     check(run_once(short("fast", 4e-3), Source(planetary)), ripple=4.0)
+
+
+def test_the_scene_of_the_page_loads_and_balances(tmp_path: Path) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "howto-planetary-scenes.md").read_text(encoding="utf-8")
+    (tmp_path / "my_run.toml").write_text(page.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+    loads = load_scene(tmp_path / "my_run.toml").shaft_loads
+    assert Law(loads["carrier"]).at(0.0, SPEED) == 100.0 and Law(loads["sun"]).at(0.0, 4 * SPEED) == -25.0
+    assert Law(loads["carrier"]).at(0.02, SPEED) == pytest.approx(400.0 + 20.0 * math.sin(2 * math.pi * 37.0 * 0.02))
