@@ -100,3 +100,12 @@ def test_read_a_trace(tmp_path: Path) -> None:
 def test_every_example_has_its_test() -> None:
     tested = set(re.findall(r'example\("([\w.]+)"', Path(__file__).read_text(encoding="utf-8")))
     assert tested == {path.name for path in (ROOT / "examples").glob("*.py")}
+
+
+def test_planetary_sharing(tmp_path: Path) -> None:
+    """Planets in their places carry alike; one that is ahead carries more, its neighbours less, the one opposite as
+    before."""
+    alike, apart = (numbers(line)[-4:] for line in example("planetary_sharing.py", cwd=tmp_path).splitlines())
+    assert alike == pytest.approx([1.0] * 4, abs=5e-3)
+    assert apart[0] > 1.05 and apart[1] == pytest.approx(apart[3], abs=5e-3) and apart[1] < 0.97
+    assert apart[2] == pytest.approx(1.0, abs=0.02)

@@ -124,7 +124,7 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
 def write_report(trace: Any, out: Path, stage: str | None) -> Path:
     """The report page of `trace` in `out`; with the deformed gears where the stage and its bodies can be read."""
     from gearfmu import report as room
-    from gearfmu.body import load_stage_bodies
+    from gearfmu.body import load_bodies
     from gearfmu.errors import GearfmuError
     from gearfmu.spec.stage import load_stage
 
@@ -132,7 +132,7 @@ def write_report(trace: Any, out: Path, stage: str | None) -> Path:
         return room.write(trace, trace.meta, out)
     try:
         spec = load_stage(stage)
-        return room.write(trace, trace.meta, out, spec, load_stage_bodies(spec))
+        return room.write(trace, trace.meta, out, spec, load_bodies(spec))
     except GearfmuError as error:
         click.echo(f"gearfmu: the report goes without the deformed pair: {error}", err=True)
         return room.write(trace, trace.meta, out)

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from gearfmu.cosim.masters import Cut, Master, master
 from gearfmu.cosim.recorder import Recorder
+from gearfmu.cosim.shaft_loads import Loaded
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError, FmuError, ModelError, SimulationError
 from gearfmu.stage.trace import Trace
@@ -57,7 +58,7 @@ class Result:
         return None if work is None or not self.throughput else (self.work + work) / self.throughput
 
 
-def run_coupled(cut: Cut, plan: Plan) -> Result:
+def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
     """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good
     communication point. A failure before the first point is raised as it is."""
     timed = _Timed(cut.stage)
@@ -90,7 +91,7 @@ class _Timed:
 
 
 class _Run:
-    def __init__(self, cut: Cut, plan: Plan) -> None:
+    def __init__(self, cut: Cut | Loaded, plan: Plan) -> None:
         self.cut, self.plan = cut, plan
         self.master: Master = master(plan.master, cut)
         self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, plan.omit)

@@ -8,6 +8,8 @@ gs_mean  Gauss–Seidel with mean torques. (1) Predict the drivetrain's motion o
 jacobi   What importers do: all outputs are exchanged at the communication points and held. First order; second with
          `tau_next` held instead of `tau` (Wiring).
 
+A stage under known torques (`Loaded`) has no drivetrain to exchange with: `TorqueMaster`.
+
 Signals, which are known beforehand, reach the stage as value at the start and rate over the step.
 """
 
@@ -19,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.ports import KEYS, ports_of
+from gearfmu.cosim.shaft_loads import Loaded, TorqueMaster
 from gearfmu.cosim.signals import Signal
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
@@ -153,12 +156,12 @@ def _everything(wiring: Wiring) -> bool:
     return wiring.motion == KEYS and wiring.rates
 
 
-Master = GsMean | Jacobi
+Master = GsMean | Jacobi | TorqueMaster
 MASTERS: dict[str, type[GsMean] | type[Jacobi]] = {"gs_mean": GsMean, "jacobi": Jacobi}
 
 
-def master(name: str, cut: Cut) -> Master:
+def master(name: str, cut: Cut | Loaded) -> Master:
     """The master of that name over `cut`; raises CouplingError with the known names."""
     if name not in MASTERS:
         raise CouplingError(f"no master {name!r}; choose one of {', '.join(MASTERS)}")
-    return MASTERS[name](cut)
+    return TorqueMaster(cut, name == "gs_mean") if isinstance(cut, Loaded) else MASTERS[name](cut)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.cosim.units import Unit, Variable
+from gearfmu.cosim.units import Recorded, Variable
 from gearfmu.errors import CouplingError
 from gearfmu.stage.trace import Channel, Trace
 
@@ -23,7 +23,7 @@ class Recorder:
     """
 
     def __init__(
-        self, stage: Unit, drive: Unit, patterns: Sequence[str], points: int, omit: Sequence[str] = ()
+        self, stage: Recorded, drive: Recorded, patterns: Sequence[str], points: int, omit: Sequence[str] = ()
     ) -> None:
         self._names = {prefix: _chosen(prefix, unit, patterns, omit) for prefix, unit in (("", stage), (DRIVE, drive))}
         everything = [prefix + name for prefix, unit in (("", stage), (DRIVE, drive)) for name in unit.outputs()]
@@ -56,7 +56,7 @@ class Recorder:
         return Trace(np.array(self._time), channels, meta)
 
 
-def _chosen(prefix: str, unit: Unit, patterns: Sequence[str], omit: Sequence[str]) -> dict[str, Variable]:
+def _chosen(prefix: str, unit: Recorded, patterns: Sequence[str], omit: Sequence[str]) -> dict[str, Variable]:
     return {
         name: about
         for name, about in unit.outputs().items()

@@ -9,14 +9,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gearfmu import fmu
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
+from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, start_speeds, torque_ports
 from gearfmu.cosim.source import Source, UnitSource
 from gearfmu.cosim.summary import summary
+from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.spec.expand import as_general
@@ -68,13 +70,16 @@ def run(
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     spec = load_stage(scene.stage.name)
-    return assemble(in_drivetrain(scene, spec), load_stage_bodies(spec))
+    return assemble(in_drivetrain(scene, spec), load_bodies(spec))
 
 
 def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
     """The stage with the ports that the scene's drivetrain needs. SpecError where more than its input and output would
-    have to be driven."""
-    shafts = shafts_of(as_general(spec))
+    have to be driven, or a load has no port."""
+    general = as_general(spec)
+    shafts = shafts_of(general)
+    if scene.shaft_loads is not None:
+        return with_ports(spec, torque_ports(scene, general))
     require_two_driven(spec, shafts, "a scene")
     return with_ports(spec, stage_ports(scene, shafts))
 
@@ -97,16 +102,32 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
         "slices": choice.slices,
         "h": choice.h,
         **{f"effect.{name}": 0.0 for name in choice.effects.off},
-        **stage_start(scene, shafts),
+        **_start(scene, source.model),
     }
     stage = source.unit(parameters)
     try:
-        drive = PyUnit(build(scene, shafts), scene.coupling.micro_step or None)
-        cut = Cut(stage, drive, (shafts.input, shafts.output), stage_signals(scene, shafts), wiring)
+        cut = _cut(scene, stage, source.model, wiring)
         coupling, omit = scene.coupling, stage_joints(scene, shafts)
         return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
     finally:
         stage.close()
+
+
+def _start(scene: SceneSpec, model: StageModel) -> dict[str, float]:
+    """Start values of the stage that follow from the scene."""
+    if scene.shaft_loads is None:
+        return stage_start(scene, model.shafts)
+    speeds = start_speeds(scene, model.stage, model.shafts.input)
+    return {f"{name}.w_start": speed for name, speed in speeds.items()}
+
+
+def _cut(scene: SceneSpec, stage: Unit, model: StageModel, wiring: Wiring) -> Cut | Loaded:
+    """The stage with its drivetrain, or with the torques on its shafts."""
+    shafts = model.shafts
+    if scene.shaft_loads is not None:
+        return Loaded(stage, ShaftLoads(scene.shaft_loads), start_speeds(scene, model.stage, shafts.input))
+    drive = PyUnit(build(scene, shafts), scene.coupling.micro_step or None)
+    return Cut(stage, drive, (shafts.input, shafts.output), stage_signals(scene, shafts), wiring)
 
 
 def verified(

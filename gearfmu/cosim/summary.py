@@ -11,13 +11,15 @@ from typing import Any
 from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.turning import meshings
 
 TORQUES = (
     "{}.shaft.tau",
     "{}.tau",
-)  # whose coupling error is the run's: the input shaft's torque, in a chain or in the port
+    "{}.w",
+)  # whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
 COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "trouble": "solver.trouble"}
 
 
@@ -67,7 +69,7 @@ def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | 
     torque = next((name for name in (text.format(port) for text in TORQUES) if name in errors), None)
     return {
         "coupling_error": errors[torque].relative if torque else None,
-        "coupling_error_rms_Nm": errors[torque].rms if torque else None,
+        "coupling_error_rms_Nm": errors[torque].rms if torque and torque.endswith(".tau") else None,
         "coupling_error_of": torque,
         "coupling_errors": {name: error.relative for name, error in errors.items()},
         "energy_residual": result.energy_residual,
@@ -76,7 +78,8 @@ def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | 
 
 
 def _origin(scene: SceneSpec, source: Source) -> dict[str, Any]:
-    names = [gear.name for gear in source.model.stage.gears]
+    spec = source.model.spec
+    names = [gear.name for gear in spec.gears] + (["carrier"] if isinstance(spec, PlanetarySpec) else [])
     hashes = {f"body {name}": text for name, text in zip(names, source.model.body_hashes, strict=True)}
     hashes |= {"scene": scene.hash, "model": source.model.hash}
     if source.fmu_path is not None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from gearfmu.spec.drivetrain import PassengerCar, TestRig, table
 from gearfmu.spec.scene import load_scene, shipped_scenes
+from gearfmu.spec.shaft_loads import ShaftLoad
 
 INTRODUCTION = """# Drivetrains and scenes
 
@@ -38,6 +39,7 @@ def page() -> str:
             [
                 INTRODUCTION,
                 *(_drivetrain(kind, title) for kind, title in ((PassengerCar, "Passenger car"), (TestRig, "Test rig"))),
+                _shaft_loads(),
                 _scenes(),
             ]
         )
@@ -58,6 +60,13 @@ def _drivetrain(kind: type[PassengerCar] | type[TestRig], title: str) -> str:
         for row in table(kind)
     ]
     return f"## {title}\n{what}\n\n" + _table(("name", "meaning", "value", "unit", "source"), rows)
+
+
+def _shaft_loads() -> str:
+    what = " ".join((ShaftLoad.__doc__ or "").split())
+    rows = [(f"`{name}`", field.description or "") for name, field in ShaftLoad.model_fields.items()]
+    about = f"A scene may give the torques on the stage's ports instead, `[shaft_loads.PORT]`. {what}"
+    return f"## Torques on the shafts\n{about}\n\n" + _table(("name", "meaning"), rows)
 
 
 def _scenes() -> str:

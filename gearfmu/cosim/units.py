@@ -27,6 +27,13 @@ class Log(Protocol):
         """(times, names) kept so far."""
 
 
+class Recorded(Protocol):
+    """What a recorder asks of either side of a coupling."""
+
+    def outputs(self) -> Mapping[str, Variable]: ...
+    def log(self, names: Sequence[str], points: int) -> Log: ...
+
+
 class Unit(Protocol):
     """One side of a coupling.
 

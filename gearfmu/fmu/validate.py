@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import queue
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import fmpy
 from fmpy.model_description import ModelDescription
@@ -19,7 +22,7 @@ from gearfmu.fmu.probes import CHECKS
 from gearfmu.fmu.symbols import exported_symbols
 from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
 
-TIMEOUT = 300
+TIMEOUT = 300  # s without an answer: of a single check, as big stages take long to initialise
 EXPORT_AGAIN = "export the FMU again"
 TERMINALS_SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
 
@@ -147,11 +150,31 @@ def _answers(folder: Path) -> Iterator[tuple[str, str, str]]:
 
 
 def _probe(folder: Path, checks: list[str]) -> tuple[str, str]:
-    """Output of a probe process and how it ended."""
-    command = [sys.executable, "-m", "gearfmu.fmu", str(folder), *checks]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT)
-    except subprocess.TimeoutExpired as late:
-        output = late.stdout.decode("utf-8", "replace") if isinstance(late.stdout, bytes) else late.stdout or ""
-        return output, f"no answer within {TIMEOUT} s"
-    return done.stdout, f"ended with code {done.returncode} {done.stderr.strip()[-300:]}"
+    """Output of a probe process and how it ended; it is stopped when a check does not answer within TIMEOUT."""
+    command, output = [sys.executable, "-m", "gearfmu.fmu", str(folder), *checks], ""
+    with tempfile.TemporaryFile("w+", errors="replace") as said:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True, errors="replace")
+        lines: queue.Queue[str | None] = queue.Queue()
+        reader = threading.Thread(target=_read, args=(process.stdout, lines), daemon=True)
+        reader.start()
+        try:
+            while (line := lines.get(timeout=TIMEOUT)) is not None:
+                output += line
+            code, late = process.wait(), False
+        except queue.Empty:
+            process.kill()
+            code, late = process.wait(), True
+        reader.join(1.0)
+        said.seek(0)
+        return (
+            output,
+            f"no answer within {TIMEOUT} s" if late else f"ended with code {code} {said.read().strip()[-300:]}",
+        )
+
+
+def _read(stream: Any, lines: queue.Queue[str | None]) -> None:
+    """Lines of a process as they come, None at the end."""
+    for line in stream:
+        lines.put(line)
+    stream.close()
+    lines.put(None)

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from gearfmu.files import write_text
-from gearfmu.report import page, picture, plots, plots_nvh
+from gearfmu.report import page, picture, plots, plots_nvh, plots_set
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
+from gearfmu.report.plots_set import PlanetSet
 from gearfmu.report.results import key_results, strict
-from gearfmu.report.signals import SETTLED, mesh_angles, meshes, window_of_interest
+from gearfmu.report.signals import SETTLED, known_meshings, mesh_angles, meshes, window_of_interest
 from gearfmu.spec.expand import as_general
 from gearfmu.stage.trace import Trace, write_columns
 
@@ -51,7 +52,11 @@ def write(
 def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[Plot], list[str]]:
     """Every plot the trace allows, and in words why others are not there."""
     angles, window = mesh_angles(trace, spec), window_of_interest(trace)
-    makers: list[Callable[[], Plot | None]] = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
+    own_set = plots_set.planet_set(trace, known_meshings(trace, spec))
+    makers: list[Callable[[], Plot | None]]
+    if own_set is not None:
+        return _made(_of_set(trace, own_set))
+    makers = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
     for mesh in meshes(trace):
         makers += [
             partial(plots.mesh_force_and_error, trace, mesh),
@@ -63,6 +68,30 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
     makers.append(lambda: plots_nvh.force_spectrum(trace, window, angles))
     makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
     makers.append(lambda: plots_nvh.force_spectrogram(trace, angles))
+    made, missing = _made(makers)
+    if not angles:
+        missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
+    return made, missing
+
+
+def _of_set(trace: Trace, own: PlanetSet) -> list[Callable[[], Plot | None]]:
+    """What makes the plots of a planetary set: its planets side by side instead of mesh by mesh."""
+    window = window_of_interest(trace)
+    return [
+        lambda: plots_set.speeds(trace, own),
+        lambda: plots.torque_and_slip(trace),
+        lambda: plots_set.forces(trace, own),
+        lambda: plots_set.forces(trace, own, plots_set.detail_window(trace, own, window)),
+        lambda: plots_set.sharing(trace, own, window),
+        lambda: plots_set.pin_forces(trace, own),
+        lambda: plots.bearing_forces(trace, carried=True),
+        lambda: plots_set.energy(trace),
+        lambda: plots_set.spectrum(trace, own, window),
+    ]
+
+
+def _made(makers: Sequence[Callable[[], Plot | None]]) -> tuple[list[Plot], list[str]]:
+    """The plots that could be made, and in words why others could not."""
     made, missing = [], []
     for maker in makers:
         try:
@@ -72,8 +101,6 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
             continue
         if plot is not None:
             made.append(plot)
-    if not angles:
-        missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
     return made, list(dict.fromkeys(missing))
 
 
@@ -105,7 +132,7 @@ def _document(
     body = [
         page.head(title, str(summary.get("outcome", "outcome not given")), f"{stage}{' · ' + about if about else ''}"),
         page.facts(_facts(summary)),
-        page.section("Results", _results(trace)),
+        *(_planets(trace, spec) or [page.section("Results", _results(trace))]),
         *[page.figure(plot) for plot in made if not plot.name.startswith(NVH)],
         *_warned(trace),
         *([page.section("Octave bands", bands)] if (bands := _octaves(trace)) else []),
@@ -116,6 +143,19 @@ def _document(
     if missing:
         body.insert(3, page.section("Not shown", *[page.note(reason) for reason in missing]))
     return page.page(f"{title} – {stage}", body)
+
+
+def _planets(trace: Trace, spec: Any) -> list[str]:
+    """The table of planets of a set."""
+    own, window = plots_set.planet_set(trace, known_meshings(trace, spec)), window_of_interest(trace)
+    if own is None:
+        return []
+    try:
+        table = page.table(*plots_set.results(trace, own, window))
+    except MetricsError:
+        return []
+    where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}. Share: 1 where all planets carry alike."
+    return [page.section("Planets", table, page.note(where))]
 
 
 def _warned(trace: Trace) -> list[str]:
@@ -227,7 +267,7 @@ def _accuracy(summary: Mapping[str, Any], spec: Any, bodies: Sequence[Any] | Non
                 "(benchmarks/levels.py does it)."
             )
         )
-    return parts + [page.note(_frf_words(body)) for body in bodies or ()]
+    return parts + [page.note(_frf_words(body)) for body in bodies or () if hasattr(body, "frf")]
 
 
 PRICES = (

@@ -46,7 +46,7 @@ def torque_and_slip(trace: Trace) -> Plot | None:
         for axis, (names, label) in zip(axes, rows, strict=True):
             for name in names:
                 axis.plot(trace.time, trace[name], label=name, **(_DASHED if name.endswith(".capacity") else {}))
-            _finish(axis, label)
+            finish(axis, label)
         _mark_lock(trace, axes)
         axes[-1].set_xlabel("time in s")
         picture = svg(figure, "torque")
@@ -66,7 +66,7 @@ def speeds(trace: Trace) -> Plot | None:
         figure, (axis,) = panels((2.3,))
         for name in names:
             axis.plot(trace.time, np.abs(trace[name]) * RPM, label=name)
-        _finish(axis, "speed in rpm")
+        finish(axis, "speed in rpm")
         axis.set_xlabel("time in s")
         picture = svg(figure, "speed")
     return Plot("speed", "Speeds", "Magnitudes; the data keep sign and rad/s.", picture, columns(trace, names))
@@ -101,8 +101,8 @@ def of_mesh(trace: Trace, mesh: str, title: str) -> str:
     return f"{title}, {mesh}" if len(meshes(trace)) > 1 else title
 
 
-def bearing_forces(trace: Trace) -> Plot | None:
-    """Bearing forces x and y of every bearing over time; None without them."""
+def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
+    """Bearing forces x and y of every bearing over time; None without them. carried: of a planetary set."""
     groups = [found for b in bearings(trace) if (found := [n for d in "xy" if (n := f"bearing.{b}.f{d}") in trace])]
     if not groups:
         return None
@@ -111,12 +111,14 @@ def bearing_forces(trace: Trace) -> Plot | None:
         for axis, found in zip(axes, groups, strict=True):
             for name in found:
                 axis.plot(trace.time, trace[name] * 1e-3, label=name, lw=0.8)
-            _finish(axis, "force in kN")
+            finish(axis, "force in kN")
         axes[-1].set_xlabel("time in s")
         picture = svg(figure, "bearing")
     names = [name for found in groups for name in found]
     caption = "Force of the shaft on its bearing, along the axes x and y of the stage."
-    if len(meshes(trace)) == 1:
+    if carried:
+        caption = "Force of the body on its bearing, in axes that turn with the carrier."
+    elif len(meshes(trace)) == 1:
         caption = "Force of the gear on its bearing; x points from pinion to wheel."
     return Plot("bearing", "Bearing forces", caption, picture, columns(trace, names))
 
@@ -140,7 +142,8 @@ def distinct(trace: Trace, names: Iterable[str]) -> list[str]:
 _DASHED: dict[str, Any] = {"ls": "--", "color": MUTED, "lw": 1.2}
 
 
-def _finish(axis: Axes, label: str) -> None:
+def finish(axis: Axes, label: str) -> None:
+    """Label, no margin along time, legend above the panel."""
     axis.set_ylabel(label)
     axis.margins(x=0)
     axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)

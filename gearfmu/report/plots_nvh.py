@@ -39,7 +39,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
         return None
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
-    spectra = {name: metrics.amplitude_spectrum(part[name], step, _segment(part.time.size)) for name in names}
+    spectra = {name: metrics.amplitude_spectrum(part[name], step, segment(part.time.size)) for name in names}
     groups = _by_part(names)
     with styled():
         figure, axes = panels((1.7,) * len(groups) if len(groups) > 1 else (2.6,))
@@ -47,7 +47,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
             for name in group:
                 spectrum = spectra[name]
                 axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, lw=0.9)
-            _level_axis(axis, "dB re 1 N")
+            level_axis(axis, "dB re 1 N")
             axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
             marked = [mesh for mesh, angle in angles.items() if _mark_orders(axis, part.time, trace, (mesh, angle))]
         axes[-1].set_xlabel("frequency in kHz")
@@ -81,7 +81,7 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
             for row, order in enumerate(cut.orders):
                 if np.any(np.isfinite(cut.amplitude[row])):
                     axis.plot(cut.time, metrics.level(cut.amplitude[row]), label=f"order {order}")
-            _level_axis(axis, "dB re 1 N", trace.time[-1])
+            level_axis(axis, "dB re 1 N", trace.time[-1])
             axis.set_title(name, loc="left", color=INK)
         axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=ORDERS, borderaxespad=0.1)
         axes[-1].set_xlabel("time in s")
@@ -107,8 +107,8 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     preferred = "_mean" if sampling_warning(trace) else ".fy"
     name = next((n for n in names if preferred in n), names[0])
     step = metrics.sample_step(trace.time)
-    segment = _segment(trace.time.size, windows=14)
-    picture_data = metrics.spectrogram(trace[name], step, segment, max(segment // 16, 1))
+    window_size = segment(trace.time.size, windows=14)
+    picture_data = metrics.spectrogram(trace[name], step, window_size, max(window_size // 16, 1))
     if picture_data.time.size < 4:
         raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
     values = metrics.level(picture_data.amplitude)
@@ -131,7 +131,7 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
             _overlay_orders(axis, trace, (angle, style), min(SHOWN_TO, 0.5 / step))
         picture = png(figure)
     caption = (
-        f"{name}; Hann windows of {segment * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
+        f"{name}; Hann windows of {window_size * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
         f"Dashed: orders {' and, dotted, '.join(f'of {mesh}' for mesh in angles) or 'of the mesh'} from the speed."
     )
     data = {
@@ -157,7 +157,7 @@ def _by_part(names: list[str]) -> list[list[str]]:
     return list(groups.values())
 
 
-def _segment(samples: int, windows: int = 3) -> int:
+def segment(samples: int, windows: int = 3) -> int:
     """Samples a Hann window for about `windows` windows in the record: a power of two, at least 64 where there are
     as many."""
     wanted = max(64, 2 ** int(np.round(np.log2(max(samples / windows, 1)))))
@@ -182,7 +182,7 @@ def sampling_warning(trace: Trace) -> str | None:
     )
 
 
-def _level_axis(axis: Axes, label: str, end: float | None = None) -> None:
+def level_axis(axis: Axes, label: str, end: float | None = None) -> None:
     """Limit the level axis to RANGE_DB below the highest line, so that a silent line does not squeeze the rest."""
     tops = [np.nanmax(line.get_ydata()) for line in axis.lines]
     lows = [np.nanmin(line.get_ydata()) for line in axis.lines]

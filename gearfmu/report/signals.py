@@ -42,13 +42,16 @@ def meshes(trace: Trace) -> list[str]:
     return list(dict.fromkeys(parts[0] for parts in found if len(parts) == 2 and parts[1] in MESH_CHANNELS))
 
 
-def mesh_angles(trace: Trace, spec: Any = None) -> dict[str, np.ndarray]:
-    """Mesh angle (n,) rad of every engagement whose gear's speed and teeth are known, from the stage `spec` or the
-    trace's meta "meshes"."""
+def known_meshings(trace: Trace, spec: Any = None) -> dict[str, Meshing]:
+    """Meshing of every engagement, from the stage `spec` or the trace's meta "meshes"."""
     if spec is not None:
-        known = meshings(as_general(spec))
-    else:
-        known = {mesh: Meshing.of_plain(own) for mesh, own in dict(trace.meta.get("meshes") or {}).items()}
+        return meshings(as_general(spec))
+    return {mesh: Meshing.of_plain(own) for mesh, own in dict(trace.meta.get("meshes") or {}).items()}
+
+
+def mesh_angles(trace: Trace, spec: Any = None) -> dict[str, np.ndarray]:
+    """Mesh angle (n,) rad of every engagement whose gear's speed and teeth are known: `known_meshings`."""
+    known = known_meshings(trace, spec)
     speeds = {name.removesuffix(GEAR_SPEED): trace[name] for name in trace.channels if name.endswith(GEAR_SPEED)}
     return {
         mesh: mesh_angle(trace.time, meshing.relative(speeds), meshing.teeth)

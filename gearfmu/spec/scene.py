@@ -8,13 +8,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, Strict
+from pydantic import AliasChoices, Field, Strict
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, read_toml, validate
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
+from gearfmu.spec.shaft_loads import ShaftLoad, load_problems
 
 SHIPPED = Path(__file__).parent.parent / "scenes"
+DRIVES = ("passenger_car", "test_rig", "shaft_loads")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
 Switch = Annotated[bool, Strict()]
@@ -72,14 +74,17 @@ class ClutchSpec(Spec):
 
 
 class StartSpec(Spec):
-    """Speeds at the start; slip: engine faster than the pinion by this."""
+    """Speeds at the start; pinion_speed, also written input_speed: of the stage's input, its first port; slip: engine
+    faster than the pinion by this."""
 
-    pinion_speed: Annotated[float, Quantity("rad/s")]
+    pinion_speed: Annotated[float, Quantity("rad/s")] = Field(
+        validation_alias=AliasChoices("pinion_speed", "input_speed")
+    )
     slip: Annotated[float, Quantity("rad/s")] = 0.0
 
 
 class SceneSpec(Spec):
-    """A scene. Exactly one of `passenger_car` and `test_rig`; the car needs a `clutch`.
+    """A scene. Exactly one of `passenger_car`, `test_rig` and `shaft_loads`; the car needs a `clutch`.
 
     record : names of stage outputs and drivetrain variables, "*" and "?" as in file names.
     """
@@ -94,6 +99,7 @@ class SceneSpec(Spec):
     clutch: ClutchSpec | None = None
     passenger_car: PassengerCar | None = None
     test_rig: TestRig | None = None
+    shaft_loads: dict[Name, ShaftLoad] | None = None
     record: tuple[Text, ...] = ("*",)
 
     @property
@@ -102,6 +108,8 @@ class SceneSpec(Spec):
         values = self.model_dump()
         if not self.stage.effects.off:
             del values["stage"]["effects"]
+        if self.shaft_loads is None:
+            del values["shaft_loads"]
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     @property
@@ -147,11 +155,10 @@ def scene_path(path_or_name: str | Path) -> Path:
 
 def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
     """What no single field shows."""
-    chosen = [key for key in ("passenger_car", "test_rig") if getattr(scene, key) is not None]
+    chosen = [key for key in DRIVES if getattr(scene, key) is not None]
     if len(chosen) != 1:
-        yield Problem(
-            file, "", "", f"give exactly one of [passenger_car] and [test_rig], found {' and '.join(chosen) or 'none'}"
-        )
+        remedy = "give exactly one of [passenger_car], [test_rig] and [shaft_loads]"
+        yield Problem(file, "", "", f"{remedy}, found {' and '.join(chosen) or 'none'}")
     if scene.passenger_car is not None and scene.clutch is None:
         yield Problem(file, "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity")
     if scene.passenger_car is None and scene.clutch is not None:
@@ -160,6 +167,8 @@ def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
         yield Problem(
             file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it"
         )
+    if scene.shaft_loads is not None:
+        yield from load_problems(scene.shaft_loads, file)
     if scene.clutch is not None:
         yield from _clutch_problems(scene, scene.clutch, file)
     yield from _time_problems(scene, file)

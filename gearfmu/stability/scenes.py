@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gearfmu.stability import clutches, loads, speeds, stepping, trains
+from gearfmu.stability import clutches, loads, sets, speeds, stepping, trains
 from gearfmu.stability.case import Case, Finding
 
 SCENES: dict[str, Callable[[Case], Finding]] = {
@@ -16,6 +16,7 @@ SCENES: dict[str, Callable[[Case], Finding]] = {
         loads.light_load_rattle,
         stepping.random_communication_steps,
         stepping.rollbacks,
+        sets.planetary_backfire,
         clutches.clutch_dump,
         clutches.clutch_hundred_times,
         trains.train_closing_clutch,

@@ -23,10 +23,11 @@ from gearfmu.stability.checks import finding
 from gearfmu.stability.clutches import DUMP
 from gearfmu.stability.record import Stopped
 from gearfmu.stability.scenes import SCENES
+from gearfmu.stability.sets import BACKFIRE, planetary
 from gearfmu.stability.trains import CLOSING, train
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
-JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains")
+JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains", "sets")
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
@@ -121,7 +122,8 @@ def fingerprint() -> str:
     for stage in (PLAIN, RELIEVED):
         digest.update(model(Variant(stage)).blob)
     digest.update(train().blob)
-    for scene in (DUMP, CLOSING):
+    digest.update(planetary().blob)
+    for scene in (DUMP, CLOSING, BACKFIRE):
         digest.update(scene_path(scene).read_bytes())
     for name in JUDGES:
         digest.update((Path(__file__).parent / f"{name}.py").read_bytes())

@@ -11,8 +11,13 @@ from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
 
 
 def test_shipped_scenes():
-    assert shipped_scenes() == ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded"]
-    for name in shipped_scenes():
+    pairs = ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded"]
+    sets = ["planetary_backfire", "planetary_paper"]
+    assert shipped_scenes() == sorted(pairs + sets)
+    for name in sets:
+        scene = load_scene(name)
+        assert (scene.name, scene.stage.name, scene.stage.level) == (name, "planetary54", "fast")
+    for name in pairs:
         scene = load_scene(name)
         assert (
             scene.name == name

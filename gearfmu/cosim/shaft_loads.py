@@ -1,0 +1,187 @@
+"""Stages under torques that are known as functions of time and speed: no drivetrain with a state of its own.
+
+The stage's ports are torque ports: torque in, motion out. In every communication step the torque is held at its mean:
+of the functions of time exactly, of what follows the speed at the speed in the middle of the step, to which the last
+step's change of speed is carried on. Second order in the step; `jacobi` holds the torque of the step's beginning, as
+importers do: first order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from gearfmu.cosim.signals import Ramp
+from gearfmu.cosim.units import Unit, Variable
+from gearfmu.errors import CouplingError, Problem, SpecError
+from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.shaft_loads import ShaftLoad
+from gearfmu.spec.turning import turns
+
+ORDERS = {"gs_mean": 2, "jacobi": 1}
+
+
+@dataclass(frozen=True)
+class Law:
+    """Torque on one shaft as a function of time and speed."""
+
+    load: ShaftLoad
+
+    def at(self, time: float, w: float) -> float:
+        """Torque (N·m) at `time` (s), right limit where it jumps, at the speed w (rad/s)."""
+        alternating = self.load.alternating
+        swing = alternating.amplitude * math.sin(2.0 * math.pi * alternating.frequency * time) if alternating else 0.0
+        return self._steady(w) + self._ends(time, time)[0] + swing
+
+    def mean(self, time: float, h: float, w: float) -> float:
+        """Mean torque (N·m) from `time` over h (s) at the mean speed w (rad/s)."""
+        alternating, swing = self.load.alternating, 0.0
+        if alternating:
+            omega = 2.0 * math.pi * alternating.frequency
+            swing = alternating.amplitude * (math.cos(omega * time) - math.cos(omega * (time + h))) / (omega * h)
+        return self._steady(w) + 0.5 * sum(self._ends(time, time + h)) + swing
+
+    def _steady(self, w: float) -> float:
+        proportional = self.load.proportional
+        return (self.load.constant or 0.0) + (proportional.slope * w if proportional else 0.0)
+
+    def _ends(self, start: float, end: float) -> tuple[float, float]:
+        return Ramp(self.load.over_time).ends(start, end) if self.load.over_time else (0.0, 0.0)
+
+
+class ShaftLoads:
+    """The torques of a run and their work, as a recorder reads them.
+
+    tau (k,) N·m: mean over the last communication step, at the start that of the start; work (k,) J: given to the
+    stage since the start.
+    """
+
+    def __init__(self, loads: Mapping[str, ShaftLoad]) -> None:
+        self.laws = {name: Law(load) for name, load in loads.items()}
+        self.tau, self.work = np.zeros(len(loads)), np.zeros(len(loads))
+
+    def outputs(self) -> dict[str, Variable]:
+        """`<shaft>.tau` and `<shaft>.work`."""
+        torques = {f"{name}.tau": Variable("N.m", "mean torque on the stage over the last step") for name in self.laws}
+        return torques | {f"{name}.work": Variable("J", "work done on the stage since the start") for name in self.laws}
+
+    def log(self, names: Sequence[str], points: int) -> LoadLog:
+        """Keeps these outputs at up to `points` times."""
+        known = list(self.outputs())
+        return LoadLog(self, [known.index(name) for name in names], np.zeros((points, len(names))))
+
+
+@dataclass
+class LoadLog:
+    """Rows of torques and works."""
+
+    loads: ShaftLoads
+    places: list[int]
+    table: np.ndarray
+    count: int = 0
+
+    def take(self) -> None:
+        """Keep the present outputs."""
+        if self.count == len(self.table):
+            raise CouplingError(f"the log holds {self.count} times and no more")
+        self.table[self.count] = np.concatenate([self.loads.tau, self.loads.work])[self.places]
+        self.count += 1
+
+    def rows(self) -> np.ndarray:
+        """(times, names) kept so far."""
+        return self.table[: self.count]
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A stage with torque ports under these loads: what `Cut` is to a stage in a drivetrain. start: speed (rad/s) of
+    every loaded shaft at the start."""
+
+    stage: Unit
+    drive: ShaftLoads
+    start: Mapping[str, float]
+
+
+@dataclass
+class Exchanged:
+    """Energy that the loads got from the stage, signed sum and sum of magnitudes, J (as of `Ports`)."""
+
+    work: float = 0.0
+    throughput: float = 0.0
+
+
+@dataclass
+class TorqueMaster:
+    """Steps a loaded stage. foreseen: whether the torque is the mean of the step or that of its beginning."""
+
+    cut: Loaded
+    foreseen: bool = True
+    ports: Exchanged = field(default_factory=Exchanged)
+
+    def __post_init__(self) -> None:
+        stage, names = self.cut.stage, list(self.cut.drive.laws)
+        self.order = ORDERS["gs_mean" if self.foreseen else "jacobi"]
+        self._tau: Any = stage.resolve([f"{name}.tau" for name in names])
+        self._phi: Any = stage.resolve([f"{name}.phi" for name in names])
+        self._w: Any = stage.resolve([f"{name}.w" for name in names])
+        self._before = self._now = np.array([self.cut.start[name] for name in names])
+
+    def begin(self, time: float) -> None:
+        """Initialise the stage at rest under the torques of the start."""
+        drive = self.cut.drive
+        drive.tau = self._each("at", (time,), self._now)
+        self.cut.stage.set(self._tau, drive.tau)
+        self.cut.stage.initialize(time)
+
+    def step(self, time: float, h: float) -> None:
+        """One communication step."""
+        stage, drive = self.cut.stage, self.cut.drive
+        middle = 1.5 * self._now - 0.5 * self._before
+        drive.tau = self._each("mean", (time, h), middle) if self.foreseen else self._each("at", (time,), self._now)
+        stage.set(self._tau, drive.tau)
+        start = stage.get(self._phi).copy()
+        stage.step(time, h)
+        given = drive.tau * (stage.get(self._phi) - start)
+        drive.work = drive.work + given
+        self.ports.work -= float(given.sum())
+        self.ports.throughput += float(np.abs(given).sum())
+        self._before, self._now = self._now, stage.get(self._w).copy()
+
+    def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
+        laws = zip(self.cut.drive.laws.values(), speeds.tolist(), strict=True)
+        return np.array([getattr(law, what)(*when, w) for law, w in laws])
+
+
+def torque_ports(scene: SceneSpec, stage: GeneralStage) -> dict[str, PortSpec]:
+    """The stage's loaded ports as torque ports. SpecError with every load of a port that the stage does not have, and
+    every spring port that nothing would drive."""
+    assert scene.shaft_loads is not None
+    remedy = f"the stage has no such port; it has {', '.join(stage.ports)}"
+    problems = [
+        Problem(scene.name, f"shaft_loads.{name}", "", remedy) for name in scene.shaft_loads if name not in stage.ports
+    ]
+    problems += [
+        Problem(str(stage.source), f"ports.{name}.kind", '"spring"', f"nothing drives it: write [shaft_loads.{name}]")
+        for name, port in stage.ports.items()
+        if name not in scene.shaft_loads and port.kind == "spring"
+    ]
+    if problems:
+        raise SpecError(problems)
+    return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in scene.shaft_loads}
+
+
+def start_speeds(scene: SceneSpec, stage: GeneralStage, input_port: str) -> dict[str, float]:
+    """Speed (rad/s) of every torque port at the start: that of the input, and what is geared to it by its teeth; others
+    begin at rest."""
+    turning = turns(stage, input_port)
+    return {
+        name: scene.start.pinion_speed * float(turning.get(stage.rotor_of(port.body), 0))
+        for name, port in stage.ports.items()
+        if port.kind == "torque"
+    }

@@ -1,0 +1,62 @@
+"""Torques on the shafts of a stage: sums of laws of time and speed. Declared once; docs are made from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+from pydantic import Field
+
+from gearfmu.errors import Problem
+from gearfmu.spec.base import Quantity, Spec
+
+Torque = Annotated[float, Quantity("N*m")]
+Time = Annotated[float, Quantity("s", at_least=0)]
+
+
+class ProportionalTorque(Spec):
+    """A torque that follows the speed of the shaft: `torque` at `speed`, zero at rest. A brake has the other sign than
+    its speed."""
+
+    torque: Torque = Field(description="torque at that speed")
+    speed: Annotated[float, Quantity("rad/s")] = Field(description="speed at which the shaft has this torque")
+
+    @property
+    def slope(self) -> float:
+        """Torque per speed, N·m·s/rad."""
+        return self.torque / self.speed
+
+
+class AlternatingTorque(Spec):
+    """amplitude · sin(2π frequency t)."""
+
+    amplitude: Annotated[float, Quantity("N*m", at_least=0)] = Field(description="of the sine")
+    frequency: Annotated[float, Quantity("Hz", above=0)] = Field(description="of the sine, which begins at zero")
+
+
+class ShaftLoad(Spec):
+    """Torque of the outside on one shaft about +z: the sum of what is given."""
+
+    constant: Torque | None = Field(default=None, description="the same at all times")
+    over_time: Annotated[tuple[tuple[Time, Torque], ...], Field(min_length=1)] | None = Field(
+        default=None, description="straight lines through (time, torque), constant outside; the same time twice jumps"
+    )
+    proportional: ProportionalTorque | None = Field(default=None, description="follows the speed of the shaft")
+    alternating: AlternatingTorque | None = Field(default=None, description="a sine of time")
+
+
+def load_problems(loads: dict[str, ShaftLoad], file: str) -> Iterator[Problem]:
+    """What no single field of [shaft_loads] shows."""
+    if not loads:
+        yield Problem(file, "shaft_loads", "", 'no shaft has a load: write e.g. [shaft_loads.sun] constant = "9 N*m"')
+    for name, load in loads.items():
+        if all(value is None for _, value in load):
+            parts = ", ".join(ShaftLoad.model_fields)
+            yield Problem(file, f"shaft_loads.{name}", "", f"this shaft has no torque: give one or more of {parts}")
+        times = [time for time, _ in load.over_time or ()]
+        if any(b < a for a, b in zip(times, times[1:], strict=False)):
+            remedy = "times must not decrease: sort the points by time"
+            yield Problem(file, f"shaft_loads.{name}.over_time", "", remedy)
+        if load.proportional is not None and load.proportional.speed == 0.0:
+            field = f"shaft_loads.{name}.proportional.speed"
+            yield Problem(file, field, "0 rad/s", "a torque at rest follows no speed: write it as constant")

@@ -1,0 +1,230 @@
+"""Scenes with torques on the shafts: bad files, the laws, second order in time on a rotor with an exact solution, and
+the planetary set through the coupling."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu.body import load_bodies
+from gearfmu.cosim.coupled import OK, Plan, Result, run_coupled
+from gearfmu.cosim.masters import master
+from gearfmu.cosim.scene_run import in_drivetrain, run_once
+from gearfmu.cosim.shaft_loads import Law, Loaded, ShaftLoads, start_speeds
+from gearfmu.cosim.source import Source
+from gearfmu.cosim.units import Variable
+from gearfmu.errors import SpecError
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
+from gearfmu.spec.shaft_loads import ShaftLoad
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble
+
+SPEED = 85.0  # rad/s, of the carrier
+PAPER = "planetary_paper"
+
+
+def test_the_scene_of_the_paper_is_in_balance_at_the_start() -> None:
+    """600 N·m on the carrier at 85 rad/s, −150 N·m on the sun at four times that: no power left over."""
+    scene = load_scene(PAPER)
+    stage = as_general(load_stage(scene.stage.name))
+    speeds = start_speeds(scene, stage, "carrier")
+    assert scene.duration == 0.1 and scene.start.pinion_speed == SPEED and speeds == {"carrier": 85.0, "sun": 340.0}
+    power = {name: Law(load).at(0.0, speeds[name]) * speeds[name] for name, load in scene.shaft_loads.items()}
+    assert power["carrier"] == 600.0 * SPEED and sum(power.values()) == pytest.approx(0.0, abs=1e-9)
+
+
+BAD = """
+[shaft_loads.carrier]
+[shaft_loads.sun]
+constant = "5 N"
+proportionl = 3
+over_time = [["2 ms", "1 N*m"], ["1 ms", "1 N*m"]]
+proportional = { torque = "1 N*m", speed = "0 rad/s" }
+alternating = { amplitude = "-1 N*m" }
+"""
+HEAD = (SHIPPED / f"{PAPER}.toml").read_text(encoding="utf-8").partition("[shaft_loads")[0]
+
+
+def problems_of(tmp_path: Path, text: str) -> dict[str, str]:
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SpecError) as told:
+        load_scene(tmp_path / "scene.toml")
+    return {problem.field: problem.remedy for problem in told.value.problems}
+
+
+def test_every_bad_field_of_the_loads_at_once(tmp_path: Path) -> None:
+    found = problems_of(tmp_path, HEAD + BAD)
+    sun = "shaft_loads.sun"
+    assert {f"{sun}.constant", f"{sun}.alternating.amplitude", f"{sun}.alternating.frequency"} <= set(found)
+    assert 'did you mean "proportional"' in found[f"{sun}.proportionl"]
+
+
+def test_what_no_single_field_of_the_loads_shows_at_once(tmp_path: Path) -> None:
+    lines = [line for line in BAD.splitlines() if not line.startswith(("constant", "proportionl", "alternating"))]
+    found = problems_of(tmp_path, HEAD + "\n".join(lines) + '\n[test_rig]\ntorque = "1 N*m"\n')
+    assert "give one or more of" in found["shaft_loads.carrier"]
+    assert "must not decrease" in found["shaft_loads.sun.over_time"]
+    assert "write it as constant" in found["shaft_loads.sun.proportional.speed"]
+    assert "found test_rig and shaft_loads" in found[""]
+
+
+def test_a_load_without_a_port_and_a_port_without_a_load_are_told_together() -> None:
+    scene = load_scene(PAPER)
+    stage = load_stage(scene.stage.name)
+    spring = stage.ports["sun"].model_copy(update={"kind": "spring"})
+    stage = stage.model_copy(update={"ports": {**stage.ports, "sun": spring}})
+    loads = {"carrier": scene.shaft_loads["carrier"], "ring": scene.shaft_loads["sun"]}
+    with pytest.raises(SpecError) as told:
+        in_drivetrain(scene.model_copy(update={"shaft_loads": loads}), stage)
+    remedies = {problem.field: problem.remedy for problem in told.value.problems}
+    assert remedies["shaft_loads.ring"].endswith("it has carrier, sun")
+    assert remedies["ports.sun.kind"] == "nothing drives it: write [shaft_loads.sun]"
+
+
+def test_hashes_of_scenes_without_loads_are_those_of_before() -> None:
+    """The field that is not there is not in the hash."""
+    assert load_scene("pair_light").hash == "0c0c1e12c867288f57f4b04a3e32b8fb52fdb241f1c5a06bf58dcdee81f7a113"
+
+
+def test_the_laws_add_up_and_their_means_are_exact() -> None:
+    load = ShaftLoad(
+        constant=3.0,
+        over_time=((0.0, 0.0), (1.0, 10.0)),
+        proportional={"torque": -4.0, "speed": 2.0},
+        alternating={"amplitude": 5.0, "frequency": 0.25},
+    )
+    law = Law(load)
+    assert law.at(0.5, 7.0) == pytest.approx(3.0 + 5.0 - 14.0 + 5.0 * math.sin(math.pi / 4.0))
+    assert law.mean(0.0, 0.5, 7.0) == pytest.approx(3.0 + 2.5 - 14.0 + 20.0 / math.pi * (1.0 - math.cos(math.pi / 4.0)))
+    jump = Law(ShaftLoad(over_time=((0.0, 1.0), (0.5, 1.0), (0.5, 9.0), (2.0, 9.0))))
+    assert (jump.mean(0.4, 0.1, 0.0), jump.mean(0.5, 0.1, 0.0), jump.at(0.5, 0.0)) == (1.0, 9.0, 9.0)
+
+
+class Rotor:
+    """A stage of one inertia (kg·m²) with a torque port, moved exactly under a held torque."""
+
+    INERTIA = 2e-3
+
+    def __init__(self, w: float) -> None:
+        self.values = {"shaft.tau": 0.0, "shaft.phi": 0.0, "shaft.w": w}
+
+    def outputs(self) -> dict[str, Variable]:
+        return {name: Variable("", "") for name in ("shaft.phi", "shaft.w")}
+
+    def initialize(self, time: float) -> None:
+        pass
+
+    def resolve(self, names) -> list[str]:
+        return list(names)
+
+    def set(self, handle, values) -> None:
+        self.values |= dict(zip(handle, map(float, values), strict=True))
+
+    def get(self, handle) -> np.ndarray:
+        return np.array([self.values[name] for name in handle])
+
+    def step(self, time: float, h: float) -> None:
+        a = self.values["shaft.tau"] / self.INERTIA
+        self.values["shaft.phi"] += h * (self.values["shaft.w"] + 0.5 * a * h)
+        self.values["shaft.w"] += a * h
+
+    def log(self, names, points):
+        unit, rows = self, []
+
+        class Log:
+            def take(self) -> None:
+                rows.append(unit.get(names))
+
+            def rows(self) -> np.ndarray:
+                return np.array(rows)
+
+        return Log()
+
+    def save(self) -> dict[str, float]:
+        return dict(self.values)
+
+    def restore(self, state) -> None:
+        self.values = dict(state)
+
+
+def speed_at_the_end(steps: int, name: str, load: ShaftLoad, duration: float = 0.02, w: float = 100.0) -> Result:
+    cut = Loaded(Rotor(w), ShaftLoads({"shaft": load}), {"shaft": w})
+    return run_coupled(cut, Plan(name, duration / steps, steps))
+
+
+@pytest.mark.parametrize(("name", "order"), [("gs_mean", 2), ("jacobi", 1)])
+def test_a_braked_rotor_runs_down_as_the_exponential_of_its_order(name: str, order: int) -> None:
+    """J w' = −c w under a swing that the mean takes exactly: w against the exact solution, at steps H and H/2."""
+    c, amplitude, frequency = 0.2, 30.0, 60.0
+    load = ShaftLoad(
+        proportional={"torque": -c, "speed": 1.0}, alternating={"amplitude": amplitude, "frequency": frequency}
+    )
+    rate, omega, t = c / Rotor.INERTIA, 2.0 * math.pi * frequency, 0.02
+    swing = amplitude / Rotor.INERTIA / (rate**2 + omega**2)
+    exact = (100.0 + swing * omega) * math.exp(-rate * t)
+    exact += swing * (rate * math.sin(omega * t) - omega * math.cos(omega * t))
+    results = [speed_at_the_end(steps, name, load) for steps in (200, 400, 800)]
+    errors = [abs(result.trace["shaft.w"][-1] - exact) for result in results]
+    assert all(result.order == order for result in results)
+    assert math.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.15), errors
+    assert errors[2] < {1: 0.3, 2: 2e-3}[order]
+
+
+def test_work_of_the_loads_is_the_kinetic_energy_gained() -> None:
+    result = speed_at_the_end(50, "gs_mean", ShaftLoad(constant=3.0, alternating={"amplitude": 7.0, "frequency": 90.0}))
+    gained = 0.5 * Rotor.INERTIA * (result.trace["shaft.w"][-1] ** 2 - 100.0**2)
+    assert result.trace["drive.shaft.work"][-1] == pytest.approx(gained, rel=1e-12)
+    assert -result.work == pytest.approx(gained, rel=1e-12) and result.throughput >= abs(gained)
+    assert result.trace["drive.shaft.tau"][0] == 3.0
+
+
+def test_the_masters_of_loads_have_the_names_of_the_others() -> None:
+    cut = Loaded(Rotor(1.0), ShaftLoads({"shaft": ShaftLoad(constant=1.0)}), {"shaft": 1.0})
+    assert master("gs_mean", cut).order == 2 and master("jacobi", cut).order == 1
+
+
+@pytest.fixture(scope="module")
+def planetary() -> StageModel:
+    spec = load_stage("planetary54")
+    return assemble(in_drivetrain(load_scene(PAPER), spec), load_bodies(spec))
+
+
+def short(level: str, duration: float) -> SceneSpec:
+    scene = load_scene(PAPER)
+    stage = scene.stage.model_copy(update={"level": level})
+    return scene.model_copy(update={"duration": duration, "settle": 0.0, "stage": stage})
+
+
+def check(result: Result, ripple: float) -> None:
+    """Speeds as the teeth say, means of the forces those of the torque, work in balance; ripple: of the sun, rad/s."""
+    trace, force = result.trace, 600.0 / (4.0 * 4.0 * 0.0225 * math.cos(math.radians(20.0)))  # T_c/(ratio N r_b)
+    assert result.outcome == OK and abs(result.energy_residual) < 1e-5
+    for name, speed in {"carrier.w": 85.0, "planet1.gear.w": -170.0, "sun.w": 340.0, "planet4.gear.w": -170.0}.items():
+        assert trace[name].mean() == pytest.approx(speed, rel=2e-3), name
+    assert np.abs(trace["sun.w"] - 340.0).max() < ripple, "it starts without a jolt"
+    for central in ("sun", "ring"):
+        means = np.array([np.abs(trace[f"{central}_planet{k}.force_mean"][1:]).mean() for k in (1, 2, 3, 4)])
+        assert means.mean() == pytest.approx(force, rel=0.01) and np.ptp(means) < 0.03 * force
+    works = [trace[f"drive.{name}.work"][-1] for name in ("carrier", "sun")]
+    assert works[0] == pytest.approx(600.0 * 85.0 * trace.time[-1], rel=1e-3) and abs(sum(works)) < 2e-3 * works[0]
+
+
+def test_the_set_runs_under_its_torques_with_rigid_bodies(planetary: StageModel) -> None:
+    check(run_once(short("rigid", 2e-3), Source(planetary)), ripple=0.6)
+
+
+@pytest.mark.full
+def test_the_set_runs_under_its_torques_at_level_fast(planetary: StageModel) -> None:
+    check(run_once(short("fast", 4e-3), Source(planetary)), ripple=4.0)
+
+
+def test_the_scene_of_the_page_loads_and_balances(tmp_path: Path) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "howto-planetary-scenes.md").read_text(encoding="utf-8")
+    (tmp_path / "my_run.toml").write_text(page.partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+    loads = load_scene(tmp_path / "my_run.toml").shaft_loads
+    assert Law(loads["carrier"]).at(0.0, SPEED) == 100.0 and Law(loads["sun"]).at(0.0, 4 * SPEED) == -25.0
+    assert Law(loads["carrier"]).at(0.02, SPEED) == pytest.approx(400.0 + 20.0 * math.sin(2 * math.pi * 37.0 * 0.02))

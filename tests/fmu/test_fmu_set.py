@@ -1,0 +1,100 @@
+"""The FMU of the planetary set: the kernel's numbers bit for bit, its state, its terminals; all probes with either kind
+of port."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_stage import unpack
+
+from gearfmu.body import load_bodies
+from gearfmu.commands.models import of_other_kinds
+from gearfmu.fmu import export, validate
+from gearfmu.fmu.probes import Subject
+from gearfmu.fmu.terminals import shafts
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble
+
+STEPS, H, RIGID = 10, 1e-4, 0
+START = {"carrier.tau": 600.0, "sun.tau": -150.0, "carrier.w_start": 85.0, "sun.w_start": 340.0}
+
+pytestmark = pytest.mark.full  # the blob holds four planets: packing and loading it takes longer than the runs
+
+
+def model(kind: str) -> StageModel:
+    spec = load_stage("planetary54")
+    return assemble(of_other_kinds(spec, {"carrier": kind, "sun": kind}), load_bodies(spec))
+
+
+@pytest.fixture(scope="module")
+def planetary() -> StageModel:
+    return model("torque")
+
+
+@pytest.fixture(scope="module")
+def fmu(planetary: StageModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export(planetary, tmp_path_factory.mktemp("set") / "planetary54.fmu")
+
+
+@pytest.fixture
+def subject(fmu: Path) -> Iterator[tuple[Subject, dict[str, int]]]:
+    """The FMU, initialised with rigid bodies under the torques of START, and its value references."""
+    folder = fmu.parent / "open"
+    made = Subject(str(folder) if folder.is_dir() else unpack(fmu, folder))
+    references = {v.name: v.valueReference for v in made.variables}
+    made.fmu.setInteger([references["level"]], [RIGID])
+    made.fmu.setReal([references[name] for name in START], list(START.values()))
+    made.fmu.setupExperiment(startTime=0.0)
+    made.fmu.enterInitializationMode()
+    made.fmu.exitInitializationMode()
+    made.step_size = H
+    yield made, references
+    made.close()
+
+
+def test_the_fmu_of_a_set_is_its_kernel_bit_for_bit(
+    planetary: StageModel, subject: tuple[Subject, dict[str, int]]
+) -> None:
+    theirs, references = subject
+    kernel = planetary.kernel(level=float(RIGID))
+    for name, value in START.items():
+        kernel.set(name, value)
+    kernel.initialize(0.0)
+    names = [v.name for v in planetary.kernel_variables() if v.causality == "output" and v.type == "Real"]
+    found, expected = [], []
+    for step in range(STEPS):
+        kernel.step(step * H, H)
+        theirs.fmu.doStep(step * H, H)
+        expected.append([kernel.get(name) for name in names])
+        found.append(theirs.fmu.getReal([references[name] for name in names]))
+    values = np.array(expected)
+    assert np.abs(values[:, names.index("ring_planet3.force")]).min() > 1000, "the run loads the teeth"
+    assert values.tobytes() == np.array(found).tobytes()
+
+
+def test_a_saved_state_of_a_set_goes_on_with_the_same_bits(subject: tuple[Subject, dict[str, int]]) -> None:
+    theirs, _ = subject
+    theirs.run(3)
+    state, time = theirs.fmu.getFMUstate(), theirs.time
+    image = theirs.fmu.serializeFMUstate(state)
+    expected = theirs.run(STEPS)
+    for again in (state, theirs.fmu.deSerializeFMUstate(image)):
+        theirs.fmu.setFMUstate(again)
+        theirs.time = time
+        assert theirs.run(STEPS) == expected
+        theirs.fmu.freeFMUstate(again)
+
+
+def test_a_set_names_its_ports_planets_and_pins(planetary: StageModel) -> None:
+    variables = planetary.kernel_variables()
+    assert list(shafts(variables)) == ["carrier", "sun"]
+    names = {v.name for v in variables}
+    assert {"sun_planet1.force", "ring_planet4.te", "pin.planet2.fx", "bearing.ring.fy", "planet3.gear.w"} <= names
+
+
+@pytest.mark.parametrize("kind", ["torque", "spring"])
+def test_the_fmu_of_a_set_passes_every_probe(kind: str, tmp_path: Path) -> None:
+    assert validate(export(model(kind), tmp_path / "planetary54.fmu")) == []

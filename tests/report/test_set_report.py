@@ -1,0 +1,105 @@
+"""The report of a planetary set on a made-up trace: planets side by side, shares, sidebands, and nothing for pairs."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu import report
+from gearfmu.report import plots_set
+from gearfmu.report.metrics import amplitude_spectrum, band_rms
+from gearfmu.report.plots_set import planet_set, shares
+from gearfmu.report.signals import Window, known_meshings
+from gearfmu.stage.trace import Channel, Trace
+
+STEP, SAMPLES, CARRIER = 2e-5, 10001, 85.0
+MESH = 54 * CARRIER / (2 * np.pi)  # Hz
+SHARES = (1.1, 0.9, 1.05, 0.95)
+FIGURES = ("set_speed", "torque", "set_force", "set_force_detail", "sharing", "pin", "bearing", "energy", "spectrum")
+
+
+def set_run() -> Trace:
+    """Four planets with shares of 1.1, 0.9, 1.05, 0.95 that ripple at the mesh frequency in alternating phase; the
+    force of the ring on its mounts stands still in the axes of the carrier."""
+    t = np.arange(SAMPLES) * STEP
+    channels, meshes = {}, {}
+    ripple = np.cos(2 * np.pi * MESH * t)
+    for k, share in enumerate(SHARES):
+        planet, force = f"planet{k + 1}", share * 1000.0 + (-1) ** k * 50.0 * ripple
+        channels[f"{planet}.gear.w"] = Channel(np.full(SAMPLES, -170.0) + 0.01 * k, "rad/s")
+        channels[f"pin.{planet}.fx"], channels[f"pin.{planet}.fy"] = (Channel(f * force, "N") for f in (0.6, 0.8))
+        for central, gear, sign in (("sun", "sun", -1), ("ring", planet, 1)):
+            channels[f"{central}_{planet}.force"] = Channel(sign * force, "N")
+            channels[f"{central}_{planet}.te"] = Channel(sign * 1e-8 * force, "m")
+            channels[f"{central}_{planet}.contact"] = Channel(np.full(SAMPLES, sign), "")
+            meshes[f"{central}_{planet}"] = [gear, 18, "carrier"]
+    channels["carrier.gear.w"] = Channel(np.full(SAMPLES, CARRIER), "rad/s")
+    channels["carrier.gear.phi"] = Channel(CARRIER * t, "rad")
+    channels["sun.gear.w"] = Channel(np.full(SAMPLES, 4 * CARRIER), "rad/s")
+    channels["bearing.ring.fx"] = Channel(100.0 * ripple, "N")
+    channels["bearing.ring.fy"] = Channel(np.zeros(SAMPLES), "N")
+    for name, torque, speed in (("carrier", 600.0, CARRIER), ("sun", -150.0, 4 * CARRIER)):
+        channels[f"drive.{name}.tau"] = Channel(np.full(SAMPLES, torque), "N.m")
+        channels[f"drive.{name}.work"] = Channel(torque * speed * t, "J")
+    for name in ("work", "stored", "dissipated", "residual"):
+        channels[f"energy.{name}"] = Channel(np.zeros(SAMPLES), "J")
+    return Trace(t, channels, {"scene": "set", "stage": "set", "outcome": "ok", "settle": 0.02, "meshes": meshes})
+
+
+def test_a_set_shows_its_planets_side_by_side(tmp_path: Path) -> None:
+    trace = set_run()
+    report.write(trace, trace.meta, tmp_path)
+    assert sorted(p.stem for p in (tmp_path / "data").glob("*.csv")) == sorted(FIGURES)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    table = text[text.index("<h2>Planets") :]
+    cells = dict(re.findall(r"<tr><td>(\w+)</td>(.*?)</tr>", table))
+    rows = {mesh: re.findall(r">([^<]+)</td>", numbers) for mesh, numbers in cells.items() if "_planet" in mesh}
+    assert len(rows) == 8
+    for mesh, share in (("ring_planet3", 1.05), ("sun_planet2", -0.9)):
+        wanted = [1e3 * share, 35.355, abs(share), 10 * share, 0.35355, 1e3 * abs(share)]
+        assert [float(cell) for cell in rows[mesh]] == pytest.approx(wanted, rel=1e-3), mesh
+    assert "Deformed" not in text and "planet4.gear.w" in text
+
+
+def test_shares_are_means_over_a_mesh_period_and_of_the_window() -> None:
+    trace = set_run()
+    own = planet_set(trace, known_meshings(trace))
+    assert own is not None and own.planets == ["planet1", "planet2", "planet3", "planet4"] and own.carrier == "carrier"
+    over_time, means = shares(trace, own, Window(0.02, 0.2, "here"))
+    for k, share in enumerate(SHARES):
+        assert means[f"sun_planet{k + 1}"] == pytest.approx(share, rel=1e-3)
+        inner = over_time[f"ring_planet{k + 1}"]
+        assert np.isnan(inner[0]) and np.isnan(inner[-1])
+        assert np.nanmax(np.abs(inner - share)) < 2e-3, "the ripple of ±5 % is averaged out"
+
+
+def test_spectrum_of_the_ring_is_that_in_fixed_axes(tmp_path: Path) -> None:
+    """A force at f_m along an axis of the carrier is one at f_m ± f_c in fixed axes, half of it each, none at f_m."""
+    trace = set_run()
+    own = planet_set(trace, known_meshings(trace))
+    assert own is not None
+    plot = plots_set.spectrum(trace, own, Window(0.0, 0.2, "here"))
+    assert f"f_m = {MESH:.1f} Hz" in plot.caption and f"f_c = {CARRIER / 2 / np.pi:.2f} Hz" in plot.caption
+    turned = plots_set._in_fixed_axes(trace, own)["bearing.ring.fx"]
+    lines = amplitude_spectrum(turned, STEP)
+    middle, low, high = (band_rms(lines, MESH + side * 13.53 - 6.0, MESH + side * 13.53 + 6.0) for side in (0, -1, 1))
+    assert low == pytest.approx(50 / np.sqrt(2), rel=0.1) and high == pytest.approx(low, rel=0.1) and middle < 0.3 * low
+
+
+def test_a_pair_is_no_set() -> None:
+    trace = set_run()
+    trace.meta["meshes"] = {"sun_planet1": ["sun", 18]}
+    assert planet_set(trace, known_meshings(trace)) is None
+
+
+def test_energy_that_the_balance_leaves_is_told_of_what_passed_through() -> None:
+    trace = set_run()
+    channels = {**trace.channels, "energy.residual": Channel(np.linspace(0.0, 1.02, SAMPLES), "J")}
+    plot = plots_set.energy(Trace(trace.time, channels, trace.meta))
+    assert plot is not None and "5.0e-05 of the energy" in plot.caption
+    rows = list(csv.reader(",".join(plot.columns).splitlines()))
+    assert "drive.carrier.work_[J]" in rows[0]
