@@ -203,6 +203,23 @@ void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const g
         }
 }
 
+/* ---- far ------------------------------------------------------------------------------------------------------------ */
+/* takes an interpolated part of a far row away */
+static void less_far(gk_span span, const gk_real *low, const gk_real *high, double part, double *out)
+{
+    const gk_four *a = (const gk_four *)(low + span.from), *b = (const gk_four *)(high + span.from);
+    gk_quad *to = (gk_quad *)(out + span.from);
+    for (int q = 0; q < span.width / 4; q++) {
+        const gk_quad here = GK_WIDENED(a[q]);
+        to[q] -= here + part * (GK_WIDENED(b[q]) - here);
+    }
+}
+
+static gk_span far_supports(const gk_setup *setup)
+{
+    return (gk_span){setup->far_supports, setup->far - setup->far_supports};
+}
+
 /* interpolated far row of a contact on one side, its sign that of the contact's row */
 static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, double *out)
 {
@@ -210,7 +227,8 @@ static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_s
     const int strips = GK_STRIPS(setup), points = side->candidates * strips, far = setup->far;
     const int point = engaged->place[engaged->system.place_of[i]].candidate[side->which] * strips + i % strips;
     const gk_real *low = side->far + ((size_t)at->node * points + point) * far, *high = low + (size_t)points * far;
-    for (int k = 0; k < far; k++) out[k] -= low[k] + at->part * (high[k] - low[k]);
+    less_far(side->far_read, low, high, at->part, out);
+    less_far(far_supports(setup), low, high, at->part, out);
 }
 
 /* Fills the rows of contacts and joints through which residuals of different engagements meet */
@@ -229,25 +247,28 @@ void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* what the rows read through the residual that engagements share: oscillators that are not dynamic add, supports take away */
-void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
-                      double *read)
+/* adds what the rows read through the residual that engagements share: oscillators that are not dynamic add, supports take
+ * away */
+void gk_rows_read_far(const gk_setup *setup, const gk_work *work, int e, const double *far, double *read)
 {
-    const gk_engaged *engaged = &work->engaged[e];
-    const int oscillators = model->ground[setup->base.set].n, n = engaged->system.n;
-    double signed_far[MAX_GROUND + MAX_SUPPORTS + 4];
-    for (int i = 0; i < engaged->system.stride; i++) read[i] = 0.0;
-    for (int k = 0; k < setup->far; k++) signed_far[k] = k < oscillators ? far[k] : -far[k];
-    for (int i = 0; i < n && setup->far; i++)
-        read[i] = gk_dot_quads(engaged->far + (size_t)i * setup->far, signed_far, setup->far / 4);
+    const gk_span *part = setup->mesh[e].far;
+    for (int i = 0; i < work->engaged[e].system.n && setup->far; i++) {
+        const double *row = work->engaged[e].far + (size_t)i * setup->far;
+        read[i] += gk_dot_span(part[0], row, far) + gk_dot_span(part[1], row, far) -
+                   gk_dot_span(far_supports(setup), row, far);
+    }
 }
 
 /* adds the forces x of the rows there */
 void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
 {
-    const gk_engaged *engaged = &work->engaged[e];
-    for (int i = 0; i < engaged->system.n && setup->far; i++)
-        if (x[i] != 0.0) gk_axpy(x[i], engaged->far + (size_t)i * setup->far, out, 0, setup->far / 4);
+    const gk_span *part = setup->mesh[e].far;
+    for (int i = 0; i < work->engaged[e].system.n && setup->far; i++) {
+        const double *row = work->engaged[e].far + (size_t)i * setup->far;
+        if (x[i] == 0.0) continue;
+        for (int w = 0; w < 2; w++) gk_axpy_span(part[w], x[i], row, out);
+        gk_axpy_span(far_supports(setup), x[i], row, out);
+    }
 }
 
 typedef struct pushes { /* rows whose forces are not zero */
@@ -288,15 +309,16 @@ static void contact_forces(const gk_setup *setup, const gk_engaged *work, const 
     for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
 }
 
-/* adds the modal forces of the contacts' forces x to those of a gear group */
-void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, gk_real *out)
+/* adds the modal forces of the contacts' forces x and y to those of a gear group */
+void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
+                        gk_real *out_x, gk_real *out_y)
 {
     const gk_engaged *engaged = &work->engaged[e];
     const gk_side *side = &setup->mesh[e].side[which];
-    const gk_real *turned[2] = {work->turned, work->turned};
-    gk_real *sum[2] = {out, work->turned_next};
+    const gk_real *turned[2] = {work->turned, work->turned_next};
+    gk_real *sum[2] = {out_x, out_y};
     pushes p;
-    list_pushes(x, x, engaged->system.contacts, &p);
+    list_pushes(x, y, engaged->system.contacts, &p);
     if (!GK_LANES(setup, side->gear) || !p.count) return;
     contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
     turn_forth(&setup->modal[side->gear], engaged->position[which].tooth, turned, sum);
@@ -342,13 +364,12 @@ static void ground_forces(const gk_mesh *mesh, const gk_engaged *engaged, const 
     }
 }
 
-/* adds the forces x of the rows on the ground group */
-void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, double *out)
+void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
+                         double *out_x, double *out_y)
 {
-    const gk_mesh *mesh = &setup->mesh[e];
-    const gk_system *s = &engaged->system;
-    for (int i = 0; i < s->n; i++)
-        if (x[i] != 0.0 && mesh->local) gk_local_axpy(mesh, x[i], engaged->ground + (size_t)i * mesh->local, out);
+    pushes p;
+    list_pushes(x, y, engaged->system.n, &p);
+    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged, &p, out_x, out_y);
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */
