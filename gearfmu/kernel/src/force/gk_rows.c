@@ -153,16 +153,34 @@ static void turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_rea
         }
 }
 
+/* adds sign · row·x over a span to what each row reads: `each` rows side by side, whose sums do not wait for each other */
+GK_INLINE void read_some(const double *rows, size_t stride, gk_span span, const double *x, double sign, double *read,
+                         const int each)
+{
+    const gk_quad *b = (const gk_quad *)(x + span.from);
+    gk_quad sum[4] = {{0}};
+    for (int q = 0; q < span.width / 4; q++)
+        for (int i = 0; i < each; i++) sum[i] += ((const gk_quad *)(rows + (size_t)i * stride + span.from))[q] * b[q];
+    for (int i = 0; i < each; i++) read[i] += sign * ((sum[i][0] + sum[i][2]) + (sum[i][1] + sum[i][3]));
+}
+
+static void read_rows(const double *rows, int n, size_t stride, gk_span span, const double *x, double sign,
+                      double *read)
+{
+    int i = 0;
+    for (; i + 4 <= n; i += 4) read_some(rows + (size_t)i * stride, stride, span, x, sign, read + i, 4);
+    for (; i < n; i++) read_some(rows + (size_t)i * stride, stride, span, x, sign, read + i, 1);
+}
+
 /* what the rows of an engagement read of displacements (or speeds) of the ground group */
 void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read)
 {
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &engaged->system;
-    const int quads = mesh->local / 4;
     double local[MAX_GROUND + 4 * MAX_ROTORS];
     gk_local_gather(mesh, ground, local);
-    for (int i = 0; i < s->n; i++) read[i] = gk_dot_quads(engaged->ground + (size_t)i * mesh->local, local, quads);
-    for (int i = s->n; i < s->stride; i++) read[i] = 0.0;
+    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    read_rows(engaged->ground, s->n, (size_t)mesh->local, (gk_span){0, mesh->local}, local, 1.0, read);
 }
 
 /* the same with displacements (or speeds) y of the gear groups */
@@ -251,24 +269,11 @@ void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e)
  * away */
 void gk_rows_read_far(const gk_setup *setup, const gk_work *work, int e, const double *far, double *read)
 {
-    const gk_span *part = setup->mesh[e].far;
-    for (int i = 0; i < work->engaged[e].system.n && setup->far; i++) {
-        const double *row = work->engaged[e].far + (size_t)i * setup->far;
-        read[i] += gk_dot_span(part[0], row, far) + gk_dot_span(part[1], row, far) -
-                   gk_dot_span(far_supports(setup), row, far);
-    }
-}
-
-/* adds the forces x of the rows there */
-void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
-{
-    const gk_span *part = setup->mesh[e].far;
-    for (int i = 0; i < work->engaged[e].system.n && setup->far; i++) {
-        const double *row = work->engaged[e].far + (size_t)i * setup->far;
-        if (x[i] == 0.0) continue;
-        for (int w = 0; w < 2; w++) gk_axpy_span(part[w], x[i], row, out);
-        gk_axpy_span(far_supports(setup), x[i], row, out);
-    }
+    const double *rows = work->engaged[e].far;
+    const int n = work->engaged[e].system.n;
+    const size_t stride = (size_t)setup->far;
+    for (int w = 0; w < 2; w++) read_rows(rows, n, stride, setup->mesh[e].far[w], far, 1.0, read);
+    read_rows(rows, n, stride, far_supports(setup), far, -1.0, read);
 }
 
 typedef struct pushes { /* rows whose forces are not zero */
@@ -370,6 +375,35 @@ void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e
     pushes p;
     list_pushes(x, y, engaged->system.n, &p);
     if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged, &p, out_x, out_y);
+}
+
+/* adds Σ rows·x over a span of the far rows, in registers */
+static void push_span(const pushes *p, const double *rows, size_t stride, gk_span span, double *out)
+{
+    gk_quad *to = (gk_quad *)(out + span.from);
+    int q = 0;
+    for (; q + 4 <= span.width / 4; q += 4) {
+        gk_quad sum[4] = {to[q], to[q + 1], to[q + 2], to[q + 3]};
+        for (int r = 0; r < p->count; r++) {
+            const gk_quad *row = (const gk_quad *)(rows + (size_t)p->row[r] * stride + span.from) + q;
+            for (int k = 0; k < 4; k++) sum[k] += p->x[r] * row[k];
+        }
+        for (int k = 0; k < 4; k++) to[q + k] = sum[k];
+    }
+    for (; q < span.width / 4; q++)
+        for (int r = 0; r < p->count; r++)
+            to[q] += p->x[r] * ((const gk_quad *)(rows + (size_t)p->row[r] * stride + span.from))[q];
+}
+
+/* adds the forces x of the rows to what they do through the residual that engagements share */
+void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
+{
+    const double *rows = work->engaged[e].far;
+    const size_t stride = (size_t)setup->far;
+    pushes p;
+    list_pushes(x, x, work->engaged[e].system.n, &p);
+    for (int w = 0; w < 2; w++) push_span(&p, rows, stride, setup->mesh[e].far[w], out);
+    push_span(&p, rows, stride, far_supports(setup), out);
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */

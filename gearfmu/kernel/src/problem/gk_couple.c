@@ -199,9 +199,10 @@ static void part_at_once(const gk_coupled *c)
 static void sweep(const gk_island *island)
 {
     const gk_coupled *c = island->context;
-    double change = INFINITY;
+    double change = INFINITY, next = INFINITY;
     give_all(c, WHOLE);
-    for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) {
+    for (int round = 0; round < SWEEPS && !(next < TOLERANCE); round++) {
+        const double last = change;
         change = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {
             if (!within(c, e)) continue;
@@ -209,9 +210,10 @@ static void sweep(const gk_island *island)
             gk_solve_contacts(&c->work->engaged[e].system);
             give(c, e, WHOLE);
         }
+        next = round ? change * gk_min(1.0, change / last) : change; /* what another sweep would find */
     }
     part_at_once(c);
-    if (!(change < TOLERANCE)) island->member[0]->limit_reached = 1;
+    if (!(next < TOLERANCE)) island->member[0]->limit_reached = 1;
 }
 
 gk_island gk_couple_island(gk_coupled *c)

@@ -128,8 +128,7 @@ static double own_compliance(const gk_system *s, int i, int j)
 
 /* what a unit force of one row does at once to all rows of its own engagement, and through the bodies that they share to
  * those of others */
-static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *rows, int r,
-                            gk_linear *out)
+static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *rows, int r, gk_linear *out)
 {
     const gk_system *s = &work->engaged[rows[r].engagement].system;
     double unit[MAX_STRIDE] = {0}, read[MAX_STRIDE];

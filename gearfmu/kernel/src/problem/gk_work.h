@@ -53,7 +53,8 @@ typedef struct gk_engaged { /* an engagement in a step */
     gk_real *basis[2]; /* (contacts, n) rows of the contacts in the frame of the reference tooth */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
     double *matrix;    /* D, A, P, J, L, B */
-    double *given_ground, given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
+    double *given_ground,
+        given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
                                                        step less at once; of spins in the step, at once */
     gk_real *given_modes[2];      /* (n): the same of the gear groups that other engagements read too */
     double *given_far;            /* (far): what its forces do there */
@@ -87,12 +88,12 @@ struct gk_work {
     double run_h, run_gamma;     /* γ of the internal step of the run */
     gk_engaged *engaged;         /* (engagements) */
     /* statics (gk_static.c): every oscillator is compliance */
-    double *rest_ground;    /* displacement of the ground group */
-    double *rest;           /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
-    double *columns;        /* room for a node's rows and their products */
+    double *rest_ground; /* displacement of the ground group */
+    double *rest;        /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
+    double *columns;     /* room for a node's rows and their products */
     double *sum_ground, *sum_far, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     double *port_far;                                     /* (ports, far) rows of the bore angles */
-    uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
+    uint64_t cycles[PHASES], mark;                        /* phase profile, filled by a build with GK_PROFILE */
 };
 
 /* gk_flank.c */

@@ -98,8 +98,8 @@ typedef struct gk_side {
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
     gk_span held;  /* the supports that this side loads */
-    double *support; /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
-    gk_real *far;    /* (nodes + 1, points, far): outward, of ground oscillators that are not dynamic and that another
+    double *support;  /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
+    gk_real *far;     /* (nodes + 1, points, far): outward, of ground oscillators that are not dynamic and that another
                                engagement reads too, over Ω; then Lᵀ C_fs of the supports, κ = L Lᵀ */
     gk_span far_read; /* the oscillators among them */
 } gk_side;

@@ -500,7 +500,8 @@ void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *wor
     memset(to, 0, (size_t)setup->far * sizeof *to);
     if (!setup->on.residual) return;
     for (int k = 0; k < ground->n; k++)
-        if (setup->far_slot[k] >= 0) to[setup->far_slot[k]] = ground->port_rows[port * ground->n + k] / ground->omega[k];
+        if (setup->far_slot[k] >= 0)
+            to[setup->far_slot[k]] = ground->port_rows[port * ground->n + k] / ground->omega[k];
     press_supports(setup, model->port_support + port * model->supports, model->supports, to + setup->far_supports);
 }
 
