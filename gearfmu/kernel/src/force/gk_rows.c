@@ -153,16 +153,34 @@ static void turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_rea
         }
 }
 
+/* adds sign · row·x over a span to what each row reads: `each` rows side by side, whose sums do not wait for each other */
+GK_INLINE void read_some(const double *rows, size_t stride, gk_span span, const double *x, double sign, double *read,
+                         const int each)
+{
+    const gk_quad *b = (const gk_quad *)(x + span.from);
+    gk_quad sum[4] = {{0}};
+    for (int q = 0; q < span.width / 4; q++)
+        for (int i = 0; i < each; i++) sum[i] += ((const gk_quad *)(rows + (size_t)i * stride + span.from))[q] * b[q];
+    for (int i = 0; i < each; i++) read[i] += sign * ((sum[i][0] + sum[i][2]) + (sum[i][1] + sum[i][3]));
+}
+
+static void read_rows(const double *rows, int n, size_t stride, gk_span span, const double *x, double sign,
+                      double *read)
+{
+    int i = 0;
+    for (; i + 4 <= n; i += 4) read_some(rows + (size_t)i * stride, stride, span, x, sign, read + i, 4);
+    for (; i < n; i++) read_some(rows + (size_t)i * stride, stride, span, x, sign, read + i, 1);
+}
+
 /* what the rows of an engagement read of displacements (or speeds) of the ground group */
 void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read)
 {
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &engaged->system;
-    const int quads = mesh->local / 4;
     double local[MAX_GROUND + 4 * MAX_ROTORS];
     gk_local_gather(mesh, ground, local);
-    for (int i = 0; i < s->n; i++) read[i] = gk_dot_quads(engaged->ground + (size_t)i * mesh->local, local, quads);
-    for (int i = s->n; i < s->stride; i++) read[i] = 0.0;
+    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    read_rows(engaged->ground, s->n, (size_t)mesh->local, (gk_span){0, mesh->local}, local, 1.0, read);
 }
 
 /* the same with displacements (or speeds) y of the gear groups */
@@ -203,6 +221,23 @@ void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const g
         }
 }
 
+/* ---- far ------------------------------------------------------------------------------------------------------------ */
+/* takes an interpolated part of a far row away */
+static void less_far(gk_span span, const gk_real *low, const gk_real *high, double part, double *out)
+{
+    const gk_four *a = (const gk_four *)(low + span.from), *b = (const gk_four *)(high + span.from);
+    gk_quad *to = (gk_quad *)(out + span.from);
+    for (int q = 0; q < span.width / 4; q++) {
+        const gk_quad here = GK_WIDENED(a[q]);
+        to[q] -= here + part * (GK_WIDENED(b[q]) - here);
+    }
+}
+
+static gk_span far_supports(const gk_setup *setup)
+{
+    return (gk_span){setup->far_supports, setup->far - setup->far_supports};
+}
+
 /* interpolated far row of a contact on one side, its sign that of the contact's row */
 static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, double *out)
 {
@@ -210,7 +245,8 @@ static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_s
     const int strips = GK_STRIPS(setup), points = side->candidates * strips, far = setup->far;
     const int point = engaged->place[engaged->system.place_of[i]].candidate[side->which] * strips + i % strips;
     const gk_real *low = side->far + ((size_t)at->node * points + point) * far, *high = low + (size_t)points * far;
-    for (int k = 0; k < far; k++) out[k] -= low[k] + at->part * (high[k] - low[k]);
+    less_far(side->far_read, low, high, at->part, out);
+    less_far(far_supports(setup), low, high, at->part, out);
 }
 
 /* Fills the rows of contacts and joints through which residuals of different engagements meet */
@@ -229,25 +265,15 @@ void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* what the rows read through the residual that engagements share: oscillators that are not dynamic add, supports take away */
-void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
-                      double *read)
+/* adds what the rows read through the residual that engagements share: oscillators that are not dynamic add, supports take
+ * away */
+void gk_rows_read_far(const gk_setup *setup, const gk_work *work, int e, const double *far, double *read)
 {
-    const gk_engaged *engaged = &work->engaged[e];
-    const int oscillators = model->ground[setup->base.set].n, n = engaged->system.n;
-    double signed_far[MAX_GROUND + MAX_SUPPORTS + 4];
-    for (int i = 0; i < engaged->system.stride; i++) read[i] = 0.0;
-    for (int k = 0; k < setup->far; k++) signed_far[k] = k < oscillators ? far[k] : -far[k];
-    for (int i = 0; i < n && setup->far; i++)
-        read[i] = gk_dot_quads(engaged->far + (size_t)i * setup->far, signed_far, setup->far / 4);
-}
-
-/* adds the forces x of the rows there */
-void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
-{
-    const gk_engaged *engaged = &work->engaged[e];
-    for (int i = 0; i < engaged->system.n && setup->far; i++)
-        if (x[i] != 0.0) gk_axpy(x[i], engaged->far + (size_t)i * setup->far, out, 0, setup->far / 4);
+    const double *rows = work->engaged[e].far;
+    const int n = work->engaged[e].system.n;
+    const size_t stride = (size_t)setup->far;
+    for (int w = 0; w < 2; w++) read_rows(rows, n, stride, setup->mesh[e].far[w], far, 1.0, read);
+    read_rows(rows, n, stride, far_supports(setup), far, -1.0, read);
 }
 
 typedef struct pushes { /* rows whose forces are not zero */
@@ -288,15 +314,16 @@ static void contact_forces(const gk_setup *setup, const gk_engaged *work, const 
     for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
 }
 
-/* adds the modal forces of the contacts' forces x to those of a gear group */
-void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, gk_real *out)
+/* adds the modal forces of the contacts' forces x and y to those of a gear group */
+void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
+                        gk_real *out_x, gk_real *out_y)
 {
     const gk_engaged *engaged = &work->engaged[e];
     const gk_side *side = &setup->mesh[e].side[which];
-    const gk_real *turned[2] = {work->turned, work->turned};
-    gk_real *sum[2] = {out, work->turned_next};
+    const gk_real *turned[2] = {work->turned, work->turned_next};
+    gk_real *sum[2] = {out_x, out_y};
     pushes p;
-    list_pushes(x, x, engaged->system.contacts, &p);
+    list_pushes(x, y, engaged->system.contacts, &p);
     if (!GK_LANES(setup, side->gear) || !p.count) return;
     contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
     turn_forth(&setup->modal[side->gear], engaged->position[which].tooth, turned, sum);
@@ -342,13 +369,41 @@ static void ground_forces(const gk_mesh *mesh, const gk_engaged *engaged, const 
     }
 }
 
-/* adds the forces x of the rows on the ground group */
-void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, double *out)
+void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
+                         double *out_x, double *out_y)
 {
-    const gk_mesh *mesh = &setup->mesh[e];
-    const gk_system *s = &engaged->system;
-    for (int i = 0; i < s->n; i++)
-        if (x[i] != 0.0 && mesh->local) gk_local_axpy(mesh, x[i], engaged->ground + (size_t)i * mesh->local, out);
+    pushes p;
+    list_pushes(x, y, engaged->system.n, &p);
+    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged, &p, out_x, out_y);
+}
+
+/* adds Σ rows·x over a span of the far rows, in registers */
+static void push_span(const pushes *p, const double *rows, size_t stride, gk_span span, double *out)
+{
+    gk_quad *to = (gk_quad *)(out + span.from);
+    int q = 0;
+    for (; q + 4 <= span.width / 4; q += 4) {
+        gk_quad sum[4] = {to[q], to[q + 1], to[q + 2], to[q + 3]};
+        for (int r = 0; r < p->count; r++) {
+            const gk_quad *row = (const gk_quad *)(rows + (size_t)p->row[r] * stride + span.from) + q;
+            for (int k = 0; k < 4; k++) sum[k] += p->x[r] * row[k];
+        }
+        for (int k = 0; k < 4; k++) to[q + k] = sum[k];
+    }
+    for (; q < span.width / 4; q++)
+        for (int r = 0; r < p->count; r++)
+            to[q] += p->x[r] * ((const gk_quad *)(rows + (size_t)p->row[r] * stride + span.from))[q];
+}
+
+/* adds the forces x of the rows to what they do through the residual that engagements share */
+void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
+{
+    const double *rows = work->engaged[e].far;
+    const size_t stride = (size_t)setup->far;
+    pushes p;
+    list_pushes(x, x, work->engaged[e].system.n, &p);
+    for (int w = 0; w < 2; w++) push_span(&p, rows, stride, setup->mesh[e].far[w], out);
+    push_span(&p, rows, stride, far_supports(setup), out);
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */

@@ -495,6 +495,11 @@ static void set_joints(rest *r)
     }
 }
 
+/* do any engagements share rotors? */
+static int shares(const rest *r) { return r->setup.islands < r->model->engagements; }
+
+static int close_to_rest(const rest *r, double length) { return length <= ENOUGH + ROUNDING * deepest_of(r); }
+
 static int search(rest *r)
 {
     double length = INFINITY;
@@ -503,13 +508,15 @@ static int search(rest *r)
     if (!press(r)) return 0;
     for (int i = 0; i < REST_ITERATIONS; i++) {
         balance_rotation(r, 1);
+        const double last = length;
         length = relax(r);
         if (!gk_finite(length)) return 0;
         if (length <= AT_REST + EXACT * deepest_of(r)) break;
+        if (shares(r) && close_to_rest(r, length) && length > 0.5 * last) break; /* rounding of the rows is left */
     }
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e)) gk_step_remember(&r->setup, &r->work->engaged[e], r->data, e);
-    return length <= ENOUGH + ROUNDING * deepest_of(r);
+    return close_to_rest(r, length);
 }
 
 /* Equilibrium under the given boundary: for each port a spring of stiffness k at angle phi, a held angle (PORT_FIXED, k =

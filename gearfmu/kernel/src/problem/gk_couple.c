@@ -4,151 +4,216 @@
  * of all parts is exact, so is the energy they are balanced with. */
 #include "problem/gk_work.h"
 
-enum { SWEEPS = 40, D_PART = 0, FORCE_PART = 1, DAMPER_PART = 2, PARTS = 3 };
+enum { SWEEPS = 40 };
 #ifdef GK_DOUBLE_MODES
 static const double TOLERANCE = 1e-11;
 #else
 static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
 #endif
 
-/* forces of an engagement by what they meet: z (D), λ (A), the dampers' at the end (A) */
-static void forces_of(const gk_system *s, double x[PARTS][MAX_STRIDE])
+typedef enum { WHOLE, AT_ONCE } effect; /* all that forces do to gaps in the step; their deflection at once alone */
+
+/* forces of an engagement by what they meet: D in the step, A at once; a clutch knows no A */
+static void forces_of(const gk_system *s, effect of, double *step, double *once)
 {
     for (int i = 0; i < s->stride; i++) {
         const int row = i < s->n, clutch = row && s->kind[i] == ROW_CLUTCH;
-        x[D_PART][i] = row ? s->z[i] : 0.0;
-        x[FORCE_PART][i] = row && !clutch ? s->force[i] : 0.0;
-        x[DAMPER_PART][i] = row && !clutch ? s->end[i] : 0.0;
+        step[i] = row && of == WHOLE ? s->z[i] : 0.0;
+        once[i] = row && !clutch ? s->force[i] + (of == WHOLE ? s->end[i] : 0.0) : 0.0;
     }
 }
 
-/* what an engagement's forces give to spins, ground group and the far part of the residual */
-static void give(const gk_setup *setup, gk_work *work, int e)
+/* ---- what an engagement gives ---------------------------------------------------------------------------------------- */
+/* sum += now − before, before = now */
+static void exchange(double *sum, double *before, const double *now, int n)
 {
+    for (int i = 0; i < n; i++) sum[i] += now[i] - before[i], before[i] = now[i];
+}
+
+static void give_spins(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const double *step,
+                       const double *once)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    double x[PARTS][MAX_STRIDE];
-    forces_of(s, x);
-    for (int part = 0; part < PARTS; part++) {
-        double *ground = engaged->given_ground + part * setup->base.n;
-        memset(ground, 0, (size_t)setup->base.n * sizeof *ground);
-        gk_rows_push_ground(setup, engaged, e, x[part], ground);
-        for (int l = 0; l < setup->mesh[e].spins; l++)
-            engaged->given_spin[part][l] = gk_dot_quads(s->rigid[l], x[part], s->stride / 4);
+    for (int l = 0; l < mesh->spins; l++) {
+        const int d = mesh->spin[l];
+        const double inverse = setup->inverse_inertia[d];
+        const double moved = k->rigid_mobility * inverse * gk_dot_quads(s->rigid[l], step, s->stride / 4);
+        const double yielded = k->rigid_kappa * inverse * gk_dot_quads(s->rigid[l], once, s->stride / 4);
+        exchange(&work->sum_spin[0][d], &engaged->given_spin[0][l], &moved, 1);
+        exchange(&work->sum_spin[1][d], &engaged->given_spin[1][l], &yielded, 1);
     }
-    for (int w = 0; w < 2; w++) {
-        const int g = setup->mesh[e].side[w].gear;
-        const size_t n = (size_t)setup->modal[g].n;
-        if (setup->engagements_of[g] < 2) continue;
-        memset(engaged->given_modes[w], 0, PARTS * n * sizeof(gk_real));
-        for (int part = 0; part < PARTS; part++)
-            gk_rows_push_modes(setup, work, e, w, x[part], engaged->given_modes[w] + (size_t)part * n);
-    }
-    memset(engaged->given_far, 0, 2 * (size_t)setup->far * sizeof *engaged->given_far);
-    gk_rows_push_far(setup, work, e, x[FORCE_PART], engaged->given_far);
-    gk_rows_push_far(setup, work, e, x[DAMPER_PART], engaged->given_far + setup->far);
 }
 
-/* sums over the other engagements of the island, weighed: what they do per unit row */
-typedef struct field {
-    double spin[PARTS][MAX_SPINS];
-    double *ground[PARTS], *far[2];
-} field;
-
-static field others(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int island,
-                    int e)
+static void give_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const double *step,
+                        const double *once)
 {
     const int n = setup->base.n;
-    field f = {.ground = {work->far, work->far + n, work->far + 2 * n},
-               .far = {work->far + 3 * n, work->far + 3 * n + setup->far}};
-    memset(work->far, 0, (size_t)(3 * n + 2 * setup->far) * sizeof *work->far);
-    for (int c = 0; c < model->engagements; c++) {
-        const gk_engaged *from = &work->engaged[c];
-        if (c == e || setup->mesh[c].island != island) continue;
-        for (int part = 0; part < PARTS; part++) {
-            for (int l = 0; l < setup->mesh[c].spins; l++)
-                f.spin[part][setup->mesh[c].spin[l]] += from->given_spin[part][l];
-            gk_axpy(1.0, from->given_ground + part * n, f.ground[part], 0, n / 4);
-        }
-        for (int i = 0; i < setup->far; i++)
-            f.far[0][i] += from->given_far[i], f.far[1][i] += from->given_far[setup->far + i];
-    }
-    for (int i = 0; i < n; i++) {
-        f.ground[D_PART][i] *= k->ground.mobility[i];
-        f.ground[FORCE_PART][i] *= k->ground.kappa[i];
-        f.ground[DAMPER_PART][i] *= k->ground.kappa[i];
-    }
-    for (int d = 0; d < setup->spins; d++) {
-        f.spin[D_PART][d] *= k->rigid_mobility * setup->inverse_inertia[d];
-        f.spin[FORCE_PART][d] *= k->rigid_kappa * setup->inverse_inertia[d];
-        f.spin[DAMPER_PART][d] *= k->rigid_kappa * setup->inverse_inertia[d];
-    }
-    return f;
+    double moved[MAX_GROUND + 4 * MAX_ROTORS], yielded[MAX_GROUND + 4 * MAX_ROTORS];
+    memset(moved, 0, (size_t)n * sizeof *moved);
+    memset(yielded, 0, (size_t)n * sizeof *yielded);
+    gk_rows_push_ground(setup, &work->engaged[e], e, step, once, moved, yielded);
+    for (int i = 0; i < n; i++) moved[i] = k->ground.mobility[i] * moved[i] - k->ground.kappa[i] * yielded[i];
+    exchange(work->sum_ground, work->engaged[e].given_ground, moved, n);
 }
 
-/* adds what the rows of an engagement read of a gear's modes under the forces of its other engagements */
-static void take_modes(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e,
-                       int which, double read[PARTS][MAX_STRIDE])
+/* displacement of the modes of a gear that other engagements read too */
+static void give_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, int w, const double *step,
+                       const double *once)
 {
-    const int g = setup->mesh[e].side[which].gear, n = setup->modal[g].n;
-    gk_real *sum = work->scaled;
-    for (int part = 0; part < PARTS; part++) {
-        const gk_real *by = part == D_PART ? k->flow[g].mobility : k->flow[g].kappa;
-        memset(sum, 0, (size_t)n * sizeof *sum);
-        for (int c = 0; c < model->engagements; c++)
-            for (int w = 0; w < 2 && c != e; w++) {
-                const gk_real *given = work->engaged[c].given_modes[w] + part * n;
-                for (int i = 0; i < n && setup->mesh[c].side[w].gear == g; i++) sum[i] += given[i];
-            }
-        for (int i = 0; i < n; i++) sum[i] *= by[i];
-        gk_rows_read_modes(setup, work, e, which, sum, read[part]);
-    }
+    const int g = setup->mesh[e].side[w].gear, n = setup->modal[g].n;
+    gk_real *given = work->engaged[e].given_modes[w], *yielded = work->scaled;
+    memset(given, 0, (size_t)n * sizeof *given);
+    memset(yielded, 0, (size_t)n * sizeof *yielded);
+    gk_rows_push_modes(setup, work, e, w, step, once, given, yielded);
+    for (int i = 0; i < n; i++) given[i] = k->flow[g].mobility[i] * given[i] - k->flow[g].kappa[i] * yielded[i];
 }
 
-/* what the others do to the rows of an engagement: gaps in the step (outer), deflection at once (beyond). Returns how much
- * that has changed, against the largest gap and deflection. */
-static double take(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e)
+static void give_far(const gk_setup *setup, gk_work *work, int e, const double *once)
 {
-    gk_engaged *engaged = &work->engaged[e];
-    gk_system *s = &engaged->system;
-    field f = others(model, setup, work, k, setup->mesh[e].island, e);
-    double read[PARTS][MAX_STRIDE], far[2][MAX_STRIDE], change = 0.0, scale = 1e-12;
-    for (int part = 0; part < PARTS; part++) {
-        gk_rows_read_ground(setup, engaged, e, f.ground[part], read[part]);
-        for (int l = 0; l < setup->mesh[e].spins; l++)
-            gk_axpy(f.spin[part][setup->mesh[e].spin[l]], s->rigid[l], read[part], 0, s->stride / 4);
-    }
+    double far[MAX_FAR];
+    memset(far, 0, (size_t)setup->far * sizeof *far);
+    gk_rows_push_far(setup, work, e, once, far);
+    exchange(work->sum_far, work->engaged[e].given_far, far, setup->far);
+}
+
+/* what an engagement's forces do to spins, ground group, shared gears and the far part of the residual */
+static void give(const gk_coupled *c, int e, effect of)
+{
+    double step[MAX_STRIDE], once[MAX_STRIDE];
+    forces_of(&c->work->engaged[e].system, of, step, once);
+    give_spins(c->setup, c->work, c->k, e, step, once);
+    give_ground(c->setup, c->work, c->k, e, step, once);
+    give_far(c->setup, c->work, e, once);
     for (int w = 0; w < 2; w++)
-        if (setup->engagements_of[setup->mesh[e].side[w].gear] > 1) take_modes(model, setup, work, k, e, w, read);
-    for (int i = 0; i < 2; i++) gk_rows_read_far(model, setup, work, e, f.far[i], far[i]);
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1)
+            give_modes(c->setup, c->work, c->k, e, w, step, once);
+}
+
+static int within(const gk_coupled *c, int e) { return c->setup->mesh[e].island == c->island; }
+
+static void give_all(const gk_coupled *c, effect of)
+{
+    gk_work *work = c->work;
+    memset(work->sum_spin, 0, sizeof work->sum_spin);
+    memset(work->sum_ground, 0, (size_t)c->setup->base.n * sizeof *work->sum_ground);
+    memset(work->sum_far, 0, (size_t)c->setup->far * sizeof *work->sum_far);
+    for (int e = 0; e < c->model->engagements; e++) {
+        gk_engaged *engaged = &work->engaged[e];
+        if (!within(c, e)) continue;
+        memset(engaged->given_spin, 0, sizeof engaged->given_spin);
+        memset(engaged->given_ground, 0, (size_t)c->setup->base.n * sizeof *engaged->given_ground);
+        memset(engaged->given_far, 0, (size_t)c->setup->far * sizeof *engaged->given_far);
+        give(c, e, of);
+    }
+}
+
+/* ---- what it takes -------------------------------------------------------------------------------------------------------- */
+static void take_spins(const gk_coupled *c, int e, double *read)
+{
+    const gk_engaged *engaged = &c->work->engaged[e];
+    const gk_mesh *mesh = &c->setup->mesh[e];
+    const gk_system *s = &engaged->system;
+    for (int l = 0; l < mesh->spins; l++) {
+        const double moved = c->work->sum_spin[0][mesh->spin[l]] - engaged->given_spin[0][l];
+        const double yielded = c->work->sum_spin[1][mesh->spin[l]] - engaged->given_spin[1][l];
+        gk_axpy(moved - yielded, s->rigid[l], read, 0, s->stride / 4);
+        for (int i = s->n - s->clutches; i < s->n; i++) read[i] += yielded * s->rigid[l][i];
+    }
+}
+
+static void take_ground(const gk_coupled *c, int e, double *read)
+{
+    const gk_work *work = c->work;
+    double others[MAX_GROUND + 4 * MAX_ROTORS];
+    for (int i = 0; i < c->setup->base.n; i++) others[i] = work->sum_ground[i] - work->engaged[e].given_ground[i];
+    gk_rows_read_ground(c->setup, &work->engaged[e], e, others, read);
+}
+
+static void take_far(const gk_coupled *c, int e, double *read)
+{
+    const gk_work *work = c->work;
+    double others[MAX_FAR];
+    for (int i = 0; i < c->setup->far; i++) others[i] = work->sum_far[i] - work->engaged[e].given_far[i];
+    gk_rows_read_far(c->setup, work, e, others, read);
+}
+
+/* by the modes of a gear that other engagements read too */
+static void take_modes(const gk_coupled *c, int e, int which, double *read)
+{
+    gk_work *work = c->work;
+    const int g = c->setup->mesh[e].side[which].gear, n = c->setup->modal[g].n;
+    gk_real *sum = work->scaled;
+    memset(sum, 0, (size_t)n * sizeof *sum);
+    for (int other = 0; other < c->model->engagements; other++)
+        for (int w = 0; w < 2 && other != e; w++) {
+            const gk_real *given = work->engaged[other].given_modes[w];
+            for (int i = 0; i < n && c->setup->mesh[other].side[w].gear == g; i++) sum[i] += given[i];
+        }
+    gk_rows_read_modes(c->setup, work, e, which, sum, read);
+}
+
+/* what the others do to the rows of an engagement */
+static void take(const gk_coupled *c, int e, double *read)
+{
+    take_ground(c, e, read);
+    take_spins(c, e, read);
+    take_far(c, e, read);
+    for (int w = 0; w < 2; w++)
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, read);
+}
+
+/* takes all that the others do; returns how much that has changed, against the largest gap and deflection */
+static double take_whole(const gk_coupled *c, int e)
+{
+    gk_system *s = &c->work->engaged[e].system;
+    double read[MAX_STRIDE], change = 0.0, scale = 1e-12;
+    take(c, e, read);
     for (int i = 0; i < s->n; i++) {
-        const int clutch = s->kind[i] == ROW_CLUTCH;
-        const double outer = read[D_PART][i] + (clutch ? 0.0 : far[1][i] - read[DAMPER_PART][i]);
-        const double beyond = clutch ? 0.0 : far[0][i] - read[FORCE_PART][i];
-        change = gk_max(change, fabs(outer + beyond - s->outer[i] - s->beyond[i]));
+        change = gk_max(change, fabs(read[i] - s->outer[i] - s->beyond[i]));
         scale = gk_max(scale, fabs(s->g[i]) + fabs(s->Dz[i]) + fabs(s->Al[i]));
-        s->outer[i] = outer, s->beyond[i] = beyond;
+        s->outer[i] = read[i] - s->beyond[i];
     }
     return change / scale;
+}
+
+/* tells the deflection at once from the rest of what was taken */
+static void part_at_once(const gk_coupled *c)
+{
+    give_all(c, AT_ONCE);
+    for (int e = 0; e < c->model->engagements; e++) {
+        gk_system *s = &c->work->engaged[e].system;
+        double read[MAX_STRIDE];
+        if (!within(c, e)) continue;
+        take(c, e, read);
+        for (int i = 0; i < s->n; i++) {
+            const double beyond = s->kind[i] == ROW_CLUTCH ? 0.0 : read[i];
+            s->outer[i] += s->beyond[i] - beyond;
+            s->beyond[i] = beyond;
+        }
+    }
 }
 
 /* sweeps until what engagements do to each other no longer changes */
 static void sweep(const gk_island *island)
 {
     const gk_coupled *c = island->context;
-    double change = INFINITY;
-    for (int e = 0; e < c->model->engagements; e++)
-        if (c->setup->mesh[e].island == c->island) give(c->setup, c->work, e);
-    for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) {
+    double change = INFINITY, next = INFINITY;
+    give_all(c, WHOLE);
+    for (int round = 0; round < SWEEPS && !(next < TOLERANCE); round++) {
+        const double last = change;
         change = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {
-            if (c->setup->mesh[e].island != c->island) continue;
-            change = gk_max(change, take(c->model, c->setup, c->work, c->k, e));
+            if (!within(c, e)) continue;
+            change = gk_max(change, take_whole(c, e));
             gk_solve_contacts(&c->work->engaged[e].system);
-            give(c->setup, c->work, e);
+            give(c, e, WHOLE);
         }
+        next = round ? change * gk_min(1.0, change / last) : change; /* what another sweep would find */
     }
-    if (!(change < TOLERANCE)) island->member[0]->limit_reached = 1;
+    part_at_once(c);
+    if (!(next < TOLERANCE)) island->member[0]->limit_reached = 1;
 }
 
 gk_island gk_couple_island(gk_coupled *c)
@@ -163,13 +228,12 @@ gk_island gk_couple_island(gk_coupled *c)
 /* the start of the step: under λ0 the others deflect too */
 void gk_couple_recall(gk_coupled *c)
 {
-    for (int e = 0; e < c->model->engagements; e++)
-        if (c->setup->mesh[e].island == c->island) give(c->setup, c->work, e);
+    part_at_once(c);
     for (int e = 0; e < c->model->engagements; e++) {
         gk_system *s = &c->work->engaged[e].system;
-        if (c->setup->mesh[e].island != c->island) continue;
-        take(c->model, c->setup, c->work, c->k, e);
+        if (!within(c, e)) continue;
         for (int i = 0; i < s->n; i++) {
+            s->outer[i] = 0.0;
             if (s->kind[i] == ROW_CLUTCH) continue;
             if (i >= s->contacts || s->recalled[i]) s->g0[i] -= s->beyond[i];
             s->stored0 += 0.5 * s->force0[i] * s->beyond[i];

@@ -128,19 +128,21 @@ static double own_compliance(const gk_system *s, int i, int j)
 
 /* what a unit force of one row does at once to all rows of its own engagement, and through the bodies that they share to
  * those of others */
-static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, const kept *rows, int r,
-                            gk_linear *out)
+static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *rows, int r, gk_linear *out)
 {
     const gk_system *s = &work->engaged[rows[r].engagement].system;
     double unit[MAX_STRIDE] = {0}, read[MAX_STRIDE];
     int of = -1;
     unit[rows[r].row] = 1.0;
-    memset(work->far, 0, (size_t)setup->far * sizeof *work->far);
-    gk_rows_push_far(setup, work, rows[r].engagement, unit, work->far);
+    memset(work->sum_far, 0, (size_t)setup->far * sizeof *work->sum_far);
+    gk_rows_push_far(setup, work, rows[r].engagement, unit, work->sum_far);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
-        if (!same && e != of) gk_rows_read_far(model, setup, work, of = e, work->far, read);
+        if (!same && e != of) {
+            memset(read, 0, sizeof read);
+            gk_rows_read_far(setup, work, of = e, work->sum_far, read);
+        }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
                                                                                : 0.0;
@@ -168,7 +170,7 @@ static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
 {
     for (int r = 0; r < out->rows; r++) {
         describe_row(setup, work, rows[r], r, out);
-        fill_compliance(model, setup, work, rows, r, out);
+        fill_compliance(setup, work, rows, r, out);
     }
     for (int e = 0; e < model->engagements; e++)
         memset(work->engaged[e].system.force, 0, sizeof work->engaged[e].system.force);

@@ -54,9 +54,10 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
     double *matrix;    /* D, A, P, J, L, B */
     double *given_ground,
-        given_spin[3][MAX_LOCAL]; /* what the forces give to ground group (3, n) and spins: z, λ, dampers */
-    gk_real *given_modes[2];      /* (3, n): the same to the gear groups that other engagements read too */
-    double *given_far;            /* (2, far): λ, dampers at the end */
+        given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
+                                                       step less at once; of spins in the step, at once */
+    gk_real *given_modes[2];      /* (n): the same of the gear groups that other engagements read too */
+    double *given_far;            /* (far): what its forces do there */
     double *far;                  /* (rows, far): rows of contacts and joints there */
     gk_step_side table[2];
     gk_system system;
@@ -88,11 +89,12 @@ struct gk_work {
     double run_h, run_gamma;     /* γ of the internal step of the run */
     gk_engaged *engaged;         /* (engagements) */
     /* statics (gk_static.c): every oscillator is compliance */
-    double *rest_ground;    /* displacement of the ground group */
-    double *rest;           /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
-    double *columns;        /* room for a node's rows and their products */
-    double *far, *port_far; /* sums of an island: (3, n of ground) and (2, far); (ports, far) rows of the bore angles */
-    uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
+    double *rest_ground; /* displacement of the ground group */
+    double *rest;        /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
+    double *columns;     /* room for a node's rows and their products */
+    double *sum_ground, *sum_far, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
+    double *port_far;                                     /* (ports, far) rows of the bore angles */
+    uint64_t cycles[PHASES], mark;                        /* phase profile, filled by a build with GK_PROFILE */
 };
 
 /* gk_flank.c */
@@ -119,7 +121,8 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
                   double *read);
 void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
                            const double *ground, double *read);
-void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, gk_real *out);
+void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
+                        gk_real *out_x, gk_real *out_y);
 void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
 void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
                      const double *(*y)(const gk_system *));
@@ -129,9 +132,9 @@ static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int
     return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
 void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read);
-void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, double *out);
-void gk_rows_read_far(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const double *far,
-                      double *read);
+void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
+                         double *out_x, double *out_y);
+void gk_rows_read_far(const gk_setup *setup, const gk_work *work, int e, const double *far, double *read);
 void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out);
 void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e);
 /* gk_couple.c */

@@ -452,16 +452,12 @@ static void store_ground(const node *n, int at)
     }
 }
 
-/* Lᵀ x of the supports, κ = L Lᵀ (Cholesky, lower; a support that does not act has an empty row) */
-static void press_supports(const gk_model *model, int set, const double *x, double *out)
+/* Lᵀ x of the supports (a support that does not act has an empty row in L) */
+static void press_supports(const gk_setup *setup, const double *x, int n, double *out)
 {
-    const int n = model->supports;
-    double L[MAX_SUPPORTS * MAX_SUPPORTS];
-    memcpy(L, model->ground[set].kappa, (size_t)(n * n) * sizeof *L);
-    gk_limit_cholesky(L, n);
     for (int j = 0; j < n; j++) {
         out[j] = 0.0;
-        for (int i = j; i < n; i++) out[j] += L[i * n + j] * x[i];
+        for (int i = j; i < n; i++) out[j] += setup->press[i * n + j] * x[i];
     }
 }
 
@@ -469,30 +465,44 @@ static void press_supports(const gk_model *model, int set, const double *x, doub
 static void store_far(const node *n, int at, const double *still)
 {
     const gk_side *side = n->side;
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, all = n->model->ground[set].n;
+    const gk_setup *setup = n->setup;
+    const int set = setup->base.set, reads = n->gear->ground[set].reads;
     const int32_t *list = n->gear->ground[set].list;
     double pressed[MAX_SUPPORTS];
     for (int i = 0; i < n->points; i++) {
-        gk_real *to = side->far + ((size_t)at * n->points + i) * n->setup->far;
-        memset(to, 0, (size_t)n->setup->far * sizeof *to);
-        for (int k = 0; k < reads; k++) to[list[k]] = (gk_real)(n->ground[(size_t)i * reads + k] * sqrt(still[k]));
-        press_supports(n->model, set, n->support + (size_t)i * n->model->supports, pressed);
-        for (int s = 0; s < n->model->supports; s++) to[all + s] = (gk_real)pressed[s];
+        gk_real *to = side->far + ((size_t)at * n->points + i) * setup->far;
+        memset(to, 0, (size_t)setup->far * sizeof *to);
+        for (int k = 0; k < reads; k++)
+            if (setup->far_slot[list[k]] >= 0)
+                to[setup->far_slot[list[k]]] = (gk_real)(n->ground[(size_t)i * reads + k] * sqrt(still[k]));
+        press_supports(setup, n->support + (size_t)i * n->model->supports, n->model->supports, pressed);
+        for (int s = 0; s < n->model->supports; s++) to[setup->far_supports + s] = (gk_real)pressed[s];
     }
+}
+
+/* the far oscillators that a gear reads */
+static gk_span far_of(const gk_model *model, const gk_setup *setup, int g)
+{
+    const int set = setup->base.set;
+    int from = setup->far, to = 0;
+    for (int k = 0; k < model->gear[g].ground[set].reads && setup->far; k++) {
+        const int slot = setup->far_slot[model->gear[g].ground[set].list[k]];
+        if (slot >= 0) from = slot < from ? slot : from, to = slot >= to ? slot + 1 : to;
+    }
+    return from < to ? (gk_span){from / 4 * 4, (to + 3) / 4 * 4 - from / 4 * 4} : (gk_span){0, 0};
 }
 
 /* the same of a bore's angle */
 void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *work, int port)
 {
-    const gk_base *base = &setup->base;
-    const gk_ground *ground = &model->ground[base->set];
+    const gk_ground *ground = &model->ground[setup->base.set];
     double *to = work->port_far + (size_t)port * setup->far;
     memset(to, 0, (size_t)setup->far * sizeof *to);
+    if (!setup->on.residual) return;
     for (int k = 0; k < ground->n; k++)
-        to[k] = base->slot[k] >= 0 || !setup->on.residual ? 0.0
-                                                          : ground->port_rows[port * ground->n + k] / ground->omega[k];
-    press_supports(model, base->set, model->port_support + port * model->supports, to + ground->n);
-    for (int s = 0; s < model->supports && !setup->on.residual; s++) to[ground->n + s] = 0.0;
+        if (setup->far_slot[k] >= 0)
+            to[setup->far_slot[k]] = ground->port_rows[port * ground->n + k] / ground->omega[k];
+    press_supports(setup, model->port_support + port * model->supports, model->supports, to + setup->far_supports);
 }
 
 /* ---- all of them -------------------------------------------------------------------------------------------------- */
@@ -544,6 +554,7 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     double still[MAX_GROUND];
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
     flexibility_of_still(&n, still);
+    side->far_read = far_of(model, setup, side->gear);
     for (int at = 0; at <= side->nodes; at++) {
         gather_node(&n, (double)at / side->nodes);
         store_rows(&n, at);
