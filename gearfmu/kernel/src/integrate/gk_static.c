@@ -1,5 +1,6 @@
 /* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): the potential energy of a stage at rest is
- * least. Outer unknowns are the spins and the dynamic oscillators of the ground group; at given ones each engagement has
+ * least. Outer unknowns are the spins, the dynamic oscillators of the ground group and the soft modes of gears with
+ * several engagements, through which these meet; at given ones each engagement has
  * its contact problem, everything else being compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces
  * that are left, with the tangents of the engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W; islands come to rest one after the
  * other: they know nothing of each other. */
@@ -17,7 +18,7 @@ static const double SEE = 3e-3;        /* m: look this far for flanks */
 static const double AT_REST = 1e-15, EXACT = 1e-11; /* m; of the deepest deflection: a move that is none */
 static const double ENOUGH = 1e-11,
                     ROUNDING = 2e-7; /* the same where single precision of the rows leaves it undecided */
-enum { REST_ITERATIONS = 100, BACK = 60 };
+enum { REST_ITERATIONS = 100, BACK = 60, STATIC_SWEEPS = 400 };
 
 typedef struct rest { /* a search for rest */
     const gk_model *model;
@@ -30,8 +31,10 @@ typedef struct rest { /* a search for rest */
     int floats[MAX_ROTORS]; /* motions that nothing holds */
     int leader[MAX_ROTORS]; /* port that decides where a motion begins, −1: none */
     double given[MAX_SPINS], before[MAX_SPINS];
-    int island;           /* that comes to rest now */
-    int unknowns;         /* spins, then lanes of the ground group */
+    int island;                              /* that comes to rest now */
+    int unknowns;                            /* spins, lanes of the ground group, soft modes gear by gear */
+    int soft[MAX_GEARS], soft_at[MAX_GEARS]; /* how many of a gear; number of the first among the unknowns */
+    int32_t lane[MAX_GEARS][MAX_SOFT];
     double *force, *move; /* of them */
     double *tangent;      /* (unknowns, unknowns) */
     double trust;         /* m: how far the next move may go */
@@ -143,6 +146,8 @@ static void begin(rest *r)
     const gk_model *m = r->model;
     gk_data *data = r->data;
     memset(r->work->rest_ground, 0, (size_t)r->setup.base.n * sizeof(double));
+    for (int g = 0; g < m->gears; g++)
+        if (r->soft[g]) memset(r->work->rest_modes[g], 0, (size_t)r->setup.modal[g].n * sizeof(gk_real));
     for (int e = 0; e < m->engagements; e++)
         if (searched(r, e)) data->meshing[e].pairs = 0;
     for (int d = 0; d < r->setup.spins; d++) {
@@ -233,11 +238,11 @@ static int press(rest *r)
         work->spin[d] = r->data->x[d] + MOBILITY * r->setup.inverse_inertia[d] * r->given[d];
         work->speed[d] = 2.0 * work->spin[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
-    for (int g = 0; g < r->model->gears; g++) work->y[g] = work->zero;
+    for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->zero;
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e) && !form(r, e)) return 0;
-    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island};
+    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, STATIC_SWEEPS};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
     return 1;
@@ -261,20 +266,61 @@ static void find_forces(rest *r)
     gk_frame_load(r->model, &r->setup, r->data, r->work->ground_force);
     for (int i = 0; i < base->n; i++)
         r->force[spins + i] = r->work->ground_force[i] - base->omega2[i] * r->work->rest_ground[i];
+    for (int g = 0; g < r->model->gears; g++)
+        for (int i = 0; i < r->soft[g]; i++) {
+            const int lane = r->lane[g][i];
+            const double omega = r->setup.modal[g].omega[lane];
+            r->force[r->soft_at[g] + i] = (double)r->work->force[g][lane] -
+                                          omega * omega * (double)r->work->rest_modes[g][lane];
+        }
 }
 
-/* what the rows of an engagement have to do with unknown number `local` of its own: a spin or a lane of its part of the
- * ground group. Returns its number among all, and which it is in `column` (0 in rows that are not active). */
-static int own_unknown(const rest *r, int e, int local, double *column)
+/* rows of an engagement on the soft modes of its gears, (side, row, mode) */
+typedef double soft_rows[2][MAX_ROWS][MAX_SOFT];
+
+static void find_soft_rows(rest *r, int e, soft_rows rows)
+{
+    const gk_system *s = &r->work->engaged[e].system;
+    for (int w = 0; w < 2; w++) {
+        const int g = r->setup.mesh[e].side[w].gear, n = r->setup.modal[g].n;
+        for (int row = 0; row < s->contacts && r->soft[g]; row++) {
+            double unit[MAX_STRIDE] = {0};
+            gk_real *out = r->work->trial[g];
+            memset(out, 0, 2 * (size_t)n * sizeof *out);
+            unit[row] = 1.0;
+            gk_rows_push_modes(&r->setup, r->work, e, w, unit, unit, out, out + n);
+            for (int i = 0; i < r->soft[g]; i++) rows[w][row][i] = (double)out[r->lane[g][i]];
+        }
+    }
+}
+
+/* the unknowns that an engagement's rows read: spins, lanes of its part of the ground group, soft modes of both gears */
+static int own_unknowns(const rest *r, int e)
+{
+    const gk_mesh *mesh = &r->setup.mesh[e];
+    return mesh->spins + mesh->local + r->soft[mesh->side[0].gear] + r->soft[mesh->side[1].gear];
+}
+
+/* Column of one of them, 0 in rows that are not active. Returns its number among all. */
+static int own_unknown(const rest *r, int e, int local, soft_rows soft, double *column)
 {
     const gk_mesh *mesh = &r->setup.mesh[e];
     const gk_engaged *engaged = &r->work->engaged[e];
     const gk_system *s = &engaged->system;
-    const int spin = local < mesh->spins, lane = local - mesh->spins, width = mesh->part[0].width;
-    for (int i = 0; i < s->n; i++)
-        column[i] = !s->active[i] ? 0.0 : spin ? s->rigid[local][i] : engaged->ground[(size_t)i * mesh->local + lane];
-    for (int i = s->n; i < s->stride; i++) column[i] = 0.0;
-    if (spin) return mesh->spin[local];
+    const int lane = local - mesh->spins, mode = lane - mesh->local, first = r->soft[mesh->side[0].gear];
+    const int w = mode >= first, width = mesh->part[0].width;
+    for (int i = 0; i < s->stride; i++) column[i] = 0.0;
+    for (int i = 0; i < s->n; i++) {
+        if (!s->active[i]) continue;
+        if (lane < 0)
+            column[i] = s->rigid[local][i];
+        else if (mode < 0)
+            column[i] = engaged->ground[(size_t)i * mesh->local + lane];
+        else if (i < s->contacts)
+            column[i] = soft[w][i][mode - w * first];
+    }
+    if (lane < 0) return mesh->spin[local];
+    if (mode >= 0) return r->soft_at[mesh->side[w].gear] + mode - w * first;
     return r->setup.spins + (lane < width ? mesh->part[0].from + lane : mesh->part[1].from + lane - width);
 }
 
@@ -282,15 +328,17 @@ static int own_unknown(const rest *r, int e, int local, double *column)
 static void add_tangent(rest *r, int e)
 {
     gk_system *s = &r->work->engaged[e].system;
-    const int own = r->setup.mesh[e].spins + r->setup.mesh[e].local;
+    const int own = own_unknowns(r, e);
     double column[MAX_STRIDE], other[MAX_STRIDE];
+    soft_rows soft;
     if (!s->n) return;
     gk_tangent_factorise(s);
+    find_soft_rows(r, e, soft);
     for (int a = 0; a < own; a++) {
-        const int i = own_unknown(r, e, a, column);
+        const int i = own_unknown(r, e, a, soft, column);
         gk_tangent_solve(s, column);
         for (int b = 0; b <= a; b++) {
-            const int j = own_unknown(r, e, b, other);
+            const int j = own_unknown(r, e, b, soft, other);
             const double k = gk_dot_quads(column, other, s->stride / 4);
             r->tangent[(size_t)i * r->unknowns + j] += k;
             if (a != b) r->tangent[(size_t)j * r->unknowns + i] += k;
@@ -308,6 +356,11 @@ static void find_tangent(rest *r)
     }
     for (int i = 0; i < r->setup.base.n; i++)
         r->tangent[(size_t)(spins + i) * n + spins + i] = r->setup.base.omega2[i] > 0.0 ? r->setup.base.omega2[i] : 1.0;
+    for (int g = 0; g < r->model->gears; g++)
+        for (int i = 0; i < r->soft[g]; i++) {
+            const double omega = r->setup.modal[g].omega[r->lane[g][i]];
+            r->tangent[(size_t)(r->soft_at[g] + i) * (size_t)(n + 1)] = omega * omega;
+        }
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e)) add_tangent(r, e);
     for (int t = 0; t < r->motion.count; t++) { /* what nothing holds */
@@ -346,6 +399,9 @@ static void go(rest *r, double share)
     const int spins = r->setup.spins;
     for (int d = 0; d < spins; d++) r->data->x[d] += share * r->move[d];
     for (int i = 0; i < r->setup.base.n; i++) r->work->rest_ground[i] += share * r->move[spins + i];
+    for (int g = 0; g < r->model->gears; g++)
+        for (int i = 0; i < r->soft[g]; i++)
+            r->work->rest_modes[g][r->lane[g][i]] += (gk_real)(share * r->move[r->soft_at[g] + i]);
 }
 
 static double along(const rest *r)
@@ -455,6 +511,24 @@ static void spread(rest *r)
 }
 
 /* ---- the search -------------------------------------------------------------------------------------------------------- */
+/* Modes of a gear with several engagements through which these feel each other: softer, with the gear's own mass, than a
+ * few per cent of a contact */
+static void find_soft(rest *r)
+{
+    const gk_base *base = &r->setup.base;
+    int count = r->setup.spins + base->n;
+    for (int g = 0; g < r->model->gears; g++) {
+        const gk_modal *m = &r->setup.modal[g];
+        const double *x = base->centre[g] + base->from[g], mobility = gk_dot_quads(x, x, base->width[g] / 4);
+        const double yields = r->model->gear[g].local / r->model->gear[g].width;
+        r->soft[g] = 0, r->soft_at[g] = count;
+        for (int i = 0; i < m->n && r->setup.engagements_of[g] > 1 && r->soft[g] < MAX_SOFT; i++)
+            if (m->omega[i] > 0.0 && mobility > yields * m->omega[i] * m->omega[i]) r->lane[g][r->soft[g]++] = i;
+        count += r->soft[g];
+    }
+    r->unknowns = count;
+}
+
 /* κ = −1/ω² puts the dynamic modes of the gear groups into C′ too */
 static void set_compliance(rest *r)
 {
@@ -465,6 +539,7 @@ static void set_compliance(rest *r)
         r->k.flow[g].exact = m->pairs;
         for (int i = 0; i < m->n; i++)
             r->k.flow[g].kappa[i] = m->omega[i] > 0.0 ? (gk_real)(-1.0 / (m->omega[i] * m->omega[i])) : 0;
+        for (int i = 0; i < r->soft[g]; i++) r->k.flow[g].kappa[r->lane[g][i]] = 0;
     }
     r->k.rigid_mobility = MOBILITY;
 }
@@ -526,7 +601,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
                            const gk_boundary *boundary, int bare, int keep)
 {
     rest r = {.model = model, .setup = *setup, .work = work, .data = data, .boundary = boundary};
-    r.unknowns = setup->spins + setup->base.n;
+    find_soft(&r);
     r.force = work->rest, r.move = r.force + r.unknowns, r.tangent = r.move + r.unknowns;
     for (int p = 0; p < model->ports && bare; p++) {
         r.setup.chained[p] = 0;

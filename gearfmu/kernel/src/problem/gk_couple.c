@@ -201,7 +201,8 @@ static void sweep(const gk_island *island)
     const gk_coupled *c = island->context;
     double change = INFINITY, next = INFINITY;
     give_all(c, WHOLE);
-    for (int round = 0; round < SWEEPS && !(next < TOLERANCE); round++) {
+    const int most = c->sweeps ? c->sweeps : SWEEPS;
+    for (int round = 0; round < most && !(next < TOLERANCE); round++) {
         const double last = change;
         change = 0.0;
         for (int e = 0; e < c->model->engagements; e++) {

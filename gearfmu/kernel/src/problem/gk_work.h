@@ -89,9 +89,10 @@ struct gk_work {
     double run_h, run_gamma;     /* γ of the internal step of the run */
     gk_engaged *engaged;         /* (engagements) */
     /* statics (gk_static.c): every oscillator is compliance */
-    double *rest_ground; /* displacement of the ground group */
-    double *rest;        /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
-    double *columns;     /* room for a node's rows and their products */
+    double *rest_ground;            /* displacement of the ground group */
+    gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
+    double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
+    double *columns; /* room for a node's rows and their products */
     double *sum_ground, *sum_far, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     double *port_far;                                     /* (ports, far) rows of the bore angles */
     uint64_t cycles[PHASES], mark;                        /* phase profile, filled by a build with GK_PROFILE */
@@ -143,7 +144,7 @@ typedef struct gk_coupled { /* an island in a step */
     const gk_setup *setup;
     gk_work *work;
     const gk_coefficients *k;
-    int island;
+    int island, sweeps; /* sweeps: at most; 0: as many as a step may take */
 } gk_coupled;
 gk_island gk_couple_island(gk_coupled *coupled);
 void gk_couple_recall(gk_coupled *coupled);

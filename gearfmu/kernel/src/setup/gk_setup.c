@@ -206,7 +206,12 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         lay_out_engaged(&b, setup, work->engaged ? &work->engaged[e] : &counted, e);
     }
     work->rest_ground = doubles(&b, ground);
-    const size_t unknowns = (size_t)(model->rotors + 2 * model->chains) + ground;
+    size_t unknowns = (size_t)(model->rotors + 2 * model->chains) + ground;
+    for (int g = 0; g < model->gears; g++) {
+        const int shared = setup->engagements_of[g] > 1;
+        work->rest_modes[g] = reals(&b, shared ? (size_t)setup->modal[g].n : 0);
+        unknowns += shared ? MAX_SOFT : 0;
+    }
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
     work->columns = doubles(&b, gk_side_scratch(model));
     work->sum_ground = doubles(&b, ground);
@@ -276,11 +281,15 @@ static int modes_below(const gk_gear *gear, double cut_hz)
     return best;
 }
 
-static int modes_at_level(const gk_model *model, gk_level level, int g)
+/* Modes below a share of the cut of level fast by which engagements of one gear feel each other (the ovals of a ring
+ * between planets) are dynamic at every level: what is static is known within an engagement alone. */
+static const double SHARED_BELOW = 0.25;
+
+static int modes_at_level(const gk_model *model, const gk_setup *setup, int g)
 {
     const gk_gear *gear = &model->gear[g];
-    switch (level) {
-    case LEVEL_RIGID: return 0;
+    switch (setup->level) {
+    case LEVEL_RIGID: return setup->engagements_of[g] > 1 ? modes_below(gear, SHARED_BELOW * model->cut[0]) : 0;
     case LEVEL_FAST: return modes_below(gear, model->cut[0]);
     case LEVEL_STANDARD: return modes_below(gear, model->cut[1]);
     default: return gear->modes;
@@ -704,13 +713,13 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(setup, 0, sizeof *setup);
     gk_outcome outcome = choose(model, data, setup, message);
     if (outcome) return outcome;
-    for (int g = 0; g < model->gears; g++) modes[g] = setup->on.elastic ? modes_at_level(model, setup->level, g) : 0;
+    count_engagements(model, setup);
+    for (int g = 0; g < model->gears; g++) modes[g] = setup->on.elastic ? modes_at_level(model, setup, g) : 0;
     for (int e = 0; e < model->engagements; e++) {
         setup->mesh[e].index = e;
         for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
     }
     find_islands(model, setup);
-    count_engagements(model, setup);
     lay_out_setup(model, setup, behind(setup, sizeof *setup), modes, list_ground(model, setup, which));
     memset(work, 0, sizeof *work);
     lay_out_work(model, setup, work, behind(work, sizeof *work));

@@ -11,6 +11,7 @@ enum {
     GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
     MAX_CANDIDATES = 24, /* tooth pairs that can be near contact at any position, both flanks */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
+    MAX_SOFT = 64, /* modes of a gear with several engagements that statics take as unknowns */
     MAX_FAR = MAX_GROUND + MAX_SUPPORTS + 4 * MAX_GEARS + 4
 };
 
