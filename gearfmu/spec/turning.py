@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -39,30 +40,49 @@ def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
     """Speeds of the rotors that are geared to the rotor of `port`, itself among them, and of those that stand, by name:
     per its unit speed. Engagements roll in the axes of the rotor that carries them (Willis). Where a stage has
     carriers, ports beyond input and output stand."""
-    found = {name: Fraction(0) for name, rotor in stage.rotors.items() if rotor.stands}
+    known = {name: Fraction(0) for name, rotor in stage.rotors.items() if rotor.stands}
     if stage.carriers:
-        found |= {stage.rotor_of(held.body): Fraction(0) for held in list(stage.ports.values())[2:]}
-    found[stage.rotor_of(stage.ports[port].body)] = Fraction(1)
-    for _ in range(len(stage.rotors)):
-        for mesh in stage.engagements:
-            a, b = (stage.rotor_of(gear) for gear in mesh.gears)
-            frame = stage.frame_of(mesh)
-            unknown = [name for name in {a, b, frame} - {None} if name not in found]
-            if len(unknown) == 1 and unknown[0] is not None:
-                found[unknown[0]] = _speed_of(stage, mesh, unknown[0], found)
-    return found
+        known |= {stage.rotor_of(held.body): Fraction(0) for held in list(stage.ports.values())[2:]}
+    known[stage.rotor_of(stage.ports[port].body)] = Fraction(1)
+    equations = [({name: Fraction(1)}, speed) for name, speed in known.items()]
+    equations += [(_rolling(stage, mesh), Fraction(0)) for mesh in stage.engagements]
+    return _solved(equations)
 
 
-def _speed_of(stage: GeneralStage, mesh: EngagementSpec, rotor: str, known: dict[str, Fraction]) -> Fraction:
-    """Speed of the one rotor of an engagement that is not known: z_A (w_A − w_f) ± z_B (w_B − w_f) = 0."""
-    (a, b), frame = (stage.rotor_of(gear) for gear in mesh.gears), stage.frame_of(mesh)
+def _rolling(stage: GeneralStage, mesh: EngagementSpec) -> dict[str, Fraction]:
+    """Factors of the rotors' speeds in z_A (w_A − w_f) ± z_B (w_B − w_f) = 0."""
     z_a, z_b = (_teeth(stage, gear) for gear in mesh.gears)
     z_b *= -1 if stage.internal(mesh) else 1
-    if rotor == frame:
-        return (z_a * known[a] + z_b * known[b]) / (z_a + z_b)
-    carried = known[frame] if frame is not None else Fraction(0)
-    other, ratio = (b, Fraction(z_b, z_a)) if rotor == a else (a, Fraction(z_a, z_b))
-    return carried - (known[other] - carried) * ratio
+    factors: dict[str, Fraction] = defaultdict(Fraction)
+    for rotor, teeth in ((stage.rotor_of(mesh.gears[0]), z_a), (stage.rotor_of(mesh.gears[1]), z_b)):
+        factors[rotor] += teeth
+        if (frame := stage.frame_of(mesh)) is not None:
+            factors[frame] -= teeth
+    return factors
+
+
+def _solved(equations: list[tuple[dict[str, Fraction], Fraction]]) -> dict[str, Fraction]:
+    """The unknowns that linear equations (factors by name, right side) decide; elimination without rounding."""
+    rows: dict[str, tuple[dict[str, Fraction], Fraction]] = {}
+    for factors, right in equations:
+        left = {name: Fraction(factor) for name, factor in factors.items() if factor}
+        for name, (own, value) in rows.items():
+            if share := left.pop(name, None):
+                right -= share * value
+                for other, factor in own.items():
+                    left[other] = left.get(other, Fraction(0)) - share * factor
+        left = {name: factor for name, factor in left.items() if factor}
+        if not left:
+            continue
+        pivot, factor = next(iter(left.items()))
+        new = {name: value / factor for name, value in left.items() if name != pivot}, right / factor
+        for name, (own, value) in rows.items():
+            if share := own.pop(pivot, None):
+                for other, part in new[0].items():
+                    own[other] = own.get(other, Fraction(0)) - share * part
+                rows[name] = {other: part for other, part in own.items() if part}, value - share * new[1]
+        rows[pivot] = new
+    return {name: value for name, (own, value) in rows.items() if not own}
 
 
 @dataclass(frozen=True)
