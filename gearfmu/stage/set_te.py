@@ -3,10 +3,7 @@ the step.
 
 In the axes of the carrier everything repeats after one mesh period: sun and ring have moved on by one tooth each, and
 the mounts of the ring are smeared round its rim. Where pins stand in their places, a planet does a part of the period
-later what the others do: its mean share over the period is 1.
-
-What one planet's mesh does to the others' through the modes of sun and ring is not part of these statics, which are at
-level rigid: above all the ovalisation of the ring."""
+later what the others do: its mean share over the period is 1."""
 
 from __future__ import annotations
 
