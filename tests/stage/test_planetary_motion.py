@@ -88,7 +88,7 @@ def test_speeds_and_forces_are_those_of_the_set(model: StageModel) -> None:
 
 def test_a_ring_on_a_port_is_the_ring_that_its_mounts_hold(model: StageModel) -> None:
     """The same stiffness against turning, as a spin with a port or as an oscillator: the same statics. What a gear's
-    bore yields beyond all modes reaches the engagement that has the port's row alone: 4e-5 of the carrier's angle."""
+    bore yields beyond all modes reaches the engagement that has the port's row alone: 6e-5 of the carrier's angle."""
     spec = load_stage("planetary54")
     mounts = spec.ring.mounts
     k = mounts.points * mounts.stiffness * (spec.ring.rim_diameter / 2) ** 2
@@ -101,12 +101,13 @@ def test_a_ring_on_a_port_is_the_ring_that_its_mounts_hold(model: StageModel) ->
         kernel.prepare()
         state = kernel.transmission(0.0, 600.0, 4)
         found.append([state.phi, sum(map(sum, state.forces.values()))])
-    assert found[0] == pytest.approx(found[1], rel=5e-5)
+    assert found[0] == pytest.approx(found[1], rel=7e-5)
 
 
 def test_two_integrators_see_the_same_set(model: StageModel) -> None:
-    """The step with its rotation in half steps, and the explicit peer with the same forces as accelerations: the
-    carrier's axes matter (5 % of a pin's force at 300 rad/s), the roads differ by a tenth of a percent."""
+    """The step with its rotation in half steps, and the explicit peer with the same forces as accelerations: Coriolis
+    forces are 7 % of a pin's ripple at 300 rad/s, the roads differ by 1 % of it, 2 % of the transmission error's
+    (0.2 and 0.1 % before the ring's ovals, in single precision, were dynamic here)."""
     names = ("sun_planet1.te", "pin.planet1.fx")
     roads = {}
     for name, settings in {
@@ -118,4 +119,4 @@ def test_two_integrators_see_the_same_set(model: StageModel) -> None:
         roads[name] = stepped(kernel, 20, *names)
     swing = roads["dg4"].std(axis=0)
     apart = {name: np.sqrt(((road - roads["dg4"]) ** 2).mean(axis=0)) / swing for name, road in roads.items()}
-    assert np.all(apart["central"] < 3e-3) and np.all(apart["without"] > 5e-3)
+    assert apart["central"][0] < 0.025 and apart["central"][1] < 0.02 and apart["without"][1] > 0.05
