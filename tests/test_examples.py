@@ -103,9 +103,8 @@ def test_every_example_has_its_test() -> None:
 
 
 def test_planetary_sharing(tmp_path: Path) -> None:
-    """Planets in their places carry alike; one that is ahead carries more, its neighbours less, the one opposite as
-    before."""
+    """Planets in their places carry alike; one that is ahead carries more, the others alike less."""
     alike, apart = (numbers(line)[-4:] for line in example("planetary_sharing.py", cwd=tmp_path).splitlines())
     assert alike == pytest.approx([1.0] * 4, abs=5e-3)
     assert apart[0] > 1.05 and apart[1] == pytest.approx(apart[3], abs=5e-3) and apart[1] < 0.98
-    assert apart[2] == pytest.approx(1.0, abs=0.02)
+    assert apart[2] == pytest.approx(apart[1], abs=0.02)  # the ring is soft against an oval
