@@ -293,8 +293,6 @@ def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "inspect stage.toml",
         "validate damaged.fmu",
         "new fzg_c/../x",
-        "te planetary54 --torque 1_N*m",
-        "export planetary54 -o new.fmu",
         "simulate planetary54 --torque 1_N*m --speed 1_rpm",
         "mesh planetary54 --gear wheel",
     ],
