@@ -221,59 +221,50 @@ void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const g
         }
 }
 
-/* ---- far ------------------------------------------------------------------------------------------------------------ */
-/* takes an interpolated part of a far row away */
-static void less_far(gk_span span, const gk_real *low, const gk_real *high, double part, double *out)
-{
-    const gk_four *a = (const gk_four *)(low + span.from), *b = (const gk_four *)(high + span.from);
-    gk_quad *to = (gk_quad *)(out + span.from);
-    for (int q = 0; q < span.width / 4; q++) {
-        const gk_quad here = GK_WIDENED(a[q]);
-        to[q] -= here + part * (GK_WIDENED(b[q]) - here);
-    }
-}
-
-static gk_span far_supports(const gk_setup *setup)
-{
-    return (gk_span){setup->far_supports, setup->far - setup->far_supports};
-}
-
-/* interpolated far row of a contact on one side, its sign that of the contact's row */
-static void far_row(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, double *out)
+/* ---- bores ---------------------------------------------------------------------------------------------------------- */
+/* what a moment on the port of a side's rotor turns its contacts outward at once */
+GK_INLINE void bore_column(const gk_side *side, const gk_engaged *engaged, double *out, const int strips)
 {
     const gk_position *at = &engaged->position[side->which];
-    const int strips = GK_STRIPS(setup), points = side->candidates * strips, far = setup->far;
-    const int point = engaged->place[engaged->system.place_of[i]].candidate[side->which] * strips + i % strips;
-    const gk_real *low = side->far + ((size_t)at->node * points + point) * far, *high = low + (size_t)points * far;
-    less_far(side->far_read, low, high, at->part, out);
-    less_far(far_supports(setup), low, high, at->part, out);
-}
-
-/* Fills the rows of contacts and joints through which residuals of different engagements meet */
-void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e)
-{
-    gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    const size_t size = (size_t)setup->far * sizeof(double);
-    for (int i = 0; i < s->n && size; i++) {
-        double *row = engaged->far + (size_t)i * setup->far;
-        memset(row, 0, size);
-        if (i < s->contacts)
-            for (int w = 0; w < 2; w++) far_row(setup, engaged, &setup->mesh[e].side[w], i, row);
-        else if (gk_rows_at_bore(setup, s, i))
-            memcpy(row, work->port_far + (size_t)s->port_of[i] * setup->far, size);
+    const int points = side->candidates * strips;
+    const double *node = side->port + (size_t)at->node * points;
+    for (int p = 0; p < engaged->places; p++, out += strips) {
+        const double *low = node + engaged->place[p].candidate[side->which] * strips, *high = low + points;
+        for (int i = 0; i < strips; i++) out[i] = low[i] + at->part * (high[i] - low[i]);
     }
 }
 
-/* adds what the rows read through the residual that engagements share: oscillators that are not dynamic add, supports take
- * away */
-void gk_rows_read_far(const gk_setup *setup, const gk_work *work, int e, const double *far, double *read)
+/* Fills what moments on ports turn the contacts of an engagement */
+void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e)
 {
-    const double *rows = work->engaged[e].far;
-    const int n = work->engaged[e].system.n;
-    const size_t stride = (size_t)setup->far;
-    for (int w = 0; w < 2; w++) read_rows(rows, n, stride, setup->mesh[e].far[w], far, 1.0, read);
-    read_rows(rows, n, stride, far_supports(setup), far, -1.0, read);
+    for (int w = 0; w < 2; w++)
+        if (setup->mesh[e].side[w].port_of >= 0)
+            GK_STRIPPED(GK_STRIPS(setup), bore_column, &setup->mesh[e].side[w], &work->engaged[e],
+                        work->engaged[e].bore[w])
+}
+
+/* adds what the rows' forces do at once between flanks and bores: moments on ports, and what contacts turn the bores */
+void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum)
+{
+    const gk_system *s = &engaged->system;
+    for (int i = s->contacts; i < s->n; i++)
+        if (gk_rows_at_bore(setup, s, i)) sum->moment[s->port_of[i]] += x[i];
+    for (int w = 0; w < 2; w++) {
+        const int port = setup->mesh[e].side[w].port_of;
+        for (int i = 0; i < s->contacts && port >= 0; i++) sum->turned[port] -= engaged->bore[w][i] * x[i];
+    }
+}
+
+/* adds what the rows read of it */
+void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores, double *read)
+{
+    const gk_system *s = &engaged->system;
+    for (int i = s->contacts; i < s->n; i++)
+        if (gk_rows_at_bore(setup, s, i)) read[i] += bores->turned[s->port_of[i]];
+    for (int w = 0; w < 2; w++) {
+        const int port = setup->mesh[e].side[w].port_of;
+        for (int i = 0; i < s->contacts && port >= 0; i++) read[i] -= engaged->bore[w][i] * bores->moment[port];
+    }
 }
 
 typedef struct pushes { /* rows whose forces are not zero */
@@ -375,35 +366,6 @@ void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e
     pushes p;
     list_pushes(x, y, engaged->system.n, &p);
     if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged, &p, out_x, out_y);
-}
-
-/* adds Σ rows·x over a span of the far rows, in registers */
-static void push_span(const pushes *p, const double *rows, size_t stride, gk_span span, double *out)
-{
-    gk_quad *to = (gk_quad *)(out + span.from);
-    int q = 0;
-    for (; q + 4 <= span.width / 4; q += 4) {
-        gk_quad sum[4] = {to[q], to[q + 1], to[q + 2], to[q + 3]};
-        for (int r = 0; r < p->count; r++) {
-            const gk_quad *row = (const gk_quad *)(rows + (size_t)p->row[r] * stride + span.from) + q;
-            for (int k = 0; k < 4; k++) sum[k] += p->x[r] * row[k];
-        }
-        for (int k = 0; k < 4; k++) to[q + k] = sum[k];
-    }
-    for (; q < span.width / 4; q++)
-        for (int r = 0; r < p->count; r++)
-            to[q] += p->x[r] * ((const gk_quad *)(rows + (size_t)p->row[r] * stride + span.from))[q];
-}
-
-/* adds the forces x of the rows to what they do through the residual that engagements share */
-void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out)
-{
-    const double *rows = work->engaged[e].far;
-    const size_t stride = (size_t)setup->far;
-    pushes p;
-    list_pushes(x, x, work->engaged[e].system.n, &p);
-    for (int w = 0; w < 2; w++) push_span(&p, rows, stride, setup->mesh[e].far[w], out);
-    push_span(&p, rows, stride, far_supports(setup), out);
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */

@@ -46,9 +46,9 @@
 #define gk_couple_recall gk_couple_recall_avx2
 #define gk_rows_read_ground gk_rows_read_ground_avx2
 #define gk_rows_push_ground gk_rows_push_ground_avx2
-#define gk_rows_read_far gk_rows_read_far_avx2
-#define gk_rows_push_far gk_rows_push_far_avx2
-#define gk_rows_form_far gk_rows_form_far_avx2
+#define gk_rows_form_bores gk_rows_form_bores_avx2
+#define gk_rows_push_bores gk_rows_push_bores_avx2
+#define gk_rows_read_bores gk_rows_read_bores_avx2
 #define gk_rows_push_modes gk_rows_push_modes_avx2
 #define gk_rows_read_modes gk_rows_read_modes_avx2
 #define gk_solve_settle gk_solve_settle_avx2

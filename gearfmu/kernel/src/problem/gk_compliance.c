@@ -137,30 +137,17 @@ static void gram(const gk_setup *setup, gk_work *work, gk_engaged *engaged, cons
 }
 
 /* residual between contacts and the bores of their own gear, and of the bores */
-GK_INLINE void joint_rows(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e, const int strips)
+static void joint_residual(const gk_setup *setup, gk_engaged *engaged, int e)
 {
     gk_system *s = &engaged->system;
     for (int r = s->contacts; r < s->n; r++) {
         if (!gk_rows_at_bore(setup, s, r)) continue;
-        s->A[r * s->stride + r] += setup->port_own[s->port_of[r]];
-        for (int w = 0; w < 2; w++) {
-            const gk_side *side = &setup->mesh[e].side[w];
-            const double part = engaged->position[w].part;
-            const int points = side->candidates * strips;
-            double *A = s->A + r * s->stride;
-            if (gk_port_of(model, side->gear) != s->port_of[r]) continue;
-            const double *node = side->port + (size_t)engaged->position[w].node * points;
-            for (int p = 0; p < engaged->places; p++, A += strips) {
-                const double *low = node + engaged->place[p].candidate[w] * strips, *high = low + points;
-                for (int i = 0; i < strips; i++) A[i] -= low[i] + part * (high[i] - low[i]);
-            }
-        }
+        double *A = s->A + r * s->stride;
+        A[r] += setup->port_own[s->port_of[r]];
+        for (int w = 0; w < 2; w++)
+            for (int i = 0; i < s->contacts && setup->mesh[e].side[w].port_of == s->port_of[r]; i++)
+                A[i] -= engaged->bore[w][i];
     }
-}
-
-static void joint_residual(const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
-{
-    GK_STRIPPED(GK_STRIPS(setup), joint_rows, model, setup, engaged, e)
 }
 
 /* ---- dampers --------------------------------------------------------------------------------------------------------- */
@@ -212,14 +199,13 @@ static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
 }
 
 /* D, A and P of the contacts and of the joints' residual; from the tables of the step, or for any step from the rows */
-void gk_compliance_form(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
-                        int tables)
+void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables)
 {
     gk_engaged *engaged = &work->engaged[e];
     between_contacts(setup, engaged, e, tables);
     take_paths(setup, engaged, e); /* entry by entry: long before quads of the same rows are read again */
     for (int w = 0; w < 2 && !tables; w++) gram(setup, work, engaged, &setup->mesh[e].side[w], k);
-    if (GK_ON(setup, residual)) joint_residual(model, setup, engaged, e);
+    if (GK_ON(setup, residual)) joint_residual(setup, engaged, e);
 }
 
 GK_INLINE void mirror(gk_system *s, const int quads)

@@ -70,22 +70,22 @@ static void give_modes(const gk_setup *setup, gk_work *work, const gk_coefficien
     for (int i = 0; i < n; i++) given[i] = k->flow[g].mobility[i] * given[i] - k->flow[g].kappa[i] * yielded[i];
 }
 
-static void give_far(const gk_setup *setup, gk_work *work, int e, const double *once)
+static void give_bores(const gk_setup *setup, gk_work *work, int e, const double *once)
 {
-    double far[MAX_FAR];
-    memset(far, 0, (size_t)setup->far * sizeof *far);
-    gk_rows_push_far(setup, work, e, once, far);
-    exchange(work->sum_far, work->engaged[e].given_far, far, setup->far);
+    gk_bores bores = {{0}, {0}}, *given = &work->engaged[e].given_bores;
+    gk_rows_push_bores(setup, &work->engaged[e], e, once, &bores);
+    exchange(work->sum_bores.moment, given->moment, bores.moment, MAX_PORTS);
+    exchange(work->sum_bores.turned, given->turned, bores.turned, MAX_PORTS);
 }
 
-/* what an engagement's forces do to spins, ground group, shared gears and the far part of the residual */
+/* what an engagement's forces do to spins, ground group, bores and shared gears */
 static void give(const gk_coupled *c, int e, effect of)
 {
     double step[MAX_STRIDE], once[MAX_STRIDE];
     forces_of(&c->work->engaged[e].system, of, step, once);
     give_spins(c->setup, c->work, c->k, e, step, once);
     give_ground(c->setup, c->work, c->k, e, step, once);
-    give_far(c->setup, c->work, e, once);
+    give_bores(c->setup, c->work, e, once);
     for (int w = 0; w < 2; w++)
         if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1)
             give_modes(c->setup, c->work, c->k, e, w, step, once);
@@ -98,13 +98,13 @@ static void give_all(const gk_coupled *c, effect of)
     gk_work *work = c->work;
     memset(work->sum_spin, 0, sizeof work->sum_spin);
     memset(work->sum_ground, 0, (size_t)c->setup->base.n * sizeof *work->sum_ground);
-    memset(work->sum_far, 0, (size_t)c->setup->far * sizeof *work->sum_far);
+    memset(&work->sum_bores, 0, sizeof work->sum_bores);
     for (int e = 0; e < c->model->engagements; e++) {
         gk_engaged *engaged = &work->engaged[e];
         if (!within(c, e)) continue;
         memset(engaged->given_spin, 0, sizeof engaged->given_spin);
         memset(engaged->given_ground, 0, (size_t)c->setup->base.n * sizeof *engaged->given_ground);
-        memset(engaged->given_far, 0, (size_t)c->setup->far * sizeof *engaged->given_far);
+        memset(&engaged->given_bores, 0, sizeof engaged->given_bores);
         give(c, e, of);
     }
 }
@@ -131,12 +131,15 @@ static void take_ground(const gk_coupled *c, int e, double *read)
     gk_rows_read_ground(c->setup, &work->engaged[e], e, others, read);
 }
 
-static void take_far(const gk_coupled *c, int e, double *read)
+static void take_bores(const gk_coupled *c, int e, double *read)
 {
-    const gk_work *work = c->work;
-    double others[MAX_FAR];
-    for (int i = 0; i < c->setup->far; i++) others[i] = work->sum_far[i] - work->engaged[e].given_far[i];
-    gk_rows_read_far(c->setup, work, e, others, read);
+    const gk_bores *sum = &c->work->sum_bores, *own = &c->work->engaged[e].given_bores;
+    gk_bores others;
+    for (int p = 0; p < MAX_PORTS; p++) {
+        others.moment[p] = sum->moment[p] - own->moment[p];
+        others.turned[p] = sum->turned[p] - own->turned[p];
+    }
+    gk_rows_read_bores(c->setup, &c->work->engaged[e], e, &others, read);
 }
 
 /* by the modes of a gear that other engagements read too */
@@ -159,7 +162,7 @@ static void take(const gk_coupled *c, int e, double *read)
 {
     take_ground(c, e, read);
     take_spins(c, e, read);
-    take_far(c, e, read);
+    take_bores(c, e, read);
     for (int w = 0; w < 2; w++)
         if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, read);
 }

@@ -146,8 +146,8 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     s->L = s->J + size;
     s->B = s->L + size;
     gk_rows_form_ground(setup, work, e);
-    gk_rows_form_far(setup, work, e);
-    gk_compliance_form(model, setup, k, work, e, tables);
+    gk_rows_form_bores(setup, work, e);
+    gk_compliance_form(setup, k, work, e, tables);
     memset(s->outer, 0, (size_t)s->stride * sizeof(double));
     memset(s->beyond, 0, (size_t)s->stride * sizeof(double));
     gaps(model, setup, k->h, work, e);

@@ -126,22 +126,23 @@ static double own_compliance(const gk_system *s, int i, int j)
     return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->yield[i] : 0.0);
 }
 
-/* what a unit force of one row does at once to all rows of its own engagement, and through the bodies that they share to
- * those of others */
+/* what a unit force of one row does at once to all rows of its own engagement, and between bores and flanks to those of
+ * others */
 static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *rows, int r, gk_linear *out)
 {
     const gk_system *s = &work->engaged[rows[r].engagement].system;
     double unit[MAX_STRIDE] = {0}, read[MAX_STRIDE];
     int of = -1;
     unit[rows[r].row] = 1.0;
-    memset(work->sum_far, 0, (size_t)setup->far * sizeof *work->sum_far);
-    gk_rows_push_far(setup, work, rows[r].engagement, unit, work->sum_far);
+    gk_bores bores = {{0}, {0}};
+    gk_rows_push_bores(setup, &work->engaged[rows[r].engagement], rows[r].engagement, unit, &bores);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
         if (!same && e != of) {
             memset(read, 0, sizeof read);
-            gk_rows_read_far(setup, work, of = e, work->sum_far, read);
+            of = e;
+            gk_rows_read_bores(setup, &work->engaged[e], e, &bores, read);
         }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]

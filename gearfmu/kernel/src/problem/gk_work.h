@@ -44,6 +44,10 @@ typedef struct gk_step_side { /* D and A of one step h: squares of nodes and pro
     double share[COMMON];          /* of what they have with each other in h: ½, of the bore angle 1 */
 } gk_step_side;
 
+typedef struct gk_bores { /* at once: moments on ports, and what contacts turn the bores */
+    double moment[MAX_PORTS], turned[MAX_PORTS];
+} gk_bores;
+
 typedef struct gk_engaged { /* an engagement in a step */
     int index;
     gk_place place[MAX_PAIRS];
@@ -57,8 +61,8 @@ typedef struct gk_engaged { /* an engagement in a step */
         given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
                                                        step less at once; of spins in the step, at once */
     gk_real *given_modes[2];      /* (n): the same of the gear groups that other engagements read too */
-    double *given_far;            /* (far): what its forces do there */
-    double *far;                  /* (rows, far): rows of contacts and joints there */
+    double bore[2][MAX_CONTACTS]; /* what a moment on the port of either side's rotor turns the contacts at once */
+    gk_bores given_bores;
     gk_step_side table[2];
     gk_system system;
 } gk_engaged;
@@ -93,9 +97,9 @@ struct gk_work {
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
     double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
     double *columns; /* room for a node's rows and their products */
-    double *sum_ground, *sum_far, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
-    double *port_far;                                     /* (ports, far) rows of the bore angles */
-    uint64_t cycles[PHASES], mark;                        /* phase profile, filled by a build with GK_PROFILE */
+    double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
+    gk_bores sum_bores;
+    uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
 };
 
 /* gk_flank.c */
@@ -110,7 +114,6 @@ int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *m
 size_t gk_side_scratch(const gk_model *model);
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
-void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *work, int port);
 /* gk_moves.c */
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 /* gk_rows.c */
@@ -135,9 +138,9 @@ static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int
 void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read);
 void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
                          double *out_x, double *out_y);
-void gk_rows_read_far(const gk_setup *setup, const gk_work *work, int e, const double *far, double *read);
-void gk_rows_push_far(const gk_setup *setup, const gk_work *work, int e, const double *x, double *out);
-void gk_rows_form_far(const gk_setup *setup, gk_work *work, int e);
+void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e);
+void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum);
+void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores, double *read);
 /* gk_couple.c */
 typedef struct gk_coupled { /* an island in a step */
     const gk_model *model;
@@ -150,8 +153,7 @@ gk_island gk_couple_island(gk_coupled *coupled);
 void gk_couple_recall(gk_coupled *coupled);
 /* gk_compliance.c; columns of a row of D and A that are filled directly */
 static inline int gk_block_end(int i) { return i / 4 * 4 + 4; }
-void gk_compliance_form(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
-                        int tables);
+void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables);
 void gk_compliance_mirror(gk_system *s);
 /* gk_ground.c */
 void gk_ground_add(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,

@@ -37,20 +37,14 @@ static int share_rotor(const gk_model *model, const gk_engagement *a, const gk_e
     return gk_frame_of(model, a) >= 0 && gk_frame_of(model, a) == gk_frame_of(model, b);
 }
 
-/* every gear's part of the oscillators is padded to quads, and the supports */
-#define MOST_FAR(oscillators, supports) (((oscillators) + (supports) + 4 * MAX_GEARS + 3) / 4 * 4)
-
-/* Engagements that share a rotor belong to one island. Where one has more than one member, their residuals meet through the
- * ground group: by its oscillators that are not dynamic and by the supports. */
+/* Engagements that share a rotor belong to one island */
 static void find_islands(const gk_model *model, gk_setup *setup)
 {
-    int members = 0;
     for (int e = 0; e < model->engagements; e++) setup->mesh[e].island = -1;
-    setup->islands = setup->far = 0;
+    setup->islands = 0;
     for (int root = 0; root < model->engagements; root++) {
         if (setup->mesh[root].island >= 0) continue;
         setup->mesh[root].island = setup->islands;
-        members = 1;
         for (int changed = 1; changed;) {
             changed = 0;
             for (int a = 0; a < model->engagements; a++)
@@ -58,11 +52,10 @@ static void find_islands(const gk_model *model, gk_setup *setup)
                     if (setup->mesh[a].island != setup->islands || setup->mesh[b].island >= 0) continue;
                     if (!share_rotor(model, &model->engagement[a], &model->engagement[b])) continue;
                     setup->mesh[b].island = setup->islands;
-                    changed = 1, members++;
+                    changed = 1;
                 }
         }
         setup->islands++;
-        if (members > 1) setup->far = MOST_FAR(model->ground[setup->base.set].n, model->supports);
     }
 }
 
@@ -117,7 +110,6 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->path = doubles(b, points * strips);
     side->port = doubles(b, points);
     side->support = doubles(b, points * (size_t)model->supports);
-    side->far = reals(b, points * (size_t)setup->far);
 }
 
 /* everything after the setup itself; returns the bytes used */
@@ -131,8 +123,6 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         at += 3 * (size_t)setup->modal[g].n;
     }
     lay_out_base(&b, model, &setup->base, ground);
-    setup->far_slot = take(&b, (size_t)model->ground[setup->base.set].n * sizeof *setup->far_slot);
-    setup->press = doubles(&b, (size_t)(model->supports * model->supports));
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
     setup->state_size = sizeof(gk_data) + 3 * (size_t)setup->base.n * sizeof(double) + at * sizeof(gk_real);
@@ -173,8 +163,6 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
     engaged->index = e;
     engaged->matrix = doubles(b, 6 * rows * rows);
     engaged->given_ground = doubles(b, (size_t)setup->base.n);
-    engaged->given_far = doubles(b, (size_t)setup->far);
-    engaged->far = doubles(b, rows * (size_t)setup->far);
 }
 
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
@@ -215,8 +203,6 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
     work->columns = doubles(&b, gk_side_scratch(model));
     work->sum_ground = doubles(&b, ground);
-    work->sum_far = doubles(&b, (size_t)setup->far);
-    work->port_far = doubles(&b, (size_t)(model->ports * setup->far));
     return b.used;
 }
 
@@ -478,64 +464,6 @@ static void fill_parts(const gk_model *model, const gk_base *base, gk_mesh *mesh
     mesh->at[1] = base->from[mesh->side[1].gear] - (b->width ? b->from - a->width : a->from);
 }
 
-/* ---- what is far --------------------------------------------------------------------------------------------------- */
-static int reads(const gk_model *model, int set, int g, int oscillator)
-{
-    const int32_t *list = model->gear[g].ground[set].list;
-    for (int k = 0; k < model->gear[g].ground[set].reads; k++)
-        if (list[k] == oscillator) return 1;
-    return 0;
-}
-
-/* does an engagement hear of an oscillator, by a gear or by the bore of a port? */
-static int hears(const gk_model *model, const gk_setup *setup, int e, int oscillator)
-{
-    const gk_mesh *mesh = &setup->mesh[e];
-    const gk_ground *ground = &model->ground[setup->base.set];
-    for (int p = 0; p < mesh->ports; p++)
-        if (ground->port_rows[mesh->port[p] * ground->n + oscillator] != 0.0) return 1;
-    return reads(model, setup->base.set, mesh->side[0].gear, oscillator) ||
-           reads(model, setup->base.set, mesh->side[1].gear, oscillator);
-}
-
-/* columns of the oscillators that are not dynamic and that several engagements hear of: those that the same gear is the
- * first to read follow each other */
-static void fill_far(const gk_model *model, gk_setup *setup)
-{
-    const gk_base *base = &setup->base;
-    const gk_ground *ground = &model->ground[base->set];
-    int n = 0;
-    for (int k = 0; k < ground->n; k++) setup->far_slot[k] = -1;
-    if (!setup->far) return;
-    for (int g = 0; g <= model->gears; g++, n = (n + 3) / 4 * 4)
-        for (int k = 0; k < ground->n; k++) {
-            int hearing = 0;
-            if (base->slot[k] >= 0 || setup->far_slot[k] >= 0) continue;
-            if (g < model->gears && !reads(model, base->set, g, k)) continue;
-            for (int e = 0; e < model->engagements && hearing < 2; e++) hearing += hears(model, setup, e, k);
-            if (hearing > 1) setup->far_slot[k] = n++;
-        }
-    setup->far_supports = n;
-    setup->far = n + (model->supports + 3) / 4 * 4;
-    memcpy(setup->press, ground->kappa, (size_t)(model->supports * model->supports) * sizeof *setup->press);
-    gk_limit_cholesky(setup->press, model->supports);
-}
-
-/* the parts of the far oscillators that the rows of an engagement read: its gears, and the ports among its joints */
-static void fill_far_parts(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_mesh *mesh)
-{
-    for (int w = 0; w < 2; w++) mesh->far[w] = mesh->side[w].far_read;
-    for (int p = 0; p < mesh->ports; p++) {
-        const gk_span port = span_of(work->port_far + mesh->port[p] * setup->far, setup->far_supports);
-        const int w = gk_port_of(model, mesh->side[0].gear) == mesh->port[p] ? 0 : 1;
-        mesh->far[w] = hull(mesh->far[w], port);
-    }
-    if (meet(mesh->far[0], mesh->far[1])) {
-        mesh->far[0] = hull(mesh->far[0], mesh->far[1]);
-        mesh->far[1] = (gk_span){0, 0};
-    }
-}
-
 static void add_joint(gk_setup *setup, int port, int which, int live, double k, double c)
 {
     setup->joint[port][which] = (gk_joint){live, live && k > 0.0 ? 1.0 / k : 0.0, live ? c : 0.0};
@@ -728,11 +656,8 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     fill_base(model, setup, which);
     fill_ports(model, setup);
     for (int e = 0; e < model->engagements; e++) fill_mesh(model, setup, data, e);
-    fill_far(model, setup);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);
-    for (int p = 0; p < model->ports && setup->far; p++) gk_side_port_far(model, setup, work, p);
-    for (int e = 0; e < model->engagements; e++) fill_far_parts(model, setup, work, &setup->mesh[e]);
     fill_explicit(model, setup, work);
     outcome = gk_limit_choose(model, setup, work, data->stage[V_H], message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;

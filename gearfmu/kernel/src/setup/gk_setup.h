@@ -11,8 +11,7 @@ enum {
     GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
     MAX_CANDIDATES = 24, /* tooth pairs that can be near contact at any position, both flanks */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
-    MAX_SOFT = 64, /* modes of a gear with several engagements that statics take as unknowns */
-    MAX_FAR = MAX_GROUND + MAX_SUPPORTS + 4 * MAX_GEARS + 4
+    MAX_SOFT = 64 /* modes of a gear with several engagements that statics take as unknowns */
 };
 
 typedef struct gk_effects {
@@ -102,12 +101,10 @@ typedef struct gk_side {
         *residual; /* (nodes + 1, points, 2, columns): C of what is not dynamic at the node, and mixed with the next, so
                           that the whole of C is a parabola between nodes at every level; points: strips of the candidates */
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
+    int port_of;   /* the port that the gear feels, −1: none */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
     gk_span held;  /* the supports that this side loads */
-    double *support;  /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
-    gk_real *far;     /* (nodes + 1, points, far): outward, of ground oscillators that are not dynamic and that another
-                               engagement reads too, over Ω; then Lᵀ C_fs of the supports, κ = L Lᵀ */
-    gk_span far_read; /* the oscillators among them */
+    double *support; /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
 } gk_side;
 
 typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
@@ -120,7 +117,6 @@ typedef struct gk_mesh { /* an engagement */
     gk_span part[2];      /* parts of the ground group that its rows read: gear A's, gear B's; one where these meet */
     int local;            /* their widths together */
     int at[2];            /* where the part of either gear begins in such a row */
-    gk_span far[2];       /* parts of the far oscillators that its rows read, likewise */
     int joined;           /* both gears read the same oscillators: what a step does has no tables */
     int ports, port[2];   /* ports whose rows stand in this engagement's system */
     int spins, spin[7];   /* spins that its rows read: rotor of A, of B, of their frame, chains' inertias and discs */
@@ -196,10 +192,7 @@ struct gk_setup {
     gk_modal modal[MAX_GEARS];
     gk_base base;
     gk_mesh mesh[MAX_ENGAGEMENTS];
-    int islands, far;  /* far: length of the rows through which residuals of different engagements meet, 0: none do */
-    int32_t *far_slot; /* (all ground oscillators) their columns there, −1: dynamic, or read by one engagement only */
-    int far_supports;  /* column of the first support */
-    double *press;     /* (supports, supports) L of κ = L Lᵀ, lower */
+    int islands;
     gk_step_function *step; /* of the integrator, in the widest vectors of this processor */
     size_t state_size;
 };

@@ -44,6 +44,7 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
     const gk_gear *gear = &model->gear[e->gear[which]];
     memset(side, 0, sizeof *side);
     side->gear = e->gear[which], side->which = which;
+    side->port_of = gk_port_of(model, side->gear);
     side->nodes = 1, side->candidates = side->count[0] = 1;
     side->step = which == 1 && e->kind == MESH_EXTERNAL ? -1 : 1;
     side->pitch = 1.0;
@@ -92,7 +93,6 @@ typedef struct node { /* what a node's tables are made from */
     double *support;     /* (points, supports): C_fs */
     double *port;        /* (points) */
     double *flexibility; /* (modes) 1/ω² of the dynamic ones */
-    int port_of;         /* the port that the gear feels, −1: none */
 } node;
 
 static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
@@ -266,7 +266,7 @@ static void gather_node(node *n, double position)
         blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
         if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
         blend(n, n->gear->port_residual, p, n->model->ports, ports);
-        n->port[i] = n->port_of >= 0 ? ports[n->port_of] : 0.0;
+        n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
         if (n->e->kind != MESH_FLAT)
             ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
                          n->rigid + (size_t)i * n->gear->ground[set].reads,
@@ -414,12 +414,13 @@ static void store_joints(const node *n, int at, const double *still)
             const double w = row[k] * still[k];
             if (w == 0.0) continue;
             for (int s = 0; s < supports; s++) moved[s] += w * ground->support_rows[s * ground->n + list[k]];
-            if (n->port_of >= 0) turned += w * ground->port_rows[n->port_of * ground->n + list[k]];
+            if (n->side->port_of >= 0) turned += w * ground->port_rows[n->side->port_of * ground->n + list[k]];
         }
         for (int s = 0; s < supports; s++) {
             const double *kappa = ground->kappa + s * supports;
             side->support[((size_t)at * points + i) * supports + s] = dot(kappa, moved, supports);
-            if (n->port_of >= 0) turned -= fs[s] * dot(kappa, n->model->port_support + n->port_of * supports, supports);
+            if (n->side->port_of >= 0)
+                turned -= fs[s] * dot(kappa, n->model->port_support + n->side->port_of * supports, supports);
         }
         side->port[(size_t)at * points + i] = turned;
     }
@@ -452,59 +453,6 @@ static void store_ground(const node *n, int at)
     }
 }
 
-/* Lᵀ x of the supports (a support that does not act has an empty row in L) */
-static void press_supports(const gk_setup *setup, const double *x, int n, double *out)
-{
-    for (int j = 0; j < n; j++) {
-        out[j] = 0.0;
-        for (int i = j; i < n; i++) out[j] += setup->press[i * n + j] * x[i];
-    }
-}
-
-/* rows through which other engagements of the island meet this one's residual */
-static void store_far(const node *n, int at, const double *still)
-{
-    const gk_side *side = n->side;
-    const gk_setup *setup = n->setup;
-    const int set = setup->base.set, reads = n->gear->ground[set].reads;
-    const int32_t *list = n->gear->ground[set].list;
-    double pressed[MAX_SUPPORTS];
-    for (int i = 0; i < n->points; i++) {
-        gk_real *to = side->far + ((size_t)at * n->points + i) * setup->far;
-        memset(to, 0, (size_t)setup->far * sizeof *to);
-        for (int k = 0; k < reads; k++)
-            if (setup->far_slot[list[k]] >= 0)
-                to[setup->far_slot[list[k]]] = (gk_real)(n->ground[(size_t)i * reads + k] * sqrt(still[k]));
-        press_supports(setup, n->support + (size_t)i * n->model->supports, n->model->supports, pressed);
-        for (int s = 0; s < n->model->supports; s++) to[setup->far_supports + s] = (gk_real)pressed[s];
-    }
-}
-
-/* the far oscillators that a gear reads */
-static gk_span far_of(const gk_model *model, const gk_setup *setup, int g)
-{
-    const int set = setup->base.set;
-    int from = setup->far, to = 0;
-    for (int k = 0; k < model->gear[g].ground[set].reads && setup->far; k++) {
-        const int slot = setup->far_slot[model->gear[g].ground[set].list[k]];
-        if (slot >= 0) from = slot < from ? slot : from, to = slot >= to ? slot + 1 : to;
-    }
-    return from < to ? (gk_span){from / 4 * 4, (to + 3) / 4 * 4 - from / 4 * 4} : (gk_span){0, 0};
-}
-
-/* the same of a bore's angle */
-void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *work, int port)
-{
-    const gk_ground *ground = &model->ground[setup->base.set];
-    double *to = work->port_far + (size_t)port * setup->far;
-    memset(to, 0, (size_t)setup->far * sizeof *to);
-    if (!setup->on.residual) return;
-    for (int k = 0; k < ground->n; k++)
-        if (setup->far_slot[k] >= 0)
-            to[setup->far_slot[k]] = ground->port_rows[port * ground->n + k] / ground->omega[k];
-    press_supports(setup, model->port_support + port * model->supports, model->supports, to + setup->far_supports);
-}
-
 /* ---- all of them -------------------------------------------------------------------------------------------------- */
 static node begin_node(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
 {
@@ -518,7 +466,6 @@ static node begin_node(const gk_model *model, const gk_setup *setup, double *roo
     n.support = room, room += most * (size_t)model->supports;
     n.port = room, room += most;
     n.flexibility = room;
-    n.port_of = gk_port_of(model, side->gear);
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
     gk_strips_rows(model, setup, n.e, side->gear, n.weight);
     const double x = n.e->position[1][0] - n.e->position[0][0], y = n.e->position[1][1] - n.e->position[0][1];
@@ -554,14 +501,12 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     double still[MAX_GROUND];
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
     flexibility_of_still(&n, still);
-    side->far_read = far_of(model, setup, side->gear);
     for (int at = 0; at <= side->nodes; at++) {
         gather_node(&n, (double)at / side->nodes);
         store_rows(&n, at);
         if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
         if (setup->on.residual) store_residual(&n, at, 0, still);
         if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, still);
-        if (setup->far && setup->on.residual) store_far(&n, at, still);
     }
     for (int at = 0; at < side->nodes && setup->on.residual; at++) {
         gather_node(&n, (at + 0.5) / side->nodes);
@@ -573,7 +518,6 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
         memset(side->residual, 0, 2 * nodes * points * (size_t)side->columns * sizeof(gk_real));
         memset(side->path, 0, nodes * points * (size_t)setup->strips * sizeof *side->path);
     }
-    if (!setup->on.residual) memset(side->far, 0, nodes * points * (size_t)setup->far * sizeof *side->far);
     if (!setup->on.residual || n.e->kind == MESH_FLAT) {
         memset(side->port, 0, nodes * points * sizeof *side->port);
         memset(side->support, 0, nodes * points * (size_t)model->supports * sizeof *side->support);
