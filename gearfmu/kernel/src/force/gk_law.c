@@ -7,26 +7,33 @@
 
 static const double B_LOW = 5e-6; /* m: half-width under which a flank is rough rather than Hertzian (assumed) */
 
-/* the law of a contact with 1/ρA + 1/ρB = curvature, per metre of length. b² at its bounds is the same for all
+/* secant at torque_max carried by one tooth pair: a straight line δ = c f */
+static void straighten(const gk_engagement *e, gk_laws *law)
+{
+    const double reference = e->force_max / e->width;
+    for (int l = 0; l < 4; l++)
+        law->c[l] -= 0.5 * law->a[l] * gk_log(law->beta[l] * gk_clamp(reference, law->low[l], law->high[l]));
+    law->a = law->low = law->high = GK_ALL(0.0);
+    law->c_low = law->slope_high = law->c;
+    law->q_low = law->phi_log = law->phi_high = law->delta_high = GK_ALL(0.0);
+}
+
+/* the laws of four contacts with 1/ρA + 1/ρB = curvature, per metre of length. b² at its bounds is the same for all
  * curvatures, so are the logarithms there. */
-void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double curvature, gk_local *law)
+static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_quad curvature, gk_laws *law)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
-    law->a = model->gear[e->gear[0]].local + model->gear[e->gear[1]].local;
-    law->c = mesh->strip_term;            /* Σ local (ln 4w − 1) */
+    law->a = GK_ALL(model->gear[e->gear[0]].local + model->gear[e->gear[1]].local);
+    law->c = GK_ALL(mesh->strip_term);    /* Σ local (ln 4w − 1) */
     law->beta = 2.0 * law->a / curvature; /* b² = 4 f R / (π E*), 1/E* = Σ (1−ν²)/E = Σ π·local/2 */
     law->low = mesh->square_low / law->beta;
     law->high = mesh->square_high / law->beta;
-    if (!GK_ON(setup, hertz)) { /* secant at torque_max carried by one tooth pair: a straight line δ = c f */
-        const double reference = e->force_max / e->width;
-        law->c -= 0.5 * law->a * gk_log(law->beta * gk_clamp(reference, law->low, law->high));
-        law->a = law->low = law->high = 0.0;
-        law->c_low = law->slope_high = law->c;
-        law->q_low = law->phi_log = law->phi_high = law->delta_high = 0.0;
+    if (!GK_ON(setup, hertz)) {
+        straighten(e, law);
         return;
     }
-    const double secant_low = law->c - 0.5 * law->a * mesh->log_low,
-                 secant_high = law->c - 0.5 * law->a * mesh->log_high; /* δ/f at the bounds */
+    const gk_quad secant_low = law->c - 0.5 * law->a * mesh->log_low,
+                  secant_high = law->c - 0.5 * law->a * mesh->log_high; /* δ/f at the bounds */
     law->c_low = secant_low + 0.5 * law->a;
     law->q_low = -0.5 * law->a / law->low;
     law->phi_log = law->low * law->low *
@@ -34,6 +41,14 @@ void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mes
     law->delta_high = secant_high * law->high;
     law->slope_high = secant_high - 0.5 * law->a;
     law->phi_high = law->high * law->high * (0.5 * secant_high - 0.125 * law->a - 0.5 * law->slope_high) + law->phi_log;
+}
+
+/* the laws of all contacts of a problem, by their curvatures */
+void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s)
+{
+    for (int i = s->contacts; i % 4; i++) s->curvature[i] = s->curvature[0];
+    for (int i = 0; i < s->contacts; i += 4)
+        set_four(model, setup, mesh, *(const gk_quad *)(s->curvature + i), &s->law[i / 4]);
 }
 
 /* half-widths at which the logarithm begins and ends */
@@ -59,18 +74,18 @@ GK_INLINE void log_of_four(const gk_quad *x, gk_quad *out)
     *out = n * GK_LN2_HIGH - ((half_square - (s * (half_square + z * r) + n * GK_LN2_LOW)) - f);
 }
 
-/* δ, δ′ and ∫ λ dδ of four strips of lengths `width` (per_width: their inverse, 0 where there is no strip); λ ≤ 0
- * follows the straight line through the origin, for iterates only */
-GK_INLINE void law_of_four(const gk_local *law, const double *force, const double *width, const double *per_width,
+/* δ, δ′ and ∫ λ dδ of four contacts of lengths `width` (per_width: their inverse, 0 where there is none); λ ≤ 0 follows
+ * the straight line through the origin, for iterates only */
+GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double *width, const double *per_width,
                            double *delta, double *yield, double *potential)
 {
     const gk_quad per = *(const gk_quad *)per_width, f = *(const gk_quad *)force * per;
-    gk_quad d = law->delta_high + law->slope_high * (f - law->high), slope = GK_ALL(law->slope_high),
+    gk_quad d = law->delta_high + law->slope_high * (f - law->high), slope = law->slope_high,
             energy = law->phi_high + 0.5 * law->slope_high * f * f;
-    if (GK_HAS(hertz) && law->a != 0.0) {
+    if (GK_HAS(hertz) && law->a[0] != 0.0) {
         const gk_bits low = f <= law->low, high = f >= law->high;
-        const gk_quad q = GK_CHOOSE(f > 0.0, GK_ALL(law->q_low), GK_ALL(0.0));
-        gk_quad square = law->beta * GK_CHOOSE(low, GK_ALL(law->low), f); /* b² */
+        const gk_quad q = GK_CHOOSE(f > 0.0, law->q_low, GK_ALL(0.0));
+        gk_quad square = law->beta * GK_CHOOSE(low, law->low, f); /* b² */
         log_of_four(&square, &square);
         const gk_quad secant = law->c - 0.5 * law->a * square;
         d = GK_CHOOSE(low, f * (law->c_low + q * f), GK_CHOOSE(high, d, f * secant));
@@ -83,34 +98,21 @@ GK_INLINE void law_of_four(const gk_local *law, const double *force, const doubl
     *(gk_quad *)potential = energy * *(const gk_quad *)width;
 }
 
-gk_approach gk_law_at(const gk_local *law, double width, double force)
+/* δ′ of a contact at a force that it does not have */
+double gk_law_slope(const gk_system *s, int i, double force)
 {
-    const double four[3][4] = {{force, force, force, force},
-                               {width, width, width, width},
-                               {1.0 / width, 1.0 / width, 1.0 / width, 1.0 / width}};
+    const int first = i / 4 * 4;
+    const gk_quad forces = GK_ALL(force);
     double delta[4], yield[4], potential[4];
-    law_of_four(law, four[0], four[1], four[2], delta, yield, potential);
-    return (gk_approach){delta[0], yield[0], potential[0]};
+    law_of_four(&s->law[i / 4], (const double *)&forces, s->width + first, s->per_width + first, delta, yield,
+                potential);
+    return yield[i % 4];
 }
 
-GK_INLINE void apply(gk_system *s, const int strips)
-{
-    for (int p = 0, first = 0; first < s->contacts; p++, first += strips)
-        for (int i = first; i < first + strips;
-             i += 4) /* what a quad writes beyond its place the next one writes again; links have no width */
-            law_of_four(&s->local[p], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
-                        s->potential + i);
-}
-
-/* the law of every contact at its present λ */
+/* the law of every contact at its present λ; what a quad writes beyond the contacts is 0: links have no width */
 void gk_law_apply(gk_system *s)
 {
-    if (!s->own_laws) {
-        GK_STRIPPED(GK_STRIPS(s), apply, s)
-        return;
-    }
-    for (int i = 0; i < s->contacts; i++) {
-        const gk_approach at = gk_law_at(&s->local[i], s->width[i], s->force[i]);
-        s->delta[i] = at.delta, s->yield[i] = at.slope, s->potential[i] = at.energy;
-    }
+    for (int i = 0; i < s->contacts; i += 4)
+        law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
+                    s->potential + i);
 }

@@ -134,7 +134,7 @@ static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, i
     if (!gk_limit_place(model, setup, work, &empty, &work->explicit_rows, e, position)) return 0;
     for (int i = 0; i < s->n; i++) {
         s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
-        s->slope[i] = i < s->contacts ? gk_law_at(gk_law_of(s, i), s->width[i], full * s->width[i]).slope : 0.0;
+        s->slope[i] = i < s->contacts ? gk_law_slope(s, i, full * s->width[i]) : 0.0;
     }
     gk_limit_compliance(s, s->A, full, 0, s->J);
     return gk_limit_cholesky(s->J, s->n);

@@ -456,7 +456,8 @@ void gk_step_remember(const gk_setup *setup, const gk_engaged *engaged, gk_data 
             m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
             m->dash[strip] = s->dash[i];
             m->end[strip] = s->end[i];
-            if (GK_ON(setup, hertz) && s->force[i] > gk_law_of(s, i)->high * s->width[i]) data->status |= STATUS_LAW;
+            if (GK_ON(setup, hertz) && s->force[i] > s->law[i / 4].high[i % 4] * s->width[i])
+                data->status |= STATUS_LAW;
         }
     }
     for (int i = s->contacts; i < s->n; i++)

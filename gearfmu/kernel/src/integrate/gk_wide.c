@@ -37,7 +37,7 @@
 #define gk_form_rates gk_form_rates_avx2
 #define gk_law_set gk_law_set_avx2
 #define gk_law_bounds gk_law_bounds_avx2
-#define gk_law_at gk_law_at_avx2
+#define gk_law_slope gk_law_slope_avx2
 #define gk_law_apply gk_law_apply_avx2
 #define gk_solve_contacts gk_solve_contacts_avx2
 #define gk_solve_clear gk_solve_clear_avx2

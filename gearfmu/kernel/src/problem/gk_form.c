@@ -19,7 +19,6 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
     for (int p = 0; p < engaged->places; p++) {
         const gk_place *place = &engaged->place[p];
         const gk_memory *memory = place->memory < 0 ? &fresh : &meshing->memory[place->memory];
-        if (!s->own_laws) gk_law_set(model, setup, mesh, place->point[0].curvature, &s->local[p]);
         for (int i = 0; i < GK_STRIPS(s); i++, n++) {
             const gk_point *point = gk_point_of(setup, place, i);
             const double width = mesh->strip_width[i] * point->share;
@@ -34,10 +33,11 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->weight[n] = width * slice;
             s->width[n] = width * per_cosine;
             s->per_width[n] = 1.0 / s->width[n];
-            if (s->own_laws) gk_law_set(model, setup, mesh, point->curvature, &s->local[n]);
+            s->curvature[n] = point->curvature;
         }
     }
     s->contacts = s->n = n;
+    gk_law_set(model, setup, mesh, s);
 }
 
 static void list_joint(const gk_setup *setup, const gk_data *data, double h, gk_system *s, int port, int joint)
@@ -63,7 +63,6 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
     gk_system *s = &work->engaged[e].system;
     s->strips = setup->strips;
     s->n = s->clutches = 0;
-    s->own_laws = setup->spatial;
     list_contacts(model, setup, data, h, work, e);
     for (int joint = 0; joint < JOINTS; joint++) /* clutches last */
         for (int p = 0; p < mesh->ports; p++)

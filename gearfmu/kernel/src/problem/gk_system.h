@@ -21,12 +21,10 @@ enum {
 /* λ ≥ 0; any λ; given torque; velocity-level friction */
 typedef enum { ROW_CONTACT, ROW_SPRING, ROW_TORQUE, ROW_CLUTCH } gk_row_kind;
 
-typedef struct gk_local {
-    double c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high;
-} gk_local;
-typedef struct gk_approach {
-    double delta, slope, energy;
-} gk_approach; /* δ(λ), δ′, ∫ λ dδ */
+/* local laws of four contacts side by side */
+typedef struct gk_laws {
+    gk_quad c, a, beta, low, high, q_low, c_low, phi_log, phi_high, slope_high, delta_high;
+} gk_laws;
 
 typedef struct gk_system {
     int contacts, n, stride, strips, clutches; /* clutches are the last rows */
@@ -38,9 +36,9 @@ typedef struct gk_system {
     double bound[MAX_ROWS], slip[MAX_JOINTS];        /* clutch: |z| ≤ bound; z of a slipping one, by clutch */
     double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
     double width[MAX_STRIDE], per_width[MAX_STRIDE]; /* of the contacts' strips; 0 in joints */
-    int own_laws;                 /* every strip has a law of its own, else the strips of a tooth pair share one */
-    gk_local local[MAX_CONTACTS]; /* laws of the contacts, per metre */
-    double rigid[MAX_LOCAL][MAX_STRIDE]; /* derivative of the rows by each spin of the engagement */
+    double curvature[MAX_STRIDE];                    /* of the contacts, 1/m */
+    gk_laws law[MAX_STRIDE / 4];                     /* laws of the contacts, per metre */
+    double rigid[MAX_LOCAL][MAX_STRIDE];             /* derivative of the rows by each spin of the engagement */
     double *D, *A, *P;          /* (n, stride) symmetric; P: strips of a tooth pair among each other, 1/k of joints */
     double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
                                          factor; what a damper's force does, D + late·A */
@@ -113,15 +111,9 @@ void gk_tangent_solve(const gk_system *s, double *x);
 /* gk_balance.c */
 void gk_balance_plain(const gk_island *island);
 void gk_balance_solve(const gk_island *island);
-/* law of a contact */
-static inline const gk_local *gk_law_of(const gk_system *s, int i)
-{
-    return &s->local[s->own_laws ? i : s->place_of[i]];
-}
-
 /* gk_law.c */
-void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double curvature, gk_local *law);
+void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s);
 void gk_law_bounds(const gk_model *model, gk_mesh *mesh);
-gk_approach gk_law_at(const gk_local *law, double width, double force);
+double gk_law_slope(const gk_system *s, int i, double force);
 void gk_law_apply(gk_system *s);
 #endif

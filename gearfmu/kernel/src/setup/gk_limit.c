@@ -90,9 +90,7 @@ void gk_limit_compliance(const gk_system *s, const double *Q, double full, int d
         const int first = p * strips;
         double S[MAX_SLICES * MAX_SLICES], X[MAX_SLICES * MAX_SLICES];
         for (int a = 0; a < strips * strips; a++) S[a] = s->P[(first + a / strips) * s->stride + first + a % strips];
-        for (int a = 0; a < strips; a++)
-            S[a * strips + a] +=
-                gk_law_at(gk_law_of(s, first + a), s->width[first + a], full * s->width[first + a]).slope;
+        for (int a = 0; a < strips; a++) S[a * strips + a] += gk_law_slope(s, first + a, full * s->width[first + a]);
         if (dashpots)
             yielding(S, s->damping + first, strips, X);
         else
