@@ -20,12 +20,13 @@ static void straighten(const gk_engagement *e, gk_laws *law)
 
 /* the laws of four contacts with 1/ρA + 1/ρB = curvature, per metre of length. b² at its bounds is the same for all
  * curvatures, so are the logarithms there. */
-static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_quad curvature, gk_laws *law)
+static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *curvature,
+                     gk_laws *law)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
     law->a = GK_ALL(model->gear[e->gear[0]].local + model->gear[e->gear[1]].local);
-    law->c = GK_ALL(mesh->strip_term);    /* Σ local (ln 4w − 1) */
-    law->beta = 2.0 * law->a / curvature; /* b² = 4 f R / (π E*), 1/E* = Σ (1−ν²)/E = Σ π·local/2 */
+    law->c = GK_ALL(mesh->strip_term);                      /* Σ local (ln 4w − 1) */
+    law->beta = 2.0 * law->a / *(const gk_quad *)curvature; /* b² = 4 f R / (π E*), 1/E* = Σ (1−ν²)/E = Σ π·local/2 */
     law->low = mesh->square_low / law->beta;
     law->high = mesh->square_high / law->beta;
     if (!GK_ON(setup, hertz)) {
@@ -47,8 +48,7 @@ static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh
 void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s)
 {
     for (int i = s->contacts; i % 4; i++) s->curvature[i] = s->curvature[0];
-    for (int i = 0; i < s->contacts; i += 4)
-        set_four(model, setup, mesh, *(const gk_quad *)(s->curvature + i), &s->law[i / 4]);
+    for (int i = 0; i < s->contacts; i += 4) set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
 }
 
 /* half-widths at which the logarithm begins and ends */

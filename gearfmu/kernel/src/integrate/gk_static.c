@@ -242,7 +242,7 @@ static int press(rest *r)
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e) && !form(r, e)) return 0;
-    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, STATIC_SWEEPS};
+    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, STATIC_SWEEPS, 1.0};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
     return 1;

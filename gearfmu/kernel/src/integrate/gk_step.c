@@ -481,7 +481,7 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
 {
     const int balanced = !gk_scheme_of(setup->integrator)->linear_force;
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, k, i, 0};
+        gk_coupled coupled = {model, setup, work, k, i, 0, 1.0};
         const gk_island island = gk_couple_island(&coupled);
         if (island.sweep) gk_couple_recall(&coupled);
         if (balanced)

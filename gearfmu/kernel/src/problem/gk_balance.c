@@ -8,9 +8,10 @@
 #endif
 static const double BALANCE = 1e-9; /* relative defect of energy left after a change of status */
 #ifdef GK_DOUBLE_MODES
-static const double STEADY_BALANCE = 1e-9;
+static const double STEADY_BALANCE = 1e-9, COUPLED_BALANCE = 1e-9;
 #else
-static const double STEADY_BALANCE = 1e-7; /* rows in float are good to 1e-7 */
+static const double STEADY_BALANCE = 1e-7;  /* rows in float are good to 1e-7 */
+static const double COUPLED_BALANCE = 1e-6; /* engagements know each other's gaps to 1e-7; what is left waits */
 #endif
 
 typedef struct balance {
@@ -191,6 +192,7 @@ static int find_alpha(const gk_island *island, balance b)
  * then the defect waits, as it does in a step without change of status. */
 void gk_balance_solve(const gk_island *island)
 {
+    const double steady = island->sweep ? COUPLED_BALANCE : STEADY_BALANCE;
     int curved = 0;
     for (int m = 0; m < island->count; m++) curved |= island->member[m]->curved;
     for (int all_rows = 0; all_rows < 2; all_rows++) {
@@ -198,7 +200,7 @@ void gk_balance_solve(const gk_island *island)
         const int changed = any_changed(island);
         if (!changed && !(GK_HAS(hertz) && curved)) return;
         const balance b = defect_of_all(island);
-        if (!open_balance(&b, changed ? BALANCE : STEADY_BALANCE)) {
+        if (!open_balance(&b, changed ? BALANCE : steady)) {
             leave(island, &b);
             return;
         }
@@ -208,6 +210,6 @@ void gk_balance_solve(const gk_island *island)
     gk_balance_plain(island);
     const balance b = defect_of_all(island);
     leave(island, &b);
-    if (open_balance(&b, STEADY_BALANCE))
+    if (open_balance(&b, steady))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }

@@ -201,7 +201,7 @@ static void part_at_once(const gk_coupled *c)
 /* sweeps until what engagements do to each other no longer changes */
 static void sweep(const gk_island *island)
 {
-    const gk_coupled *c = island->context;
+    gk_coupled *c = island->context;
     double change = INFINITY, next = INFINITY;
     give_all(c, WHOLE);
     const int most = c->sweeps ? c->sweeps : SWEEPS;
@@ -214,7 +214,8 @@ static void sweep(const gk_island *island)
             gk_solve_contacts(&c->work->engaged[e].system);
             give(c, e, WHOLE);
         }
-        next = round ? change * gk_min(1.0, change / last) : change; /* what another sweep would find */
+        if (round) c->rate = gk_min(1.0, change / last);
+        next = change * c->rate; /* what another sweep would find */
     }
     part_at_once(c);
     if (!(next < TOLERANCE)) island->member[0]->limit_reached = 1;

@@ -148,6 +148,7 @@ typedef struct gk_coupled { /* an island in a step */
     gk_work *work;
     const gk_coefficients *k;
     int island, sweeps; /* sweeps: at most; 0: as many as a step may take */
+    double rate;        /* by which a sweep changed less than the one before */
 } gk_coupled;
 gk_island gk_couple_island(gk_coupled *coupled);
 void gk_couple_recall(gk_coupled *coupled);
