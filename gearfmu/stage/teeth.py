@@ -21,7 +21,7 @@ def gear_section(gear: GearSpec | RingBody, shape: GearShape, phase: float, plac
     material, relief, edge = gear.material, gear.tip_relief, max(gear.tip_edge_radius, SHARPEST_EDGE)
     start = float(relief.start_roll) if relief else shape.s_a
     curve = relief.amount / (shape.s_a - start) ** 2 if relief else 0.0
-    inner = shape.s_tip - edge
+    inner = shape.s_tip - math.copysign(edge, shape.s_tip - shape.s_form)  # the edge's centre, inside the tooth
     local = 2 * (1 - material.poisson_ratio**2) / (math.pi * material.youngs_modulus)
     return gear_numbers(
         {

@@ -26,12 +26,17 @@ GK_API int probe_places(const gk_model *model, const gk_setup *setup, const doub
 /* out: {approach, slope, energy} of one slice at `force` */
 GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curvature, double force, double *out)
 {
-    gk_local law;
-    gk_law_set(model, setup, &setup->mesh[0], curvature, &law);
-    const gk_approach at = gk_law_at(&law, model->engagement[0].width / setup->slices, force);
-    out[0] = at.delta;
-    out[1] = at.slope;
-    out[2] = at.energy;
+    gk_system s;
+    memset(&s, 0, sizeof s);
+    s.contacts = 1;
+    s.curvature[0] = curvature, s.force[0] = force;
+    s.width[0] = model->engagement[0].width / setup->slices;
+    s.per_width[0] = 1.0 / s.width[0];
+    gk_law_set(model, setup, &setup->mesh[0], &s);
+    gk_law_apply(&s);
+    out[0] = s.delta[0];
+    out[1] = s.yield[0];
+    out[2] = s.potential[0];
 }
 
 GK_API double probe_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)

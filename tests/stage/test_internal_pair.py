@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from by_hand import BORE, _at, slice_weights
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from gearfmu.body import ReducedBody
 from gearfmu.body.reduce import reduced_gear
@@ -87,6 +87,15 @@ def flank_of(stage: GeneralStage, mesh: RingMesh, which: int, pose: np.ndarray, 
     return lambda roll: axis + turn @ gear.flank_point(roll, 1 - 2 * place[0])
 
 
+EDGES = {"pinion": 0, "ring": 1}
+
+
+def past(mesh: RingMesh, place, which: int) -> bool:
+    """Has the pair left the flank of gear `which`? Its roll stays at the tip then."""
+    tip = mesh.gears[which].s_tip
+    return place.roll[which] >= tip if which == 0 else place.roll[which] <= tip
+
+
 @pytest.mark.parametrize("flank", [DRIVE, COAST])
 def test_gap_is_the_distance_of_two_involutes(stage: GeneralStage, mesh: RingMesh, inner: Inner, flank: int) -> None:
     """At displaced axes and any angle; open flanks, so that the shortest distance is along the common normal. Thinner
@@ -96,7 +105,7 @@ def test_gap_is_the_distance_of_two_involutes(stage: GeneralStage, mesh: RingMes
     for phi in rng.uniform(-20.0, 20.0, 6):
         pose = rolling(mesh, phi, lead) + np.append(rng.uniform(-1e-5, 1e-5, 2), np.zeros(4))
         for place in inner.places(pose, 2e-4):
-            if place.flank != flank:
+            if place.flank != flank or past(mesh, place, 0) or past(mesh, place, 1):
                 continue
             curves = [flank_of(stage, mesh, which, pose, (flank, place.tooth)) for which in (0, 1)]
             near = minimize(
@@ -128,10 +137,101 @@ def test_gradient_of_the_gap(mesh: RingMesh, inner: Inner) -> None:
                 assert place.gradient[c] == pytest.approx((ends[1] - ends[0]) / (2 * step), abs=1e-7)
 
 
+def edge_centre(mesh: RingMesh, which: int) -> np.ndarray:
+    """Centre (2,) of the tip edge's arc from the axis, tooth or space 0 on its axis, drive flank: inside the tooth by
+    the edge's radius along the normal of the flank's end."""
+    gear = mesh.gears[which]
+    edge = gear.tip_edge
+    end, step = gear.flank_point(gear.s_tip, 1), 1e-6
+    inwards = gear.s_form - gear.s_tip
+    tangent = gear.flank_point(gear.s_tip + math.copysign(step, inwards), 1) - end
+    tangent /= np.hypot(*tangent)
+    normals = [np.array([-tangent[1], tangent[0]]), np.array([tangent[1], -tangent[0]])]
+    # material of the pinion's tooth lies towards its axis of symmetry, of the ring's away from that of its space
+    towards = -1.0 if which == 0 else 1.0
+    return end + edge * max(normals, key=lambda n: towards * n[1] * np.sign(end[1]))
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_a_tip_edge_past_its_flank_is_an_arc_against_the_other_involute(
+    stage: GeneralStage, mesh: RingMesh, inner: Inner, edge: str
+) -> None:
+    """The gap is the shortest distance of the arc's centre from the other flank, less the radius; open flanks."""
+    c, o, worst, count = EDGES[edge], 1 - EDGES[edge], 0.0, 0
+    for phi in np.linspace(0.0, 2 * math.pi / mesh.planet.z, 60):
+        pose = rolling(mesh, phi, 2e-5)
+        for place in inner.places(pose, 2e-4):
+            if place.flank != DRIVE or not past(mesh, place, c):
+                continue
+            curves = [flank_of(stage, mesh, which, pose, (DRIVE, place.tooth)) for which in (0, 1)]
+            name = stage.gears[c].name
+            axis = np.array(stage.rotors[stage.rotor_of(name)].axis) + pose[3 * c : 3 * c + 2]
+            angle = pose[3 * c + 2] + tooth_phases(stage)[name] + 2 * math.pi * place.tooth / mesh.gears[c].z
+            turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+            centre = axis + turn @ edge_centre(mesh, c)
+            near = minimize_scalar(
+                lambda roll, curve=curves[o], centre=centre: np.hypot(*(curve(roll) - centre)),
+                bracket=(place.roll[o], place.roll[o] + 1e-5),
+                options={"xtol": 1e-12},
+            )
+            worst, count = max(worst, abs(near.fun - mesh.gears[c].tip_edge - place.gap)), count + 1
+            assert near.x == pytest.approx(place.roll[o], abs=2e-6)
+    print(f"{count} places, largest difference {worst:.2e} m")
+    assert count >= 3 and worst < 1e-9
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_gap_and_gradient_go_over_to_the_tip_edge_without_a_jump(mesh: RingMesh, inner: Inner, edge: str) -> None:
+    c, found = EDGES[edge], 0
+
+    def at(phi: float, tooth: int):
+        pose = rolling(mesh, phi, 1e-5) + np.array([2e-5, -1e-5, 0, 0, 0, 0])
+        return next((p for p in inner.places(pose, 2e-3) if p.flank == DRIVE and p.tooth == tooth), None)
+
+    for tooth in range(-3, 4):
+        angles = np.linspace(0.0, 2 * math.pi / mesh.planet.z, 200)
+        kinds = [(place := at(phi, tooth)) is not None and past(mesh, place, c) for phi in angles]
+        for i in np.flatnonzero(np.diff(kinds)):
+            low, high = angles[i], angles[i + 1]
+            if at(low, tooth) is None or at(high, tooth) is None:
+                continue
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if past(mesh, at(middle, tooth), c) == kinds[i] else (low, middle)
+            before, after = at(low - 1e-9, tooth), at(high + 1e-9, tooth)
+            assert before.gap == pytest.approx(after.gap, abs=1e-9)
+            assert np.allclose(before.gradient, after.gradient, atol=1e-6)
+            assert before.curvature == pytest.approx(after.curvature, rel=1e-3)
+            found += 1
+    assert found
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_gradient_of_the_gap_of_a_tip_edge(mesh: RingMesh, inner: Inner, edge: str) -> None:
+    c, step, count = EDGES[edge], 1e-7, 0
+    for phi in np.linspace(0.0, 2 * math.pi / mesh.planet.z, 30):
+        pose = rolling(mesh, phi, lead=1e-5)
+        for place in inner.places(pose, 2e-4):
+            if not past(mesh, place, c):
+                continue
+            for k in range(6):
+                ends = []
+                for sign in (-1, 1):
+                    moved = pose.copy()
+                    moved[k] += sign * step
+                    near = (p for p in inner.places(moved, 1e-3) if (p.flank, p.tooth) == (place.flank, place.tooth))
+                    ends.append(next(near))
+                if all(past(mesh, end, c) for end in ends):
+                    slope = (ends[1].gap - ends[0].gap) / (2 * step)
+                    assert place.gradient[k] == pytest.approx(slope, abs=1e-6)
+                    count += 1
+    assert count > 20
+
+
 def test_drive_flanks_touch_along_the_path_and_coast_flanks_leave_the_backlash(mesh: RingMesh, inner: Inner) -> None:
     path, ratios = mesh.path, []
     for phi in np.linspace(-40.0, 40.0, 101):
-        places = inner.places(rolling(mesh, phi))
+        places = [p for p in inner.places(rolling(mesh, phi)) if not past(mesh, p, 0) and not past(mesh, p, 1)]
         drive = [p for p in places if p.flank == DRIVE]
         ratios.append(len(drive))
         assert drive and max(abs(p.gap) for p in drive) < 1e-13

@@ -121,12 +121,13 @@ static void flank_touch(const pair *q, const line *l, const gk_point *p, touch *
 }
 
 /* Eq. 6: tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l =
- * line of action. Returns 0 when the edge's centre lies inside the base circle of o: no involute there. All formulas
- * for c = 0; for c = 1 the roles and the direction of n swap, which the signs below say. */
+ * line of action. Returns 0 when the edge's centre lies inside the base circle of o: no involute there. m: along the
+ * other's involute normal, away from its base circle, into the teeth of a ring and out of others (side = 1). */
 static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_point *p, touch *t)
 {
     const int o = 1 - c, on = GK_ON(q->setup, tip_relief);
     const gk_gear *tip = q->gear[c], *other = q->gear[o];
+    const double side = o == 1 && internal(q) ? -1.0 : 1.0, own = c == 1 && internal(q) ? -1.0 : 1.0;
     double d[2];
     double over = p->roll[c] - tip->s_tip, sine, cosine;
     gk_sincos(beta[c] - l->sg * tip->corner_angle, &sine, &cosine);
@@ -138,22 +139,24 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
     double length = sqrt(l2);
     /* tangent point direction of the other's base circle: arg(D) − sg·atan(length / r_b) */
     double ct = (dx * other->r_b + l->sg * dy * length) / r2, st = (dy * other->r_b - l->sg * dx * length) / r2;
-    double nominal = l->t + (o == 1 ? GK_PI : 0.0); /* t′ is near t (+π): take the small difference as angle */
+    double nominal = l->t +
+                     (o == 1 && !internal(q) ? GK_PI : 0.0); /* t′ is near t (+π): the small difference as angle */
     gk_sincos(nominal, &sine, &cosine);
     double turn = gk_atan2(st * cosine - ct * sine, ct * cosine + st * sine);
     double s = other->r_b * l->sg * (beta[o] - nominal - turn);
-    double mx = -l->sg * st, my = l->sg * ct; /* outward normal of the other's flank */
+    double mx = -l->sg * st, my = l->sg * ct;
+    const double ux = side * mx, uy = side * my; /* outward normal of the other's flank */
     double slope_c, slope_o, relief_c = relief(tip, on, tip->s_tip, &slope_c),
                              relief_o = relief(other, on, s, &slope_o);
-    double fade = 1.0 / (1.0 + over / tip->edge);
-    p->gap = length - s - tip->edge + relief_c + slope_c * over * fade + relief_o;
+    double fade = 1.0 / (1.0 + own * over / tip->edge);
+    p->gap = side * (length - s) - tip->edge + relief_c + slope_c * over * fade + relief_o;
     memset(p->gradient, 0, sizeof p->gradient);
-    p->gradient[SPACE * c] = mx;
-    p->gradient[SPACE * c + 1] = my;
-    p->gradient[SPACE * c + 2] = mx * -ry + my * rx;
-    p->gradient[SPACE * o] = -mx;
-    p->gradient[SPACE * o + 1] = -my;
-    p->gradient[SPACE * o + 2] = -l->sg * other->r_b;
+    p->gradient[SPACE * c] = ux;
+    p->gradient[SPACE * c + 1] = uy;
+    p->gradient[SPACE * c + 2] = ux * -ry + uy * rx;
+    p->gradient[SPACE * o] = -ux;
+    p->gradient[SPACE * o + 1] = -uy;
+    p->gradient[SPACE * o + 2] = -side * l->sg * other->r_b;
     if (slope_c != 0.0) add_roll(p, l, tip, c, slope_c * fade * fade);
     if (slope_o != 0.0) { /* ∂s = sg r_b (∂φ_o − ∂t′), ∂t′ = ∂arg D − sg (r_b/(length r²)) D·∂D */
         double k = slope_o * l->sg * other->r_b, radial = -l->sg * other->r_b / (length * r2);
@@ -168,15 +171,15 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
     p->roll[c] = tip->s_tip;
     p->roll[o] = s;
     if (t) {
-        const double out = c == 0 ? -1.0 : 1.0, middle = 0.5 * (s + length - tip->edge);
-        t->n[0] = out * mx, t->n[1] = out * my;
+        const double out = c == 0 ? -1.0 : 1.0, middle = 0.5 * (s + length - side * tip->edge);
+        t->n[0] = out * ux, t->n[1] = out * uy;
         t->at[o][0] = other->r_b * ct + middle * mx, t->at[o][1] = other->r_b * st + middle * my;
         t->at[c][0] = rx + (middle - length) * mx, t->at[c][1] = ry + (middle - length) * my;
     }
-    double blend = gk_clamp(over / tip->strip, 0.0,
-                            1.0); /* the contact patch leaves the flank over about the strip's half-width */
+    /* the contact patch leaves the flank over about the strip's half-width */
+    double blend = gk_clamp(own * over / tip->strip, 0.0, 1.0);
     blend = blend * blend * (3.0 - 2.0 * blend);
-    p->curvature = (1.0 - blend) / tip->s_tip + blend / tip->edge + 1.0 / gk_max(s, 1e-4);
+    p->curvature = own * (1.0 - blend) / tip->s_tip + blend / tip->edge + side / gk_max(s, 1e-4);
     return 1;
 }
 
@@ -216,7 +219,7 @@ static flank_side side_of(const pair *q, int flank)
     s.p_b = q->gear[0]->r_b * s.pitch[0];
     s.allowance = flank ? q->allowance : 0.0;
     s.gap = (internal(q) ? s.roll[1] - s.roll[0] - s.l.L : s.l.L - s.roll[0] - s.roll[1]) + s.allowance;
-    s.beyond = GK_ON(q->setup, tip_contact) && !internal(q) ? 0.5 * s.p_b : 0.0;
+    s.beyond = GK_ON(q->setup, tip_contact) ? 0.5 * s.p_b : 0.0;
     return s;
 }
 
@@ -269,7 +272,7 @@ static int section(const pair *q, const flank_side *s, const double beta[2], dou
 {
     const int tip_b = internal(q) ? p->roll[1] < q->gear[1]->s_tip : p->roll[1] > q->gear[1]->s_tip;
     const int corner = p->roll[0] > q->gear[0]->s_tip ? 0 : tip_b ? 1 : -1;
-    if (corner >= 0 && (internal(q) || !GK_ON(q->setup, tip_contact))) return 0;
+    if (corner >= 0 && !GK_ON(q->setup, tip_contact)) return 0;
     if (corner < 0) {
         flank_contact(q, &s->l, s->gap - closer, p);
         if (t) flank_touch(q, &s->l, p, t);

@@ -219,14 +219,17 @@ static double corner_roll(const node *n, const place *p)
     const gk_engagement *e = n->e;
     const gk_gear *tip = &n->model->gear[e->gear[1 - n->side->which]];
     const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
-    const double a = sqrt(x * x + y * y), R = gk_base_reach(n->model, e), roll = sqrt(a * a - R * R) - p->nominal;
-    if (e->kind != MESH_EXTERNAL || !n->setup->on.tip_contact || roll <= tip->s_tip) return p->nominal;
+    const double a = sqrt(x * x + y * y), R = gk_base_reach(n->model, e), L = sqrt(a * a - R * R);
+    const int inside = e->kind == MESH_INTERNAL, on_ring = inside && n->side->which == 1;
+    const double roll = inside ? p->nominal + (on_ring ? -L : L) : L - p->nominal;
+    const int past = inside && !on_ring ? roll < tip->s_tip : roll > tip->s_tip;
+    if (e->kind == MESH_FLAT || !n->setup->on.tip_contact || !past) return p->nominal;
     const double sg = p->flank ? -1.0 : 1.0, angle = sg * (roll / tip->r_b - gk_acos(R / a) - tip->corner_angle);
     double sine, cosine;
     gk_sincos(angle, &sine, &cosine);
-    const double dx = tip->corner_radius * cosine - a, dy = tip->corner_radius * sine;
+    const double dx = tip->corner_radius * cosine + (on_ring ? a : -a), dy = tip->corner_radius * sine;
     const double l2 = dx * dx + dy * dy - n->gear->r_b * n->gear->r_b;
-    return l2 > 0.0 ? sqrt(l2) - tip->edge : 0.0;
+    return l2 > 0.0 ? sqrt(l2) - (on_ring ? -tip->edge : tip->edge) : 0.0;
 }
 
 /* Where a strip carries at the nominal centre distance: its part on both flanks, with a length of its own */

@@ -84,9 +84,10 @@ gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_me
  * leave the flank as a whole. Longer parts of coarse slices would carry at the gap of their middle alone. */
 static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_gear *gear, double helix)
 {
-    if (!GK_ON(setup, tip_contact) || e->kind != MESH_EXTERNAL) return 0.0;
+    if (!GK_ON(setup, tip_contact) || e->kind == MESH_FLAT) return 0.0;
     const double span = fabs(helix) * e->width / setup->slices, least = 1e-6;
-    return gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
+    const double outwards = gear->s_tip > gear->s_form ? 1.0 : -1.0;
+    return outwards * gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
 }
 
 /* mean of a gear's lead over −1 … 1 of its half-width, from … to */
