@@ -20,7 +20,14 @@ CouplingKind = Literal["rigid", "averaging"]
 class SetSpec(Spec):
     """The set as a whole; sun–planet and planet–ring share centre distance, module and pressure angle."""
 
-    planets: Annotated[Count, Field(ge=2, le=12)] = Field(description="number of planets, equally spaced")
+    planets: Annotated[Count, Field(ge=2, le=12)] = Field(
+        description="number of planets; equally spaced where `positions` is absent"
+    )
+    positions: tuple[Annotated[int, Field(ge=0, le=2000)], ...] | None = Field(
+        default=None,
+        description="places of the planets in steps of 360 deg/(z_sun + z_ring), the only ones at which their teeth "
+        "fit: ascending, the first 0",
+    )
     center_distance: Length = Field(description="distance of planet and sun axes, the radius of the bolt circle")
     normal_module: Length = Field(description="normal module m_n")
     pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
