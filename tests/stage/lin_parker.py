@@ -45,12 +45,13 @@ def springs(angles: Sequence[float], alpha: float) -> dict[str, np.ndarray]:
 
 
 def matrices(known: Mapping[str, Any], angles: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """M and K, kg and N/m."""
+    """M and K, kg and N/m. k_sun: radial stiffness of the sun's bearing where it is another than that of the others."""
     rows = springs(angles, math.radians(known["alpha_deg"]))
     bodies = [known[name] for name in ("carrier", "ring", "sun")] + [known["planet"]] * len(angles)
     mass = np.diag([value for body in bodies for value in (body["m"], body["m"], body["I_r2"])])
     bearing = known["k_bearing"]
-    held = [bearing, bearing, known["k_cu"], bearing, bearing, known["k_ru"], bearing, bearing, known["k_su"]]
+    sun = known.get("k_sun", bearing)
+    held = [bearing, bearing, known["k_cu"], bearing, bearing, known["k_ru"], sun, sun, known["k_su"]]
     stiffness = np.diag([*held, *[0.0] * (3 * len(angles))])
     for name, k in (("sun", known["k_mesh"]), ("ring", known["k_mesh"]), ("radial", bearing), ("tangential", bearing)):
         stiffness += k * rows[name].T @ rows[name]
@@ -70,3 +71,24 @@ def class_of(shape: np.ndarray, planets: int) -> str:
     return {(True, False): "rotational", (False, True): "translational", (False, False): "planet"}.get(
         (bool(turns), bool(moves)), "mixed"
     )
+
+
+def mesh_forces(
+    known: Mapping[str, Any], angles: Sequence[float], torque: float, pins: Mapping[int, tuple[float, float]]
+) -> np.ndarray:
+    """(2, N) N: static forces in the sun's and the ring's meshes, the sun held and the force torque/r on the carrier.
+
+    pins: deviation of single pins, radial and tangential (m). torque: over the radius of the bolts, N; its sign decides
+    which flanks carry, here those of `springs`.
+    """
+    rows = springs(angles, math.radians(known["alpha_deg"]))
+    _, stiffness = matrices(known, angles)
+    load = np.zeros(len(stiffness))
+    load[CARRIER + 2] = torque
+    for planet, error in pins.items():
+        for name, e in zip(("radial", "tangential"), error, strict=True):
+            load -= known["k_bearing"] * rows[name][planet] * e
+    free = np.delete(np.arange(len(load)), SUN + 2)
+    x = np.zeros(len(load))
+    x[free] = np.linalg.solve(stiffness[np.ix_(free, free)], load[free])
+    return known["k_mesh"] * np.stack([rows["sun"] @ x, rows["ring"] @ x])

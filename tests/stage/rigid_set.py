@@ -2,13 +2,15 @@
 
 The spec is that of planetary54 with other teeth, places, springs and planets; what `assemble` reads of a reduced body
 is written by hand. A flank yields by half of 1/k at every roll, on its own tooth alone, and its material is so hard that
-the local law adds 1e-8 of that: a mesh is a linear spring k for every pair of teeth in contact.
+the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +19,7 @@ import numpy as np
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import PlanetaryGeometry
+from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
@@ -31,6 +33,9 @@ from gearfmu.stage.groups import SPIN, Group
 from gearfmu.stage.layout import stage_layout
 
 HARD = 5e19  # Pa: the local compliance stays above the least that a model may have
+TORQUE = PortSpec(kind="torque")
+WIDTH, EDGE = 2.0, 1e-6  # m
+SPRINGS = {"level": 0.0, "slices": 1.0, "effect.hertz": 0.0, "effect.tip_contact": 0.0}
 WEAK = 1e-200  # kg^-½: its square is 0
 OUT_OF_PLANE = 1e8  # N/m and N·m/rad: nothing excites it
 
@@ -64,7 +69,8 @@ class RigidSet:
     pins: dict[int, tuple[float, float]] = field(default_factory=dict)
     positions: tuple[int, ...] | None = None
     damping_ratio: float = 0.0
-    ring_port: bool = False
+    contact_damping: float = 0.0
+    ports: Mapping[str, PortSpec] = field(default_factory=dict)
 
     @property
     def ring_teeth(self) -> int:
@@ -106,8 +112,6 @@ class RigidSet:
         }
         if self.positions is not None:
             update["positions"] = self.positions
-        torque = {"kind": "torque", "k": None, "c": None}
-        ports = {name: PortSpec(**torque) for name in ("carrier", "sun", *(["ring"] if self.ring_port else []))}
         all_mounts = self.ring.bearing
         radius = math.sqrt(self.ring_twist / all_mounts) * self.base("ring")
         mounts = shipped.ring.mounts.model_copy(
@@ -127,15 +131,16 @@ class RigidSet:
                 ),
                 "ring": shipped.ring.model_copy(update=ring),
                 "carrier": shipped.carrier.model_copy(update={"bearing": self._bearing(self.carrier)}),
-                "ports": ports,
-                "contact": shipped.contact.model_copy(update={"slices": 1, "damping": 0.0}),
+                "ports": {"carrier": TORQUE, "sun": TORQUE} | dict(self.ports),
+                "contact": shipped.contact.model_copy(update={"slices": 1, "damping": self.contact_damping / WIDTH}),
             }
         )
 
     def _common(self, gear: Any) -> dict[str, Any]:
         """Hard material, no relief, sharp tips that give the contact ratio."""
         material = gear.material.model_copy(update={"youngs_modulus": HARD})
-        found: dict[str, Any] = {"material": material, "tip_edge_radius": 1e-6, "tip_diameter": self._tip(gear.name)}
+        found: dict[str, Any] = {"material": material, "tip_edge_radius": EDGE, "tip_diameter": self._tip(gear.name)}
+        found["face_width"] = WIDTH
         return found | ({} if gear.name == "ring" else {"tip_relief": None})
 
     def _tip(self, name: str) -> float:
@@ -143,9 +148,7 @@ class RigidSet:
         half = self.contact_ratio / 2 * math.pi * self.module * math.cos(self.pressure_angle)
         r_b = self.base(name)
         roll = r_b * math.tan(self.pressure_angle) + (-half if name == "ring" else half)
-        edge = 1e-6
-        along = roll + edge
-        return 2 * (math.hypot(along, r_b) + (-edge if name == "ring" else edge))
+        return 2 * (math.hypot(roll + EDGE, r_b) + (-EDGE if name == "ring" else EDGE))
 
     def _bearing(self, body: Rigid) -> Any:
         shipped = load_stage("planetary54").sun.bearing
@@ -167,8 +170,12 @@ class RigidSet:
     def model(self) -> StageModel:
         return assemble(self.spec(), self.bodies())
 
-    def geometry(self) -> PlanetaryGeometry:
-        return PlanetaryGeometry.of(self.spec())
+
+def kernel_of(model: StageModel, library: Path | None = None, **parameters: float) -> Kernel:
+    """Prepared: nothing but springs of the meshes, one slice."""
+    kernel = Kernel(model.blob, SPRINGS | parameters, library)
+    kernel.prepare()
+    return kernel
 
 
 def _gear(rigid: RigidSet, gear: Any, shape: Any) -> SimpleNamespace:
@@ -252,6 +259,14 @@ class Motion:
         stage, bodies = self.model.stage, self.rigid.bodies()
         *gears, carrier = set_gears(self.model.spec, bodies)
         return mount_sets(stage_layout(stage, gears, carriers={"carrier": carrier}))[0]
+
+    def plane_modes(self, system: Linearised) -> tuple[np.ndarray, np.ndarray]:
+        """Natural frequencies (k,) Hz, ascending, of the motions in the plane, and their shapes (9 + 3N, k)."""
+        scale = 1 / np.sqrt(system.linear.mass)
+        squared, shapes = np.linalg.eigh(scale[:, None] * system.stiffness * scale)
+        moved = self.rows(system) @ (scale[:, None] * shapes)
+        inside = np.abs(moved).max(axis=0) > 1e-6
+        return np.sqrt(np.clip(squared[inside], 0, None)) / (2 * math.pi), moved[:, inside]
 
     def rows(self, system: Linearised) -> np.ndarray:
         """(9 + 3N, n)."""
