@@ -15,9 +15,9 @@ from gearfmu.geometry.planetary import planet_angles
 class CarrierGeometry:
     """Carrier in the set's frame (m): axis z, z = 0 at the planets' mid-width, bolt 0 on +x.
 
-    angles: of the bolts (rad), ascending. a: radius of the bolt circle. r_bore, r_o: bore and outer radius of the plate;
-    it lies in z ∈ [plate_low, plate_high]. r_bolt: radius of the bolts, from the plate to z = +seat/2; their seats, where the
-    planets' bearings sit, are z ∈ [−seat/2, seat/2].
+    angles: of the bolts (rad), ascending. a: radius of the bolt circle. r_bore, r_o: bore and outer radius of the
+    plate; it lies in z ∈ [plate_low, plate_high]. r_bolt: radius of the bolts, from the plate to z = +seat/2; their
+    seats, where the planets' bearings sit, are z ∈ [−seat/2, seat/2].
     """
 
     angles: tuple[float, ...]

@@ -1,8 +1,8 @@
 """The planar model of a planetary set on paper: J. Lin, R. G. Parker, Analytical characterization of the unique
 properties of planetary gear free vibration, J. Vib. Acoust. 121 (1999) 316–321. No code of the product.
 
-Three freedoms a body, x, y and u = r θ (r: base radius; of the carrier that of the bolts), in the axes of the carrier at
-rest: carrier, ring, sun, then planets with x radial and y tangential at their places ψ. Without gyroscopic terms.
+Three freedoms a body, x, y and u = r θ (r: base radius; of the carrier that of the bolts), in the axes of the carrier
+at rest: carrier, ring, sun, then planets with x radial and y tangential at their places ψ. Without gyroscopic terms.
 """
 
 from __future__ import annotations

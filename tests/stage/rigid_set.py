@@ -1,8 +1,8 @@
 """Planetary sets of rigid bodies made without finite elements: given masses and inertias, every tooth yields alike.
 
 The spec is that of planetary54 with other teeth, places, springs and planets; what `assemble` reads of a reduced body
-is written by hand. A flank yields by half of 1/k at every roll, on its own tooth alone, and its material is so hard that
-the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact.
+is written by hand. A flank yields by half of 1/k at every roll, on its own tooth alone, and its material is so hard
+that the local law adds 1e-9 of that: a mesh is a linear spring k for every pair of teeth in contact.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class RigidSet:
         return [*gears, _carrier(self)]
 
     def model(self) -> StageModel:
-        return assemble(self.spec(), self.bodies())
+        return assemble(self.spec(), self.bodies(), rolls=4)
 
 
 def kernel_of(model: StageModel, library: Path | None = None, **parameters: float) -> Kernel:
