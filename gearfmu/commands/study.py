@@ -12,8 +12,10 @@ from gearfmu.commands.shared import Progress, progress_bar
 
 ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
 
-SET_ERRORS = ("planets", "rad/s", "level", "slices", "off", "n_dyn", "h_us", "against", "te_%", "mean_%", "force_%")
-SET_ERRORS += ("pin_%", "time", "ratio")
+SET_ERRORS = (
+    *("planets", "rad/s", "level", "slices", "off", "n_dyn", "h_us", "against"),
+    *("te_%", "mean_%", "force_%", "pin_%", "time", "ratio"),
+)
 
 
 @click.command()

@@ -404,3 +404,27 @@ def test_sets_of_three_to_six_planets_run(rigid: RigidSet) -> None:
     assert speeds == pytest.approx([1.0, rigid.ratio, *[planet] * rigid.planets], rel=5e-3)
     assert all(abs(kernel.get(f"sun_planet{k + 1}.force")) > 100 for k in range(rigid.planets))
     assert kernel.get("solver.trouble") == 0
+
+
+@pytest.mark.parametrize("coriolis", [1.0, 0.0])
+def test_a_sun_in_free_flight_moves_straight_on(coriolis: float) -> None:
+    """At 85 rad/s of the carrier, in axes that stand: where no tooth touches it the sun has the acceleration of its
+    bearing, −(k/m + Ω²) x, softening by Ω² being left out of the model; without Coriolis forces it bends by 2Ω v."""
+    speed, step = 85.0, 2 * H
+    stiffness, rigid = 1e6, replace(FREE, sun=Rigid(0.4, 0.39, 1e6))
+    start = {"carrier.w_start": speed, "sun.w_start": speed * rigid.ratio + 2.0, "effect.contact_damping": 0.0}
+    kernel = kernel_of(rigid.model(), h=H, **start, **{"effect.coriolis": coriolis})
+    kernel.initialize()
+    place, touched = np.empty(1500, complex), np.empty(1500, bool)
+    for i in range(len(place)):
+        kernel.step(step * i, step)
+        place[i] = kernel.get("sun.gear.x") + 1j * kernel.get("sun.gear.y")
+        touched[i] = any(kernel.get(f"sun_planet{k + 1}.force_max") > 0 for k in range(4))
+    flies = ~np.convolve(touched, np.ones(15), mode="same").astype(bool)[1:-1]
+    velocity, here = (place[2:] - place[:-2])[flies] / (2 * step), place[1:-1][flies]
+    bent = np.diff(place, 2)[flies] / step**2 + (stiffness / rigid.sun.mass + speed**2) * here
+    off = 2j * speed * velocity + 2 * speed**2 * here
+    size = np.abs(off).max()
+    print(flies.sum(), np.abs(bent).max() / size, np.abs(bent - off).max() / size)
+    assert flies.sum() > 200
+    assert np.abs(bent - (0.0 if coriolis else off)).max() < 0.01 * size
