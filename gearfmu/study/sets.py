@@ -14,7 +14,7 @@ from typing import Any
 
 from gearfmu.body import load_bodies
 from gearfmu.body.planetary import reduce_set_body
-from gearfmu.errors import ModelError
+from gearfmu.errors import ModelError, SimulationError
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
@@ -206,8 +206,8 @@ class _SetStudy:
         self.tell(min(len(self.rows) / 40, 1.0), where)
         try:
             run = measure(scene, model, point)
-        except ModelError as error:
-            self.said.append(f"{where}: refused: {error}")
+        except (ModelError, SimulationError) as error:
+            self.said.append(f"{where}: {error}")
             return
         if run.warning:
             self.said.append(f"{where}: {run.warning}")
