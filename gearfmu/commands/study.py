@@ -84,20 +84,17 @@ def _errors(spec: Any, out: Path, quick: bool, jobs: int) -> None:
 def _set_errors(spec: Any, out: Path, quick: bool) -> None:
     """Measure the price list of the scene's set and write table and chart."""
     from gearfmu.report.study import write_chart
-    from gearfmu.study.sets import SetRow, ladder, set_study
-    from gearfmu.study.table import read_rows, write_rows
+    from gearfmu.spec.stage import load_stage
+    from gearfmu.study.sets import ladder, set_study
 
     with progress_bar(spec.name) as progress:
-        found = set_study(spec, quick, progress)
-    path = out / "sets.csv"
-    kept = [row for row in read_rows(path, SetRow) if row.scene != spec.name]
-    write_rows(path, SetRow, [*kept, *found.rows])
+        found = set_study(spec, out, quick, progress)
     click.echo(set_table(found.rows))
     for note in found.notes:
         click.echo(f"- {note}")
-    levels = ladder(found.rows, found.rows[0].planets)
+    levels = ladder(found.rows, load_stage(spec.stage.name).set.planets)
     written = write_chart(levels, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
-    click.echo(", ".join(map(str, [path, *written])))
+    click.echo(", ".join(map(str, [out / "sets.csv", *written])))
 
 
 def _other(table: str, specs: Sequence[Any], out: Path, quick: bool) -> None:

@@ -8,20 +8,29 @@ five slices and all effects, so that their error is what they change and not tha
 
 from __future__ import annotations
 
+import hashlib
+import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
+from pathlib import Path
 from typing import Any
 
 from gearfmu.body import load_bodies
 from gearfmu.body.planetary import reduce_set_body
 from gearfmu.errors import ModelError, SimulationError
+from gearfmu.files import write_text
+from gearfmu.kernel import library_path
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel
-from gearfmu.study.bench import Point, Price, Replay, Run, measure, models_for, replayed_price
+from gearfmu.study.bench import Point, Replay, Run, measure, models_for, replayed_price
 from gearfmu.study.ladder import LEVELS, fitting
 from gearfmu.study.norm import Errors, Signals, errors
+from gearfmu.study.run import identity
+from gearfmu.study.table import KeptTable
 
 SETTLE, DURATION = 5e-3, 15e-3  # s
 STEPS = (10e-6, 6.7e-6, 5e-6, 2.5e-6, 1.25e-6)  # s
@@ -79,9 +88,13 @@ class SetStudy:
     notes: tuple[str, ...]
 
 
-def set_study(scene: SceneSpec, quick: bool = False, progress: Tell | None = None) -> SetStudy:
-    """The price list of the scene's planetary set; quick: few points on a short window. Raises what a run raises."""
-    return _SetStudy(scene, quick, progress or (lambda fraction, text="": None)).go()
+def set_study(scene: SceneSpec, out: Path, quick: bool = False, progress: Tell | None = None) -> SetStudy:
+    """Measure what is not yet in the folder `out` and return all of it; quick: few points on a short window.
+
+    Writes sets.csv after every point and sets.json, which says what the rows belong to: those of another kernel, stage
+    or scene are dropped. Raises what a run raises, but a point that the kernel refuses is told.
+    """
+    return _SetStudy(scene, out, quick, progress or (lambda fraction, text="": None)).go()
 
 
 def window(scene: SceneSpec, quick: bool = False) -> SceneSpec:
@@ -123,103 +136,136 @@ def ladder(rows: Sequence[SetRow], planets: int) -> list[SetRow]:
     return [row for row in rows if row.planets == planets and row.against.startswith("full") and not row.off]
 
 
+@dataclass(frozen=True)
+class _Case:
+    """What points share: scene, model, and what their errors are measured against, made when it is needed first."""
+
+    scene: SceneSpec
+    model: Callable[[], StageModel]
+    planets: int
+    against: str
+    wanted: Callable[[], Signals]
+
+
 class _SetStudy:
     """A price list that is being made."""
 
-    def __init__(self, scene: SceneSpec, quick: bool, tell: Tell) -> None:
-        self.scene, self.quick, self.tell = window(scene, quick), quick, tell
+    def __init__(self, scene: SceneSpec, out: Path, quick: bool, tell: Tell) -> None:
+        self.scene, self.out, self.quick, self.tell = window(scene, quick), out, quick, tell
         spec = load_stage(scene.stage.name)
         assert isinstance(spec, PlanetarySpec)
-        self.spec, self.bodies = spec, load_bodies(spec)
-        self.slices = scene.stage.slices
-        self.rows: list[SetRow] = []
-        self.said: list[str] = []
-        self.base: Replay | None = None
+        self.spec, self.bodies, self.slices = spec, load_bodies(spec), scene.stage.slices
+        self.model = self._model_of(spec, self.bodies)
+        self.base = Point("fast", h=self._fitting(BASE_STEP), slices=self.slices)
+        self.table = KeptTable(out / "sets.csv", SetRow)
+        self.identity = identity(self.scene, self.model, hashlib.sha256(library_path().read_bytes()).hexdigest())
+        kept = self._facts().get(scene.name, {})
+        fits = kept.get("identity") == self.identity
+        self.said: list[str] = kept.get("said", []) if fits else []
+        if not fits:
+            self.table.drop(scene.name)
 
     def go(self) -> SetStudy:
-        model = self._model(self.spec, self.bodies)
-        base = Point("fast", h=self._fitting(BASE_STEP), slices=self.slices)
-        first = measure(self.scene, model, base)
-        assert first.recording is not None
-        self.base = Replay(first.recording)
-        self._ladder(model)
-        self._changes(self.scene, model, first)
+        """Changes of the shipped set, its levels and steps, then other numbers of planets."""
+        self._say()
+        own, planets = (lambda: self.model), self.spec.set.planets
+        plain = f"fast, {1e6 * self.base.h:.3g} µs, {self.slices} slices"
+        here = _Case(self.scene, own, planets, plain, lambda: self._base_run.signals)
+        slices = [n for n in (SLICES[:1] if self.quick else SLICES) if n != self.slices]
+        effects = TURNING if self.quick else EFFECTS + TURNING
+        self._add(here, [replace(self.base, slices=n) for n in slices])
+        self._add(here, [replace(self.base, off=(effect,)) for effect in effects])
         if not self.quick:
             fast = at_speed(self.scene, FAST_SPEED)
-            self._changes(fast, model, measure(fast, model, base), TURNING)
-            for planets in (n for n in PLANETS if n != self.spec.set.planets):
-                self._planets(planets, base)
-        return SetStudy(tuple(self.rows), tuple(dict.fromkeys(self.said)))
+            there = _Case(fast, own, planets, plain, cache(lambda: measure(fast, self.model, self.base).signals))
+            self._add(there, [replace(self.base, off=(effect,)) for effect in TURNING])
+        steps = [self._fitting(h) for h in (QUICK_STEPS if self.quick else STEPS)]
+        levels = ("rigid", "fast") if self.quick else LEVELS
+        points = [Point(level, h=h, slices=self.slices) for level in levels for h in steps]
+        self._add(self._against_full(own, planets), points)
+        for count in () if self.quick else (n for n in PLANETS if n != planets):
+            self._add(self._against_full(cache(partial(self._with_planets, count)), count), [self.base])
+        return SetStudy(tuple(self.table.of(self.scene.name)), tuple(self.said))
 
-    def _model(self, spec: PlanetarySpec, bodies: Sequence[Any]) -> StageModel:
+    def _model_of(self, spec: PlanetarySpec, bodies: Sequence[Any]) -> StageModel:
         return models_for(self.scene, bodies, **{name: getattr(spec, name) for name in ("set", "carrier")})
+
+    def _with_planets(self, planets: int) -> StageModel:
+        self.tell(0.0, f"carrier of {planets} planets")
+        spec = with_planets(self.spec, planets)
+        return self._model_of(spec, [*self.bodies[:3], reduce_set_body(spec, "carrier")])
 
     def _fitting(self, wished: float) -> float:
         return fitting(self.scene.coupling.step, wished)
 
-    def _ladder(self, model: StageModel) -> None:
-        """Levels and steps against level full."""
-        wanted, name = self._reference(self.scene, model)
-        steps = [self._fitting(h) for h in (QUICK_STEPS if self.quick else STEPS)]
-        levels = ("rigid", "fast") if self.quick else LEVELS
-        for level in levels:
-            for h in steps:
-                self._add(self.scene, model, Point(level, h=h, slices=self.slices), wanted, name)
+    @cached_property
+    def _base_run(self) -> Run:
+        """What slices and effects at the scene's speed, and all prices, are compared with."""
+        return measure(self.scene, self.model, self.base)
 
-    def _changes(self, scene: SceneSpec, model: StageModel, plain: Run, effects: Sequence[str] = ()) -> None:
-        """Slices and effects, or these effects alone, against the same run with all of them."""
-        point = plain.point
-        name = f"{point.level}, {1e6 * plain.h:.3g} µs, {point.slices} slices"
-        if not effects:
-            for slices in (count for count in (SLICES[:1] if self.quick else SLICES) if count != point.slices):
-                self._add(scene, model, replace(point, slices=slices), plain.signals, name)
-        for effect in effects or (TURNING if self.quick else EFFECTS + TURNING):
-            self._add(scene, model, replace(point, off=(effect,)), plain.signals, name)
+    @cached_property
+    def _base_replay(self) -> Replay:
+        assert self._base_run.recording is not None
+        return Replay(self._base_run.recording)
 
-    def _planets(self, planets: int, point: Point) -> None:
-        """Another number of planets at level fast against its own reference."""
-        self.tell(0.0, f"carrier of {planets} planets")
-        spec = with_planets(self.spec, planets)
-        model = self._model(spec, [*self.bodies[:3], reduce_set_body(spec, "carrier")])
-        wanted, name = self._reference(self.scene, model)
-        self._add(self.scene, model, point, wanted, name)
+    def _against_full(self, model: Callable[[], StageModel], planets: int) -> _Case:
+        """Points against level full at the finest step."""
+        h = self._fitting(4 * FINEST if self.quick else FINEST)
 
-    def _reference(self, scene: SceneSpec, model: StageModel) -> tuple[Signals, str]:
-        """Level full at twice and once the finest step, and its name."""
-        finest = 4 * FINEST if self.quick else FINEST
-        self.tell(0.0, "reference")
-        coarse, fine = (
-            measure(scene, model, Point("full", h=self._fitting(h), slices=self.slices)) for h in (2 * finest, finest)
-        )
-        moved, name = errors(coarse.signals, fine.signals), f"full, {1e6 * fine.h:.3g} µs"
-        assert isinstance(model.spec, PlanetarySpec)
-        self.said.append(
-            f"reference of {model.spec.set.planets} planets, {name}: halved last it moved {_percent(moved)}"
-        )
-        return fine.signals, name
+        def wanted() -> Signals:
+            self.tell(0.0, "reference")
+            coarse, fine = (
+                measure(self.scene, model(), Point("full", h=step, slices=self.slices)) for step in (2 * h, h)
+            )
+            moved = _percent(errors(coarse.signals, fine.signals))
+            self._say(f"reference of {planets} planets, full, {1e6 * h:.3g} µs: halved last it moved {moved}")
+            return fine.signals
 
-    def _add(self, scene: SceneSpec, model: StageModel, point: Point, wanted: Signals, against: str) -> None:
-        assert isinstance(model.spec, PlanetarySpec)
-        planets, off = model.spec.set.planets, " ".join(point.off)
-        where = f"{planets} planets, {point.level}, {1e6 * point.h:.3g} µs, {point.slices} slices"
-        where += f", {off} off" if off else ""
-        self.tell(min(len(self.rows) / 40, 1.0), where)
+        return _Case(self.scene, model, planets, f"full, {1e6 * h:.3g} µs", cache(wanted))
+
+    def _add(self, case: _Case, points: Sequence[Point]) -> None:
+        for point in points:
+            if any(_is_at(row, case, point) for row in self.table.of(self.scene.name)):
+                continue
+            where = f"{case.planets} planets, {case.scene.start.pinion_speed:g} rad/s, {point.level}, "
+            where += f"{1e6 * point.h:.3g} µs, {point.slices} slices" + "".join(f", {off} off" for off in point.off)
+            self.tell(min(len(self.table.of(self.scene.name)) / 40, 1.0), where)
+            wanted = case.wanted()
+            try:
+                run = measure(case.scene, case.model(), point)
+            except (ModelError, SimulationError) as error:
+                self._say(f"{where}: {error}")
+                continue
+            if run.warning:
+                self._say(f"{where}: {run.warning}")
+            self.table.add(self._row(case, run, wanted))
+
+    def _row(self, case: _Case, run: Run, wanted: Signals) -> SetRow:
+        assert run.recording is not None
+        e, price = errors(run.signals, wanted), replayed_price(Replay(run.recording), self._base_replay)
+        head = (self.scene.name, case.planets, case.scene.start.pinion_speed, run.point.level, run.h, run.point.slices)
+        found = (e.te, e.te_mean, e.force, e.bearing, price.realtime_factor, price.cpu_ratio)
+        return SetRow(*head, " ".join(run.point.off), run.n_dyn, case.against, *found)
+
+    def _facts(self) -> dict[str, Any]:
         try:
-            run = measure(scene, model, point)
-        except (ModelError, SimulationError) as error:
-            self.said.append(f"{where}: {error}")
-            return
-        if run.warning:
-            self.said.append(f"{where}: {run.warning}")
-        e, price = errors(run.signals, wanted), self._price(run)
-        head = (self.scene.name, planets, scene.start.pinion_speed, point.level, run.h, point.slices, off, run.n_dyn)
-        self.rows.append(
-            SetRow(*head, against, e.te, e.te_mean, e.force, e.bearing, price.realtime_factor, price.cpu_ratio)
-        )
+            found: dict[str, Any] = json.loads((self.out / "sets.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found
 
-    def _price(self, run: Run) -> Price:
-        assert self.base is not None and run.recording is not None
-        return replayed_price(Replay(run.recording), self.base)
+    def _say(self, *texts: str) -> None:
+        """Kept beside the table: a study that goes on says it again."""
+        self.said = list(dict.fromkeys([*self.said, *texts]))
+        facts = self._facts() | {self.scene.name: {"identity": self.identity, "said": self.said}}
+        write_text(self.out / "sets.json", json.dumps(facts, indent=1, sort_keys=True) + "\n")
+
+
+def _is_at(row: SetRow, case: _Case, point: Point) -> bool:
+    """Whether the row is this point."""
+    same = (row.planets, row.speed, row.level, row.slices, row.off, row.against)
+    wanted = (case.planets, case.scene.start.pinion_speed, point.level, point.slices, " ".join(point.off), case.against)
+    return same == wanted and math.isclose(row.h_s, point.h, rel_tol=1e-4)
 
 
 def _percent(e: Errors) -> str:
