@@ -166,23 +166,23 @@ class _SetStudy:
             self.table.drop(scene.name)
 
     def go(self) -> SetStudy:
-        """Changes of the shipped set, its levels and steps, then other numbers of planets."""
+        """Levels and steps, slices and effects of the shipped set, then other numbers of planets."""
         self._say()
         own, planets = (lambda: self.model), self.spec.set.planets
         plain = f"fast, {1e6 * self.base.h:.3g} µs, {self.slices} slices"
         here = _Case(self.scene, own, planets, plain, lambda: self._base_run.signals)
         slices = [n for n in (SLICES[:1] if self.quick else SLICES) if n != self.slices]
         effects = TURNING if self.quick else EFFECTS + TURNING
+        steps = [self._fitting(h) for h in (QUICK_STEPS if self.quick else STEPS)]
+        levels = ("rigid", "fast") if self.quick else LEVELS
+        points = [Point(level, h=h, slices=self.slices) for level in levels for h in steps]
+        self._add(self._against_full(own, planets), points)
         self._add(here, [replace(self.base, slices=n) for n in slices])
         self._add(here, [replace(self.base, off=(effect,)) for effect in effects])
         if not self.quick:
             fast = at_speed(self.scene, FAST_SPEED)
             there = _Case(fast, own, planets, plain, cache(lambda: measure(fast, self.model, self.base).signals))
             self._add(there, [replace(self.base, off=(effect,)) for effect in TURNING])
-        steps = [self._fitting(h) for h in (QUICK_STEPS if self.quick else STEPS)]
-        levels = ("rigid", "fast") if self.quick else LEVELS
-        points = [Point(level, h=h, slices=self.slices) for level in levels for h in steps]
-        self._add(self._against_full(own, planets), points)
         for count in () if self.quick else (n for n in PLANETS if n != planets):
             self._add(self._against_full(cache(partial(self._with_planets, count)), count), [self.base])
         return SetStudy(tuple(self.table.of(self.scene.name)), tuple(self.said))
