@@ -251,8 +251,8 @@ EFFECTS: tuple[Effect, ...] = (
         formula="F = Ω² Σ m a on the places of the planets",
         equation="3.10 (eq. 17g)",
         matters=(
-            "forces of pins, and meshes whose planets it moves: 60 N a planet at 85 rad/s, 750 N at 300; without it the "
-            "ripple of transmission error and mesh forces is off by 3 and 12 %, and by 12 and 51 % (2.5 % of the mean)"
+            "forces of pins, and meshes whose planets it moves: 60 N a planet at 85 rad/s, 750 N at 300; without it "
+            "the ripple of transmission error and mesh forces is off by 3 and 12 %, and by 12 and 51 % (2.5 % of the mean)"
         ),
         off="pins carry mesh forces alone",
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
