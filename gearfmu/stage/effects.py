@@ -252,7 +252,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="3.10 (eq. 17g)",
         matters=(
             "forces of pins, and meshes whose planets it moves: 60 N a planet at 85 rad/s, 750 N at 300; without it "
-            "the ripple of transmission error and mesh forces is off by 3 and 12 %, and by 12 and 51 % (2.5 % of the mean)"
+            "the ripple of transmission error and mesh forces is off by 3 and 12 %, by 12 and 51 % (2.5 % of the mean)"
         ),
         off="pins carry mesh forces alone",
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
