@@ -36,6 +36,7 @@ stability: $(STAMP)
 ## make study       what accuracy costs: tables and charts of docs/study.md in benchmarks/study (bodies alone: make study-bodies)
 study: $(STAMP)
 	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --jobs $(JOBS)
+	$(RUN) -m gearfmu.cli study planetary_paper --out benchmarks/study
 	$(RUN) -m gearfmu.cli study pair_loaded pair_light --out benchmarks/study --table cuts
 	$(RUN) -m gearfmu.cli study pair_loaded --out benchmarks/study --table order --table limits
 	$(RUN) benchmarks/levels.py

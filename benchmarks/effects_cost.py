@@ -3,8 +3,9 @@ compiled without its code. Callgrind counts, which repeat exactly.
 
     python benchmarks/effects_cost.py [EFFECT …]
 
-Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; settings of each effect in
-gearfmu/stage/effects.py. Needs valgrind and cc. Prints a table and writes gearfmu/stage/effects_cost.csv, where
+Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; what only sets have on planetary54
+under 600 N·m at 85 rad/s of the carrier; settings of each effect in gearfmu/stage/effects.py. Needs valgrind and cc.
+Prints a table and writes gearfmu/stage/effects_cost.csv, where
 docs/effects.md takes it from; with EFFECT only those rows are measured again. Aim (issue 3): off costs at most 5 %
 more than without.
 """
@@ -18,9 +19,10 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies, load_stage_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel.build import build_library, source_hash, sources
 from gearfmu.spec.stage import load_stage
@@ -34,6 +36,10 @@ TORQUE, LIGHT = 302.0, {"tip_contact": 80.0}  # light: flanks carry alone, else 
 H, WARM, STEPS = 50e-6, 10, 38  # communication steps; 38 are one mesh period
 BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
 MISPLACED = {0: 5e-6}  # tooth → m
+SET, SET_WARM, SET_STEPS = "planetary54", 4, 10
+SET_START = {"carrier.w_start": 85.0, "sun.w_start": 340.0}
+SET_TORQUE = {"carrier.tau": 600.0, "sun.tau": -150.0}
+SET_WATCHED = ("sun_planet1.te", "sun_planet1.force", "energy.stored", "energy.dissipated")
 WATCHED = ("mesh.te", "mesh.force", "energy.stored", "energy.dissipated")
 
 
@@ -71,21 +77,30 @@ class Bench:
         """One run under callgrind. CalledProcessError when it fails."""
         blob = self.folder / f"{model.hash[:12]}.blob"
         blob.write_bytes(model.blob)
+        of_set = model is self.turning
+        words = set_arguments(model, settings) if of_set else arguments(model, settings, torque)
         command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--toggle-collect=measured",
-                   "--callgrind-out-file=/dev/null", self.host, library, blob, WARM, STEPS, H,
-                   *arguments(model, settings, torque)]  # fmt: skip
+                   "--callgrind-out-file=/dev/null", self.host, library, blob,
+                   *((SET_WARM, SET_STEPS) if of_set else (WARM, STEPS)), H, *words]  # fmt: skip
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=True)
         collected = re.search(r"Collected\s*:\s*(\d+)", done.stderr)
         internal, *outputs = done.stdout.split()
         return Count(int(collected[1]) / float(internal), tuple(outputs))
 
+    @cached_property
+    def turning(self) -> StageModel:
+        """A planetary set, which takes some seconds to assemble."""
+        spec = load_stage(SET)
+        return assemble(spec, load_bodies(spec))
+
     def measure(self, effect: Effect) -> tuple[Cost, bool]:
         """The three counts; and whether the kernel without the code computes the same bits as the effect off."""
-        with_it = self.misplaced if effect.name == "pitch_errors" else self.plain
+        plain = self.turning if effect.carried else self.plain
+        with_it = self.misplaced if effect.name == "pitch_errors" else plain
         whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
         on = self.count(whole, with_it, {**BASE, **effect.on_setting}, torque)
-        off = self.count(whole, self.plain, {**BASE, **effect.off_setting}, torque)
-        without = self.count(lacking, self.plain, {**BASE, **effect.off_setting}, torque)
+        off = self.count(whole, plain, {**BASE, **effect.off_setting}, torque)
+        without = self.count(lacking, plain, {**BASE, **effect.off_setting}, torque)
         cost = Cost(effect.name, on.instructions, off.instructions, without.instructions)
         return cost, off.outputs == without.outputs
 
@@ -98,6 +113,14 @@ def arguments(model: StageModel, settings: Mapping[str, float], torque: float) -
     words = [f"p{known[name].reference}={value!r}+0" for name, value in settings.items()]
     words += [f"i{known[name].reference}={start[name]!r}+{later[name] - start[name]!r}" for name in start]
     return words + [f"w{known[name].reference}" for name in WATCHED]
+
+
+def set_arguments(model: StageModel, settings: Mapping[str, float]) -> list[str]:
+    """`arguments` of a planetary set under constant torques."""
+    known, parameters = model.kernel().variables, {**settings, **SET_START}
+    words = [f"p{known[name].reference}={value!r}+0" for name, value in parameters.items()]
+    words += [f"i{known[name].reference}={value!r}+0" for name, value in SET_TORQUE.items()]
+    return words + [f"w{known[name].reference}" for name in SET_WATCHED]
 
 
 def table(rows: Mapping[str, Cost]) -> str:

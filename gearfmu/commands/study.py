@@ -12,6 +12,11 @@ from gearfmu.commands.shared import Progress, progress_bar
 
 ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "force_%", "bearing_%", "time", "ratio")
 
+SET_ERRORS = (
+    *("planets", "rad/s", "level", "slices", "off", "n_dyn", "h_us", "against"),
+    *("te_%", "mean_%", "force_%", "pin_%", "time", "ratio"),
+)
+
 
 @click.command()
 @click.argument("scenes", nargs=-1, required=True, metavar="SCENE...")
@@ -35,19 +40,28 @@ ERRORS = ("level", "integrator", "slices", "n_dyn", "h_us", "te_%", "mean_%", "f
 @click.option("--quick", is_flag=True, help="Few points on a short window.")
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes, for table errors.")
 def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bool, jobs: int) -> None:
-    """Error and price of the fidelity levels in SCENE, over the internal step and the slices."""
+    """Error and price of the fidelity levels in SCENE, over the internal step and the slices; of a planetary set also
+    over the number of planets and single effects (sets.csv)."""
     from gearfmu.commands.models import bodies_for_motion
     from gearfmu.spec.scene import load_scene
-    from gearfmu.spec.stage import load_pair
+    from gearfmu.spec.stage import load_stage, require_pair
 
     specs = [load_scene(scene) for scene in scenes]
-    for spec in specs:
-        load_pair(spec.stage.name)
-        bodies_for_motion(spec.stage.name)
+    stages = {spec.stage.name: load_stage(spec.stage.name) for spec in specs}
+    sets = {name for name, stage in stages.items() if stage.kind == "planetary_set"}
+    if sets and set(tables) != {"errors"}:
+        raise click.UsageError(f"{', '.join(sorted(sets))} is a planetary set: it has the table errors alone")
+    for name, stage in stages.items():
+        if name not in sets:
+            require_pair(stage)
+        bodies_for_motion(name)
     for table in dict.fromkeys(tables):
         if table == "errors":
             for spec in specs:
-                _errors(spec, out, quick, jobs)
+                if spec.stage.name in sets:
+                    _set_errors(spec, out, quick)
+                else:
+                    _errors(spec, out, quick, jobs)
         else:
             _other(table, specs, out, quick)
 
@@ -65,6 +79,22 @@ def _errors(spec: Any, out: Path, quick: bool, jobs: int) -> None:
         click.echo(f"- {note}")
     written = write_chart(found.rows, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
     click.echo(", ".join(map(str, [out / "study.csv", *written])))
+
+
+def _set_errors(spec: Any, out: Path, quick: bool) -> None:
+    """Measure the price list of the scene's set and write table and chart."""
+    from gearfmu.report.study import write_chart
+    from gearfmu.spec.stage import load_stage
+    from gearfmu.study.sets import ladder, set_study
+
+    with progress_bar(spec.name) as progress:
+        found = set_study(spec, out, quick, progress)
+    click.echo(set_table(found.rows))
+    for note in found.notes:
+        click.echo(f"- {note}")
+    levels = ladder(found.rows, load_stage(spec.stage.name).set.planets)
+    written = write_chart(levels, spec.stage.slices, out / spec.name, f"{spec.name}: {spec.description}")
+    click.echo(", ".join(map(str, [out / "sets.csv", *written])))
 
 
 def _other(table: str, specs: Sequence[Any], out: Path, quick: bool) -> None:
@@ -119,5 +149,23 @@ def error_table(rows: Any) -> str:
         )
         for row in rows
     ]
+    return _aligned(lines)
+
+
+def set_table(rows: Any) -> str:
+    """The rows of a planetary set as text, as `error_table`."""
+    lines = [SET_ERRORS] + [
+        (
+            *(str(row.planets), f"{row.speed:g}", row.level, str(row.slices), row.off or "-", str(row.n_dyn)),
+            *(f"{1e6 * row.h_s:.3g}", row.against),
+            *(f"{100 * getattr(row, f'{name}_error'):.2g}" for name in ("te", "te_mean", "force", "pin")),
+            *(f"{row.realtime_factor:.3g}", f"{row.cpu_ratio:.3g}"),
+        )
+        for row in rows
+    ]
+    return _aligned(lines)
+
+
+def _aligned(lines: Sequence[Sequence[str]]) -> str:
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)) for line in lines)

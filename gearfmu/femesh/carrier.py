@@ -10,6 +10,7 @@ for y ≥ 0; the other half is the mirror image. Blocks meet on two rays from th
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -45,6 +46,26 @@ def carrier_sector(geometry: CarrierGeometry, mesh: CarrierMeshSpec) -> FeMesh:
     if not (worst := float(scaled_jacobian(result).min())) > 0:
         raise MeshError(f"carrier: an element is folded (scaled Jacobian {worst:.2g}): give the bolts more room")
     return result
+
+
+def whole_carrier(geometry: CarrierGeometry, sector: FeMesh) -> FeMesh:
+    """The whole carrier of its `carrier_sector`: every bolt, with the wedge of the plate that it covers, turned to its
+    place, and the plate between two bolts stretched. MeshError where that folds an element."""
+    mesh = sector.full()
+    even = 2 * math.pi * np.arange(geometry.planets) / geometry.planets
+    if np.array_equal(even, geometry.angles):
+        return mesh
+    covered = 1.1 * math.asin(geometry.r_bolt / geometry.a)
+    ends = np.stack([even - covered, even + covered], 1).ravel()
+    turned = np.repeat(np.asarray(geometry.angles) - even, 2)
+    polar = np.arctan2(mesh.nodes[:, 1], mesh.nodes[:, 0])
+    turn = np.interp(polar, ends, turned, period=2 * math.pi)
+    c, s = np.cos(turn), np.sin(turn)
+    x, y, z = mesh.nodes.T
+    moved = replace(mesh, nodes=np.stack([c * x - s * y, s * x + c * y, z], 1))
+    if not (worst := float(scaled_jacobian(moved).min())) > 0:
+        raise MeshError(f"carrier: an element is folded (scaled Jacobian {worst:.2g}): move the planets apart")
+    return moved
 
 
 def _section(g: CarrierGeometry, mesh: CarrierMeshSpec) -> tuple[np.ndarray, np.ndarray]:

@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.geometry.planetary import planet_angles
+
 
 @dataclass(frozen=True)
 class CarrierGeometry:
-    """Carrier in the set's frame (m): axis z, z = 0 at the planets' mid-width, bolt 0 on +x, bolt k at angle 2πk/N.
+    """Carrier in the set's frame (m): axis z, z = 0 at the planets' mid-width, bolt 0 on +x.
 
-    planets: number N of bolts. a: radius of the bolt circle. r_bore, r_o: bore and outer radius of the plate; it lies
-    in z ∈ [plate_low, plate_high]. r_bolt: radius of the bolts, from the plate to z = +seat/2; their seats, where the
-    planets' bearings sit, are z ∈ [−seat/2, seat/2].
+    angles: of the bolts (rad), ascending. a: radius of the bolt circle. r_bore, r_o: bore and outer radius of the
+    plate; it lies in z ∈ [plate_low, plate_high]. r_bolt: radius of the bolts, from the plate to z = +seat/2; their
+    seats, where the planets' bearings sit, are z ∈ [−seat/2, seat/2].
     """
 
-    planets: int
+    angles: tuple[float, ...]
     a: float
     r_bore: float
     r_o: float
@@ -32,10 +34,15 @@ class CarrierGeometry:
         """The geometry of the carrier of a PlanetarySpec."""
         carrier = spec.carrier
         return cls(
-            planets=spec.set.planets, a=spec.set.center_distance, r_bore=carrier.bore_diameter / 2,
+            angles=planet_angles(spec), a=spec.set.center_distance, r_bore=carrier.bore_diameter / 2,
             r_o=carrier.outer_diameter / 2, r_bolt=carrier.bolt_diameter / 2, thickness=carrier.thickness,
             gap=carrier.gap, seat=spec.planet.face_width,
         )  # fmt: skip
+
+    @property
+    def planets(self) -> int:
+        """Number of bolts."""
+        return len(self.angles)
 
     @property
     def plate_high(self) -> float:
@@ -47,7 +54,7 @@ class CarrierGeometry:
 
     def bolt_axis(self, bolt: int) -> np.ndarray:
         """(3,) m, middle of the seat of a bolt: its master node."""
-        angle = 2 * math.pi * bolt / self.planets
+        angle = self.angles[bolt]
         return np.array([self.a * math.cos(angle), self.a * math.sin(angle), 0.0])
 
     @property
@@ -63,7 +70,7 @@ class CarrierGeometry:
 
     @property
     def centre_of_mass(self) -> float:
-        """z of the centre of mass, m."""
+        """z of the centre of mass, m. Equally spaced bolts leave it on the axis."""
         plate, bolt = self._parts()
         moment = plate * self.bore_centre[2] - self.planets * bolt * self.gap / 2
         return moment / self.volume

@@ -1,4 +1,4 @@
-"""A planetary set: two meshes with one centre distance, equally spaced planets, phases of assembly."""
+"""A planetary set: two meshes with one centre distance, places of the planets, phases of assembly."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from gearfmu.geometry import involute
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.pair import PairGeometry
+
+SAME_ANGLE = 1e-9  # rad
 
 
 @dataclass(frozen=True)
@@ -127,11 +129,11 @@ class RingMesh:
 
 @dataclass(frozen=True)
 class PlanetaryGeometry:
-    """Sun, planets and ring of a set: the two meshes and how many planets."""
+    """Sun, planets and ring of a set: the two meshes and the angles (rad) of the planets."""
 
     sun_mesh: PairGeometry
     ring_mesh: RingMesh
-    planets: int
+    angles: tuple[float, ...]
 
     @classmethod
     def of(cls, spec: Any) -> PlanetaryGeometry:
@@ -139,7 +141,7 @@ class PlanetaryGeometry:
         sun, planet = (GearGeometry.of(gear, spec.set) for gear in (spec.sun, spec.planet))
         ring = InternalGearGeometry.of(spec.ring, spec.set)
         a, backlash = spec.set.center_distance, spec.set.backlash
-        return cls(PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), spec.set.planets)
+        return cls(PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), planet_angles(spec))
 
     @property
     def ratio(self) -> float:
@@ -147,23 +149,23 @@ class PlanetaryGeometry:
         return 1 + self.ring_mesh.ring.z / self.sun_mesh.gears[0].z
 
     def planet_centre(self, planet: int) -> np.ndarray:
-        """(2,) m, with the carrier at angle 0: planet k at 2πk/N."""
-        angle = 2 * math.pi * planet / self.planets
+        """(2,) m, with the carrier at angle 0."""
+        angle = self.angles[planet]
         return self.sun_mesh.a * np.array([math.cos(angle), math.sin(angle)])
 
     @property
     def neighbour_clearance(self) -> float:
         """Gap (m) between the tip circles of neighbouring planets; negative: they touch."""
-        return 2 * self.sun_mesh.a * math.sin(math.pi / self.planets) - 2 * self.ring_mesh.planet.r_a
+        return 2 * self.sun_mesh.a * math.sin(least_apart(self.angles) / 2) - 2 * self.ring_mesh.planet.r_a
 
     def planet_phase(self, planet: int) -> float:
         """Angle (rad, in (−π/z_p, π/z_p]) of planet k's tooth 0 from +x that centres it in the mesh with the ring.
 
         Ring at rest with space 0 on +x, carrier at 0: the planet rolls in the ring by θ (1 − z_r/z_p) on the way to its
-        place θ = 2πk/N.
+        place θ.
         """
         z_p, z_r = self.ring_mesh.planet.z, self.ring_mesh.ring.z
-        theta, pitch = 2 * math.pi * planet / self.planets, 2 * math.pi / z_p
+        theta, pitch = self.angles[planet], 2 * math.pi / z_p
         return _wrapped(theta * (1 - z_r / z_p), pitch)
 
     def sun_phase(self) -> float:
@@ -175,8 +177,22 @@ class PlanetaryGeometry:
         return math.pi / z_s if z_p % 2 == 0 else 0.0
 
     def assembles(self) -> bool:
-        """Whether equally spaced planets fit: (z_s + z_r)/N is an integer."""
-        return (self.sun_mesh.gears[0].z + self.ring_mesh.ring.z) % self.planets == 0
+        """Whether the planets fit: their angles are multiples of 2π/(z_s + z_r)."""
+        teeth = self.sun_mesh.gears[0].z + self.ring_mesh.ring.z
+        return all(abs(math.remainder(angle, 2 * math.pi / teeth)) < SAME_ANGLE for angle in self.angles)
+
+
+def planet_angles(spec: Any) -> tuple[float, ...]:
+    """Angles (rad) of the planets of a PlanetarySpec with the carrier at 0, the first 0: as its `positions` say, or
+    2πk/N."""
+    if spec.set.positions is None:
+        return tuple(2 * math.pi * k / spec.set.planets for k in range(spec.set.planets))
+    return tuple(2 * math.pi * place / (spec.sun.teeth + spec.ring.teeth) for place in spec.set.positions)
+
+
+def least_apart(angles: tuple[float, ...]) -> float:
+    """Smallest angle (rad) between neighbours of ascending `angles`."""
+    return min(b - a for a, b in zip(angles, (*angles[1:], angles[0] + 2 * math.pi), strict=True))
 
 
 def _wrapped(angle: float, period: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from gearfmu.body.imported import imported_full_order, imported_set_sector, set_geometry
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh
-from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.femesh.ring import sector_mesh
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.modes.cyclic import Progress, cyclic_modes
@@ -71,7 +71,7 @@ def _carrier(spec: Any, count: int, progress: Progress | None, scale: float) -> 
     if progress:
         progress("finite elements", 0.1)
     sector = set_sector(spec, "carrier", scale)
-    mesh = sector.full()
+    mesh = whole_carrier(CarrierGeometry.of(spec), sector)
     slaves = {f"bolt{k}": sector.sector_nodes(k)[sector.sets["bolt"]] for k in range(sector.teeth)}
     return whole_modes(
         carrier_full_order(spec, scale), mesh, slaves | {"bore": mesh.sets["bore"]}, spec.carrier.material, count

@@ -1,11 +1,11 @@
-"""The carrier before reduction: four bolts, its 24 inputs, and the bore, which is the ground when it is judged."""
+"""The carrier before reduction: its bolts, six inputs each, and the bore, which is the ground when it is judged."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from gearfmu.fem import hex20
-from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
@@ -23,7 +23,7 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
     geometry = CarrierGeometry.of(spec)
     counts = spec.carrier.mesh
     sector = carrier_sector(geometry, counts.model_copy(update={"scale": counts.scale * scale}))
-    whole = sector.full()
+    whole = whole_carrier(geometry, sector)
     body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, spec.carrier.material))
     couplings = [
         Coupling(

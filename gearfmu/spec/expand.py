@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
+from gearfmu.geometry.planetary import planet_angles
 from gearfmu.spec.gear import Bearing, GearSpec
 from gearfmu.spec.general import (
     CarrierBody,
@@ -153,9 +154,9 @@ def _set_gear(gear: SetGearSpec, name: str, angles: dict[str, Any]) -> GearBody:
 
 def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]:
     rotors = {"sun": RotorSpec(axis=(0.0, 0.0), bodies={"sun": 0.0}, carried_by="carrier")}
+    angles = planet_angles(spec)
     for k, name in enumerate(planets):
-        angle = 2 * math.pi * k / spec.set.planets
-        c, s = math.cos(angle), math.sin(angle)
+        c, s = math.cos(angles[k]), math.sin(angles[k])
         radial, tangential = spec.set.pin_errors.get(k, (0.0, 0.0))
         rotors[name] = RotorSpec(
             axis=(spec.set.center_distance * c, spec.set.center_distance * s),

@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import Bearing, BodySpec, Factor, Length, Material, RackSpec, Ratio, Size, TipRelief
 from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
@@ -17,16 +17,29 @@ Deviation = Annotated[float, Quantity("m", at_least=-1e-3, at_most=1e-3)]
 CouplingKind = Literal["rigid", "averaging"]
 
 
+def _spur(angle: float) -> float:
+    if angle != 0.0:
+        raise refuse("planetary sets are spur so far: leave it out (pairs and trains of kind general may be helical)")
+    return angle
+
+
 class SetSpec(Spec):
     """The set as a whole; sun–planet and planet–ring share centre distance, module and pressure angle."""
 
-    planets: Annotated[Count, Field(ge=2, le=12)] = Field(description="number of planets, equally spaced")
+    planets: Annotated[Count, Field(ge=2, le=12)] = Field(
+        description="number of planets; equally spaced where `positions` is absent"
+    )
+    positions: tuple[Annotated[int, Field(ge=0, le=2000)], ...] | None = Field(
+        default=None,
+        description="places of the planets in steps of 360 deg/(z_sun + z_ring), the only ones at which their teeth "
+        "fit: ascending, the first 0",
+    )
     center_distance: Length = Field(description="distance of planet and sun axes, the radius of the bolt circle")
     normal_module: Length = Field(description="normal module m_n")
     pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
         description="normal pressure angle"
     )
-    helix_angle: Annotated[float, Quantity("rad", at_least=0, at_most=0)] = Field(
+    helix_angle: Annotated[float, Quantity("rad"), AfterValidator(_spur)] = Field(
         default=0.0, description="helix angle; only spur gears so far"
     )
     backlash: Size = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")

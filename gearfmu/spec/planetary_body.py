@@ -20,7 +20,13 @@ def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
     common = {"kind": spec.kind, "body": name}
     tooth = {"normal_module": s.normal_module, "pressure_angle": s.pressure_angle, "helix_angle": s.helix_angle}
     if name == "carrier":
-        place = {"planets": s.planets, "center_distance": s.center_distance, "seat": spec.planet.face_width}
+        place: dict[str, Any] = {
+            "planets": s.planets,
+            "center_distance": s.center_distance,
+            "seat": spec.planet.face_width,
+        }
+        if s.positions is not None:
+            place["positions"] = [k / (spec.sun.teeth + spec.ring.teeth) for k in s.positions]
         couplings = ["bore", *(f"bolt{k}" for k in range(s.planets))]
         carrier = spec.carrier.model_dump(exclude={"coupling", "imported", "bearing"})
         if spec.carrier.imported is not None:

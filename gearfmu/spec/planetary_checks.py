@@ -7,7 +7,7 @@ Formulas: ISO 21771; tip interference: Colbourne (1987). Nothing here stops at t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import RingMesh
+from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles
 from gearfmu.spec.checks import (
     STRIP_PER_HERTZ,
     Found,
@@ -193,21 +193,34 @@ def internal_half_width(gears: tuple[Any, Any], mesh: RingMesh, force: float) ->
 
 
 def _assembly(spec: PlanetarySpec, planet: GearGeometry) -> Found:
-    teeth, planets = spec.sun.teeth + spec.ring.teeth, spec.set.planets
-    if teeth % planets:
+    teeth, planets, positions = spec.sun.teeth + spec.ring.teeth, spec.set.planets, spec.set.positions
+    if positions is None and teeth % planets:
         fitting = [n for n in range(2, 13) if teeth % n == 0]
+        nearest = ", ".join(str(round(k * teeth / planets)) for k in range(planets))
         remedy = (
             f"the set cannot be assembled with equally spaced planets: (z_sun + z_ring)/planets = {teeth}/{planets} is "
-            f"no integer; possible are {', '.join(map(str, fitting)) or 'none'}, or other tooth numbers"
+            f"no integer; possible are {', '.join(map(str, fitting)) or 'none'}, or other tooth numbers, or planets "
+            f"that are not equally spaced: write positions = [{nearest}]"
         )
         yield "set.planets", str(planets), remedy
-    room = 2 * spec.set.center_distance * math.sin(math.pi / planets)
+    if positions is not None and not _are_places(positions, planets, teeth):
+        shown = f"[{', '.join(map(str, positions))}]"
+        remedy = f"one for each of the {planets} planets, ascending from 0 and below z_sun + z_ring = {teeth}"
+        yield "set.positions", shown, remedy
+        return
+    room = 2 * spec.set.center_distance * math.sin(least_apart(planet_angles(spec)) / 2)
     if room <= 2 * planet.r_a:
         remedy = f"neighbouring planets touch: their axes are {millimetres(room)} apart, the tip diameter is "
         yield "set.planets", str(planets), f"{remedy}{millimetres(2 * planet.r_a)}; fewer or smaller planets"
     for pin in spec.set.pin_errors:
         if pin >= planets:
             yield f"set.pin_errors.{pin}", str(pin), f"no such pin: the {planets} are 0 to {planets - 1}"
+
+
+def _are_places(positions: Sequence[int], planets: int, teeth: int) -> bool:
+    """Whether they are places of the planets, in steps of 2π/teeth."""
+    ascending = all(a < b for a, b in zip(positions, positions[1:], strict=False))
+    return len(positions) == planets and positions[0] == 0 and ascending and positions[-1] < teeth
 
 
 def _mounts(spec: PlanetarySpec) -> Found:
@@ -229,8 +242,8 @@ def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
     if g.r_o <= g.a + g.r_bolt:
         least = millimetres(2 * (g.a + g.r_bolt))
         yield "carrier.outer_diameter", carrier.outer_diameter, f"the bolts stand over the edge: more than {least}"
-    if g.r_bolt >= g.a * math.sin(math.pi / g.planets):
-        largest = millimetres(2 * g.a * math.sin(math.pi / g.planets))
+    if 0 < (half := g.a * math.sin(least_apart(g.angles) / 2)) <= g.r_bolt:
+        largest = millimetres(2 * half)
         yield "carrier.bolt_diameter", carrier.bolt_diameter, f"neighbouring bolts touch: less than {largest}"
     if carrier.imported is not None and len(set(carrier.imported.bolts)) != g.planets:
         named = ", ".join(carrier.imported.bolts) or "none"

@@ -23,7 +23,7 @@ class Effect:
     matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
     turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
     the stage decide; build: name in -DGK_WITHOUT of a kernel that has no code for it, "" where there is none; test: the
-    test by hand calculation.
+    test by hand calculation; carried: only stages with a planet carrier have it.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Effect:
     off_setting: Mapping[str, float]
     on_setting: Mapping[str, float]
     build: str = ""
+    carried: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Cost:
         return self.off / self.without - 1.0
 
 
-def _switched(name: str, **words: str) -> Effect:
+def _switched(name: str, test: str = "", carried: bool = False, **words: str) -> Effect:
     """An effect with a boolean parameter of its own, effect.<name>."""
     variable = f"effect.{name}"
     return Effect(
@@ -69,7 +70,8 @@ def _switched(name: str, **words: str) -> Effect:
         off_setting={variable: 0.0},
         on_setting={variable: 1.0},
         build=name,
-        test=f"tests/stage/test_effects.py::test_{name}",
+        test=test or f"tests/stage/test_effects.py::test_{name}",
+        carried=carried,
         **words,
     )
 
@@ -228,6 +230,34 @@ EFFECTS: tuple[Effect, ...] = (
         on_setting={},
         build="pitch_errors",
         test="tests/stage/test_pitch_errors.py::test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh",
+    ),
+    _switched(
+        "coriolis",
+        title="Coriolis forces in a carrier's axes",
+        formula="v̇ = −2Ω Pᵀ J P v on the rigid masses that a carrier carries, and its own",
+        equation="3.10 (eq. 17f)",
+        matters=(
+            "in fast sets: without it the ripple of transmission error and mesh forces is off by 0.2 and 0.2 % at 85 "
+            "rad/s of the carrier, by 0.4 and 3.2 % at 300 (planetary54, `gearfmu study planetary_paper`)"
+        ),
+        off="masses in turning axes move as in standing ones",
+        code="gk_frame.c (gk_frame_turn)",
+        test="tests/stage/test_planetary_theory.py::test_a_sun_in_free_flight_moves_straight_on",
+        carried=True,
+    ),
+    _switched(
+        "centrifugal",
+        title="centrifugal load on planets",
+        formula="F = Ω² Σ m a on the places of the planets",
+        equation="3.10 (eq. 17g)",
+        matters=(
+            "forces of pins, and meshes whose planets it moves: 60 N a planet at 85 rad/s, 750 N at 300; without it "
+            "the ripple of transmission error and mesh forces is off by 3 and 12 %, by 12 and 51 % (2.5 % of the mean)"
+        ),
+        off="pins carry mesh forces alone",
+        code="gk_frame.c (gk_frame_press, gk_frame_load)",
+        test="tests/stage/test_planetary_motion.py::test_pins_hold_the_planets_against_their_centrifugal_load",
+        carried=True,
     ),
 )
 

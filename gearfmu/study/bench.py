@@ -19,11 +19,12 @@ from gearfmu.body import load_stage_bodies
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage import StageModel, assemble
+from gearfmu.stage import StageModel, Trace, assemble
 from gearfmu.stage.tables import ROLLS
-from gearfmu.study.norm import Signals, signals_of
+from gearfmu.study.norm import Signals, set_signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once
 LOOKED_AT = 0.15  # s of processor time after which passes of a replay have said enough
@@ -32,12 +33,14 @@ LONGEST_PASS = 2.0  # s of processor time
 
 @dataclass(frozen=True)
 class Point:
-    """One choice of fidelity: level, integrator, wished step (s; 0 the default of the model), slices."""
+    """One choice of fidelity: level, integrator, wished step (s; 0 the default of the model), slices; off: effects that
+    are switched off beside those of the scene."""
 
     level: str
     integrator: str = "dg4"
     h: float = 0.0
     slices: int = 5
+    off: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,14 +132,15 @@ def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int
 
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     """A coupled run of the scene at `point`. ModelError when the kernel refuses it, with the kernel's reason."""
-    choice = {"level": point.level, "integrator": point.integrator, "h": point.h, "slices": point.slices}
+    effects = scene.stage.effects.model_copy(update=dict.fromkeys(point.off, False))
+    choice: dict[str, Any] = {"level": point.level, "integrator": point.integrator, "h": point.h}
+    choice |= {"slices": point.slices, "effects": effects}
     changed = scene.model_copy(update={"stage": scene.stage.model_copy(update=choice), "record": ("*",)})
     source = _KeptSource(model, scene.settle)
     result = run_once(changed, source)
     kept, facts, end = source.unit_made, result.facts, float(result.trace.time[-1])
     assert kept is not None, "the run made its unit"
     integrator = _integrator(kept, point)
-    pinion, wheel = (gear.name for gear in model.spec.gears)
     recording = Recording(
         model.blob,
         source.parameters,
@@ -150,7 +154,7 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     return Run(
         point,
         integrator,
-        signals_of(result.trace, (pinion, wheel), scene.settle if end > scene.settle else 0.0),
+        _signals(result.trace, model, scene.settle if end > scene.settle else 0.0),
         end / facts["solver.steps"] if integrator == "rk45" else facts["solver.h"],
         int(facts["solver.n_dyn"]),
         result.outcome,
@@ -158,6 +162,14 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
         kept.kernel.warning,
         recording,
     )
+
+
+def _signals(trace: Trace, model: StageModel, settle: float) -> Signals:
+    """What a run of a pair or of a planetary set is judged by."""
+    if isinstance(model.spec, PlanetarySpec):
+        return set_signals(trace, model.spec, settle)
+    pinion, wheel = (gear.name for gear in model.spec.gears)
+    return signals_of(trace, (pinion, wheel), settle)
 
 
 def _integrator(unit: _Kept, point: Point) -> str:
@@ -224,11 +236,16 @@ def paired_price(run: Run, base: Run, looked_at: float = LOOKED_AT) -> Price:
     if run.outcome != OK or base.outcome != OK:
         return Price(float("nan"), float("nan"))
     assert run.recording is not None and base.recording is not None
-    one, other, left = Replay(run.recording), Replay(base.recording), looked_at
+    return replayed_price(Replay(run.recording), Replay(base.recording), looked_at)
+
+
+def replayed_price(one: Replay, other: Replay, looked_at: float = LOOKED_AT) -> Price:
+    """The price of `one` in turn with `other`: `paired_price`."""
+    left = looked_at
     passes: list[tuple[float, float]] = []
     while left > 0.0:
         spent, steps = _one_pass(one, other)
-        passes.append((spent[0] / (steps * run.recording.step), spent[0] / spent[1]))
+        passes.append((spent[0] / (steps * one.recording.step), spent[0] / spent[1]))
         left -= spent[0]
     return Price(float(min(time for time, _ in passes)), float(np.median([ratio for _, ratio in passes])))
 

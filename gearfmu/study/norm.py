@@ -8,11 +8,13 @@ the reference's moving average over 10 ms, whole window.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.stage.trace import Channel, Trace
 
 OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
@@ -22,9 +24,9 @@ OCTAVES = (125.0, 250.0, 500.0, 1000.0, 2000.0)  # Hz, centres
 class Signals:
     """What a run is judged by, sampled every `interval` s from `start` s on.
 
-    te (n,) m, transmission error at the sample · force (n,) N, mesh force, mean over the interval · bearing (n, 4) N,
-    both bearings' x and y forces, means over the interval · locked (n,) bool, the clutch, or None · steady: settled
-    scene. A run that stopped early has fewer samples.
+    te (n,) m, transmission error at the sample · force (n,) N, mesh force, mean over the interval; of a set (n, meshes)
+    · bearing (n, 2 B) N, x and y forces of every bearing (of a set: every pin), means over the interval · locked (n,)
+    bool, the clutch, or None · steady: settled scene. A run that stopped early has fewer samples.
     """
 
     te: np.ndarray
@@ -57,6 +59,19 @@ def signals_of(trace: Trace, gears: tuple[str, str], settle: float) -> Signals:
     )
 
 
+def set_signals(trace: Trace, spec: PlanetarySpec, settle: float) -> Signals:
+    """The signals of a run of a planetary set after `settle` (s): transmission error of the set, forces in all meshes
+    and on all pins."""
+    part = trace.window(settle * (1.0 - 1e-12))
+    planets, ratio = range(1, spec.set.planets + 1), 1 + spec.ring.teeth / spec.sun.teeth
+    r_b = 0.5 * spec.sun.teeth * spec.set.normal_module * math.cos(spec.set.pressure_angle)
+    te = r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"])
+    force = [part[f"{gear}_planet{k}.force_mean"] for gear in ("sun", "ring") for k in planets]
+    pins = [part[f"pin.planet{k}.{axis}_mean"] for k in planets for axis in ("fx", "fy")]
+    interval = float(trace.time[1] - trace.time[0])
+    return Signals(te, np.stack(force, 1), np.stack(pins, 1), None, interval, float(part.time[0]), settle > 0)
+
+
 def kept_signals(trace: Trace) -> Signals:
     """The signals of a Trace made by `Signals.trace`."""
     bearing = np.stack([trace[f"bearing_{k}"] for k in range(4)], 1)
@@ -67,7 +82,7 @@ def kept_signals(trace: Trace) -> Signals:
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative errors of transmission error, its mean, mesh force, and bearing forces (the worse of both bearings, x
+    """Relative errors of transmission error, its mean, mesh forces together, and bearing forces (the worst bearing, x
     and y together)."""
 
     te: float
@@ -88,8 +103,10 @@ def errors(found: Signals, wanted: Signals) -> Errors:
     if found.te.size != wanted.te.size:
         return STOPPED
     te, mean = _relative(found.te[:, None], wanted.te[:, None], wanted)
-    force, _ = _relative(found.force[:, None], wanted.force[:, None], wanted)
-    sides = [_relative(found.bearing[:, k : k + 2], wanted.bearing[:, k : k + 2], wanted)[0] for k in (0, 2)]
+    samples = wanted.te.size
+    force, _ = _relative(found.force.reshape(samples, -1), wanted.force.reshape(samples, -1), wanted)
+    first = range(0, wanted.bearing.shape[1], 2)
+    sides = [_relative(found.bearing[:, k : k + 2], wanted.bearing[:, k : k + 2], wanted)[0] for k in first]
     return Errors(te, mean, force, max(sides))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,7 @@ from gearfmu.errors import MeshError
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh import FeMesh, mesh_report, ring_sector, scaled_jacobian, volume
-from gearfmu.femesh.carrier import carrier_sector
+from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.gear import MeshSpec
@@ -116,16 +117,37 @@ def test_default_carrier_has_about_70_000_unknowns():
     assert len(np.unique(np.round(full.nodes, 10), axis=0)) == len(full.nodes)
 
 
+def evenly(planets: int) -> tuple[float, ...]:
+    return tuple(2 * math.pi * k / planets for k in range(planets))
+
+
 @pytest.mark.parametrize("planets", [3, 5, 6])
 def test_carriers_with_other_numbers_of_planets_mesh(planets):
-    g = CarrierGeometry(planets, 45e-3, 20e-3, 60e-3, 8e-3, 12e-3, 2e-3, 20e-3)
+    g = CarrierGeometry(evenly(planets), 45e-3, 20e-3, 60e-3, 8e-3, 12e-3, 2e-3, 20e-3)
     mesh = carrier_sector(g, CarrierMeshSpec(scale=0.5))
     assert scaled_jacobian(mesh).min() > 0.15 and cut_gap(mesh) < 1e-14
     assert planets * volume(mesh) == pytest.approx(g.volume, rel=2e-4)
 
 
+def test_bolts_stand_where_unequally_spaced_planets_are():
+    """72 teeth of sun and ring, five planets: two of the steps are longer than the others."""
+    uneven = SPEC.set.model_copy(update={"planets": 5, "positions": (0, 14, 29, 43, 58)})
+    g = CarrierGeometry.of(SPEC.model_copy(update={"set": uneven}))
+    sector = carrier_sector(g, CarrierMeshSpec(scale=0.5))
+    mesh = whole_carrier(g, sector)
+    for k, turn in enumerate((0, 14, 29, 43, 58)):
+        x, y, _ = g.bolt_axis(k)
+        assert math.atan2(y, x) == pytest.approx(math.remainder(2 * math.pi * turn / 72, 2 * math.pi), abs=1e-12)
+        seat = mesh.nodes[sector.sector_nodes(k)[sector.sets["bolt"]]]
+        assert np.hypot(seat[:, 0] - x, seat[:, 1] - y) == pytest.approx(g.r_bolt, rel=1e-12)
+    assert scaled_jacobian(mesh).min() > 0.15
+    assert volume(mesh) == pytest.approx(g.volume, rel=5e-4)
+    with pytest.raises(MeshError, match="move the planets apart"):
+        whole_carrier(replace(g, angles=(0.0, 0.4, *g.angles[2:])), sector)
+
+
 def test_bolts_without_room_are_refused():
-    crowded = CarrierGeometry(8, 45e-3, 20e-3, 60e-3, 17e-3, 12e-3, 2e-3, 20e-3)
+    crowded = CarrierGeometry(evenly(8), 45e-3, 20e-3, 60e-3, 17e-3, 12e-3, 2e-3, 20e-3)
     with pytest.raises(MeshError, match="give the bolts more room"):
         carrier_sector(crowded, CarrierMeshSpec(scale=0.5))
 

@@ -97,10 +97,12 @@ def test_least_tip_radius_is_where_the_planets_form_circle_is_met():
 def test_planets_fit_between_sun_and_ring():
     z_s, z_p, z_r = SET.sun_mesh.gears[0].z, SET.ring_mesh.planet.z, RING.z
     assert SET.ratio == 4 and SET.assembles() and SET.neighbour_clearance == pytest.approx(13.64e-3, abs=1e-5)
-    uneven = replace(SET, planets=3)
-    for case in (SET, uneven):
-        for k in range(case.planets):
-            theta, phase = 2 * math.pi * k / case.planets, case.planet_phase(k)
+    three = replace(SET, angles=(0.0, 2 * math.pi / 3, 4 * math.pi / 3))
+    uneven = replace(SET, angles=tuple(2 * math.pi * k / 72 for k in (0, 14, 29, 43, 58)))
+    for case in (SET, three, uneven):
+        assert case.assembles()
+        for k, theta in enumerate(case.angles):
+            phase = case.planet_phase(k)
             assert abs(phase) <= math.pi / z_p * (1 + 1e-9)
             in_ring = (z_p * (theta - phase) - z_r * theta) / (2 * math.pi)  # a tooth meets a space of the ring
             in_sun = (z_p * (theta + math.pi - phase) + z_s * (theta - case.sun_phase())) / (2 * math.pi)

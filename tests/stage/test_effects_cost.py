@@ -37,8 +37,9 @@ def benchmark_() -> ModuleType:
 @pytest.mark.full
 @pytest.mark.skipif(not (shutil.which("valgrind") and shutil.which("cc")), reason="needs valgrind and a C compiler")
 def test_off_costs_as_much_as_not_being_there(benchmark_: ModuleType, tmp_path: Path) -> None:
+    """Those of sets are left to the benchmark, which says the same: a set takes minutes under valgrind to begin."""
     bench = benchmark_.Bench(tmp_path)
-    for effect in EFFECTS:
+    for effect in (one for one in EFFECTS if not one.carried):
         cost, same = bench.measure(effect)
         print(f"{effect.name}: {cost.off:.0f} instructions a step off, {cost.without:.0f} in a kernel without it")
         assert same, f"{effect.name}: off is not the same as not being there"

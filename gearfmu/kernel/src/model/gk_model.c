@@ -182,7 +182,7 @@ static void read_numbers(reader *r, gk_gear *g)
     for (size_t i = 0; i < sizeof to / sizeof *to; i++) *to[i] = v[i];
     demand(r,
            between(g->r_b, 1e-4, 10) && between(g->s_form, 0, 20) && between(g->s_tip, 0, 20) &&
-               fabs(g->s_tip - g->s_form) > 1e-6 && between(g->psi_b, 0, 4) && between(g->phase, -10, 10) &&
+               fabs(g->s_tip - g->s_form) > 1e-6 && between(g->psi_b, 0, 4) && between(g->phase, -1e3, 1e3) &&
                between(g->width, 1e-6, 10) && between(g->local, 1e-20, 1) && between(g->strip, 1e-6, 0.1) &&
                between(g->relief, 0, 1e4) && between(g->relief_start, -1, 20) && between(g->edge, 1e-6, 0.1) &&
                between(g->corner_radius, 1e-4, 20) && between(g->corner_angle, -10, 10) && between(g->z_mid, -10, 10) &&

@@ -1,0 +1,89 @@
+"""The price list of a planetary set: its points, what they are measured against, its table."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from gearfmu import cli
+from gearfmu.commands.study import set_table
+from gearfmu.report.study import write_chart
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.scene import load_scene
+from gearfmu.spec.stage import load_stage
+from gearfmu.study.sets import DURATION, SETTLE, SetRow, at_speed, ladder, window, with_planets
+from gearfmu.study.table import read_rows, write_rows
+
+LIST = Path(__file__).parents[2] / "benchmarks" / "study" / "sets.csv"
+ROW = SetRow("s", 4, 85.0, "fast", 5e-6, 5, "", 248, "full, 0.312 µs", 0.02, -0.001, 0.07, 0.03, 35.0, 1.0)
+
+
+def test_the_window_is_the_beginning_of_the_scene() -> None:
+    scene = load_scene("planetary_paper")
+    assert (window(scene).settle, window(scene).duration) == (SETTLE, DURATION)
+    assert window(scene, quick=True).duration < DURATION < scene.duration
+
+
+def test_another_speed_keeps_the_loads_in_balance() -> None:
+    """What brakes in proportion to its speed has the same torque at the start."""
+    scene = at_speed(load_scene("planetary_paper"), 300.0)
+    assert scene.start.pinion_speed == 300.0 and scene.shaft_loads is not None
+    brake = scene.shaft_loads["sun"].proportional
+    assert brake is not None and brake.slope * 4 * 300.0 == pytest.approx(-150.0)
+    assert scene.shaft_loads["carrier"].constant == 600.0
+
+
+@pytest.mark.parametrize(("planets", "places"), [(3, None), (5, (0, 14, 29, 43, 58))])
+def test_planets_stand_as_evenly_as_teeth_allow(planets: int, places: tuple[int, ...] | None) -> None:
+    spec = load_stage("planetary54")
+    assert isinstance(spec, PlanetarySpec)
+    changed = with_planets(spec, planets)
+    assert (changed.set.planets, changed.set.positions) == (planets, places)
+    assert changed.carrier.mesh.scale < spec.carrier.mesh.scale
+
+
+def test_only_levels_and_steps_are_drawn(tmp_path: Path) -> None:
+    against = "fast, 5 µs, 5 slices"
+    changes = ({"planets": 3}, {"off": "coriolis", "against": against}, {"slices": 1, "against": against})
+    others = [SetRow(**asdict(ROW) | change) for change in changes]
+    finer = SetRow(**asdict(ROW) | {"h_s": 2.5e-6, "te_error": 0.01, "realtime_factor": 70.0})
+    assert ladder([ROW, *others, finer], 4) == [ROW, finer]
+    svg, _ = write_chart(ladder([ROW, finer], 4), 5, tmp_path / "set.svg")
+    assert "fast" in svg.read_text(encoding="utf-8")
+    text = set_table([ROW, others[1]]).splitlines()
+    assert len(text) == 3 and "coriolis" in text[2] and "248" in text[1]
+    write_rows(tmp_path / "sets.csv", SetRow, [ROW, finer])
+    assert read_rows(tmp_path / "sets.csv", SetRow) == [ROW, finer]
+
+
+def test_other_tables_are_for_pairs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.outcome(["study", "planetary_paper", "--out", str(tmp_path), "--table", "cuts"]) != 0
+    assert "is a planetary set" in " ".join(capsys.readouterr().err.replace("│", " ").split())
+
+
+def test_the_list_in_the_repository_says_what_the_page_says() -> None:
+    """docs/study.md quotes it: a set's step at level fast costs more than real time, dropping Coriolis forces costs
+    more at 300 than at 85 rad/s."""
+    rows = read_rows(LIST, SetRow)
+    fast = next(row for row in ladder(rows, 4) if row.level == "fast" and row.h_s == pytest.approx(5e-6))
+    dropped = {row.speed: row for row in rows if row.off == "coriolis"}
+    assert fast.realtime_factor > 1 and dropped[300.0].force_error > 2 * dropped[85.0].force_error > 0
+    assert {row.planets for row in rows} >= {3, 4, 5} and {row.slices for row in rows} >= {1, 5, 10}
+
+
+@pytest.mark.full
+def test_the_verb_makes_a_quick_list_and_keeps_it(tmp_path: Path) -> None:
+    arguments = ["study", "planetary_paper", "--quick", "--out", str(tmp_path)]
+    assert cli.outcome(arguments) == 0
+    made = (tmp_path / "sets.csv").read_bytes()
+    assert cli.outcome(arguments) == 0 and (tmp_path / "sets.csv").read_bytes() == made
+    with open(tmp_path / "sets.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["level"] for row in rows} == {"rigid", "fast"} and (tmp_path / "planetary_paper.svg").is_file()
+    by_step = {row["h_s"]: row for row in rows if row["level"] == "fast" and row["against"].startswith("full")}
+    assert float(by_step["5e-06"]["force_error"]) < float(by_step["1e-05"]["force_error"])
+    off = {row["off"]: float(row["force_error"]) for row in rows}
+    assert 0 < off["coriolis"] < 0.05 and 0 < off["centrifugal"] < 0.05
