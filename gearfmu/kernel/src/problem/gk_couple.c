@@ -236,7 +236,8 @@ void gk_couple_recall(gk_coupled *c)
         for (int i = 0; i < s->n; i++) {
             s->outer[i] = 0.0;
             if (s->kind[i] == ROW_CLUTCH) continue;
-            if (i >= s->contacts || s->recalled[i]) s->g0[i] -= s->beyond[i];
+            const int entered = i < s->contacts && !s->recalled[i];
+            s->g0[i] = entered ? gk_max(s->g[i], -gk_solve_massless(s, i)) : s->g0[i] - s->beyond[i];
             s->stored0 += 0.5 * s->force0[i] * s->beyond[i];
         }
     }
