@@ -211,6 +211,20 @@ def test_central_drifts_where_the_step_does_not() -> None:
     assert drifts[0] < 2e-6 and 1e-6 < drifts[1] < 0.05
 
 
+@pytest.mark.parametrize("level", [1.0, 2.0])
+def test_a_torque_that_changes_leaves_no_step_unsolved(level: float) -> None:
+    """100 N·m at rest, growing at every communication step: contacts hardly move and could not repay what is missing
+    when engagements recall each other's deflection under the new torque instead of the old one (40 steps of 180)."""
+    kernel = model(SetVariant(), damped=True).kernel(level=level, h=20e-6 / 3)
+    kernel.set("sun.tau", -25.0)
+    kernel.initialize()
+    for i in range(60):
+        kernel.set("sun.tau", -25.0 - 0.02 * min(i, 30) ** 2)
+        kernel.step(i * 2e-5, 2e-5)
+    print(kernel.get("solver.trouble"), kernel.get("solver.rounds"))
+    assert kernel.get("solver.trouble") == 0 and kernel.get("solver.rounds") < 50 * kernel.get("solver.steps")
+
+
 def test_a_pair_that_enters_in_penetration_leaves_no_step_unsolved() -> None:
     """Both flanks of all meshes jammed by 20 µm, 100 N·m, mesh turning: every pair of the ring enters with its spring
     wound up. g0 = 0 for such a pair, whatever others do to its place, left 6 steps of the first 4 ms without a root."""
