@@ -19,12 +19,13 @@ MESH = ("pairs", "force_mean", "force_max", "force_drive", "force_coast", "te", 
 
 @dataclass(frozen=True)
 class Watched:
-    """What is recorded of a stage: names of its engagements, of its ports and of the single gears whose place in the
-    plane is wanted."""
+    """What is recorded of a stage: names of its engagements, of its ports, of the single gears whose place in the plane
+    is wanted, and of further outputs."""
 
     meshes: tuple[str, ...]
     ports: tuple[str, ...]
     gears: tuple[str, ...] = ()
+    more: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -34,12 +35,13 @@ class Watched:
             *(f"energy.{name}" for name in ("stored", "work", "dissipated")),
             *(f"solver.{name}" for name in ("steps", "trouble", "status", "h")),
             *(f"{gear}.gear.{name}" for gear in self.gears for name in ("phi", "x", "y", "w")),
+            *self.more,
         )
 
     @property
     def optional(self) -> tuple[str, ...]:
         """Outputs that some kinds of ports have."""
-        clutch = tuple(f"{self.ports[0]}.clutch.{name}" for name in ("locked", "slip"))
+        clutch = tuple(f"{port}.clutch.{name}" for port in self.ports for name in ("locked", "slip"))
         return (*(f"{port}.tau_mean" for port in self.ports), *clutch, *(f"{port}.w" for port in self.ports))
 
 
@@ -156,7 +158,7 @@ def run(kernel: Kernel, inputs: Inputs, duration: float, step: float, watched: W
 def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarray, watched: Watched = PAIR) -> Record:
     """`run` with communication points `times` (s), the first of which is the start."""
     going, outcome, started = Run(kernel, len(times), watched), COMPLETED, clock.process_time()
-    speeds = np.full((len(times), 2), 0.0)
+    speeds = np.full((len(times), len(watched.ports)), 0.0)
     going.set(inputs(times[0]))
     kernel.initialize(times[0])
     going.take(times[0])
@@ -177,8 +179,8 @@ def run_times(kernel: Kernel, inputs: Inputs, times: Sequence[float] | np.ndarra
 
 
 def _powers(made: Record, speeds: np.ndarray, inputs: Inputs, ports: Sequence[str]) -> np.ndarray:
-    """Σ |power| of both ports in every step: of a spring port mean torque × speed of its outer end, of a torque port
-    torque × speed of the gear."""
+    """Σ |power| of the ports in every step: of a spring port mean torque × speed of its outer end, of a torque port
+    torque × speed of the gear, of a fixed one nothing."""
     n = made.time.size - 1
     total = np.zeros(n)
     for column, shaft in enumerate(ports):
@@ -186,7 +188,7 @@ def _powers(made: Record, speeds: np.ndarray, inputs: Inputs, ports: Sequence[st
             total += np.abs(made[f"{shaft}.tau_mean"][1:] * speeds[:n, column])
         else:
             torque = np.array([inputs(t)[f"{shaft}.tau"] for t in made.time[:-1]])
-            total += np.abs(torque * made[f"{shaft}.gear.w"][1:])
+            total += np.abs(torque * made[f"{shaft}.w"][1:])
     return total
 
 

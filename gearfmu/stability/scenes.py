@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gearfmu.stability import clutches, loads, sets, speeds, stepping, trains
+from gearfmu.stability import (
+    clutches,
+    loads,
+    set_effects,
+    set_faults,
+    set_loads,
+    set_shifts,
+    set_speeds,
+    set_stepping,
+    sets,
+    speeds,
+    stepping,
+    trains,
+)
 from gearfmu.stability.case import Case, Finding
 
 SCENES: dict[str, Callable[[Case], Finding]] = {
@@ -16,6 +29,31 @@ SCENES: dict[str, Callable[[Case], Finding]] = {
         loads.light_load_rattle,
         stepping.random_communication_steps,
         stepping.rollbacks,
+        set_effects.set_each_effect_off,
+        set_shifts.set_brake_shift,
+        set_speeds.set_run_up_and_down,
+        set_stepping.set_many_steps,
+        set_stepping.set_random_communication_steps,
+        set_stepping.set_rollbacks,
+        set_loads.set_rattle,
+        set_loads.set_hardly_any_load,
+        set_effects.set_all_effects,
+        set_faults.set_thin_ring,
+        set_loads.set_reversal,
+        set_loads.set_torque_step,
+        set_loads.set_start_in_mid_backlash,
+        set_loads.set_overload,
+        set_loads.set_jammed,
+        set_speeds.set_high_speed,
+        set_shifts.set_clutch_dump,
+        set_faults.set_pin_error,
+        set_faults.set_floating_sun,
+        set_faults.set_planet_without_contact,
+        set_faults.set_tip_contact,
+        set_faults.set_soft_pins,
+        set_faults.set_stiff_supports,
+        set_faults.set_star,
+        set_stepping.set_standstill,
         sets.planetary_backfire,
         clutches.clutch_dump,
         clutches.clutch_hundred_times,

@@ -28,6 +28,7 @@ from gearfmu.stability.trains import CLOSING, train
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
 JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains", "sets")
+SET_JUDGES = ("bench", "loads", "speeds", "faults", "shifts", "stepping", "effects")  # set_*.py
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
@@ -125,7 +126,7 @@ def fingerprint() -> str:
     digest.update(planetary().blob)
     for scene in (DUMP, CLOSING, BACKFIRE):
         digest.update(scene_path(scene).read_bytes())
-    for name in JUDGES:
+    for name in (*JUDGES, *(f"set_{name}" for name in SET_JUDGES)):
         digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
     return digest.hexdigest()[:12]
 

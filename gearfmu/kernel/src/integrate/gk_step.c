@@ -235,7 +235,8 @@ void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *d
     for (int i = 0; i < s->contacts; i++) {
         const int memory = engaged->place[s->place_of[i]].memory;
         s->recalled[i] = memory >= 0;
-        s->g0[i] = memory < 0 ? gk_max(s->g[i], 0.0) : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
+        s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
+                              : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }

@@ -11,7 +11,8 @@ static const double TOLERANCE = 1e-11;
 static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
 #endif
 
-typedef enum { WHOLE, AT_ONCE } effect; /* all that forces do to gaps in the step; their deflection at once alone */
+/* all that forces do to gaps in the step; their deflection at once alone, under those at the end or at the start */
+typedef enum { WHOLE, AT_ONCE, AT_START } effect;
 
 /* forces of an engagement by what they meet: D in the step, A at once; a clutch knows no A */
 static void forces_of(const gk_system *s, effect of, double *step, double *once)
@@ -19,7 +20,8 @@ static void forces_of(const gk_system *s, effect of, double *step, double *once)
     for (int i = 0; i < s->stride; i++) {
         const int row = i < s->n, clutch = row && s->kind[i] == ROW_CLUTCH;
         step[i] = row && of == WHOLE ? s->z[i] : 0.0;
-        once[i] = row && !clutch ? s->force[i] + (of == WHOLE ? s->end[i] : 0.0) : 0.0;
+        const double force = of == AT_START ? s->force0[i] : s->force[i]; /* given torques may have changed */
+        once[i] = row && !clutch ? force + (of == WHOLE ? s->end[i] : 0.0) : 0.0;
     }
 }
 
@@ -182,9 +184,9 @@ static double take_whole(const gk_coupled *c, int e)
 }
 
 /* tells the deflection at once from the rest of what was taken */
-static void part_at_once(const gk_coupled *c)
+static void part_at_once(const gk_coupled *c, effect of)
 {
-    give_all(c, AT_ONCE);
+    give_all(c, of);
     for (int e = 0; e < c->model->engagements; e++) {
         gk_system *s = &c->work->engaged[e].system;
         double read[MAX_STRIDE];
@@ -217,7 +219,7 @@ static void sweep(const gk_island *island)
         if (round) c->rate = gk_min(1.0, change / last);
         next = change * c->rate; /* what another sweep would find */
     }
-    part_at_once(c);
+    part_at_once(c, AT_ONCE);
     if (!(next < TOLERANCE)) island->member[0]->limit_reached = 1;
 }
 
@@ -233,14 +235,15 @@ gk_island gk_couple_island(gk_coupled *c)
 /* the start of the step: under λ0 the others deflect too */
 void gk_couple_recall(gk_coupled *c)
 {
-    part_at_once(c);
+    part_at_once(c, AT_START);
     for (int e = 0; e < c->model->engagements; e++) {
         gk_system *s = &c->work->engaged[e].system;
         if (!within(c, e)) continue;
         for (int i = 0; i < s->n; i++) {
             s->outer[i] = 0.0;
             if (s->kind[i] == ROW_CLUTCH) continue;
-            if (i >= s->contacts || s->recalled[i]) s->g0[i] -= s->beyond[i];
+            const int entered = i < s->contacts && !s->recalled[i];
+            s->g0[i] = entered ? gk_max(s->g[i], -gk_solve_massless(s, i)) : s->g0[i] - s->beyond[i];
             s->stored0 += 0.5 * s->force0[i] * s->beyond[i];
         }
     }

@@ -1,0 +1,79 @@
+"""What judges the scenes of sets: overlap of the flanks from places in two kinds of axes, and complaints."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearfmu.stability.case import Case
+from gearfmu.stability.motion import Constant
+from gearfmu.stability.record import Record
+from gearfmu.stability.set_bench import (
+    CENTRALS,
+    MESHES,
+    NOMINAL,
+    PLAIN_SET,
+    SPEED,
+    Carried,
+    SetVariant,
+    set_finding,
+    set_overlap,
+    set_run,
+    steady,
+    sun_torque,
+)
+
+APPROACH = {"sun": (7.0e-9, 8.8e-9), "ring": (12e-9, 15.5e-9)}  # m/N under 600 N·m
+
+
+def short(variant: SetVariant, speed: float, duration: float) -> Record:
+    return set_run(variant, Case("fast"), Carried(Constant(speed), steady(NOMINAL)), duration)
+
+
+@pytest.fixture(scope="module")
+def turning() -> Record:
+    """A quarter of a turn of the carrier, so that axes that stand and axes that turn differ."""
+    return short(PLAIN_SET, SPEED, 0.5 * math.pi / SPEED)
+
+
+def approach(variant: SetVariant, record: Record, central: str) -> np.ndarray:
+    """(N, n) overlap over force, m/N."""
+    rows = []
+    for number, mesh in enumerate(MESHES[central]):
+        force = record[f"{mesh}.force_drive"] + record[f"{mesh}.force_coast"]
+        rows.append(set_overlap(variant, record, central, number) / force)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("central", CENTRALS)
+def test_overlap_under_load_is_the_elastic_approach(turning: Record, central: str) -> None:
+    """Of all planets, at rest and in the mean of a run over a quarter of a turn, though pins stand out of place."""
+    low, high = APPROACH[central]
+    found = approach(PLAIN_SET, turning, central)
+    assert np.all((low < found[:, 0]) & (found[:, 0] < high)), found[:, 0]
+    late = found[:, turning.time > 0.01].mean(axis=1)
+    assert np.all((low < late) & (late < high)), late
+
+
+def test_overlap_does_not_know_how_far_planets_give_way() -> None:
+    """Pins of 1e7 N/m, which give way by 0.33 mm: the carrier's axes turn on by two fifths of it."""
+    soft = SetVariant(pin=1e7)
+    record = short(soft, 0.0, 2e-5)
+    for central, (low, high) in APPROACH.items():
+        found = approach(soft, record, central)[:, 0]
+        assert np.all((low < found) & (found < high)), found
+
+
+def test_judges_hear_what_is_wrong(turning: Record) -> None:
+    assert not set_finding(PLAIN_SET, turning).complaints
+    assert 4 * sun_torque(turning, 0.01) == pytest.approx(NOMINAL, rel=0.02)
+    values = dict(turning.values)
+    values["sun_planet2.te"] = values["sun_planet2.te"] - np.where(turning.time > 0.017, 30e-6, 0.0)
+    sunk = set_finding(PLAIN_SET, replace(turning, values=values)).complaints
+    assert len(sunk) == 1 and "flanks of sun_planet2 overlap" in sunk[0]
+    leak = 1e-3 * turning.throughput[-1] * turning.time / turning.time[-1]
+    leaking = dict(turning.values) | {"energy.stored": turning["energy.stored"] + leak}
+    assert "energy" in set_finding(PLAIN_SET, replace(turning, values=leaking)).complaints[0]
