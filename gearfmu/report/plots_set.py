@@ -152,7 +152,8 @@ def pin_forces(trace: Trace, own: PlanetSet) -> Plot | None:
 def energy(trace: Trace) -> Plot | None:
     """Work of every shaft, stored and dissipated energy, and what the balance leaves."""
     works = [name for name in trace.channels if name.startswith("drive.") and name.endswith(".work")]
-    if not works or any(name not in trace for name in ENERGIES):
+    works = [name for name in works if name != "drive.energy.work"] or ["energy.work"]
+    if any(name not in trace for name in (*works, *ENERGIES)):
         return None
     with styled():
         figure, axes = panels((2.0, 1.3))
@@ -164,19 +165,21 @@ def energy(trace: Trace) -> Plot | None:
         axes[1].set_xlabel("time in s")
         picture = svg(figure, "energy")
     through = sum(float(np.ptp(trace[name])) for name in works)
+    if works == ["energy.work"]:  # of all ports together: what came in and what went out is told by the run
+        through = float(trace.meta.get("exchanged_work_J") or through)
     left = float(np.ptp(trace["energy.residual"])) / through if through else 0.0
     caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts (sum of magnitudes)."
     return Plot("energy", "Energy", caption, picture, columns(trace, [*works, *ENERGIES]))
 
 
 def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
-    """Spectra of the mesh forces and of the ring's force on its mounts in fixed axes. Marked: mesh orders k f_m, and
+    """Spectra of the mesh forces and of the ring's force on its mounts along fixed axes. Marked: mesh orders k f_m, and
     around each the sidebands of the planets' passing, k f_m ± N f_c (N planets, f_c: carrier)."""
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
     names = {c: [f"{mesh}.force" for mesh in meshes.values()] for c, meshes in own.meshes.items()}
     signals = {name: _force(part, name.removesuffix(".force")) for group in names.values() for name in group}
-    fixed = {f"{name} fixed": values for name, values in _in_fixed_axes(part, own).items()}
+    fixed = on_mounts(part)
     groups = {**{f"meshes of the {c}": own_names for c, own_names in names.items()}}
     groups |= {"ring on its mounts": list(fixed)} if fixed else {}
     spectra = {n: metrics.amplitude_spectrum(v, step, segment(part.time.size, 1)) for n, v in (signals | fixed).items()}
@@ -240,21 +243,16 @@ def detail_window(trace: Trace, own: PlanetSet, window: Window, periods: float =
     return max(window.start, window.end - width), window.end
 
 
-def _in_fixed_axes(part: Trace, own: PlanetSet) -> dict[str, np.ndarray]:
-    """Ring's force on its mounts, which the model has in the carrier's axes, turned into fixed ones."""
-    names, turning = ("bearing.ring.fx", "bearing.ring.fy"), f"{own.carrier}{GEAR_PHI}"
-    if any(name not in part for name in (*names, turning)):
-        return {}
-    x, y = (_mean_or_sample(part, name) for name in names)
-    c, s = np.cos(part[turning]), np.sin(part[turning])
-    return {names[0]: c * x - s * y, names[1]: s * x + c * y}
+def on_mounts(part: Trace) -> dict[str, np.ndarray]:
+    """Force of the ring on its mounts, N, along the fixed axes x and y, by name."""
+    return {name: mean_or_sample(part, name) for name in ("bearing.ring.fx", "bearing.ring.fy") if name in part}
 
 
 def _force(trace: Trace, mesh: str) -> np.ndarray:
-    return _mean_or_sample(trace, f"{mesh}.force")
+    return mean_or_sample(trace, f"{mesh}.force")
 
 
-def _mean_or_sample(trace: Trace, name: str) -> np.ndarray:
+def mean_or_sample(trace: Trace, name: str) -> np.ndarray:
     """The mean over the communication step where it was recorded: it folds less."""
     return trace[f"{name}_mean"] if f"{name}_mean" in trace else trace[name]
 
