@@ -196,3 +196,15 @@ def test_parts_swing_as_their_shafts_say(tmp_path: Path, pair: GeneralStage) -> 
         seen.append(unit.get(wheel)[0])
     times = 1e-4 * np.arange(1, 201)
     assert np.allclose(seen, twist * np.cos(omega * times), atol=1e-9 * abs(twist) + 1e-15)
+
+
+def test_the_drivetrain_of_the_page_loads_and_starts_with_a_clutch_that_slips(
+    tmp_path: Path, pair: GeneralStage
+) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "howto-scene.md").read_text(encoding="utf-8")
+    scene, seen = scene_of(tmp_path, page.split("```toml\n")[2].partition("```")[0]), {}
+    start = start_of(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, seen))
+    i, friction = -1.5, 20.0  # N·m: the flange is slower than the machine by 26.7 rad/s, which drives it
+    assert start.speed == pytest.approx({"motor": 100.0, "flange": 100.0 / i, "machine": -40.0})
+    a = (10.0 + friction / i) / (0.03 + 0.01 / i**2)
+    assert seen["pinion"] == pytest.approx(10.0 - 0.03 * a)
