@@ -79,7 +79,7 @@ class Drivetrain(Spec):
     torques: dict[Name, TorquePart] = Field(default={}, description="torques of the outside on inertias")
 
 
-TABLES = {
+TABLES: dict[str, type[Spec]] = {
     "ports": PortShaft,
     "inertias": InertiaPart,
     "shafts": ShaftPart,
