@@ -33,7 +33,10 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     """Torques around the clutch, the other torques, and the slip of every clutch with its lock-up; None without
     torques."""
     clutch = [name for suffix in CLUTCH_TORQUES for name in trace.channels if name.endswith(suffix)]
-    others = [name for name in distinct(trace, [n for n in trace.channels if n.endswith(".tau")]) if name not in clutch]
+    own = [name for name in trace.channels if name.endswith(".tau") and f"{name[:-4]}.slip" in trace]
+    clutch += [name for name in own if name not in clutch]
+    all_torques = clutch + [name for name in trace.channels if name.endswith(".tau") and name not in clutch]
+    others = [name for name in distinct(trace, all_torques) if name not in clutch]
     slips = [name for name in trace.channels if name.endswith(".slip")]
     rows = [
         (names, label)

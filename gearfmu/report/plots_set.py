@@ -232,7 +232,7 @@ def results(trace: Trace, own: PlanetSet, window: Window) -> tuple[tuple[str, ..
             pin = [part[name] for d in "xy" if (name := f"pin.{planet}.f{d}") in part]
             held = float(np.mean(np.hypot(*pin))) if len(pin) == 2 else np.nan
             numbers = (np.mean(force), np.std(force), means[mesh], np.mean(te), np.std(te), held)
-            rows.append((mesh, *(f"{number:.4g}" for number in numbers)))
+            rows.append((mesh, *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
     head = ("mesh", "force, N", "alternating, N rms", "share", "TE, µm", "TE alternating, µm rms", "pin force, N")
     return head, rows
 
