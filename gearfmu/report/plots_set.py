@@ -19,6 +19,7 @@ from gearfmu.stage.trace import Trace
 
 ENERGIES = ("energy.work", "energy.stored", "energy.dissipated", "energy.residual")
 MARKED_ORDERS = 12
+STEADY = 0.1  # nine tenths of the speeds lie as close together, over their median, where mesh orders are marked
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,9 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     groups |= {"ring on its mounts": list(fixed)} if fixed else {}
     spectra = {n: metrics.amplitude_spectrum(v, step, segment(part.time.size, 1)) for n, v in (signals | fixed).items()}
     mesh_frequency = _mesh_speed(part, own) / (2 * np.pi)
-    carrier = float(np.median(np.abs(part[f"{own.carrier}{GEAR_SPEED}"]))) / (2 * np.pi)
+    speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
+    carrier = float(np.median(speed)) / (2 * np.pi)
+    steady = np.ptp(np.percentile(speed, [5, 95])) < STEADY * np.median(speed)
     with styled():
         figure, axes = panels((1.9,) * len(groups))
         for axis, group in zip(axes, groups.values(), strict=True):
@@ -193,14 +196,20 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
                 axis.plot(lines.frequency[1:] / 1e3, metrics.level(lines.amplitude[1:]), label=name, lw=0.8)
             level_axis(axis, "dB re 1 N")
             axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
-            _mark(axis, mesh_frequency, len(own.planets) * carrier)
+            if steady:
+                _mark(axis, mesh_frequency, len(own.planets) * carrier)
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
     caption = (
         f"Rms amplitude of each line, Hann, resolution {first.resolution:.3g} Hz, {window.start:.3g} s to "
-        f"{window.end:.3g} s ({window.reason}). Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: "
-        f"k·f_m ± {len(own.planets)} f_c, f_c = {carrier:.2f} Hz of the carrier."
+        f"{window.end:.3g} s ({window.reason}). "
+    )
+    caption += (
+        f"Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: k·f_m ± {len(own.planets)} f_c, "
+        f"f_c = {carrier:.2f} Hz of the carrier."
+        if steady
+        else "Mesh orders are not marked: the speed is not steady."
     )
     data = {"frequency_[Hz]": first.frequency} | {f"{n}_rms_[N]": s.amplitude for n, s in spectra.items()}
     return Plot("spectrum", "Spectra of the forces", caption, picture, data)

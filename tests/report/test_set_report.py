@@ -89,6 +89,15 @@ def test_spectrum_of_the_ring_is_that_of_its_force_as_recorded() -> None:
     assert middle == pytest.approx(100 / np.sqrt(2), rel=0.1) and low < 0.3 * middle and high < 0.3 * middle
 
 
+def test_mesh_orders_are_not_marked_where_the_speed_changes() -> None:
+    trace = set_run()
+    swinging = Channel(CARRIER * (1.0 + 0.2 * np.sin(40.0 * trace.time)), "rad/s")
+    trace = Trace(trace.time, {**trace.channels, "carrier.gear.w": swinging}, trace.meta)
+    own = planet_set(trace, known_meshings(trace))
+    assert own is not None
+    assert "the speed is not steady" in plots_set.spectrum(trace, own, Window(0.0, 0.2, "here")).caption
+
+
 def test_a_pair_is_no_set() -> None:
     trace = set_run()
     trace.meta["meshes"] = {"sun_planet1": ["sun", 18]}
