@@ -305,3 +305,8 @@ def test_bad_input_is_one_clear_error_and_nothing_half_written(
     assert code in (1, cli.USAGE_ERROR) and out == "" and "Traceback" not in err and "internal" not in err
     assert len(err.strip()) > 20 and (code == cli.USAGE_ERROR or len(err.strip().splitlines()) == 1), err
     assert {path: path.read_bytes() for path in wreckage.rglob("*") if path.is_file()} == before
+
+
+def test_run_lists_the_shipped_scenes(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call("run", "--list", capsys=capsys)
+    assert code == 0 and "planetary_shift" in out and "clutch_closure_train  Clutch closure on a two-stage" in out

@@ -12,6 +12,18 @@ from gearfmu.commands.shared import Quantity, progress_bar
 OUT = click.Path(path_type=Path, file_okay=False)
 
 
+def _list(context: click.Context, option: Any, wanted: bool) -> None:
+    """Print the shipped scenes and what they show, and end."""
+    if not wanted or context.resilient_parsing:
+        return
+    from gearfmu.spec.scene import load_scene, shipped_scenes
+
+    names = shipped_scenes()
+    for name in names:
+        click.echo(f"{name:{max(map(len, names))}}  {load_scene(name).description}")
+    context.exit()
+
+
 @click.command()
 @click.argument("scene")
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
@@ -27,6 +39,9 @@ OUT = click.Path(path_type=Path, file_okay=False)
 )
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 @click.option("--stage", help="Another STAGE than the scene's.")
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
+)
 def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool, stage: str | None) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
     from gearfmu.spec.scene import load_scene

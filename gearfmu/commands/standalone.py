@@ -31,11 +31,12 @@ def steady_run(
     model: StageModel, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None
 ) -> Trace:
     """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
-    from gearfmu.spec.turning import meshings, require_two_driven
+    from gearfmu.spec.turning import meshings, require_driven
     from gearfmu.stage import Steady, simulate
 
-    require_two_driven(model.stage, model.shafts, "simulate")
-    driven = {name: model.stage.ports[name] for name in (model.shafts.input, model.shafts.output)}
+    two = (model.shafts.input, model.shafts.output)
+    require_driven(model.stage, two, "simulate")
+    driven = {name: model.stage.ports[name] for name in two}
     soft = [name for name, port in driven.items() if port.kind != "spring" or port.chain is not None]
     if soft:
         raise click.UsageError(

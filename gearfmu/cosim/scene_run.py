@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,10 +13,13 @@ from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Wiring
+from gearfmu.cosim.parts import part_network, part_ports
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, start_speeds, torque_ports
 from gearfmu.cosim.source import Source, UnitSource
+from gearfmu.cosim.start import start_of, start_speeds_of
 from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
@@ -25,7 +28,7 @@ from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.spec.turning import require_two_driven, shafts_of, with_ports
+from gearfmu.spec.turning import require_driven, shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
 from gearfmu.stage.trace import Trace
 
@@ -74,13 +77,15 @@ def stage_model(scene: SceneSpec) -> StageModel:
 
 
 def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
-    """The stage with the ports that the scene's drivetrain needs. SpecError where more than its input and output would
-    have to be driven, or a load has no port."""
+    """The stage with the ports that the scene's drivetrain needs. SpecError where it leaves a spring port alone, or has
+    something for a port that the stage does not have."""
     general = as_general(spec)
     shafts = shafts_of(general)
     if scene.shaft_loads is not None:
         return with_ports(spec, torque_ports(scene, general))
-    require_two_driven(spec, shafts, "a scene")
+    if scene.drivetrain is not None:
+        return with_ports(spec, part_ports(scene, general))
+    require_driven(general, (shafts.input, shafts.output), "a scene")
     return with_ports(spec, stage_ports(scene, shafts))
 
 
@@ -95,19 +100,20 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
 
 def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected."""
-    shafts, choice = source.model.shafts, scene.stage
+    model, choice = source.model, scene.stage
     parameters = {
         "level": choice.level,
         "integrator": choice.integrator,
         "slices": choice.slices,
         "h": choice.h,
         **{f"effect.{name}": 0.0 for name in choice.effects.off},
-        **_start(scene, source.model),
+        **_start(scene, model),
     }
     stage = source.unit(parameters)
     try:
-        cut = _cut(scene, stage, source.model, wiring)
-        coupling, omit = scene.coupling, stage_joints(scene, shafts)
+        cut = _cut(scene, stage, model, parameters, wiring)
+        coupling = scene.coupling
+        omit = stage_joints(scene, model.shafts) if scene.drivetrain is None else ()
         return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
     finally:
         stage.close()
@@ -115,19 +121,37 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
 
 def _start(scene: SceneSpec, model: StageModel) -> dict[str, float]:
     """Start values of the stage that follow from the scene."""
+    if scene.drivetrain is not None:
+        speeds, ports = start_speeds_of(scene, model.stage), model.stage.ports
+        free = {name: model.stage.rotor_of(port.body) for name, port in ports.items() if port.kind == "torque"}
+        return {f"{name}.w_start": speeds.get(f"stage.{rotor}", 0.0) for name, rotor in free.items()}
     if scene.shaft_loads is None:
         return stage_start(scene, model.shafts)
     speeds = start_speeds(scene, model.stage, model.shafts.input)
     return {f"{name}.w_start": speed for name, speed in speeds.items()}
 
 
-def _cut(scene: SceneSpec, stage: Unit, model: StageModel, wiring: Wiring) -> Cut | Loaded:
-    """The stage with its drivetrain, or with the torques on its shafts."""
-    shafts = model.shafts
+def _cut(
+    scene: SceneSpec, stage: Unit, model: StageModel, parameters: Mapping[str, float | str], wiring: Wiring
+) -> Cut | Loaded:
+    """The stage with its drivetrain, or with the torques on its shafts. parameters: of the stage, for where it rests
+    under the torques of the start."""
+    shafts, micro = model.shafts, scene.coupling.micro_step or None
     if scene.shaft_loads is not None:
         return Loaded(stage, ShaftLoads(scene.shaft_loads), start_speeds(scene, model.stage, shafts.input))
-    drive = PyUnit(build(scene, shafts), scene.coupling.micro_step or None)
+    if (parts := scene.drivetrain) is not None:
+        start = start_of(scene, model.stage, lambda torques: _rest(model, parameters, torques))
+        return Cut(stage, PyUnit(part_network(parts, start), micro), tuple(parts.ports), (), wiring)
+    drive = PyUnit(build(scene, shafts), micro)
     return Cut(stage, drive, (shafts.input, shafts.output), stage_signals(scene, shafts), wiring)
+
+
+def _rest(
+    model: StageModel, parameters: Mapping[str, float | str], torques: Mapping[str, float]
+) -> Mapping[str, float]:
+    kernel = KernelUnit(model.blob, parameters).kernel
+    kernel.prepare()
+    return kernel.rest(torques)
 
 
 def verified(

@@ -22,7 +22,7 @@ from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.shaft_loads import ShaftLoad
-from gearfmu.spec.turning import turns
+from gearfmu.spec.turning import turns, undriven
 
 ORDERS = {"gs_mean": 2, "jacobi": 1}
 
@@ -48,11 +48,17 @@ class Law:
         return self._steady(w) + 0.5 * sum(self._ends(time, time + h)) + swing
 
     def _steady(self, w: float) -> float:
-        proportional = self.load.proportional
-        return (self.load.constant or 0.0) + (proportional.slope * w if proportional else 0.0)
+        proportional, control = self.load.proportional, self.load.speed_control
+        steady = (self.load.constant or 0.0) + (proportional.slope * w if proportional else 0.0)
+        return steady - control.damping * w if control else steady
 
     def _ends(self, start: float, end: float) -> tuple[float, float]:
-        return Ramp(self.load.over_time).ends(start, end) if self.load.over_time else (0.0, 0.0)
+        """What straight lines over time give at both ends."""
+        first, last = Ramp(self.load.over_time).ends(start, end) if self.load.over_time else (0.0, 0.0)
+        if control := self.load.speed_control:
+            wanted = Ramp(control.over_time).ends(start, end)
+            first, last = first + control.damping * wanted[0], last + control.damping * wanted[1]
+        return first, last
 
 
 class ShaftLoads:
@@ -166,11 +172,7 @@ def torque_ports(scene: SceneSpec, stage: GeneralStage) -> dict[str, PortSpec]:
     problems = [
         Problem(scene.name, f"shaft_loads.{name}", "", remedy) for name in scene.shaft_loads if name not in stage.ports
     ]
-    problems += [
-        Problem(str(stage.source), f"ports.{name}.kind", '"spring"', f"nothing drives it: write [shaft_loads.{name}]")
-        for name, port in stage.ports.items()
-        if name not in scene.shaft_loads and port.kind == "spring"
-    ]
+    problems += undriven(stage, scene.shaft_loads, "nothing drives it: write [shaft_loads.{name}]")
     if problems:
         raise SpecError(problems)
     return {name: PortSpec(kind="torque", k=stage.ports[name].k, c=stage.ports[name].c) for name in scene.shaft_loads}

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import get_args
 
+from gearfmu.spec.base import Quantity, Spec
 from gearfmu.spec.drivetrain import PassengerCar, TestRig, table
+from gearfmu.spec.parts import TABLES, Drivetrain
 from gearfmu.spec.scene import load_scene, shipped_scenes
 from gearfmu.spec.shaft_loads import ShaftLoad
 
@@ -40,6 +43,7 @@ def page() -> str:
                 INTRODUCTION,
                 *(_drivetrain(kind, title) for kind, title in ((PassengerCar, "Passenger car"), (TestRig, "Test rig"))),
                 _shaft_loads(),
+                _parts(),
                 _scenes(),
             ]
         )
@@ -67,6 +71,25 @@ def _shaft_loads() -> str:
     rows = [(f"`{name}`", field.description or "") for name, field in ShaftLoad.model_fields.items()]
     about = f"A scene may give the torques on the stage's ports instead, `[shaft_loads.PORT]`. {what}"
     return f"## Torques on the shafts\n{about}\n\n" + _table(("name", "meaning"), rows)
+
+
+def _parts() -> str:
+    about = " ".join((Drivetrain.__doc__ or "").split())
+    rows = []
+    for name, kind in TABLES.items():
+        own = [field for field in kind.model_fields if field not in ShaftLoad.model_fields]
+        rows += [(f"`{name}`", f"`{field}`", *_meaning(kind, field)) for field in own]
+    text = f"A scene may build its drivetrain itself, `[drivetrain]`, round any number of the stage's ports. {about}"
+    text += " A torque has the laws of `[shaft_loads]` besides; how it starts: [howto-scene](howto-scene.md)."
+    return f"## Own parts\n{text}\n\n" + _table(("table", "field", "meaning", "unit", "default"), rows)
+
+
+def _meaning(kind: type[Spec], name: str) -> tuple[str, str, str]:
+    field = kind.model_fields[name]
+    inner = [item for part in get_args(field.annotation) for item in getattr(part, "__metadata__", ())]
+    unit = next((item.unit for item in (*field.metadata, *inner) if isinstance(item, Quantity)), "")
+    default = "" if field.is_required() or field.default is None else f"{field.default:g}"
+    return field.description or "", unit, default
 
 
 def _scenes() -> str:

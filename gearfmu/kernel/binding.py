@@ -71,6 +71,7 @@ _SIGNATURES = {
         c_int,
         [c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_double, c_int, c_int, POINTER(c_double), POINTER(c_int)],
     ),
+    "gk_rest": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, POINTER(c_double), POINTER(c_double)]),
     "gk_linearise_room": (c_int, [c_void_p, c_void_p, c_void_p]),
     "gk_linearise": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
     "gk_profile": (c_int, [c_void_p, c_int, POINTER(c_char_p), POINTER(c_uint64)]),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 PLACES = 8
 SLICES = 10
+INSTANCES = 256  # value references: 256 × number of the variable + number of its instance
 
 
 @dataclass(frozen=True)
@@ -192,6 +193,22 @@ class Kernel:
         width = 2 + int(self.get("slices"))
         rows = [out[2 + i * width : 2 + (i + 1) * width] for i in range(count.value)]
         return TeState(out[0], out[1], {(int(r[0]), int(r[1])): tuple(r[2:]) for r in rows})
+
+    @property
+    def ports(self) -> list[str]:
+        """Names of the ports, in the model's order."""
+        torques = (v for v in self.variables.values() if v.name.endswith(".tau") and v.name.count(".") == 1)
+        return [v.name.removesuffix(".tau") for v in sorted(torques, key=lambda v: v.reference % INSTANCES)]
+
+    def rest(self, torques: Mapping[str, float]) -> dict[str, float]:
+        """Angles (rad) of the bores of all ports in static equilibrium under `torques` (N·m) on them, which balance in
+        every motion that the meshes allow; a port that is not named has none, chains are left out. After
+        `prepare`."""
+        names = self.ports
+        phi, given = (ctypes.c_double * len(names))(), [torques.get(name, 0.0) for name in names]
+        torque = (ctypes.c_double * len(names))(*given)
+        self._check(self._lib.gk_rest(self._model, self._setup, self._work, self._data, torque, phi))
+        return dict(zip(names, phi, strict=True))
 
     def linearise(self) -> LinearModel:
         """The stage linearised at the equilibrium that `transmission` or `initialize` found last, with the ports as the

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.files import write_text
-from gearfmu.report import page, picture, plots, plots_nvh, plots_set
+from gearfmu.report import page, picture, plots, plots_nvh, plots_runup, plots_set
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
@@ -55,7 +55,7 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
     own_set = plots_set.planet_set(trace, known_meshings(trace, spec))
     makers: list[Callable[[], Plot | None]]
     if own_set is not None:
-        return _made(_of_set(trace, own_set))
+        return _made(_of_set(trace, own_set, spec, bodies))
     makers = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
     for mesh in meshes(trace):
         makers += [
@@ -74,9 +74,13 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
     return made, missing
 
 
-def _of_set(trace: Trace, own: PlanetSet) -> list[Callable[[], Plot | None]]:
+def _of_set(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any] | None) -> list[Callable[[], Plot | None]]:
     """What makes the plots of a planetary set: its planets side by side instead of mesh by mesh."""
     window = window_of_interest(trace)
+    run = plots_runup.run_up(trace, own, window, spec, bodies)
+    over_frequency: list[Callable[[], Plot | None]] = [lambda: plots_set.spectrum(trace, own, window)]
+    if run is not None:
+        over_frequency = [partial(make, run) for make in plots_runup.FIGURES]
     return [
         lambda: plots_set.speeds(trace, own),
         lambda: plots.torque_and_slip(trace),
@@ -86,7 +90,7 @@ def _of_set(trace: Trace, own: PlanetSet) -> list[Callable[[], Plot | None]]:
         lambda: plots_set.pin_forces(trace, own),
         lambda: plots.bearing_forces(trace, carried=True),
         lambda: plots_set.energy(trace),
-        lambda: plots_set.spectrum(trace, own, window),
+        *over_frequency,
     ]
 
 

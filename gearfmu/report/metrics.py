@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from gearfmu.errors import GearfmuError
 
@@ -56,6 +57,17 @@ class OrderCuts:
     time: np.ndarray
     mesh_frequency: np.ndarray
     orders: np.ndarray
+    amplitude: np.ndarray
+
+
+@dataclass(frozen=True)
+class OrderMap:
+    """Amplitudes (T, O), rms, at orders (O,) of a shaft, over windows centred at time (T,) s at its speed (T,)
+    rad/s."""
+
+    time: np.ndarray
+    speed: np.ndarray
+    order: np.ndarray
     amplitude: np.ndarray
 
 
@@ -144,6 +156,33 @@ def order_cuts(time: np.ndarray, values: np.ndarray, angle: np.ndarray, orders: 
         usable = found * np.max(frequency[a:b]) < 0.45 / step if b - a >= 4 * periods else np.zeros(orders, dtype=bool)
         amplitude[usable, column] = _coefficients(angle[a:b] - centre, values[a:b], found[usable], width)
     return OrderCuts(centre_time, mesh_frequency, found, amplitude)
+
+
+def order_map(time: np.ndarray, values: np.ndarray, angle: np.ndarray, highest: float, turns: int = 4) -> OrderMap:
+    """Orders up to `highest` of values (n,) along the angle (n,) rad of a shaft, which grows all the time.
+
+    The signal is taken at equal steps of the angle (cubic spline), so that an order stays a line while the speed
+    changes; Hann windows of `turns` revolutions, one revolution apart: lines 1/turns of an order apart. Orders above
+    0.45 of the sampling rate at the window's speed are NaN. Raises MetricsError where the angle turns round or the
+    record holds less than one window.
+    """
+    steps, interval = np.diff(angle), sample_step(time)
+    if np.any(steps <= 0):
+        raise MetricsError("the shaft stands or turns round: there are no orders of it")
+    if angle[-1] - angle[0] < 2 * np.pi * turns:
+        held = (angle[-1] - angle[0]) / (2 * np.pi)
+        raise MetricsError(f"the record holds {held:.1f} revolutions, an order map needs {turns}; record a longer run")
+    each = int(np.ceil(2 * np.pi / steps.min()))  # samples a revolution: none is left out where the shaft is slowest
+    even = angle[0] + np.arange(int((angle[-1] - angle[0]) / (2 * np.pi) * each)) * (2 * np.pi / each)
+    frames = _frames(CubicSpline(angle, values)(even), turns * each, each)
+    centres = angle[0] + 2 * np.pi * (np.arange(len(frames)) + 0.5 * turns)
+    speed = np.interp(centres, angle, np.gradient(angle, time))
+    order = np.arange(frames.shape[1] // 2 + 1) / turns
+    kept = order <= highest
+    amplitude = _amplitudes(frames)[:, kept]
+    limit = 0.45 / interval * 2 * np.pi / speed
+    amplitude[order[None, kept] > limit[:, None]] = np.nan
+    return OrderMap(np.interp(centres, angle, time), speed, order[kept], amplitude)
 
 
 def _coefficients(angle: np.ndarray, values: np.ndarray, orders: np.ndarray, width: float) -> np.ndarray:

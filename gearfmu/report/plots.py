@@ -15,6 +15,7 @@ from gearfmu.stage.trace import Trace, heading
 
 CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
 RPM = 30 / np.pi
+LEAST_LABELLED = 0.08  # of the run: locked shorter than that gets no word
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,10 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     """Torques around the clutch, the other torques, and the slip of every clutch with its lock-up; None without
     torques."""
     clutch = [name for suffix in CLUTCH_TORQUES for name in trace.channels if name.endswith(suffix)]
-    others = [name for name in distinct(trace, [n for n in trace.channels if n.endswith(".tau")]) if name not in clutch]
+    own = [name for name in trace.channels if name.endswith(".tau") and f"{name[:-4]}.slip" in trace]
+    clutch += [name for name in own if name not in clutch]
+    all_torques = clutch + [name for name in trace.channels if name.endswith(".tau") and name not in clutch]
+    others = [name for name in distinct(trace, all_torques) if name not in clutch]
     slips = [name for name in trace.channels if name.endswith(".slip")]
     rows = [
         (names, label)
@@ -117,7 +121,7 @@ def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
     names = [name for found in groups for name in found]
     caption = "Force of the shaft on its bearing, along the axes x and y of the stage."
     if carried:
-        caption = "Force of the body on its bearing, in axes that turn with the carrier."
+        caption = "Force of the body on its bearing, along the fixed axes x and y."
     elif len(meshes(trace)) == 1:
         caption = "Force of the gear on its bearing; x points from pinion to wheel."
     return Plot("bearing", "Bearing forces", caption, picture, columns(trace, names))
@@ -155,6 +159,8 @@ def _mark_lock(trace: Trace, axes: list[Axes]) -> None:
             for start, end in spans(trace.time, trace[name].astype(bool)):
                 for axis in axes:
                     axis.axvspan(start, end, color=COAST, alpha=0.45, lw=0)
+                if end - start < LEAST_LABELLED * (trace.time[-1] - trace.time[0]):
+                    continue
                 axes[-1].annotate(
                     "locked",
                     (start, 1),

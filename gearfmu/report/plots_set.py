@@ -12,13 +12,14 @@ from matplotlib.axes import Axes
 from gearfmu.report import metrics
 from gearfmu.report.plots import Plot, columns, finish
 from gearfmu.report.plots_nvh import SHOWN_TO, level_axis, segment
-from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window
+from gearfmu.report.signals import GEAR_SPEED, Window
 from gearfmu.report.style import MUTED, panels, styled, svg
 from gearfmu.spec.turning import Meshing
 from gearfmu.stage.trace import Trace
 
 ENERGIES = ("energy.work", "energy.stored", "energy.dissipated", "energy.residual")
 MARKED_ORDERS = 12
+STEADY = 0.1  # nine tenths of the speeds lie as close together, over their median, where mesh orders are marked
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,8 @@ def pin_forces(trace: Trace, own: PlanetSet) -> Plot | None:
 def energy(trace: Trace) -> Plot | None:
     """Work of every shaft, stored and dissipated energy, and what the balance leaves."""
     works = [name for name in trace.channels if name.startswith("drive.") and name.endswith(".work")]
-    if not works or any(name not in trace for name in ENERGIES):
+    works = [name for name in works if name != "drive.energy.work"] or ["energy.work"]
+    if any(name not in trace for name in (*works, *ENERGIES)):
         return None
     with styled():
         figure, axes = panels((2.0, 1.3))
@@ -164,24 +166,28 @@ def energy(trace: Trace) -> Plot | None:
         axes[1].set_xlabel("time in s")
         picture = svg(figure, "energy")
     through = sum(float(np.ptp(trace[name])) for name in works)
+    if works == ["energy.work"]:  # of all ports together: what came in and what went out is told by the run
+        through = float(trace.meta.get("exchanged_work_J") or through)
     left = float(np.ptp(trace["energy.residual"])) / through if through else 0.0
     caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts (sum of magnitudes)."
     return Plot("energy", "Energy", caption, picture, columns(trace, [*works, *ENERGIES]))
 
 
 def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
-    """Spectra of the mesh forces and of the ring's force on its mounts in fixed axes. Marked: mesh orders k f_m, and
+    """Spectra of the mesh forces and of the ring's force on its mounts along fixed axes. Marked: mesh orders k f_m, and
     around each the sidebands of the planets' passing, k f_m ± N f_c (N planets, f_c: carrier)."""
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
     names = {c: [f"{mesh}.force" for mesh in meshes.values()] for c, meshes in own.meshes.items()}
     signals = {name: _force(part, name.removesuffix(".force")) for group in names.values() for name in group}
-    fixed = {f"{name} fixed": values for name, values in _in_fixed_axes(part, own).items()}
+    fixed = on_mounts(part)
     groups = {**{f"meshes of the {c}": own_names for c, own_names in names.items()}}
     groups |= {"ring on its mounts": list(fixed)} if fixed else {}
     spectra = {n: metrics.amplitude_spectrum(v, step, segment(part.time.size, 1)) for n, v in (signals | fixed).items()}
     mesh_frequency = _mesh_speed(part, own) / (2 * np.pi)
-    carrier = float(np.median(np.abs(part[f"{own.carrier}{GEAR_SPEED}"]))) / (2 * np.pi)
+    speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
+    carrier = float(np.median(speed)) / (2 * np.pi)
+    steady = np.ptp(np.percentile(speed, [5, 95])) < STEADY * np.median(speed)
     with styled():
         figure, axes = panels((1.9,) * len(groups))
         for axis, group in zip(axes, groups.values(), strict=True):
@@ -190,14 +196,20 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
                 axis.plot(lines.frequency[1:] / 1e3, metrics.level(lines.amplitude[1:]), label=name, lw=0.8)
             level_axis(axis, "dB re 1 N")
             axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
-            _mark(axis, mesh_frequency, len(own.planets) * carrier)
+            if steady:
+                _mark(axis, mesh_frequency, len(own.planets) * carrier)
         axes[-1].set_xlabel("frequency in kHz")
         picture = svg(figure, "spectrum")
     first = next(iter(spectra.values()))
     caption = (
         f"Rms amplitude of each line, Hann, resolution {first.resolution:.3g} Hz, {window.start:.3g} s to "
-        f"{window.end:.3g} s ({window.reason}). Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: "
-        f"k·f_m ± {len(own.planets)} f_c, f_c = {carrier:.2f} Hz of the carrier."
+        f"{window.end:.3g} s ({window.reason}). "
+    )
+    caption += (
+        f"Dotted: mesh orders k·f_m, f_m = {mesh_frequency:.1f} Hz; light: k·f_m ± {len(own.planets)} f_c, "
+        f"f_c = {carrier:.2f} Hz of the carrier."
+        if steady
+        else "Mesh orders are not marked: the speed is not steady."
     )
     data = {"frequency_[Hz]": first.frequency} | {f"{n}_rms_[N]": s.amplitude for n, s in spectra.items()}
     return Plot("spectrum", "Spectra of the forces", caption, picture, data)
@@ -229,7 +241,7 @@ def results(trace: Trace, own: PlanetSet, window: Window) -> tuple[tuple[str, ..
             pin = [part[name] for d in "xy" if (name := f"pin.{planet}.f{d}") in part]
             held = float(np.mean(np.hypot(*pin))) if len(pin) == 2 else np.nan
             numbers = (np.mean(force), np.std(force), means[mesh], np.mean(te), np.std(te), held)
-            rows.append((mesh, *(f"{number:.4g}" for number in numbers)))
+            rows.append((mesh, *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
     head = ("mesh", "force, N", "alternating, N rms", "share", "TE, µm", "TE alternating, µm rms", "pin force, N")
     return head, rows
 
@@ -240,21 +252,16 @@ def detail_window(trace: Trace, own: PlanetSet, window: Window, periods: float =
     return max(window.start, window.end - width), window.end
 
 
-def _in_fixed_axes(part: Trace, own: PlanetSet) -> dict[str, np.ndarray]:
-    """Ring's force on its mounts, which the model has in the carrier's axes, turned into fixed ones."""
-    names, turning = ("bearing.ring.fx", "bearing.ring.fy"), f"{own.carrier}{GEAR_PHI}"
-    if any(name not in part for name in (*names, turning)):
-        return {}
-    x, y = (_mean_or_sample(part, name) for name in names)
-    c, s = np.cos(part[turning]), np.sin(part[turning])
-    return {names[0]: c * x - s * y, names[1]: s * x + c * y}
+def on_mounts(part: Trace) -> dict[str, np.ndarray]:
+    """Force of the ring on its mounts, N, along the fixed axes x and y, by name."""
+    return {name: mean_or_sample(part, name) for name in ("bearing.ring.fx", "bearing.ring.fy") if name in part}
 
 
 def _force(trace: Trace, mesh: str) -> np.ndarray:
-    return _mean_or_sample(trace, f"{mesh}.force")
+    return mean_or_sample(trace, f"{mesh}.force")
 
 
-def _mean_or_sample(trace: Trace, name: str) -> np.ndarray:
+def mean_or_sample(trace: Trace, name: str) -> np.ndarray:
     """The mean over the communication step where it was recorded: it folds less."""
     return trace[f"{name}_mean"] if f"{name}_mean" in trace else trace[name]
 

@@ -15,7 +15,7 @@ from gearfmu.stage.trace import Trace
 
 GEAR_SPEED = ".gear.w"
 GEAR_PHI = ".gear.phi"
-LOCKED = ".clutch.locked"
+LOCKED = ".locked"
 MESH_CHANNELS = ("force", "force_mean", "te", "contact", "impacts")
 SETTLED = "after the scene's settling time"
 

@@ -13,15 +13,15 @@ from pydantic import AliasChoices, Field, Strict
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, read_toml, validate
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
-from gearfmu.spec.shaft_loads import ShaftLoad, load_problems
+from gearfmu.spec.parts import ClutchSpec, Drivetrain, drivetrain_problems
+from gearfmu.spec.shaft_loads import ShaftLoad, load_problems, time_problems
 
 SHIPPED = Path(__file__).parent.parent / "scenes"
-DRIVES = ("passenger_car", "test_rig", "shaft_loads")
+DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
 Switch = Annotated[bool, Strict()]
 Seconds = Annotated[float, Quantity("s", at_least=0)]
-Capacity = Annotated[float, Quantity("N*m", at_least=0)]
 
 
 class Effects(Spec):
@@ -66,13 +66,6 @@ class CouplingChoice(Spec):
     micro_step: Seconds = 0.0
 
 
-class ClutchSpec(Spec):
-    """Capacity over time: straight lines through (time, torque), constant outside; the same time twice is a jump."""
-
-    capacity: Annotated[tuple[tuple[Seconds, Capacity], ...], Field(min_length=1)]
-    peak: Annotated[float, Quantity(at_least=1)] = 1.0
-
-
 class StartSpec(Spec):
     """Speeds at the start; pinion_speed, also written input_speed: of the stage's input, its first port; slip: engine
     faster than the pinion by this."""
@@ -84,7 +77,7 @@ class StartSpec(Spec):
 
 
 class SceneSpec(Spec):
-    """A scene. Exactly one of `passenger_car`, `test_rig` and `shaft_loads`; the car needs a `clutch`.
+    """A scene. Exactly one of `passenger_car`, `test_rig`, `shaft_loads` and `drivetrain`; the car needs a `clutch`.
 
     record : names of stage outputs and drivetrain variables, "*" and "?" as in file names.
     """
@@ -100,6 +93,7 @@ class SceneSpec(Spec):
     passenger_car: PassengerCar | None = None
     test_rig: TestRig | None = None
     shaft_loads: dict[Name, ShaftLoad] | None = None
+    drivetrain: Drivetrain | None = None
     record: tuple[Text, ...] = ("*",)
 
     @property
@@ -108,8 +102,12 @@ class SceneSpec(Spec):
         values = self.model_dump()
         if not self.stage.effects.off:
             del values["stage"]["effects"]
-        if self.shaft_loads is None:
-            del values["shaft_loads"]
+        for load in (values["shaft_loads"] or {}).values():
+            if load["speed_control"] is None:
+                del load["speed_control"]
+        for added in ("shaft_loads", "drivetrain"):
+            if values[added] is None:
+                del values[added]
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     @property
@@ -157,27 +155,28 @@ def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
     """What no single field shows."""
     chosen = [key for key in DRIVES if getattr(scene, key) is not None]
     if len(chosen) != 1:
-        remedy = "give exactly one of [passenger_car], [test_rig] and [shaft_loads]"
+        remedy = "give exactly one of [passenger_car], [test_rig], [shaft_loads] and [drivetrain]"
         yield Problem(file, "", "", f"{remedy}, found {' and '.join(chosen) or 'none'}")
     if scene.passenger_car is not None and scene.clutch is None:
         yield Problem(file, "clutch", "", "the passenger car has a clutch: add [clutch] with its capacity")
     if scene.passenger_car is None and scene.clutch is not None:
-        yield Problem(file, "clutch", "", "only the passenger car has a clutch: remove this table")
+        remedy = "only the passenger car has this clutch: remove this table, or write [drivetrain.clutches.…]"
+        yield Problem(file, "clutch", "", remedy)
     if scene.passenger_car is None and scene.start.slip:
         yield Problem(
             file, "start.slip", f"{scene.start.slip:g} rad/s", "only the passenger car's clutch slips: remove it"
         )
     if scene.shaft_loads is not None:
         yield from load_problems(scene.shaft_loads, file)
+    if scene.drivetrain is not None:
+        yield from drivetrain_problems(scene.drivetrain, file)
     if scene.clutch is not None:
         yield from _clutch_problems(scene, scene.clutch, file)
     yield from _time_problems(scene, file)
 
 
 def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterator[Problem]:
-    times = [time for time, _ in clutch.capacity]
-    if any(b < a for a, b in zip(times, times[1:], strict=False)):
-        yield Problem(file, "clutch.capacity", "", "times must not decrease: sort the points by time")
+    yield from time_problems(clutch.capacity, file, "clutch.capacity")
     if clutch.peak != 1.0 and scene.passenger_car is not None and scene.passenger_car.chain_in_fmu:
         yield Problem(
             file,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -34,6 +34,16 @@ class AlternatingTorque(Spec):
     frequency: Annotated[float, Quantity("Hz", above=0)] = Field(description="of the sine, which begins at zero")
 
 
+class SpeedControl(Spec):
+    """A drive that follows a speed over time: damping · (wanted speed − speed), on top of the other torques."""
+
+    damping: Annotated[float, Quantity("N*m*s/rad", above=0)] = Field(description="torque per deviation of the speed")
+    over_time: Annotated[
+        tuple[tuple[Time, Annotated[float, Quantity("rad/s")]], ...],
+        Field(min_length=1, description="wanted speed: straight lines through (time, speed), constant outside"),
+    ]
+
+
 class ShaftLoad(Spec):
     """Torque of the outside on one shaft about +z: the sum of what is given."""
 
@@ -43,6 +53,7 @@ class ShaftLoad(Spec):
     )
     proportional: ProportionalTorque | None = Field(default=None, description="follows the speed of the shaft")
     alternating: AlternatingTorque | None = Field(default=None, description="a sine of time")
+    speed_control: SpeedControl | None = Field(default=None, description="follows a wanted speed over time")
 
 
 def load_problems(loads: dict[str, ShaftLoad], file: str) -> Iterator[Problem]:
@@ -50,13 +61,24 @@ def load_problems(loads: dict[str, ShaftLoad], file: str) -> Iterator[Problem]:
     if not loads:
         yield Problem(file, "shaft_loads", "", 'no shaft has a load: write e.g. [shaft_loads.sun] constant = "9 N*m"')
     for name, load in loads.items():
-        if all(value is None for _, value in load):
-            parts = ", ".join(ShaftLoad.model_fields)
-            yield Problem(file, f"shaft_loads.{name}", "", f"this shaft has no torque: give one or more of {parts}")
-        times = [time for time, _ in load.over_time or ()]
-        if any(b < a for a, b in zip(times, times[1:], strict=False)):
-            remedy = "times must not decrease: sort the points by time"
-            yield Problem(file, f"shaft_loads.{name}.over_time", "", remedy)
-        if load.proportional is not None and load.proportional.speed == 0.0:
-            field = f"shaft_loads.{name}.proportional.speed"
-            yield Problem(file, field, "0 rad/s", "a torque at rest follows no speed: write it as constant")
+        yield from law_problems(load, file, f"shaft_loads.{name}")
+
+
+def law_problems(load: ShaftLoad, file: str, table: str) -> Iterator[Problem]:
+    """What no single field of the torque in `table` shows."""
+    laws = ShaftLoad.model_fields
+    if all(getattr(load, name) is None for name in laws):
+        yield Problem(file, table, "", f"this shaft has no torque: give one or more of {', '.join(laws)}")
+    wanted = load.speed_control.over_time if load.speed_control is not None else ()
+    for field, points in (("over_time", load.over_time or ()), ("speed_control.over_time", wanted)):
+        yield from time_problems(points, file, f"{table}.{field}")
+    if load.proportional is not None and load.proportional.speed == 0.0:
+        field = f"{table}.proportional.speed"
+        yield Problem(file, field, "0 rad/s", "a torque at rest follows no speed: write it as constant")
+
+
+def time_problems(points: Sequence[tuple[float, float]], file: str, field: str) -> Iterator[Problem]:
+    """Points (time, value) that go back in time."""
+    times = [time for time, _ in points]
+    if any(b < a for a, b in zip(times, times[1:], strict=False)):
+        yield Problem(file, field, "", "times must not decrease: sort the points by time")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -45,8 +45,14 @@ def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
         known |= {stage.rotor_of(held.body): Fraction(0) for held in list(stage.ports.values())[2:]}
     known[stage.rotor_of(stage.ports[port].body)] = Fraction(1)
     equations = [({name: Fraction(1)}, speed) for name, speed in known.items()]
-    equations += [(_rolling(stage, mesh), Fraction(0)) for mesh in stage.engagements]
-    return _solved(equations)
+    return solved(equations + [(factors, Fraction(0)) for factors in rolling(stage)])
+
+
+def rolling(stage: GeneralStage) -> list[dict[str, Fraction]]:
+    """What the meshes say of the rotors' speeds, and those that stand: sums of factors times speeds (by name) that are
+    zero, one for each engagement and standing rotor."""
+    standing = [{name: Fraction(1)} for name, rotor in stage.rotors.items() if rotor.stands]
+    return [_rolling(stage, mesh) for mesh in stage.engagements] + standing
 
 
 def _rolling(stage: GeneralStage, mesh: EngagementSpec) -> dict[str, Fraction]:
@@ -61,7 +67,7 @@ def _rolling(stage: GeneralStage, mesh: EngagementSpec) -> dict[str, Fraction]:
     return factors
 
 
-def _solved(equations: list[tuple[dict[str, Fraction], Fraction]]) -> dict[str, Fraction]:
+def solved(equations: list[tuple[dict[str, Fraction], Fraction]]) -> dict[str, Fraction]:
     """The unknowns that linear equations (factors by name, right side) decide; elimination without rounding."""
     rows: dict[str, tuple[dict[str, Fraction], Fraction]] = {}
     for factors, right in equations:
@@ -129,13 +135,20 @@ def with_ports(spec: Any, ports: dict[str, PortSpec]) -> Any:
     return spec.model_copy(update={"ports": own})
 
 
-def require_two_driven(stage: Any, shafts: Shafts, by: str) -> None:
-    """SpecError where a spring port beside input and output would have to be driven, which `by` ("a scene") does not
-    do."""
-    for name, port in stage.ports.items():
-        if name not in (shafts.input, shafts.output) and port.kind == "spring":
-            remedy = f"{by} drives {shafts.input} and {shafts.output} only: make this port one of kind torque or fixed"
-            raise SpecError([Problem(str(stage.source), f"ports.{name}.kind", '"spring"', remedy)])
+def undriven(stage: Any, driven: Collection[str], remedy: str) -> list[Problem]:
+    """Every spring port that is not among those `driven`; remedy: what to do about it, {name} stands for the port."""
+    return [
+        Problem(str(stage.source), f"ports.{name}.kind", '"spring"', remedy.format(name=name))
+        for name, port in stage.ports.items()
+        if name not in driven and port.kind == "spring"
+    ]
+
+
+def require_driven(stage: Any, driven: Collection[str], by: str) -> None:
+    """SpecError where a spring port beside those `driven` would have to be, which `by` ("a scene") does not do."""
+    remedy = f"{by} drives {' and '.join(driven)} only: make this port one of kind torque or fixed"
+    if problems := undriven(stage, driven, remedy):
+        raise SpecError(problems)
 
 
 def _teeth(stage: GeneralStage, gear: str) -> int:

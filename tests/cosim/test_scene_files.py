@@ -12,11 +12,12 @@ from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
 
 def test_shipped_scenes():
     pairs = ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded"]
-    sets = ["planetary_backfire", "planetary_paper"]
-    assert shipped_scenes() == sorted(pairs + sets)
-    for name in sets:
+    sets = {name: "planetary54" for name in ("planetary_backfire", "planetary_paper", "planetary_closure")}
+    sets |= {"planetary_runup": "planetary54/stage_pin_error", "planetary_shift": "planetary54/stage_ring_port"}
+    assert shipped_scenes() == sorted([*pairs, *sets])
+    for name, stage in sets.items():
         scene = load_scene(name)
-        assert (scene.name, scene.stage.name, scene.stage.level) == (name, "planetary54", "fast")
+        assert (scene.name, scene.stage.name, scene.stage.level) == (name, stage, "fast")
     for name in pairs:
         scene = load_scene(name)
         assert (

@@ -228,3 +228,21 @@ def test_the_scene_of_the_page_loads_and_balances(tmp_path: Path) -> None:
     loads = load_scene(tmp_path / "my_run.toml").shaft_loads
     assert Law(loads["carrier"]).at(0.0, SPEED) == 100.0 and Law(loads["sun"]).at(0.0, 4 * SPEED) == -25.0
     assert Law(loads["carrier"]).at(0.02, SPEED) == pytest.approx(400.0 + 20.0 * math.sin(2 * math.pi * 37.0 * 0.02))
+
+
+def test_a_speed_that_is_wanted_adds_what_its_controller_gives() -> None:
+    wanted = {"damping": 5.0, "over_time": ((0.0, 100.0), (1.0, 120.0))}
+    law = Law(ShaftLoad(constant=3.0, speed_control=wanted))
+    assert law.at(0.5, 104.0) == pytest.approx(3.0 + 5.0 * (110.0 - 104.0))
+    assert law.mean(0.0, 0.5, 104.0) == pytest.approx(3.0 + 5.0 * (105.0 - 104.0))
+    assert "speed_control" in load_scene("planetary_runup").drivetrain.torques["control"].model_dump()
+
+
+def test_a_braked_rotor_follows_the_wanted_speed() -> None:
+    """J w' = c (w₀ + a t − w) from w₀: w = w₀ + a (t − J/c (1 − e^(−ct/J)))."""
+    c, gain = 0.5, 400.0
+    load = ShaftLoad(speed_control={"damping": c, "over_time": ((0.0, 100.0), (1.0, 100.0 + gain))})
+    t, lag = 0.02, Rotor.INERTIA / c
+    exact = 100.0 + gain * (t - lag * (1.0 - math.exp(-t / lag)))
+    errors = [abs(speed_at_the_end(n, "gs_mean", load).trace["shaft.w"][-1] - exact) for n in (400, 800)]
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.2) and errors[1] < 1e-3

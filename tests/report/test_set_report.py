@@ -11,7 +11,7 @@ import pytest
 
 from gearfmu import report
 from gearfmu.report import plots_set
-from gearfmu.report.metrics import amplitude_spectrum, band_rms
+from gearfmu.report.metrics import Spectrum, band_rms
 from gearfmu.report.plots_set import planet_set, shares
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.stage.trace import Channel, Trace
@@ -77,17 +77,25 @@ def test_shares_are_means_over_a_mesh_period_and_of_the_window() -> None:
         assert np.nanmax(np.abs(inner - share)) < 2e-3, "the ripple of ±5 % is averaged out"
 
 
-def test_spectrum_of_the_ring_is_that_in_fixed_axes(tmp_path: Path) -> None:
-    """A force at f_m along an axis of the carrier is one at f_m ± f_c in fixed axes, half of it each, none at f_m."""
+def test_spectrum_of_the_ring_is_that_of_its_force_as_recorded() -> None:
+    """The kernel gives forces on the ground along fixed axes: a force at f_m is one at f_m, and stays it."""
     trace = set_run()
     own = planet_set(trace, known_meshings(trace))
     assert own is not None
     plot = plots_set.spectrum(trace, own, Window(0.0, 0.2, "here"))
     assert f"f_m = {MESH:.1f} Hz" in plot.caption and f"f_c = {CARRIER / 2 / np.pi:.2f} Hz" in plot.caption
-    turned = plots_set._in_fixed_axes(trace, own)["bearing.ring.fx"]
-    lines = amplitude_spectrum(turned, STEP)
+    lines = Spectrum(plot.columns["frequency_[Hz]"], plot.columns["bearing.ring.fx_rms_[N]"], 1)
     middle, low, high = (band_rms(lines, MESH + side * 13.53 - 6.0, MESH + side * 13.53 + 6.0) for side in (0, -1, 1))
-    assert low == pytest.approx(50 / np.sqrt(2), rel=0.1) and high == pytest.approx(low, rel=0.1) and middle < 0.3 * low
+    assert middle == pytest.approx(100 / np.sqrt(2), rel=0.1) and low < 0.3 * middle and high < 0.3 * middle
+
+
+def test_mesh_orders_are_not_marked_where_the_speed_changes() -> None:
+    trace = set_run()
+    swinging = Channel(CARRIER * (1.0 + 0.2 * np.sin(40.0 * trace.time)), "rad/s")
+    trace = Trace(trace.time, {**trace.channels, "carrier.gear.w": swinging}, trace.meta)
+    own = planet_set(trace, known_meshings(trace))
+    assert own is not None
+    assert "the speed is not steady" in plots_set.spectrum(trace, own, Window(0.0, 0.2, "here")).caption
 
 
 def test_a_pair_is_no_set() -> None:

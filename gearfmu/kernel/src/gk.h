@@ -99,6 +99,12 @@ GK_API double gk_time(const gk_data *data);
 GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                         double torque, int engagement, int keep, double *out, int *places);
 
+/* Static equilibrium with the torque[p] (N m) on the bore of every port p, chains left out; phi[p] (rad): angles of the
+ * bores. The torques balance where nothing holds the rotors: Σ torque × speed = 0 in every motion that the meshes allow.
+ * After gk_prepare. */
+GK_API gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                          const double *torque, double *phi);
+
 /* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds
  * with -DGK_PROFILE only, else they stay 0. */
 GK_API int gk_profile(const gk_work *work, int phase, const char **name, uint64_t *cycles);

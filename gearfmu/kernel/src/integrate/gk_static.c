@@ -626,17 +626,27 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     return GK_OK;
 }
 
-/* angle of the first port's bore under its torque: what the rows move it by comes on top of the spin */
-static double driven_angle(const gk_model *model, const gk_work *work)
+/* angle of a port's bore under its torque: what the rows move it by comes on top of the spin */
+static double driven_angle(const gk_model *model, const gk_work *work, int port)
 {
     double angle = 0.0;
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
-            if (s->port_of[i] == 0 && s->joint_of[i] == JOINT_PORT)
+            if (s->port_of[i] == port && s->joint_of[i] == JOINT_PORT)
                 angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
     }
     return angle;
+}
+
+gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const double *torque,
+                   double *phi)
+{
+    gk_boundary b[MAX_PORTS];
+    for (int p = 0; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, torque[p], 0.0, 0.0};
+    const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, 0);
+    for (int p = 0; p < model->ports && outcome == GK_OK; p++) phi[p] = driven_angle(model, work, p);
+    return outcome;
 }
 
 /* a port beyond input and output: free, but where carriers turn its spring holds it */
@@ -660,7 +670,7 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
     if (outcome) return outcome;
     for (int r = 0; r < model->rotors; r++) angle[r] = data->x[r];
-    angle[model->port[0].rotor] = driven_angle(model, work);
+    angle[model->port[0].rotor] = driven_angle(model, work, 0);
     angle[model->port[1].rotor] = phi_out;
     const gk_engagement *mesh = &model->engagement[e];
     const gk_gear *A = &model->gear[mesh->gear[0]], *B = &model->gear[mesh->gear[1]];

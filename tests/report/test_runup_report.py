@@ -1,0 +1,137 @@
+"""The report of a run-up: order maps of made-up sweeps, and the pickup on a ring."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu import report
+from gearfmu.body import load_bodies
+from gearfmu.report.metrics import MetricsError, order_map
+from gearfmu.report.plots_runup import PICKUP, passing_orders, run_up
+from gearfmu.report.plots_set import planet_set
+from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
+from gearfmu.report.signals import Window, known_meshings
+from gearfmu.report.style import COLUMNS, MOST_POINTS, envelope
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.trace import Channel, Trace
+
+STEP, SLOW, FAST, DURATION = 5e-5, 60.0, 240.0, 1.0  # s, rad/s of the carrier
+TIME = np.arange(round(DURATION / STEP) + 1) * STEP
+SPEED = SLOW + (FAST - SLOW) * TIME / DURATION
+ANGLE = SLOW * TIME + 0.5 * (FAST - SLOW) * TIME**2 / DURATION
+
+
+def test_an_order_keeps_its_line_and_its_level_while_the_speed_grows() -> None:
+    found = order_map(TIME, 3.0 + 2.0 * np.cos(54.0 * ANGLE + 0.3), ANGLE, 100.0)
+    line = found.amplitude[:, found.order == 54.0].ravel()
+    assert line == pytest.approx(np.sqrt(2.0), rel=1e-3)
+    off = found.amplitude[:, np.abs(found.order - 54.0) > 1.0]
+    assert off.max() < 1e-3, "the mean and the sweep leave nothing beside it"
+    assert found.speed == pytest.approx(np.interp(found.time, TIME, SPEED), rel=1e-3)
+    assert found.order[1] == 0.25 and found.order[-1] == 100.0
+
+
+def test_a_tone_lies_on_a_hyperbola() -> None:
+    found = order_map(TIME, np.cos(2 * np.pi * 900.0 * TIME), ANGLE, 120.0)
+    loudest = found.order[np.argmax(found.amplitude, axis=1)]
+    slow = 2 * np.pi * 900.0 / found.speed < 110.0
+    assert slow.sum() > 10 and loudest[slow] * found.speed[slow] == pytest.approx(2 * np.pi * 900.0, rel=0.06)
+
+
+def test_orders_that_the_sampling_cannot_tell_are_left_out() -> None:
+    found = order_map(TIME, np.cos(ANGLE), ANGLE, 1000.0)
+    limit = 0.45 / STEP * 2 * np.pi / found.speed
+    for row, most in zip(found.amplitude, limit, strict=True):
+        assert np.all(np.isnan(row[found.order > most])) and np.all(np.isfinite(row[found.order <= most]))
+
+
+def test_no_orders_of_a_shaft_that_stands_or_turns_round_or_hardly_turns() -> None:
+    with pytest.raises(MetricsError, match="stands or turns round"):
+        order_map(TIME, ANGLE, np.sin(ANGLE), 10.0)
+    with pytest.raises(MetricsError, match="needs 4; record a longer run"):
+        order_map(TIME, ANGLE, 0.1 * ANGLE, 10.0)
+
+
+def sweep(speed: np.ndarray = SPEED, angle: np.ndarray = ANGLE) -> Trace:
+    """Equal planets in alternating phase, as in a set whose ring teeth leave half a tooth from planet to planet."""
+    channels, meshes = {}, {}
+    for k in range(4):
+        force = 1000.0 + 50.0 * (-1) ** k * np.cos(54.0 * angle)
+        for central, gear, sign in (("sun", "sun", -1), ("ring", f"planet{k + 1}", 1)):
+            channels[f"{central}_planet{k + 1}.force"] = Channel(sign * force, "N")
+            meshes[f"{central}_planet{k + 1}"] = [gear, 18, "carrier"]
+        channels[f"planet{k + 1}.gear.w"] = Channel(-2.0 * speed, "rad/s")
+    channels["carrier.gear.w"], channels["carrier.gear.phi"] = Channel(speed, "rad/s"), Channel(angle, "rad")
+    channels["sun.gear.w"] = Channel(4.0 * speed, "rad/s")
+    for name, values in (("fx", np.cos(angle)), ("fy", np.sin(angle))):
+        channels[f"bearing.ring.{name}"] = Channel(values, "N")
+    return Trace(TIME, channels, {"scene": "sweep", "stage": "set", "outcome": "ok", "meshes": meshes})
+
+
+def test_a_run_up_is_one_whose_carrier_gathers_speed() -> None:
+    whole = Window(0.0, DURATION, "here")
+    for trace, is_one in (
+        (sweep(), True),
+        (sweep(SPEED[::-1], ANGLE[-1] - ANGLE[::-1]), True),
+        (sweep(np.full_like(TIME, FAST), FAST * TIME), False),
+        (sweep(150.0 + 80.0 * np.sin(9.0 * TIME), 150.0 * TIME - 80.0 / 9.0 * np.cos(9.0 * TIME)), False),
+    ):
+        own = planet_set(trace, known_meshings(trace))
+        found = run_up(trace, own, whole)
+        assert (found is not None) is is_one
+        if found is not None:
+            assert found.each == 54 and list(found.signals) == [
+                "bearing.ring.fx", "sun_planet1.force", "ring_planet1.force",
+            ]  # fmt: skip
+
+
+def test_the_report_of_a_run_up_has_its_maps_instead_of_a_spectrum(tmp_path: Path) -> None:
+    trace, spec = sweep(), load_stage("planetary54")
+    report.write(trace, trace.meta, tmp_path, spec, load_bodies(spec))
+    made = {path.stem for path in (tmp_path / "data").glob("*.csv")}
+    assert {"spectrogram_speed", "orders_map", "orders_speed"} <= made and "spectrum" not in made
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Campbell diagram of the run-up" in text and "mesh orders k × 54" in text and PICKUP in text
+
+
+def test_equal_planets_make_orders_at_a_place_on_the_ring_that_their_number_divides() -> None:
+    """At 54 orders of the carrier and four planets in alternating phase: 52 and 56, nothing at 54 (McFadden and Smith,
+    Proc. IMechE 199 (1985) 65); the ring's oval is loudest where an order meets it."""
+    assert passing_orders(54, 4) == (52.0, 56.0) and passing_orders(108, 4) == (104.0, 112.0)
+    ring = load_bodies(load_stage("planetary54"))[2]
+    forces = {f"p{k}": 1000.0 + 50.0 * (-1) ** k * np.cos(54.0 * ANGLE) for k in range(4)}
+    angles = {f"p{k}": ANGLE + 0.5 * np.pi * k for k in range(4)}
+    found = order_map(TIME, velocity_of(ring, STEP, forces, angles), ANGLE, 60.0)
+    steady = (found.speed > 180.0) & (found.speed < 220.0)
+    level = {order: found.amplitude[np.ix_(steady, found.order == order)].mean() for order in (52, 53, 54, 55, 56)}
+    assert min(level[52], level[56]) > 30.0 * max(level[53], level[54], level[55]), level
+    oval = ring.frequency[(ring.nodal_diameter == 2) & (ring.parity == 1)].min()
+    for order in (52, 56):
+        at = found.speed[np.argmax(found.amplitude[:, found.order == order].ravel())] * order / (2 * np.pi)
+        assert at == pytest.approx(oval, rel=0.06), "within a window of four revolutions"
+
+
+class _Mode:
+    damping_ratio = np.array([0.02])
+
+
+def test_a_mode_under_a_ramp_moves_as_the_closed_form_says() -> None:
+    """q'' + 2ζω q' + ω² q = t: q' = (1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t))/ω²."""
+    omega, zeta = 700.0, 0.02
+    damped, t = omega * np.sqrt(1 - zeta**2), TIME[:2000]
+    exact = (
+        1 - np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
+    ) / omega**2
+    assert np.allclose(_modal_velocity(t, STEP, omega, _Mode, 0), exact, rtol=0.0, atol=1e-12 * np.abs(exact).max())
+
+
+def test_long_curves_are_shown_by_their_envelope() -> None:
+    x = np.linspace(0.0, 1.0, 20 * MOST_POINTS)
+    y = np.sin(1e5 * x) * x
+    shown_x, shown_y = envelope(x, y)
+    assert shown_x.size == shown_y.size == 2 * COLUMNS and np.all(np.diff(shown_x) >= 0.0)
+    assert (shown_y.min(), shown_y.max()) == (y.min(), y.max())
+    assert envelope(x[:100], y[:100])[1].tobytes() == y[:100].tobytes()
