@@ -201,6 +201,7 @@ struct gk_setup {
     int far_supports;  /* column of the first support */
     double *press;     /* (supports, supports) L of κ = L Lᵀ, lower */
     gk_step_function *step; /* of the integrator, in the widest vectors of this processor */
+    size_t amplitudes;      /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
 

@@ -159,6 +159,19 @@ static void turn_row(const gk_gear *gear, int offset, double *row)
     }
 }
 
+/* Row (modes) of all modes of a gear group, outward, for a load at a length of roll on a flank of the tooth that `at` says,
+ * its weights on the width functions given */
+void gk_side_modes(const gk_model *model, int gear, const gk_key *at, double roll, const double *width, double *row)
+{
+    const gk_gear *of = &model->gear[gear];
+    const node n = {.model = model, .gear = of};
+    place p = {.flank = at->flank, .roll = roll};
+    memcpy(p.width, width, (size_t)model->functions * sizeof *width);
+    grid(model, of, &p);
+    blend(&n, of->rows, &p, of->modes, row);
+    turn_row(of, at->tooth, row);
+}
+
 typedef struct direction { /* in ground axes, at the nominal place of contact */
     double angle;          /* of the tooth */
     double n[3], arm[3];   /* outward normal; point of contact from the gear's centre × normal */
