@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gearfmu.body.parts import DRAWN, PICTURE_MODES, Parts, pictured_loads, rim_of, sector_display, sector_shapes, tooth_flank
+from gearfmu.body.parts import (
+    DRAWN,
+    PICTURE_MODES,
+    Parts,
+    pictured_loads,
+    rim_of,
+    sector_display,
+    sector_shapes,
+    tooth_flank,
+)
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.reduced import Rim, Tangent
-from gearfmu.femesh import FeMesh
-from gearfmu.reduction.display import Display, Outline, Shapes, outline, unfold_mode, unfold_sectors, whole_surface
+from gearfmu.reduction.display import Display, Outline, Shapes, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfError
 from gearfmu.reduction.modal import Modes

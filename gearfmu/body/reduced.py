@@ -112,7 +112,12 @@ class ReducedBody:
     @property
     def groups(self) -> tuple[str, ...]:
         """Which of the optional `layout.GROUPS` the body has."""
-        has = {"rim": self.internal, "helix": self.base_helix_angle != 0, "tangent": self.tangent is not None, "shapes": self.shapes is not None}
+        has = {
+            "rim": self.internal,
+            "helix": self.base_helix_angle != 0,
+            "tangent": self.tangent is not None,
+            "shapes": self.shapes is not None,
+        }
         return tuple(name for name, there in has.items() if there)
 
     @property

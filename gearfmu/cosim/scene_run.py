@@ -7,12 +7,14 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from gearfmu import fmu
 from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
+from gearfmu.cosim.frames import frame_plan
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, start_speeds, torque_ports
@@ -27,6 +29,8 @@ from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.turning import require_two_driven, shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.deformation import FILE_NAME
+from gearfmu.stage.observed import gear_hashes
 from gearfmu.stage.trace import Trace
 
 WHOLE = Wiring()
@@ -44,9 +48,10 @@ def run(
 
     unit : "fmu" (exported into out_dir, or taken from fmu_path, which must have the scene's ports) or "kernel".
     verify : run again with half the communication step and estimate the coupling error. progress : told the done
-    fraction 0 … 1. Writes trace.h5 and summary.json into out_dir. The trace's meta is the summary: outcome "ok" or
-    the name of what stopped the run, last good time, CPU time of the whole loop, energy residual of the cut, errors,
-    hashes, versions. Raises CouplingError, SpecError, BodyError, FmuError when the run cannot begin.
+    fraction 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
+    [deformation]. The trace's meta is the summary: outcome "ok" or the name of what stopped the run, last good time,
+    CPU time of the whole loop, energy residual of the cut, errors, hashes, versions. Raises CouplingError, SpecError,
+    BodyError, FmuError when the run cannot begin.
     """
     if unit not in ("fmu", "kernel"):
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
@@ -60,6 +65,10 @@ def run(
             else None
         )
         meta = summary(scene, source, result, errors)
+        if result.frames is not None and out_dir is not None:
+            meta["deformation"] = FILE_NAME
+            frames = result.frames.frames(gear_hashes(source.model), _frame_meta(meta))
+            frames.save(Path(out_dir) / FILE_NAME)
     trace = Trace(result.trace.time, result.trace.channels, meta)
     if out_dir is not None:
         trace.save(Path(out_dir) / "trace.h5")
@@ -70,7 +79,14 @@ def run(
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     spec = load_stage(scene.stage.name)
-    return assemble(in_drivetrain(scene, spec), load_bodies(spec))
+    observe = scene.deformation.gears if scene.deformation is not None else ()
+    return assemble(in_drivetrain(scene, spec), load_bodies(spec), observe=observe)
+
+
+def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
+    return {name: meta[name] for name in ("scene", "description", "stage", "level")} | {
+        "model": meta["hashes"]["model"]
+    }
 
 
 def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
@@ -108,7 +124,8 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
     try:
         cut = _cut(scene, stage, source.model, wiring)
         coupling, omit = scene.coupling, stage_joints(scene, shafts)
-        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
+        frames = frame_plan(scene)
+        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit, frames))
     finally:
         stage.close()
 

@@ -58,7 +58,7 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
     moved = [
         _displacement(own[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)
     ]
-    scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
+    scale = round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
     placed = [_placed(own[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
     world = [u @ _rotation(angle).T for u, angle in zip(moved, angles, strict=True)]
     approach = _approach(pair, contacts, sg, placed, world)
@@ -174,7 +174,7 @@ def _shape(display: Any, drawn: np.ndarray, moved: np.ndarray) -> Shape:
     return Shape(drawn, np.asarray(display.quads, dtype=int), 1e6 * np.linalg.norm(moved, axis=1))
 
 
-def _round_scale(scale: float) -> float:
+def round_scale(scale: float) -> float:
     """The largest of 1, 2, 5 times a power of ten below `scale`."""
     power = 10 ** math.floor(math.log10(scale))
     return float(next(step * power for step in (5, 2, 1) if step * power <= scale))

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from gearfmu.report import metrics
 from gearfmu.report.plots import Plot, columns, finish
 from gearfmu.report.plots_nvh import SHOWN_TO, level_axis, segment
 from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window
-from gearfmu.report.style import MUTED, panels, styled, svg
+from gearfmu.report.style import MUTED, WIDTH, panels, styled, svg
 from gearfmu.spec.turning import Meshing
 from gearfmu.stage.trace import Trace
 
@@ -126,6 +127,51 @@ def sharing(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     )
     data = {"time_[s]": trace.time} | {f"{mesh}_share": values for mesh, values in over_time.items()}
     return Plot("sharing", "Load sharing", caption, picture, data)
+
+
+def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+    """One row a planet: its mesh forces and the force on its pin, over the run and over the last mesh periods."""
+    _, means = shares(trace, own, window)
+    rows = {planet: _forces_of(trace, own, planet) for planet in own.planets}
+    start, end = detail_window(trace, own, window)
+    with styled():
+        figure = Figure(figsize=(WIDTH, 1.45 * len(rows) + 0.5), layout="constrained")
+        axes = figure.subplots(len(rows), 2, squeeze=False, sharex="col", sharey=True, width_ratios=(1.5, 1))
+        for (planet, lines), (whole, detail) in zip(rows.items(), axes, strict=True):
+            part = (trace.time >= start) & (trace.time <= end)
+            for name, values in lines.items():
+                whole.plot(trace.time, values, lw=0.6)
+                detail.plot(trace.time[part], values[part], lw=1.0, label=name)
+            known = {
+                central: means[own.meshes[central][planet]] for central in own.meshes if planet in own.meshes[central]
+            }
+            carried = ", ".join(f"{central} {share:.3f}" for central, share in known.items())
+            whole.set_title(f"{planet}; share at the {carried}", loc="left")
+            whole.set_ylabel("force in kN")
+        axes[0, 1].legend(loc="upper right", ncols=3)
+        for axis in axes[-1]:
+            axis.set_xlabel("time in s")
+        picture = svg(figure, "planets")
+    caption = (
+        "Magnitudes of the mesh forces and of the force on the pin across its axis; left the whole run, right its last "
+        f"mesh periods. Shares are means from {window.start:.3g} s to {window.end:.3g} s."
+    )
+    data = {"time_[s]": trace.time}
+    data |= {f"{planet}_{name}_[N]": 1e3 * values for planet, own in rows.items() for name, values in own.items()}
+    return Plot("planets", "Planet by planet", caption, picture, data)
+
+
+def _forces_of(trace: Trace, own: PlanetSet, planet: str) -> dict[str, np.ndarray]:
+    """Magnitudes in kN of what acts on a planet, by what makes it."""
+    found = {
+        central: 1e-3 * np.abs(trace[f"{meshes[planet]}.force"])
+        for central, meshes in own.meshes.items()
+        if planet in meshes
+    }
+    pin = [f"pin.{planet}.{direction}" for direction in ("fx", "fy")]
+    if all(name in trace for name in pin):
+        found["pin"] = 1e-3 * np.hypot(trace[pin[0]], trace[pin[1]])
+    return found
 
 
 def pin_forces(trace: Trace, own: PlanetSet) -> Plot | None:

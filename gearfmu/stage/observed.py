@@ -13,9 +13,12 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import ModelError
+from gearfmu.spec.expand import as_general, set_gears
 from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.stage.free import NODE_MEMBERS
-from gearfmu.stage.groups import MOTIONS, Group, families
+from gearfmu.stage.groups import Group, families
+from gearfmu.stage.model import StageModel
 
 MOTION, MODE = ".motion.", ".mode_"
 
@@ -48,7 +51,13 @@ def observed_sections(index: int, bodies: Sequence[Any], groups: Sequence[Group]
     return found
 
 
-def output_names(gear: str, modes: int) -> list[str]:
-    """Names that outputs of a gear's motion can have: rigid motion, then all modes of a body that has `modes`. Modes
-    that nothing excites are no outputs."""
-    return [gear + MOTION + motion for motion in MOTIONS] + [f"{gear}{MODE}{k + 1}" for k in range(modes)]
+def gear_bodies(spec: Any, bodies: Sequence[Any]) -> dict[str, Any]:
+    """One of `bodies` (or what stands for them, such as their hashes) for every gear of a stage by name: of a set its
+    sun, planet, ring and carrier are given."""
+    of_gears = set_gears(spec, bodies)[:-1] if isinstance(spec, PlanetarySpec) else bodies
+    return {gear.name: body for gear, body in zip(as_general(spec).gears, of_gears, strict=True)}
+
+
+def gear_hashes(model: StageModel) -> dict[str, str]:
+    """Hash of the reduced body of every gear of a model."""
+    return gear_bodies(model.spec, model.body_hashes)
