@@ -80,6 +80,10 @@ def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Gene
         figure = Figure(figsize=(6.4, 7.1), layout="constrained", dpi=FILM_DPI)
         canvas, axis = FigureCanvasAgg(figure), figure.subplots()
         _bar(figure, [axis], face, 0.7)
+        _draw(axis, face, chosen[0], moved[0])
+        axis.set_title("t", loc="left", fontsize=13)
+        canvas.draw()
+        figure.set_layout_engine("none")  # every frame has the place of the first
         images = []
         for frame, field in zip(chosen, moved, strict=True):
             axis.clear()
@@ -90,8 +94,8 @@ def film(deformation: Deformation, gear: DeformedGear, trace: Trace, stage: Gene
     step = float(np.median(np.diff(deformation.time[chosen])))
     caption = (
         f"{len(chosen)} frames, one every {1e3 * step:.4g} ms, shown {FRAME_MS / 1e3 / step:.0f} times slower than "
-        f"they happened. Colours, from 0 to {face.norm.vmax:.3g} µm, and enlargement, {face.scale:g} times, are the same "
-        "throughout. What repeats with the teeth, faster than the frames, is seen folded."
+        f"they happened. Colours, from 0 to {face.norm.vmax:.3g} µm, and enlargement, {face.scale:g} times, are the "
+        "same throughout. What repeats with the teeth, faster than the frames, is seen folded."
     )
     title = f"Deformation of the {gear.name}, film"
     columns = _columns(deformation, gear, chosen)

@@ -1,9 +1,10 @@
 /* Variables by value reference: one table (gk_variables.inc) decides names, ranges and which of them exist in a model.
- * A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are added. */
+ * A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are added; those of
+ * amplitudes, which may be many, begin at 2²⁴. */
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
-typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED } gk_exists;
+typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED, OBSERVED } gk_exists;
 enum {
     STAGE = SCOPE_STAGE,
     SHAFT = SCOPE_SHAFT,
@@ -49,7 +50,8 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     if (instance < 0 || instance >= instances(model, row->scope)) return 0;
     const gk_port *port = row->scope == SCOPE_SHAFT ? &model->port[instance] : NULL;
     switch (row->exists) {
-    case ALWAYS: return 1;
+    case ALWAYS:
+    case OBSERVED: return 1;
     case SPRING: return port->kind == PORT_SPRING;
     case TORQUE: return port->kind == PORT_TORQUE;
     case FIXED: return port->kind == PORT_FIXED;
