@@ -294,7 +294,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     r->shape.gear = i;
     const int32_t *size = take(r, F_GEAR_size);
     if (!size) return;
-    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 1, 1, 1000) && counted(size + 2, 0, MAX_MODES),
+    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 1, 1, MAX_TEETH) && counted(size + 2, 0, MAX_MODES),
            "sizes of a gear");
     if (r->outcome) return;
     g->rotor = size[0], g->z = size[1], g->modes = size[2];

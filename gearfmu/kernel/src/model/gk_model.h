@@ -15,6 +15,7 @@ enum {
     LEADS = 33,       /* places across the face width where a lead is given */
     MAX_CARRIED = 32, /* bodies in the axes of turning rotors */
     MAX_MODES = 6000,
+    MAX_TEETH = 1000,
     MAX_GROUND = 2000,
     MAX_OWN = 1000, /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
     OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */

@@ -62,24 +62,37 @@ static void dynamic_modes(const gk_setup *setup, const gk_coefficients *k, const
     }
 }
 
-/* adds what the contacts of one engagement do at once to the modes above the cut */
-static void add_static(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which, double *out)
+/* adds the modal forces of the contacts of one engagement on modes above the cut */
+static void push_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
+                          double *force)
 {
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    const int g = model->engagement[e].gear[which], first = setup->modal[g].count, modes = model->gear[g].modes;
-    const gk_gear *gear = &model->gear[g];
-    gk_strip_weights width;
-    double row[MAX_MODES];
-    gk_strips_rows(model, setup, &model->engagement[e], g, width);
-    for (int i = 0; i < s->contacts; i++) {
-        const gk_place *place = &engaged->place[s->place_of[i]];
-        const double force = gk_reported(s, i), roll = gk_point_of(setup, place, i % s->strips)->roll[which];
-        if (force == 0.0) continue;
-        gk_side_modes(model, g, &(gk_key){place->flank, place->tooth[which]}, roll, width[i % s->strips], row);
-        for (int k = first; k < modes; k++)
-            out[k] -= gear->observed.scale * force * row[k] / (gear->omega[k] * gear->omega[k]);
+    const int g = model->engagement[e].gear[which];
+    gk_strip_load load = {.gear = g, .strips = s->strips};
+    gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
+    for (int p = 0; p < engaged->places; p++) {
+        const gk_place *place = &engaged->place[p];
+        double most = 0.0;
+        load.flank = place->flank, load.tooth = place->tooth[which];
+        for (int strip = 0; strip < s->strips; strip++) {
+            load.force[strip] = -gk_reported(s, p * s->strips + strip); /* contacts press */
+            load.roll[strip] = gk_point_of(setup, place, strip)->roll[which];
+            most = gk_max(most, fabs(load.force[strip]));
+        }
+        if (most > 0.0) gk_side_push(model, &load, setup->modal[g].count, force);
     }
+}
+
+static void static_modes(const gk_model *model, const gk_setup *setup, const gk_work *work, int g, double *out)
+{
+    const gk_gear *gear = &model->gear[g];
+    const int first = setup->modal[g].count;
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++)
+            if (model->engagement[e].gear[w] == g && model->engagement[e].kind != MESH_FLAT)
+                push_contacts(model, setup, work, e, w, out);
+    for (int k = first; k < gear->modes; k++) out[k] *= gear->observed.scale / (gear->omega[k] * gear->omega[k]);
 }
 
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
@@ -95,9 +108,6 @@ void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *
         own_motion(model, setup, data, g, moved, own);
         memset(modes, 0, (size_t)model->gear[g].modes * sizeof *modes);
         dynamic_modes(setup, k, data, g, o->scale, modes);
-        for (int e = 0; e < model->engagements && setup->on.residual; e++)
-            for (int w = 0; w < 2; w++)
-                if (model->engagement[e].gear[w] == g && model->engagement[e].kind != MESH_FLAT)
-                    add_static(model, setup, work, e, w, modes);
+        if (setup->on.residual) static_modes(model, setup, work, g, modes);
     }
 }
