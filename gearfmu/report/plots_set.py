@@ -155,9 +155,9 @@ def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
             axis.set_xlabel("time in s")
         picture = svg(figure, "planets")
     caption = (
-        "Magnitudes of the mesh forces over the last mesh periods; share in the load of sun and ring, running mean over "
-        f"one mesh period, with its mean from {window.start:.3g} s to {window.end:.3g} s; magnitude of the force on the "
-        "pin across its axis, with its mean. Each column has one scale."
+        "Magnitudes of the mesh forces over the last mesh periods; share in the load of sun and ring, running mean "
+        f"over one mesh period, with its mean from {window.start:.3g} s to {window.end:.3g} s; magnitude of the force "
+        "on the pin across its axis, with its mean. Each column has one scale."
     )
     data = {"time_[s]": trace.time}
     for planet in own.planets:
