@@ -93,7 +93,7 @@ def _plots(
     own_set = plots_set.planet_set(trace, known_meshings(trace, spec))
     makers: list[Callable[[], Plot | None]]
     if own_set is not None:
-        return _made(_of_set(trace, own_set, deformed))
+        return _made(_of_set(trace, own_set, [*deformed, *_set_pair(trace, own_set, spec, bodies)]))
     makers = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
     for mesh in meshes(trace):
         makers += [
@@ -111,6 +111,15 @@ def _plots(
     if not angles:
         missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
     return made, missing
+
+
+def _set_pair(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any] | None) -> list[Callable[[], Plot | None]]:
+    """What draws the sun with the planet that presses most."""
+    if spec is None or not bodies or "sun" not in own.meshes:
+        return []
+    mesh = max(own.meshes["sun"].values(), key=lambda name: float(np.abs(trace[f"{name}.force"]).max()))
+    known = list(gear_bodies(spec, bodies).values())
+    return [partial(picture.deformed_pair, trace, as_general(spec), mesh, known)]
 
 
 def _of_set(
