@@ -14,7 +14,7 @@ from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
-from gearfmu.cosim.frames import frame_plan
+from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.shaft_loads import Loaded, ShaftLoads, start_speeds, torque_ports
@@ -58,7 +58,8 @@ def run(
     scene = scene if isinstance(scene, SceneSpec) else load_scene(scene)
     model = stage_model(scene)
     with _source(model, unit, fmu_path, out_dir) as source:
-        result = run_once(scene, source, _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0))
+        first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
+        result = run_once(scene, source, first, frames=frame_plan(scene))
         errors = (
             verified(scene, source, result, _part(progress, 1.0 / 3.0, 1.0))
             if verify and result.outcome == OK
@@ -109,8 +110,15 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))
 
 
-def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
-    """One run of the scene with fresh units; wiring: what of the stage is connected."""
+def run_once(
+    scene: SceneSpec,
+    source: UnitSource,
+    progress: Progress | None = None,
+    wiring: Wiring = WHOLE,
+    frames: FramePlan | None = None,
+) -> Result:
+    """One run of the scene with fresh units; wiring: what of the stage is connected; frames: of moving gears, from a
+    model that observes them, as `stage_model` makes it."""
     shafts, choice = source.model.shafts, scene.stage
     parameters = {
         "level": choice.level,
@@ -124,7 +132,6 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
     try:
         cut = _cut(scene, stage, source.model, wiring)
         coupling, omit = scene.coupling, stage_joints(scene, shafts)
-        frames = frame_plan(scene)
         return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit, frames))
     finally:
         stage.close()

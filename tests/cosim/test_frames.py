@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gearfmu import cosim, fmu
+from gearfmu.cosim.frames import frame_plan
 from gearfmu.cosim.scene_run import run_once, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.errors import CouplingError, SpecError
@@ -62,8 +63,9 @@ def test_hashes_of_scenes_without_are_those_of_before() -> None:
 def test_fmu_and_kernel_record_the_same_frames_and_the_trace_stays(tmp_path: Path) -> None:
     asked = closure(gears=("wheel",), times=(1e-3,), every=5e-4)
     model = stage_model(asked)
-    through_fmu = run_once(asked, Source(model, fmu.export(model, tmp_path / "pair.fmu")))
-    through_kernel = run_once(asked, Source(model))
+    plan = frame_plan(asked)
+    through_fmu = run_once(asked, Source(model, fmu.export(model, tmp_path / "pair.fmu")), frames=plan)
+    through_kernel = run_once(asked, Source(model), frames=plan)
     plain = run_once(closure(), Source(stage_model(closure())))
     found = [run.frames.frames({"wheel": "0" * 64}, {}) for run in (through_fmu, through_kernel) if run.frames]
     assert len(found) == 2 and plain.frames is None
