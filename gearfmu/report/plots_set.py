@@ -139,9 +139,10 @@ def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
         figure = Figure(figsize=(WIDTH, 1.35 * len(own.planets) + 0.6), layout="constrained")
         axes = figure.subplots(len(own.planets), 3, squeeze=False, sharex="col", sharey="col")
         for planet, (force, share, pin) in zip(own.planets, axes, strict=True):
-            for central, mesh in _meshes_of(own, planet).items():
-                force.plot(trace.time[late], 1e-3 * np.abs(trace[f"{mesh}.force"][late]), lw=0.9, label=central)
-                share.plot(trace.time, over_time[mesh], lw=0.6, label=f"{central} {means[mesh]:.3f}")
+            for order, (central, mesh) in enumerate(_meshes_of(own, planet).items()):
+                look = {"zorder": 2.5 - 0.1 * order}  # the sun's, which vary less, in front
+                force.plot(trace.time[late], 1e-3 * np.abs(trace[f"{mesh}.force"][late]), lw=0.9, label=central, **look)
+                share.plot(trace.time, over_time[mesh], lw=0.6, label=f"{central} {means[mesh]:.3f}", **look)
             if (pressed := _pin_force(trace, planet)) is not None:
                 pin.plot(trace.time, 1e-3 * pressed, lw=0.6, color=COLOURS[2], label=f"{np.mean(pressed):.4g} N")
                 pin.legend(loc="upper right", frameon=True, framealpha=0.8, edgecolor="none")
