@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gearfmu.body.parts import DRAWN, PICTURE_MODES, Parts, pictured_loads, rim_of, sector_display, tooth_flank
+from gearfmu.body.parts import (
+    DRAWN,
+    PICTURE_MODES,
+    Parts,
+    pictured_loads,
+    rim_of,
+    sector_display,
+    sector_shapes,
+    tooth_flank,
+)
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
@@ -130,12 +139,14 @@ def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Pa
 def _by_sector(found: ImportedGear, gear: Any, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
     body, (drawn, report) = found.body, drawing
     assert isinstance(body, ImportedSector)
-    modes = elastic_modes(body, gear.body.modes, report)
+    surface = outline(drawn, body.mesh.nodes)
+    modes = elastic_modes(body, gear.body.modes, report, surface.sample)
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
-    return Parts(modes, statics, frf, found.facts, sector_display(drawn, body, modes, statics), body.inertia, rim)
+    display, shapes = sector_display(surface, body, modes, statics), sector_shapes(surface, modes)
+    return Parts(modes, statics, frf, found.facts, display, body.inertia, rim, shapes)
 
 
 def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:

@@ -181,14 +181,23 @@ def _tangent_entries() -> tuple[Entry, ...]:
     )
 
 
+def _shape_entries() -> tuple[Entry, ...]:
+    return (
+        Entry("shapes/points", "shapes.points", ("S", 3), "m", "surface points of sector 0", "f4"),
+        Entry("shapes/quads", "shapes.quads", ("T", 4), "", "quadrilaterals of its surface, point numbers", "i8"),
+        Entry("shapes/ahead", "shapes.ahead", ("T", 4), "", "1: the point of that number in the next sector", "i8"),
+        Entry("shapes/modes", "shapes.modes", ("n", "S", 3), "kg-1/2", "displacement on sector 0 in every mode", "f4"),
+    )
+
+
 ENTRIES = _entries()
 RIM_ENTRIES = _rim_entries()
-GROUPS = {"rim": RIM_ENTRIES, "helix": _helix_entries(), "tangent": _tangent_entries()}
+GROUPS = {"rim": RIM_ENTRIES, "helix": _helix_entries(), "tangent": _tangent_entries(), "shapes": _shape_entries()}
 
 
 def entries_of(groups: Iterable[str]) -> tuple[Entry, ...]:
     """The datasets of a body: those of every gear, and of the `groups` that it has besides: "rim" (an internal gear),
-    "helix" (a helical one), "tangent" (one that is loaded along the profile too)."""
+    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface in all modes)."""
     return (*ENTRIES, *(entry for name in GROUPS if name in groups for entry in GROUPS[name]))
 
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.reduced import Rim, Tangent
-from gearfmu.femesh import FeMesh
-from gearfmu.reduction.display import Display, outline, unfold_mode, unfold_sectors, whole_surface
+from gearfmu.reduction.display import Display, Outline, Shapes, unfold_mode, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfError
 from gearfmu.reduction.modal import Modes
@@ -29,7 +28,7 @@ _FEWEST_OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
 @dataclass(frozen=True)
 class Parts:
     """A reduced gear without its names and numbers: modes, static tables, error, plain facts of the mesh, pictures,
-    mass matrix (6, 6) of the rigid body, and of a ring what its mounts need."""
+    mass matrix (6, 6) of the rigid body, of a ring what its mounts need, and the surface in all modes."""
 
     modes: Modes
     statics: Statics
@@ -38,6 +37,7 @@ class Parts:
     display: Display
     inertia: np.ndarray
     rim: Rim | None = None
+    shapes: Shapes | None = None
 
 
 def tooth_flank(geometry: Any, gear: Any, internal: bool = False) -> tuple[ToothFlank, Points]:
@@ -103,10 +103,16 @@ def pictured_loads(points: Points) -> list[int]:
     return [roll * functions for roll in chosen]
 
 
-def sector_display(drawn: FeMesh, body: SectorBody, modes: Modes, statics: Statics) -> Display:
-    """Pictures of a gear reduced on one sector; `drawn`: a coarse sector mesh of the same gear."""
+def sector_shapes(sector: Outline, modes: Modes) -> Shapes | None:
+    """Surface of a sector in all modes; None where the modes were made without it."""
+    if modes.surface is None:
+        return None
+    return Shapes(sector.points.astype("f4"), sector.quads, sector.ahead.astype(int), modes.surface.astype("f4"))
+
+
+def sector_display(sector: Outline, body: SectorBody, modes: Modes, statics: Statics) -> Display:
+    """Pictures of a gear reduced on one sector, from the outline of a coarse sector mesh of the same gear."""
     pictured = pictured_loads(body.points)
-    sector = outline(drawn, body.mesh.nodes)
     points, quads = whole_surface(sector, body.teeth)
     index = [k for k in sorted(modes.shapes) if k < PICTURE_MODES]
     shapes = [unfold_mode(modes.shapes[k], int(modes.nodal_diameter[k]), sector, body.teeth) for k in index]

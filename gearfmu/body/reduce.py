@@ -20,6 +20,7 @@ from gearfmu.body.parts import (
     pictured_loads,
     rim_of,
     sector_display,
+    sector_shapes,
     tangent_of,
     tooth_flank,
 )
@@ -30,6 +31,7 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report, sector_mesh
 from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.display import outline
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.modal import elastic_modes
@@ -164,6 +166,7 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         display=made.display,
         rim=made.rim,
         tangent=tangent_of(modes, statics, points),
+        shapes=made.shapes,
         base_helix_angle=geometry.beta_b,
     )
 
@@ -174,14 +177,16 @@ def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Poi
     sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
     rigid = getattr(gear, "rigid_bore", False)  # sun, planet and ring of a set are averaged
     body = SectorBody(sector, gear.material, flank, points, rigid)
-    modes = elastic_modes(body, gear.body.modes, report)
+    drawn = sector_mesh(geometry, gear.face_width, drawn_counts(geometry, gear.face_width))
+    surface = outline(drawn, sector.nodes)
+    modes = elastic_modes(body, gear.body.modes, report, surface.sample)
     statics = static_tables(body, pictured_loads(points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
-    drawn = sector_mesh(geometry, gear.face_width, drawn_counts(geometry, gear.face_width))
-    display = sector_display(drawn, body, modes, statics)
+    display = sector_display(surface, body, modes, statics)
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
-    return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim)
+    shapes = sector_shapes(surface, modes)
+    return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim, shapes)
 
 
 def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:

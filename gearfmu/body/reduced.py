@@ -9,7 +9,7 @@ import numpy as np
 
 from gearfmu.body.layout import ALGORITHM_VERSION, FORMAT_VERSION, Entry, entries_of
 from gearfmu.errors import BodyError
-from gearfmu.reduction.display import Display
+from gearfmu.reduction.display import Display, Shapes
 from gearfmu.reduction.frf import FrfError
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
@@ -57,7 +57,8 @@ class ReducedBody:
     static_bb (6, 6). M is z, or 2K + 1 where only the tooth offsets −K … K are kept: offset m stands at m mod M.
     input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of a ring, whose
     rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one. tangent: rows along
-    the profile, None where none were made. base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
+    the profile, None where none were made. shapes: surface of a sector and how it moves in every mode, None where none
+    was made. base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
     Raises BodyError naming every field that cannot be.
     """
 
@@ -89,6 +90,7 @@ class ReducedBody:
     display: Display
     rim: Rim | None = None
     tangent: Tangent | None = None
+    shapes: Shapes | None = None
     base_helix_angle: float = 0.0
     format_version: int = FORMAT_VERSION
     algorithm_version: int = ALGORITHM_VERSION
@@ -110,7 +112,12 @@ class ReducedBody:
     @property
     def groups(self) -> tuple[str, ...]:
         """Which of the optional `layout.GROUPS` the body has."""
-        has = {"rim": self.internal, "helix": self.base_helix_angle != 0, "tangent": self.tangent is not None}
+        has = {
+            "rim": self.internal,
+            "helix": self.base_helix_angle != 0,
+            "tangent": self.tangent is not None,
+            "shapes": self.shapes is not None,
+        }
         return tuple(name for name, there in has.items() if there)
 
     @property
@@ -178,6 +185,8 @@ def _meaning_problems(body: ReducedBody) -> list[str]:
         "flank/roll must ascend inside flank/roll_range": bool(
             np.all(np.diff(np.concatenate([body.roll_range[:1], body.roll, body.roll_range[1:]])) > 0)
         ),
+        "shapes/quads names a point that is not there": body.shapes is None
+        or bool(np.all((body.shapes.quads >= 0) & (body.shapes.quads < len(body.shapes.points)))),
         "display/quads names a point that is not there": bool(
             np.all((body.display.quads >= 0) & (body.display.quads < len(body.display.points)))
         ),

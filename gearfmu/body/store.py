@@ -14,7 +14,7 @@ from gearfmu.body.layout import FORMAT, FORMAT_VERSION, GROUPS, TEXTS, Entry, en
 from gearfmu.body.reduced import ReducedBody, Rim, Tangent, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
-from gearfmu.reduction.display import Display
+from gearfmu.reduction.display import Display, Shapes
 from gearfmu.reduction.frf import FrfError
 
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, "make it again with 'gearfmu reduce STAGE'")
@@ -70,7 +70,13 @@ def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
 def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
     values["static_ff"] = _all_offsets(values["static_ff"], values["teeth"])
     parts: dict[str, Any] = {}
-    for group, kind in (("frf", FrfError), ("display", Display), ("rim", Rim), ("tangent", Tangent)):
+    for group, kind in (
+        ("frf", FrfError),
+        ("display", Display),
+        ("rim", Rim),
+        ("tangent", Tangent),
+        ("shapes", Shapes),
+    ):
         if any(name.startswith(f"{group}.") for name in values):
             parts[group] = kind(**{f.name: values.pop(f"{group}.{f.name}") for f in fields(kind)})
     return ReducedBody(**values, **parts, **heads)

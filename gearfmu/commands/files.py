@@ -98,10 +98,13 @@ def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
     from gearfmu.body.layout import FORMAT
     from gearfmu.hdf5 import format_of
+    from gearfmu.stage.deformation import FILE as DEFORMATION
     from gearfmu.stage.trace import Trace
 
     if format_of(path) in (FORMAT, INTERFACE_FORMAT):
         return inspect_file(path)
+    if format_of(path) == DEFORMATION.name:
+        return _deformation(path)
     trace = Trace.load(path)
     channels = {
         name: {"unit": c.unit, "min": float(c.values.min()), "max": float(c.values.max())}
@@ -115,6 +118,21 @@ def _hdf5(path: Path) -> dict[str, Any]:
         "time_s": span,
         "channels": channels,
         "meta": trace.meta,
+    }
+
+
+def _deformation(path: Path) -> dict[str, Any]:
+    from gearfmu.stage.deformation import Deformation
+
+    found = Deformation.load(path)
+    return {
+        "file": str(path),
+        "kind": "deformation",
+        "frames": found.time.size,
+        "pictures_at_s": found.time[found.pictures].tolist(),
+        "film_frames": found.film.size,
+        "gears": {name: {"modes": gear.modes.size, "body": gear.body_hash} for name, gear in found.gears.items()},
+        "meta": dict(found.meta),
     }
 
 

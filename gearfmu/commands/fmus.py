@@ -32,12 +32,25 @@ PORT_KINDS = ("spring", "torque", "fixed")
     default=("host",),
     help="Platforms to put in; others than the host's need the [cross] extra; may repeat.",
 )
-def export(stage: str, out: Path | None, ports: tuple[str, ...], runtime: str, platforms: tuple[str, ...]) -> None:
+@click.option(
+    "--observe",
+    multiple=True,
+    metavar="GEAR",
+    help="Its rigid motion and modal amplitudes become outputs; may repeat.",
+)
+def export(
+    stage: str,
+    out: Path | None,
+    ports: tuple[str, ...],
+    runtime: str,
+    platforms: tuple[str, ...],
+    observe: tuple[str, ...],
+) -> None:
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
     from gearfmu.commands.models import model_of
 
-    model = model_of(stage, port_kinds(ports))
+    model = model_of(stage, port_kinds(ports), observe=observe)
     path = out or Path(f"{model.spec.name}.fmu")
     fmu.export(model, path, runtime=runtime, platforms=platforms)
     click.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {runtime}, model {model.hash[:12]}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,15 +13,18 @@ if TYPE_CHECKING:
     from gearfmu.stage import StageModel
 
 
-def model_of(stage: str, port_kinds: Mapping[str, str] | None = None, bores: str | None = None) -> StageModel:
+def model_of(
+    stage: str, port_kinds: Mapping[str, str] | None = None, bores: str | None = None, observe: Sequence[str] = ()
+) -> StageModel:
     """The StageModel of STAGE, with other kinds of port where `port_kinds` (port → kind) says so.
 
-    bores : coupling of every bore, "averaging" or "rigid"; as the stage file says when None.
+    bores : coupling of every bore, "averaging" or "rigid"; as the stage file says when None. observe : gears whose
+    motion becomes outputs.
     """
     spec, bodies = bodies_for_motion(stage) if bores is None else _with_other_bores(stage, bores)
     from gearfmu.stage import assemble
 
-    return assemble(of_other_kinds(spec, port_kinds or {}), bodies)
+    return assemble(of_other_kinds(spec, port_kinds or {}), bodies, observe=observe)
 
 
 def bodies_of(stage: str) -> tuple[Any, list[Any]]:

@@ -95,6 +95,20 @@ def demo(out: Path) -> int:
 
 
 @click.command()
+@click.argument("path", type=click.Path(path_type=Path), metavar="FOLDER")
+@click.option("--stage", help="STAGE of the run; the one it names when not given.")
+@click.option("--out", type=OUT, help="Folder of the files; FOLDER/deformation when not given.")
+def deformed(path: Path, stage: str | None, out: Path | None) -> None:
+    """Write the gears that a run recorded deformed, FOLDER/deformation.h5, as .vtu with a .pvd for ParaView."""
+    from gearfmu.stage.deformation import FILE_NAME, Deformation
+
+    found = Deformation.load(path / FILE_NAME if path.is_dir() else path)
+    home = path if path.is_dir() else path.parent
+    for written in write_deformed(found, out or home / "deformation", stage or str(found.meta["stage"])):
+        click.echo(written)
+
+
+@click.command()
 @click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
 @click.option("--stage", help="STAGE of the run, for the picture of the deformed gears.")
 @click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
@@ -104,9 +118,8 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
     source = path / "trace.h5" if path.is_dir() else path
     trace = Trace.load(source)
-    click.echo(
-        write_report(trace, out or source.parent, stage or trace.meta.get("stage_path") or trace.meta.get("stage"))
-    )
+    named = stage or trace.meta.get("stage_path") or trace.meta.get("stage")
+    click.echo(write_report(trace, out or source.parent, named, source.parent))
 
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
@@ -117,6 +130,11 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
     bodies_for_motion(scene.stage.name)
     with progress_bar(scene.name) as progress:
         trace = cosim.run(scene, out, progress=progress, **options)
+    if scene.deformation is not None and scene.deformation.vtu:
+        found = recorded_deformation(trace, out)
+        assert found is not None
+        for path in write_deformed(found, out / "deformation", scene.stage.name):
+            click.echo(path)
     return finish(trace, out, scene.stage.name)
 
 
@@ -136,8 +154,34 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 
 
-def write_report(trace: Any, out: Path, stage: str | None) -> Path:
-    """The report page of `trace` in `out`; with the deformed gears where the stage and its bodies can be read."""
+def recorded_deformation(trace: Any, home: Path) -> Any:
+    """The Deformation of the run of `trace` in the folder `home`; None where the run recorded none."""
+    from gearfmu.stage.deformation import Deformation
+
+    name = trace.meta.get("deformation")
+    return Deformation.load(home / name) if name else None
+
+
+def write_deformed(deformation: Any, folder: Path, stage: str) -> list[Path]:
+    """.vtu files of every gear of a Deformation in `folder`; the paths of their .pvd."""
+    from gearfmu.body import load_bodies
+    from gearfmu.modes.deformed import deformed_gear
+    from gearfmu.modes.vtu import write_series
+    from gearfmu.spec.expand import as_general
+    from gearfmu.spec.stage import load_stage
+    from gearfmu.stage.meshes import tooth_phases
+    from gearfmu.stage.observed import gear_bodies
+
+    spec = load_stage(stage)
+    bodies = gear_bodies(spec, load_bodies(spec))
+    phases = tooth_phases(as_general(spec))
+    gears = [deformed_gear(name, bodies[name], motion, phases[name]) for name, motion in deformation.gears.items()]
+    return [write_series(gear, deformation.time, folder) for gear in gears]
+
+
+def write_report(trace: Any, out: Path, stage: str | None, home: Path | None = None) -> Path:
+    """The report page of `trace` in `out`; with the deformed gears where the stage and its bodies can be read. home:
+    folder of the run's other files, `out` when None."""
     from gearfmu import report as room
     from gearfmu.body import load_bodies
     from gearfmu.errors import GearfmuError
@@ -147,7 +191,8 @@ def write_report(trace: Any, out: Path, stage: str | None) -> Path:
         return room.write(trace, trace.meta, out)
     try:
         spec = load_stage(stage)
-        return room.write(trace, trace.meta, out, spec, load_bodies(spec))
+        deformation = recorded_deformation(trace, home or out)
+        return room.write(trace, trace.meta, out, spec, load_bodies(spec), deformation)
     except GearfmuError as error:
         click.echo(f"gearfmu: the report goes without the deformed pair: {error}", err=True)
         return room.write(trace, trace.meta, out)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
+from gearfmu.cosim.frames import FramePlan, FrameRecorder
 from gearfmu.cosim.masters import Cut, Master, master
 from gearfmu.cosim.recorder import Recorder
 from gearfmu.cosim.shaft_loads import Loaded
@@ -22,7 +23,7 @@ Progress = Callable[[float], None]
 @dataclass(frozen=True)
 class Plan:
     """How a cut is stepped: master, communication step H in s, number of steps, what to record and what of it to leave
-    out; progress is told the done fraction."""
+    out; progress is told the done fraction; frames: of moving gears, None: none."""
 
     master: str
     step: float
@@ -30,6 +31,7 @@ class Plan:
     record: tuple[str, ...] = ("*",)
     progress: Progress | None = None
     omit: tuple[str, ...] = ()
+    frames: FramePlan | None = None
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ class Result:
     """Trace up to the last good time, how the run ended, and its cost: CPU time of the whole loop and its share in the
     stage's steps.
 
-    work, throughput : J at the cut, on the drivetrain: signed sum and sum of magnitudes.
+    work, throughput : J at the cut, on the drivetrain: signed sum and sum of magnitudes. frames : None where none were
+    planned.
     """
 
     trace: Trace
@@ -49,6 +52,7 @@ class Result:
     throughput: float
     order: int
     facts: dict[str, float] = field(default_factory=dict)
+    frames: FrameRecorder | None = None
 
     @property
     def energy_residual(self) -> float | None:
@@ -73,7 +77,8 @@ def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
     facts, ports = coupled.facts(), coupled.master.ports
     trace = coupled.recorder.trace({})
     cpu, share = clock.process_time() - started, timed.seconds / (clock.perf_counter() - wall)
-    return Result(trace, outcome, message, cpu, cpu * share, ports.work, ports.throughput, coupled.master.order, facts)
+    exchanged = (ports.work, ports.throughput)
+    return Result(trace, outcome, message, cpu, cpu * share, *exchanged, coupled.master.order, facts, coupled.frames)
 
 
 class _Timed:
@@ -94,7 +99,10 @@ class _Run:
     def __init__(self, cut: Cut | Loaded, plan: Plan) -> None:
         self.cut, self.plan = cut, plan
         self.master: Master = master(plan.master, cut)
-        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, plan.omit)
+        frames = plan.frames
+        omit = plan.omit if frames is None else (*plan.omit, *frames.patterns)
+        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, omit)
+        self.frames = None if frames is None else FrameRecorder(cut.stage, frames)
         known = cut.stage.outputs()
         self._fact_names = [
             name
@@ -107,12 +115,17 @@ class _Run:
         """Every communication step; time is n·H."""
         h, tell = self.plan.step, max(1, self.plan.steps // 200)
         self.master.begin(0.0)
-        self.recorder.take(0.0)
+        self._record(0, 0.0)
         for n in range(self.plan.steps):
             self.master.step(n * h, h)
-            self.recorder.take((n + 1) * h)
+            self._record(n + 1, (n + 1) * h)
             if self.plan.progress and (n + 1) % tell == 0:
                 self.plan.progress((n + 1) / self.plan.steps)
+
+    def _record(self, number: int, time: float) -> None:
+        self.recorder.take(time)
+        if self.frames is not None:
+            self.frames.take(number, time)
 
     def facts(self) -> dict[str, float]:
         """Numbers about the run itself. After a failure those of the last good time: a failed step leaves the stage

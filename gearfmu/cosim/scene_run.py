@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from gearfmu import fmu
 from gearfmu.body import load_bodies
@@ -14,6 +15,7 @@ from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.kernel_unit import KernelUnit
+from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.parts import part_network, part_ports
 from gearfmu.cosim.py_unit import PyUnit
@@ -30,6 +32,8 @@ from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.spec.turning import require_driven, shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.deformation import FILE_NAME
+from gearfmu.stage.observed import gear_hashes
 from gearfmu.stage.trace import Trace
 
 WHOLE = Wiring()
@@ -47,22 +51,28 @@ def run(
 
     unit : "fmu" (exported into out_dir, or taken from fmu_path, which must have the scene's ports) or "kernel".
     verify : run again with half the communication step and estimate the coupling error. progress : told the done
-    fraction 0 … 1. Writes trace.h5 and summary.json into out_dir. The trace's meta is the summary: outcome "ok" or
-    the name of what stopped the run, last good time, CPU time of the whole loop, energy residual of the cut, errors,
-    hashes, versions. Raises CouplingError, SpecError, BodyError, FmuError when the run cannot begin.
+    fraction 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
+    [deformation]. The trace's meta is the summary: outcome "ok" or the name of what stopped the run, last good time,
+    CPU time of the whole loop, energy residual of the cut, errors, hashes, versions. Raises CouplingError, SpecError,
+    BodyError, FmuError when the run cannot begin.
     """
     if unit not in ("fmu", "kernel"):
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
     scene = scene if isinstance(scene, SceneSpec) else load_scene(scene)
     model = stage_model(scene)
     with _source(model, unit, fmu_path, out_dir) as source:
-        result = run_once(scene, source, _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0))
+        first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
+        result = run_once(scene, source, first, frames=frame_plan(scene))
         errors = (
             verified(scene, source, result, _part(progress, 1.0 / 3.0, 1.0))
             if verify and result.outcome == OK
             else None
         )
         meta = summary(scene, source, result, errors)
+        if result.frames is not None and out_dir is not None:
+            meta["deformation"] = FILE_NAME
+            frames = result.frames.frames(gear_hashes(source.model), _frame_meta(meta))
+            frames.save(Path(out_dir) / FILE_NAME)
     trace = Trace(result.trace.time, result.trace.channels, meta)
     if out_dir is not None:
         trace.save(Path(out_dir) / "trace.h5")
@@ -73,7 +83,14 @@ def run(
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     spec = load_stage(scene.stage.name)
-    return assemble(in_drivetrain(scene, spec), load_bodies(spec))
+    observe = scene.deformation.gears if scene.deformation is not None else ()
+    return assemble(in_drivetrain(scene, spec), load_bodies(spec), observe=observe)
+
+
+def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
+    return {name: meta[name] for name in ("scene", "description", "stage", "level")} | {
+        "model": meta["hashes"]["model"]
+    }
 
 
 def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
@@ -98,8 +115,15 @@ def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: 
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))
 
 
-def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = None, wiring: Wiring = WHOLE) -> Result:
-    """One run of the scene with fresh units; wiring: what of the stage is connected."""
+def run_once(
+    scene: SceneSpec,
+    source: UnitSource,
+    progress: Progress | None = None,
+    wiring: Wiring = WHOLE,
+    frames: FramePlan | None = None,
+) -> Result:
+    """One run of the scene with fresh units; wiring: what of the stage is connected; frames: of moving gears, from a
+    model that observes them, as `stage_model` makes it."""
     model, choice = source.model, scene.stage
     parameters = {
         "level": choice.level,
@@ -114,7 +138,7 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
         cut = _cut(scene, stage, model, parameters, wiring)
         coupling = scene.coupling
         omit = stage_joints(scene, model.shafts) if scene.drivetrain is None else ()
-        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit))
+        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit, frames))
     finally:
         stage.close()
 

@@ -27,6 +27,18 @@ class Display:
 
 
 @dataclass(frozen=True)
+class Shapes:
+    """Drawn surface of one sector and how it moves in every mode of the gear, float32. points (S, 3) m; quads (T, 4)
+    numbers of its points, normals outward, and ahead (T, 4): 1 where the point meant is that of the next sector; modes
+    (n, S, 3), kg^-½: displacement on sector 0, of the second mode of a pair its own."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    ahead: np.ndarray
+    modes: np.ndarray
+
+
+@dataclass(frozen=True)
 class Outline:
     """The drawn surface of one sector: points (P, 3) drawn once a sector, quads (Q, 4) of their numbers, `ahead` (Q,
     4): true where the point meant is that of the next sector; sample (P, N): displacement of the points from that of
@@ -52,23 +64,23 @@ def outline(drawn: Any, nodes: np.ndarray) -> Outline:
     return Outline(points, local.reshape(quads.shape), stand_in[quads] != quads, _sampling(points, nodes))
 
 
-def whole_surface(sector: Outline, teeth: int) -> tuple[np.ndarray, np.ndarray]:
+def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (z·P, 3) and quads (z·Q, 4) of all sectors."""
     per_sector = len(sector.points)
     quads = [((j + sector.ahead) % teeth) * per_sector + sector.quads for j in range(teeth)]
-    points = _turned(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
+    points = turn_sectors(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
     return points.reshape(-1, 3), np.concatenate(quads)
 
 
 def unfold_mode(shape: np.ndarray, nodal_diameter: int, sector: Outline, teeth: int) -> np.ndarray:
     """Displacement (z·P, 3) of the first (real) part of a mode from its sector shape (3N,)."""
     turn = np.exp(2j * np.pi * nodal_diameter * np.arange(teeth) / teeth)
-    return _turned(np.multiply.outer(turn, sector.sample @ shape.reshape(-1, 3)).real).reshape(-1, 3)
+    return turn_sectors(np.multiply.outer(turn, sector.sample @ shape.reshape(-1, 3)).real).reshape(-1, 3)
 
 
 def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:
     """Displacement (z·P, 3) from that of every sector in its own frame, (z, 3N)."""
-    return _turned(np.stack([sector.sample @ shape.reshape(-1, 3) for shape in shapes])).reshape(-1, 3)
+    return turn_sectors(np.stack([sector.sample @ shape.reshape(-1, 3) for shape in shapes])).reshape(-1, 3)
 
 
 def _sampling(points: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
@@ -79,9 +91,9 @@ def _sampling(points: np.ndarray, nodes: np.ndarray) -> sp.csr_array:
     return sp.coo_array((weight.ravel(), (rows, nearest.ravel())), (len(points), len(nodes))).tocsr()
 
 
-def _turned(vectors: np.ndarray) -> np.ndarray:
-    """Sector-frame vectors (z, P, 3) in the body frame."""
-    angle = 2 * np.pi * np.arange(len(vectors)) / len(vectors)
+def turn_sectors(vectors: np.ndarray) -> np.ndarray:
+    """Sector-frame vectors (…, z, P, 3) in the body frame."""
+    angle = 2 * np.pi * np.arange(vectors.shape[-3]) / vectors.shape[-3]
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = vectors[..., 0], vectors[..., 1]
     return np.stack([c * x - s * y, s * x + c * y, vectors[..., 2]], axis=-1)

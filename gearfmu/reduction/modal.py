@@ -8,14 +8,16 @@ A complex mode U e^{iθj} of 0 < ν < z/2 gives two real ones of the same freque
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.sector import SectorBody
 
 _SHAPES = 4  # lowest shapes of each family kept for pictures
+COLUMNS = ("frequency", "diameter", "part", "parity", "flank", "bore", "surface")
 
 Progress = Callable[[str, float], None]
 
@@ -27,7 +29,8 @@ class Modes:
     frequency (n,) Hz; nodal_diameter, part, parity (n,) int; flank_rows (2·R·A, n), kg^-½; bore_rows (6, n), kg^-½
     and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½; tangent_rows (2·R·A, n) or (0, n) where there are
     none, kg^-½: like flank_rows, along the profile. shapes : index of a mode → (3N,) sector
-    displacement in kg^-½, complex for a pair's first mode.
+    displacement in kg^-½, complex for a pair's first mode. surface (n, P, 3) or None, kg^-½: displacement of chosen
+    points of sector 0 in every mode, the second of a pair its imaginary part.
     """
 
     frequency: np.ndarray
@@ -39,12 +42,13 @@ class Modes:
     patch_rows: np.ndarray
     shapes: dict[int, np.ndarray]
     tangent_rows: np.ndarray | None = None
+    surface: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class _FamilyModes:
-    """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), complex for weight
-    2."""
+    """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), lowest shapes (3N, k
+    at most) for pictures, displacement (k, P, 3) of the chosen points, complex for weight 2."""
 
     weight: int
     complete: bool
@@ -52,14 +56,20 @@ class _FamilyModes:
     flank_rows: np.ndarray
     bore_rows: np.ndarray
     shapes: np.ndarray
+    surface: np.ndarray
 
 
-def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None) -> Modes:
+def elastic_modes(
+    body: SectorBody, count: int, progress: Progress | None = None, sample: sp.csr_array | None = None
+) -> Modes:
     """The `count` lowest elastic modes of the free body (one less where `count` would split a pair).
+
+    sample (P, N) : points of sector 0 from its nodes, whose displacement is kept in every mode (`Modes.surface`).
 
     Every family is solved for its expected share and again for more, until the highest frequency it was solved for
     lies above the last mode kept: no mode is missed. Raises ModesError when the eigensolver fails.
     """
+    chosen = sp.csr_array((0, len(body.mesh.nodes))) if sample is None else sample
     families = [(s, nu) for s in range(len(body.spaces)) for nu in body.diameters()]
     mean = count / (body.teeth * len(body.spaces))
     share = int(np.ceil(mean + np.sqrt(mean))) + 1
@@ -74,11 +84,12 @@ def elastic_modes(body: SectorBody, count: int, progress: Progress | None = None
         for number, key in enumerate(open_families):
             if progress:
                 progress(f"modes, nodal diameter {key[1]}", number / len(open_families))
-            found[key] = _solve(body, key, wanted[key])
+            found[key] = _solve(body, key, wanted[key], chosen)
         limit = _limit(found.values(), count)
         again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
         if not again:
-            return _assembled(body, found, count)
+            modes = _assembled(body, found, count)
+            return modes if sample is not None else replace(modes, surface=None)
         for key in again:
             wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
 
@@ -89,7 +100,7 @@ def _limit(found: Iterable[_FamilyModes], count: int) -> float:
     return squared[min(count, len(squared)) - 1]
 
 
-def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
+def _solve(body: SectorBody, key: tuple[int, int], count: int, sample: sp.csr_array) -> _FamilyModes:
     family = body.family(*key)
     harmonic = family.harmonic
     squared, shapes = lowest_modes(harmonic, count)
@@ -101,7 +112,10 @@ def _solve(body: SectorBody, key: tuple[int, int], count: int) -> _FamilyModes:
     bore = body.teeth * (family.bore.conj().T @ shapes)
     space = body.spaces[key[0]]
     pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
-    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures)
+    surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
+    for k in range(len(squared) if sample.shape[0] else 0):
+        surface[k] = sample @ (space.to_nodes @ harmonic.expand(shapes[:, [k]])).reshape(-1, 3)
+    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface)
 
 
 def _gauge(rows: np.ndarray) -> np.ndarray:
@@ -119,7 +133,7 @@ def _gauge(rows: np.ndarray) -> np.ndarray:
 def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], count: int) -> Modes:
     entries = [(m.squared[k], key, k) for key, m in found.items() for k in range(len(m.squared))]
     entries.sort(key=lambda entry: entry[0])
-    columns: dict[str, list] = {name: [] for name in ("frequency", "diameter", "part", "parity", "flank", "bore")}
+    columns: dict[str, list] = {name: [] for name in COLUMNS}
     shapes: dict[int, np.ndarray] = {}
     for squared, key, k in entries:
         modes = found[key]
@@ -135,6 +149,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
             columns["parity"].append(body.spaces[key[0]].parity)
             columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
             columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
+            columns["surface"].append(modes.surface[k].imag if part == 2 else modes.surface[k].real)
     numbers, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
     flank, patch, tangent = np.split(np.stack(columns["flank"], 1), [len(body.flank_rows), body.profile_loads])
     return Modes(
@@ -147,4 +162,5 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
         patch,
         shapes,
         tangent,
+        np.array(columns["surface"]),
     )

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.files import write_text
+from gearfmu.modes.deformed import DeformedGear, deformed_gear
+from gearfmu.report import deformation as drawn
 from gearfmu.report import page, picture, plots, plots_nvh, plots_runup, plots_set
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
@@ -20,6 +22,9 @@ from gearfmu.report.plots_set import PlanetSet
 from gearfmu.report.results import key_results, strict
 from gearfmu.report.signals import SETTLED, known_meshings, mesh_angles, meshes, window_of_interest
 from gearfmu.spec.expand import as_general
+from gearfmu.stage.deformation import Deformation, DeformationError
+from gearfmu.stage.meshes import tooth_phases
+from gearfmu.stage.observed import gear_bodies
 from gearfmu.stage.trace import Trace, write_columns
 
 NVH = ("spectrum", "orders", "spectrogram")
@@ -31,17 +36,21 @@ def write(
     out_dir: str | os.PathLike[str],
     spec: Any = None,
     bodies: Sequence[Any] | None = None,
+    deformation: Deformation | None = None,
 ) -> Path:
     """Write report.html, summary.json and data/<plot>.csv into `out_dir` and return the path of the page.
 
     trace : any subset of channels; what a missing channel would feed is left out, and said where it matters.
     summary : fields of docs/file-formats.md; what is missing is shown as "not given".
-    spec : the stage, for tooth numbers; bodies : its ReducedBody objects, for the picture of the deformed gears.
-    Raises OSError when the folder cannot be written.
+    spec : the stage, for tooth numbers; bodies : its ReducedBody objects, for the picture of the deformed gears;
+    deformation : of gears at chosen times, drawn where bodies are given too. Raises OSError when the folder cannot be
+    written.
     """
     folder = Path(out_dir)
     results = key_results(trace)
-    made, missing = _plots(trace, spec, bodies)
+    deformed, gaps = _deformed(deformation, spec, bodies)
+    made, missing = _plots(trace, spec, bodies, _of_deformation(deformation, deformed, trace, spec))
+    missing = [*gaps, *missing]
     for plot in made:
         write_columns(folder / "data" / f"{plot.name}.csv", plot.columns)
     write_text(folder / "summary.json", json.dumps(strict({**summary, "results": results}), indent=2) + "\n")
@@ -49,13 +58,42 @@ def write(
     return folder / "report.html"
 
 
-def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[Plot], list[str]]:
+def _deformed(
+    deformation: Deformation | None, spec: Any, bodies: Sequence[Any] | None
+) -> tuple[list[DeformedGear], list[str]]:
+    """The gears whose deformation can be drawn, and in words why others cannot."""
+    if deformation is None or spec is None or not bodies:
+        return [], [] if deformation is None else ["Deformed gears: the stage's bodies are not at hand."]
+    known, found, missing = gear_bodies(spec, bodies), [], []
+    phases = tooth_phases(as_general(spec))
+    for name, motion in deformation.gears.items():
+        try:
+            found.append(deformed_gear(name, known[name], motion, phases[name]))
+        except (DeformationError, KeyError) as error:
+            missing.append(f"Deformed gears: {error}")
+    return found, missing
+
+
+def _of_deformation(
+    deformation: Deformation | None, gears: Sequence[DeformedGear], trace: Trace, spec: Any
+) -> list[Callable[[], Plot | None]]:
+    """What makes the pictures and films of deformed gears."""
+    if deformation is None or not gears:
+        return []
+    stage = as_general(spec)
+    kinds = (drawn.pictures, drawn.film)
+    return [partial(kind, deformation, gear, trace, stage) for gear in gears for kind in kinds]
+
+
+def _plots(
+    trace: Trace, spec: Any, bodies: Sequence[Any] | None, deformed: Sequence[Callable[[], Plot | None]]
+) -> tuple[list[Plot], list[str]]:
     """Every plot the trace allows, and in words why others are not there."""
     angles, window = mesh_angles(trace, spec), window_of_interest(trace)
     own_set = plots_set.planet_set(trace, known_meshings(trace, spec))
     makers: list[Callable[[], Plot | None]]
     if own_set is not None:
-        return _made(_of_set(trace, own_set, spec, bodies))
+        return _made(_of_set(trace, own_set, spec, bodies, [*deformed, *_set_pair(trace, own_set, spec, bodies)]))
     makers = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
     for mesh in meshes(trace):
         makers += [
@@ -65,6 +103,7 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
     makers.append(lambda: plots.bearing_forces(trace))
     if spec is not None and bodies:
         makers += [partial(picture.deformed_pair, trace, as_general(spec), mesh, bodies) for mesh in meshes(trace)]
+    makers += deformed
     makers.append(lambda: plots_nvh.force_spectrum(trace, window, angles))
     makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
     makers.append(lambda: plots_nvh.force_spectrogram(trace, angles))
@@ -74,7 +113,22 @@ def _plots(trace: Trace, spec: Any, bodies: Sequence[Any] | None) -> tuple[list[
     return made, missing
 
 
-def _of_set(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any] | None) -> list[Callable[[], Plot | None]]:
+def _set_pair(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any] | None) -> list[Callable[[], Plot | None]]:
+    """What draws the sun with the planet that presses most."""
+    if spec is None or not bodies or "sun" not in own.meshes:
+        return []
+    mesh = max(own.meshes["sun"].values(), key=lambda name: float(np.abs(trace[f"{name}.force"]).max()))
+    known = list(gear_bodies(spec, bodies).values())
+    return [partial(picture.deformed_pair, trace, as_general(spec), mesh, known)]
+
+
+def _of_set(
+    trace: Trace,
+    own: PlanetSet,
+    spec: Any,
+    bodies: Sequence[Any] | None,
+    deformed: Sequence[Callable[[], Plot | None]],
+) -> list[Callable[[], Plot | None]]:
     """What makes the plots of a planetary set: its planets side by side instead of mesh by mesh."""
     window = window_of_interest(trace)
     run = plots_runup.run_up(trace, own, window, spec, bodies)
@@ -86,8 +140,10 @@ def _of_set(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any] | Non
         lambda: plots.torque_and_slip(trace),
         lambda: plots_set.forces(trace, own),
         lambda: plots_set.forces(trace, own, plots_set.detail_window(trace, own, window)),
+        lambda: plots_set.planets(trace, own, window),
         lambda: plots_set.sharing(trace, own, window),
         lambda: plots_set.pin_forces(trace, own),
+        *deformed,
         lambda: plots.bearing_forces(trace, carried=True),
         lambda: plots_set.energy(trace),
         *over_frequency,

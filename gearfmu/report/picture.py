@@ -40,25 +40,25 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
     if engagement is None:
         return None
     numbers = [[gear.name for gear in stage.gears].index(name) for name in engagement.gears]
-    own, turning = [bodies[number] for number in numbers], stage.rotor_of(engagement.gears[0]) + GEAR_PHI
-    if f"{mesh}.force" not in trace or turning not in trace or any(body.display is None for body in own):
+    own, angle = [bodies[number] for number in numbers], _turned(trace, stage, engagement.gears[0])
+    if f"{mesh}.force" not in trace or angle is None or any(body.display is None for body in own):
         return None
     sample = int(np.argmax(np.abs(trace[f"{mesh}.force"])))
     force = float(trace[f"{mesh}.force"][sample])
     pair = mesh_geometry(stage, engagement)
     if not isinstance(pair, PairGeometry):
-        return None  # rings are not drawn yet
+        return None  # of a ring the recorded deformation is drawn (deformation.py)
     sg = 1 if force >= 0 else -1
     (x, y), (u, v) = mesh_axes(stage, engagement)
     place = tooth_phases(stage)[engagement.gears[0]] - math.atan2(v - y, u - x)
-    angles = meshing_angles(pair, float(trace[turning][sample]) + place, sg)
+    angles = meshing_angles(pair, float(angle[sample]) + place, sg)
     contacts = contacts_at(pair, angles, sg)
     if not contacts or force == 0:
         return None
     moved = [
         _displacement(own[g], pair.gears[g].z, [(c.teeth[g], c.rolls[g]) for c in contacts], force) for g in (0, 1)
     ]
-    scale = _round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
+    scale = round_scale(SHOWN_FRACTION * pair.gears[0].m / max(float(np.linalg.norm(u, axis=1).max()) for u in moved))
     placed = [_placed(own[g].display.points, angles[g], pair.a if g else 0.0) for g in (0, 1)]
     world = [u @ _rotation(angle).T for u, angle in zip(moved, angles, strict=True)]
     approach = _approach(pair, contacts, sg, placed, world)
@@ -72,11 +72,23 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
         "under that force applied statically and split evenly over the pairs in contact; "
         f"{engagement.gears[0]} is turned on until the loaded flanks meet again. Local flattening is left out."
     )
+    if any(sum(name in e.gears for e in stage.engagements) > 1 for name in engagement.gears):
+        caption += " So are the forces at the other meshes of the two."
     pitch_point = np.array([pair.r_w[0], 0, 0])
     image = draw(shapes, pitch_point, 3.2 * pair.gears[0].m, "elastic displacement in µm")
     file = "deformed_pair" if len(stage.engagements) == 1 else f"deformed_pair_{mesh}"
     title = of_mesh(trace, mesh, "The deformed pair at the largest mesh force")
     return Plot(file, title, caption, image, _columns(shapes, moved))
+
+
+def _turned(trace: Trace, stage: GeneralStage, gear: str) -> np.ndarray | None:
+    """Angle (n,) rad of a gear in the axes in which the axes of the stage stand: those of its carrier, where it has
+    one."""
+    rotor = stage.rotor_of(gear)
+    names = [name + GEAR_PHI for name in (rotor, stage.rotors[rotor].carried_by) if name is not None]
+    if any(name not in trace for name in names):
+        return None
+    return trace[names[0]] - trace[names[1]] if len(names) > 1 else trace[names[0]]
 
 
 def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, float]:
@@ -174,7 +186,7 @@ def _shape(display: Any, drawn: np.ndarray, moved: np.ndarray) -> Shape:
     return Shape(drawn, np.asarray(display.quads, dtype=int), 1e6 * np.linalg.norm(moved, axis=1))
 
 
-def _round_scale(scale: float) -> float:
+def round_scale(scale: float) -> float:
     """The largest of 1, 2, 5 times a power of ten below `scale`."""
     power = 10 ** math.floor(math.log10(scale))
     return float(next(step * power for step in (5, 2, 1) if step * power <= scale))

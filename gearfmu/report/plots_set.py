@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from gearfmu.report import metrics
 from gearfmu.report.plots import Plot, columns, finish
 from gearfmu.report.plots_nvh import SHOWN_TO, level_axis, segment
-from gearfmu.report.signals import GEAR_SPEED, Window
-from gearfmu.report.style import MUTED, panels, styled, svg
+from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window
+from gearfmu.report.style import COLOURS, MUTED, WIDTH, panels, styled, svg
 from gearfmu.spec.turning import Meshing
 from gearfmu.stage.trace import Trace
 
@@ -129,15 +130,65 @@ def sharing(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     return Plot("sharing", "Load sharing", caption, picture, data)
 
 
+def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
+    """One row a planet: its mesh forces over the last mesh periods, its shares and the force on its pin over the
+    run."""
+    over_time, means = shares(trace, own, window)
+    start, end = detail_window(trace, own, window)
+    late = (trace.time >= start) & (trace.time <= end)
+    with styled():
+        figure = Figure(figsize=(WIDTH, 1.35 * len(own.planets) + 0.6), layout="constrained")
+        axes = figure.subplots(len(own.planets), 3, squeeze=False, sharex="col", sharey="col")
+        for planet, (force, share, pin) in zip(own.planets, axes, strict=True):
+            for order, (central, mesh) in enumerate(_meshes_of(own, planet).items()):
+                look = {"zorder": 2.5 - 0.1 * order}  # the sun's, which vary less, in front
+                force.plot(trace.time[late], 1e-3 * np.abs(trace[f"{mesh}.force"][late]), lw=0.9, label=central, **look)
+                share.plot(trace.time, over_time[mesh], lw=0.6, label=f"{central} {means[mesh]:.3f}", **look)
+            if (pressed := _pin_force(trace, planet)) is not None:
+                pin.plot(trace.time, 1e-3 * pressed, lw=0.6, color=COLOURS[2], label=f"{np.mean(pressed):.4g} N")
+                pin.legend(loc="upper right", frameon=True, framealpha=0.8, edgecolor="none")
+            share.legend(loc="upper right", ncols=2, frameon=True, framealpha=0.8, edgecolor="none")
+            share.ticklabel_format(useOffset=False)
+            force.set_ylabel(planet)
+        axes[0, 0].legend(loc="upper right", ncols=2, frameon=True, framealpha=0.8, edgecolor="none")
+        for axis, title in zip(axes[0], ("mesh forces in kN", "share", "force on the pin in kN"), strict=True):
+            axis.set_title(title, loc="left")
+        for axis in axes[-1]:
+            axis.set_xlabel("time in s")
+        picture = svg(figure, "planets")
+    caption = (
+        "Magnitudes of the mesh forces over the last mesh periods; share in the load of sun and ring, running mean "
+        f"over one mesh period, with its mean from {window.start:.3g} s to {window.end:.3g} s; magnitude of the force "
+        "on the pin across its axis, with its mean. Each column has one scale."
+    )
+    data = {"time_[s]": trace.time}
+    for planet in own.planets:
+        for central, mesh in _meshes_of(own, planet).items():
+            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": over_time[mesh]}
+        if (pressed := _pin_force(trace, planet)) is not None:
+            data[f"{planet}_pin_[N]"] = pressed
+    return Plot("planets", "Planet by planet", caption, picture, data)
+
+
+def _meshes_of(own: PlanetSet, planet: str) -> dict[str, str]:
+    """Engagements of a planet by central gear."""
+    return {central: meshes[planet] for central, meshes in own.meshes.items() if planet in meshes}
+
+
+def _pin_force(trace: Trace, planet: str) -> np.ndarray | None:
+    """(n,) N: magnitude of the force of a planet on its pin across the axis; None where it was not recorded."""
+    names = [f"pin.{planet}.{direction}" for direction in ("fx", "fy")]
+    return np.hypot(trace[names[0]], trace[names[1]]) if all(name in trace for name in names) else None
+
+
 def pin_forces(trace: Trace, own: PlanetSet) -> Plot | None:
     """Magnitude of the force of every planet on its pin in the plane of the wheels."""
-    known = [p for p in own.planets if f"pin.{p}.fx" in trace and f"pin.{p}.fy" in trace]
+    known = {planet: force for planet in own.planets if (force := _pin_force(trace, planet)) is not None}
     if not known:
         return None
     with styled():
         figure, (axis,) = panels((2.2,))
-        for planet in known:
-            force = np.hypot(trace[f"pin.{planet}.fx"], trace[f"pin.{planet}.fy"])
+        for planet, force in known.items():
             axis.plot(trace.time, 1e-3 * force, label=planet, lw=0.8)
         finish(axis, "force in kN")
         axis.set_xlabel("time in s")

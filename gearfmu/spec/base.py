@@ -108,6 +108,7 @@ class Quantity:
 Text = Annotated[str, Strict()]
 Name = Annotated[str, Strict(), Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Count = Annotated[int, Strict()]
+Switch = Annotated[bool, Strict()]
 
 
 def refuse(remedy: str) -> PydanticCustomError:

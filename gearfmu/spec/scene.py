@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AliasChoices, Field, Strict
+from pydantic import AliasChoices, Field
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, read_toml, validate
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Switch, Text, read_toml, validate
+from gearfmu.spec.deformation import DeformationChoice, deformation_problems
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
 from gearfmu.spec.parts import ClutchSpec, Drivetrain, drivetrain_problems
 from gearfmu.spec.shaft_loads import ShaftLoad, load_problems, time_problems
@@ -20,7 +21,6 @@ SHIPPED = Path(__file__).parent.parent / "scenes"
 DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
-Switch = Annotated[bool, Strict()]
 Seconds = Annotated[float, Quantity("s", at_least=0)]
 
 
@@ -79,7 +79,8 @@ class StartSpec(Spec):
 class SceneSpec(Spec):
     """A scene. Exactly one of `passenger_car`, `test_rig`, `shaft_loads` and `drivetrain`; the car needs a `clutch`.
 
-    record : names of stage outputs and drivetrain variables, "*" and "?" as in file names.
+    record : names of stage outputs and drivetrain variables, "*" and "?" as in file names. deformation : gears that
+    are recorded deformed; nothing of that is computed without.
     """
 
     name: Name
@@ -95,6 +96,7 @@ class SceneSpec(Spec):
     shaft_loads: dict[Name, ShaftLoad] | None = None
     drivetrain: Drivetrain | None = None
     record: tuple[Text, ...] = ("*",)
+    deformation: DeformationChoice | None = None
 
     @property
     def hash(self) -> str:
@@ -105,7 +107,7 @@ class SceneSpec(Spec):
         for load in (values["shaft_loads"] or {}).values():
             if load["speed_control"] is None:
                 del load["speed_control"]
-        for added in ("shaft_loads", "drivetrain"):
+        for added in ("shaft_loads", "drivetrain", "deformation"):
             if values[added] is None:
                 del values[added]
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
@@ -173,6 +175,8 @@ def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:
     if scene.clutch is not None:
         yield from _clutch_problems(scene, scene.clutch, file)
     yield from _time_problems(scene, file)
+    if scene.deformation is not None:
+        yield from deformation_problems(scene.deformation, scene.coupling.step, scene.duration, file)
 
 
 def _clutch_problems(scene: SceneSpec, clutch: ClutchSpec, file: str) -> Iterator[Problem]:

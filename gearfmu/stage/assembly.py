@@ -25,6 +25,7 @@ from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, familie
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
+from gearfmu.stage.observed import observed_number, observed_sections
 from gearfmu.stage.tables import ROLLS
 from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
 
@@ -33,19 +34,28 @@ PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
 
-def assemble(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any], rolls: int = ROLLS) -> StageModel:
+def assemble(
+    spec: StageSpec | GeneralStage | PlanetarySpec,
+    bodies: Sequence[Any],
+    rolls: int = ROLLS,
+    observe: Sequence[str] = (),
+) -> StageModel:
     """The general model of a stage. bodies: reduced gears, in the order of `spec.gears`; of a set its sun, planet,
-    ring and carrier; rolls: of the even grid along a flank.
+    ring and carrier; rolls: of the even grid along a flank; observe: names of gears whose rigid motion and modal
+    amplitudes are outputs.
 
-    ModelError when a body does not belong to its gear.
+    ModelError when a body does not belong to its gear, and for a name in `observe` that is no gear of the stage.
     """
-    sections = order_sections(general_sections(spec, bodies, rolls))
+    sections = order_sections(general_sections(spec, bodies, rolls, observe))
     hashes = tuple(body.input_hash for body in bodies)
     return StageModel(spec, write_blob(sections), hashes)
 
 
 def general_sections(
-    spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any], rolls: int = ROLLS
+    spec: StageSpec | GeneralStage | PlanetarySpec,
+    bodies: Sequence[Any],
+    rolls: int = ROLLS,
+    observe: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
     stage, carriers = as_general(spec), {}
@@ -81,6 +91,8 @@ def general_sections(
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes)
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)
+    for name in observe:
+        sections |= observed_sections(observed_number(stage, name), bodies, groups)
     return sections
 
 

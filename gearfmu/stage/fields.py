@@ -113,7 +113,12 @@ def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
 
 def _instances(sections: Mapping[str, Any], sizes: dict[str, int]) -> Iterator[tuple[Field, str, dict[str, int]]]:
     """Every field once per scope number: field, name of the section, sizes known there."""
-    of_gear = {g: sizes | dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True)) for g in range(sizes["gears"])}
+    of_gear = {
+        g: sizes
+        | dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True))
+        | {"own": len(sections.get(f"own_number{g}", ()))}
+        for g in range(sizes["gears"])
+    }
     of_set = {s: sizes | {"ground": len(sections[f"omega_ground{s}"])} for s in range(sizes["sets"])}
     for field in fields():
         if field.scope == "MODEL":

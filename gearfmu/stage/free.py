@@ -33,13 +33,15 @@ class Flank:
     """What the flanks of a gear read, on the even grid of P rolls, for A width functions.
 
     turning (2, P, A, m), kg^-½: rows on tooth 0 of the modes that turn with the gear (ν ≥ 2), chosen (m,) their
-    numbers in the body; patterns (3, 2, P, A, n), kg^-½: c₀, c_c, c_s of the ground modes; node (3, 2, P, A, 6), m/N
-    and 1/N: the same per unit force and moment on the bore node, beyond the ground modes; residual (2, 2, 7, P, P, A,
-    A), m/N: from flank, to flank, tooth offset −3 … 3, beyond the ground modes.
+    numbers in the body, low (n,) those of the ground modes (ν ≤ 1); patterns (3, 2, P, A, n), kg^-½: c₀, c_c, c_s of
+    the ground modes; node (3, 2, P, A, 6), m/N and 1/N: the same per unit force and moment on the bore node, beyond the
+    ground modes; residual (2, 2, 7, P, P, A, A), m/N: from flank, to flank, tooth offset −3 … 3, beyond the ground
+    modes.
     """
 
     turning: np.ndarray
     chosen: np.ndarray
+    low: np.ndarray
     patterns: np.ndarray
     node: np.ndarray
     residual: np.ndarray
@@ -100,6 +102,7 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
         flank=Flank(
             turning=rows[..., turning],
             chosen=turning,
+            low=low,
             patterns=patterns,
             node=node,
             residual=_flank_residual(body, degrees, to_grid, patterns, omega),

@@ -42,7 +42,7 @@ def made(tmp_path_factory) -> SimpleNamespace:
 def test_a_helical_body_reads_back_as_it_was_written(made: SimpleNamespace) -> None:
     for index, body in enumerate(made.bodies):
         again = load_body(body_path(made.spec, index))
-        assert body.groups == again.groups == ("helix", "tangent")
+        assert body.groups == again.groups == ("helix", "tangent", "shapes")
         for entry in entries_of(body.groups):
             assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
     assert [b.name for b in load_stage_bodies(made.spec)] == ["pinion", "wheel"]
@@ -101,7 +101,7 @@ def test_a_body_with_few_offsets_reads_back_by_its_offset(made: SimpleNamespace,
 def test_files_of_spur_gears_made_before_are_read_and_not_stale() -> None:
     for body in load_stage_bodies(load_stage("fzg_c")):
         assert (body.groups, body.tangent, body.base_helix_angle) == ((), None, 0.0)
-    assert set(GROUPS) == {"rim", "helix", "tangent"}
+    assert set(GROUPS) == {"rim", "helix", "tangent", "shapes"}
 
 
 def test_the_drawn_surface_follows_the_helix(made: SimpleNamespace) -> None:

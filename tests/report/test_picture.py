@@ -105,4 +105,4 @@ def test_near_faces_hide_far_ones() -> None:
 
 @pytest.mark.parametrize(("wish", "scale"), [(1.0, 1), (4.9, 2), (5.0, 5), (87.0, 50), (0.7, 0.5)])
 def test_scale_is_a_round_number(wish: float, scale: float) -> None:
-    assert picture._round_scale(wish) == pytest.approx(scale)
+    assert picture.round_scale(wish) == pytest.approx(scale)

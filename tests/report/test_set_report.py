@@ -19,7 +19,9 @@ from gearfmu.stage.trace import Channel, Trace
 STEP, SAMPLES, CARRIER = 2e-5, 10001, 85.0
 MESH = 54 * CARRIER / (2 * np.pi)  # Hz
 SHARES = (1.1, 0.9, 1.05, 0.95)
-FIGURES = ("set_speed", "torque", "set_force", "set_force_detail", "sharing", "pin", "bearing", "energy", "spectrum")
+FIGURES = (
+    "set_speed", "torque", "set_force", "set_force_detail", "planets", "sharing", "pin", "bearing", "energy", "spectrum"
+)  # fmt: skip
 
 
 def set_run() -> Trace:

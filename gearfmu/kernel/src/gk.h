@@ -46,7 +46,7 @@ typedef enum gk_type { GK_REAL, GK_INTEGER, GK_BOOLEAN, GK_ENUM } gk_type;
 typedef enum gk_causality { GK_INPUT, GK_OUTPUT, GK_PARAMETER } gk_causality;
 
 typedef struct gk_variable_info {
-    uint32_t reference; /* FMI value reference: 256 × number in gk_variables.inc + instance */
+    uint32_t reference; /* FMI value reference: gk_variables.inc */
     gk_type type;
     gk_causality causality;
     char name[64];  /* e.g. "pinion.phi"                                                */

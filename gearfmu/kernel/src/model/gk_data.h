@@ -85,8 +85,10 @@ struct gk_data {
                                                    communication step */
     gk_ledger ledger;
     int64_t steps, rounds, trouble;
+    int64_t amplitudes; /* where those of observed gears stand, in doubles from `oscillator` on */
     gk_meshing meshing[MAX_ENGAGEMENTS];
-    double oscillator[]; /* ground group: q (n), v (n), f (n), double; then of every gear group q, v, f, gk_real */
+    double oscillator[]; /* ground group: q (n), v (n), f (n), double; then of every gear group q, v, f, gk_real; then
+                            the amplitudes of observed gears */
 };
 
 #define GK_DATA_MAGIC 0x32415441444b47ULL

@@ -235,6 +235,43 @@ static void read_lead(reader *r, gk_gear *g)
     for (int k = 0; g->lead && k < 2 * LEADS; k++) demand(r, between(g->lead[k], -1e-3, 1e-3), "leads");
 }
 
+/* the first of a pair is followed by its second */
+static int pairs_whole(const int32_t *member, int count)
+{
+    for (int k = 0; k < count; k++) {
+        const int next = k + 1 < count ? member[k + 1] : -1, before = k ? member[k - 1] : -1;
+        if (!counted(member + k, 0, 2) || (member[k] == 1 && next != 2) || (member[k] == 2 && before != 1)) return 0;
+    }
+    return 1;
+}
+
+static void read_observed(reader *r, gk_model *m, gk_gear *g)
+{
+    gk_observed *o = &g->observed;
+    o->name = take(r, F_GEAR_observed);
+    if (r->outcome || !o->name) return;
+    r->shape.size[SYMBOL_own] = length_of(r, F_GEAR_own_number);
+    demand(r, r->shape.size[SYMBOL_own] <= MAX_OWN && o->name[0] && strlen(o->name) < NAME_LENGTH, "observed gears");
+    o->from = m->amplitudes, o->own = (int)r->shape.size[SYMBOL_own];
+    o->own_number = take(r, F_GEAR_own_number), o->member = take(r, F_GEAR_own_member);
+    o->number = take(r, F_GEAR_mode_number);
+    const double *scale = bounded(r, F_GEAR_mode_scale, 1e6);
+    for (int set = 0; set < m->sets && !r->outcome; set++) {
+        r->shape.set = set;
+        r->shape.size[SYMBOL_reads] = (uint64_t)g->ground[set].reads;
+        o->rows[set] = bounded(r, F_GEAR_SET_own_rows, 1e6);
+        if (!o->rows[set]) refuse(r, "rows of an observed gear", "are missing");
+    }
+    if (!r->outcome && !(o->own_number && o->member && o->number && scale))
+        refuse(r, "numbers of an observed gear", "are missing");
+    if (r->outcome) return;
+    for (int k = 0; k < o->own; k++) demand(r, counted(o->own_number + k, -6, 999999), "observed gears");
+    for (int k = 0; k < g->modes; k++) demand(r, counted(o->number + k, 1, 999999), "observed gears");
+    demand(r, pairs_whole(o->member, o->own), "pairs of observed gears");
+    o->scale = *scale;
+    m->amplitudes += o->own + g->modes;
+}
+
 /* whether anything moves along the axis, tilts, or differs over the face width but evenly */
 static int is_spatial(const gk_model *m)
 {
@@ -257,7 +294,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     r->shape.gear = i;
     const int32_t *size = take(r, F_GEAR_size);
     if (!size) return;
-    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 1, 1, 1000) && counted(size + 2, 0, MAX_MODES),
+    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 1, 1, MAX_TEETH) && counted(size + 2, 0, MAX_MODES),
            "sizes of a gear");
     if (r->outcome) return;
     g->rotor = size[0], g->z = size[1], g->modes = size[2];
@@ -274,6 +311,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
     if (!r->outcome) read_lead(r, g);
+    if (!r->outcome) read_observed(r, m, g);
 }
 
 static void read_ground(reader *r, gk_model *m, int set)

@@ -15,11 +15,22 @@ enum {
     LEADS = 33,       /* places across the face width where a lead is given */
     MAX_CARRIED = 32, /* bodies in the axes of turning rotors */
     MAX_MODES = 6000,
+    MAX_TEETH = 1000,
     MAX_GROUND = 2000,
-    OFFSETS = 7, /* tooth offsets −3 … 3 of the residual */
-    SETS = 2,    /* of ground oscillators: as supported; with the supports held */
+    MAX_OWN = 1000, /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
+    OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */
+    SETS = 2,       /* of ground oscillators: as supported; with the supports held */
     NAME_LENGTH = 32
 };
+
+/* what the outputs tell of a gear's own motion; name NULL: nothing */
+typedef struct gk_observed {
+    const char *name;
+    int from, own;                               /* its first amplitude among those of the model; rows of `rows` */
+    const int32_t *own_number, *member, *number; /* (own), (own), (modes of the gear group) */
+    double scale;
+    const double *rows[2]; /* by set: (own, reads) */
+} gk_observed;
 
 /* a toothed member */
 typedef struct gk_gear {
@@ -39,6 +50,7 @@ typedef struct gk_gear {
         const int32_t *list;
         const double *centre, *rows;
     } ground[SETS];
+    gk_observed observed;
 } gk_gear;
 
 typedef enum gk_mesh_kind { MESH_FLAT = 0, MESH_EXTERNAL = 1, MESH_INTERNAL = -1 } gk_mesh_kind;
@@ -74,6 +86,7 @@ struct gk_model {
     gk_blob blob;
     const char *name;
     int slices, rotors, gears, engagements, ports, supports, dampers, functions, rolls, sets, chains;
+    int amplitudes; /* of observed gears, together */
     char rotor_name[MAX_ROTORS][NAME_LENGTH], support_name[MAX_SUPPORTS][NAME_LENGTH],
         displacement_name[MAX_SUPPORTS][NAME_LENGTH];
     int spatial; /* something moves along the axis or tilts, or the teeth are not the same all over the width */

@@ -1,10 +1,18 @@
 /* Variables by value reference: one table (gk_variables.inc) decides names, ranges and which of them exist in a model.
- * A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are added. */
+ * A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are added; those of
+ * amplitudes, which may be many, begin at 2²⁴. */
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
-typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED } gk_exists;
-enum { STAGE = SCOPE_STAGE, SHAFT = SCOPE_SHAFT, ROTOR = SCOPE_ROTOR, MESH = SCOPE_MESH, SUPPORT = SCOPE_SUPPORT };
+typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED, OBSERVED } gk_exists;
+enum {
+    STAGE = SCOPE_STAGE,
+    SHAFT = SCOPE_SHAFT,
+    ROTOR = SCOPE_ROTOR,
+    MESH = SCOPE_MESH,
+    SUPPORT = SCOPE_SUPPORT,
+    MODE = SCOPE_MODE
+};
 typedef struct gk_row {
     gk_scope scope;
     int number, place; /* place: among the values of its scope */
@@ -23,7 +31,7 @@ static const gk_row TABLE[] = {
 #include "model/gk_variables.inc"
 #undef GK_VAR
 };
-enum { ROWS = sizeof TABLE / sizeof *TABLE, INSTANCES = 256 };
+enum { ROWS = sizeof TABLE / sizeof *TABLE, INSTANCES = 256, MODES_FROM = 1 << 24 };
 
 static int instances(const gk_model *model, gk_scope scope)
 {
@@ -32,6 +40,7 @@ static int instances(const gk_model *model, gk_scope scope)
     case SCOPE_ROTOR: return model->rotors;
     case SCOPE_MESH: return model->engagements;
     case SCOPE_SUPPORT: return model->supports;
+    case SCOPE_MODE: return model->amplitudes;
     default: return 1;
     }
 }
@@ -41,7 +50,8 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     if (instance < 0 || instance >= instances(model, row->scope)) return 0;
     const gk_port *port = row->scope == SCOPE_SHAFT ? &model->port[instance] : NULL;
     switch (row->exists) {
-    case ALWAYS: return 1;
+    case ALWAYS:
+    case OBSERVED: return 1;
     case SPRING: return port->kind == PORT_SPRING;
     case TORQUE: return port->kind == PORT_TORQUE;
     case FIXED: return port->kind == PORT_FIXED;
@@ -57,8 +67,12 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
 static const gk_row *row_of(const gk_model *model, uint32_t reference, int *instance)
 {
     const uint32_t number = reference / INSTANCES;
+    if (reference >= MODES_FROM) {
+        *instance = (int)(reference - MODES_FROM);
+        return *instance < model->amplitudes ? &TABLE[ROWS - 1] : NULL; /* the last of the table */
+    }
     *instance = (int)(reference % INSTANCES);
-    if (number < 1 || number > ROWS) return NULL; /* the table is in the order of its numbers */
+    if (number < 1 || number >= ROWS) return NULL; /* the table is in the order of its numbers */
     return exists(model, &TABLE[number - 1], *instance) ? &TABLE[number - 1] : NULL;
 }
 
@@ -69,6 +83,7 @@ static double *value_of(gk_data *data, const gk_row *row, int instance)
     case SCOPE_ROTOR: return &data->rotor[instance][row->place];
     case SCOPE_MESH: return &data->mesh[instance][row->place];
     case SCOPE_SUPPORT: return &data->support[instance][row->place];
+    case SCOPE_MODE: return data->oscillator + data->amplitudes + instance;
     default: return &data->stage[row->place];
     }
 }
@@ -100,9 +115,42 @@ static const char *instance_name(const gk_model *model, const gk_row *row, int i
     }
 }
 
+static const gk_gear *observed_of(const gk_model *model, int instance)
+{
+    const gk_gear *found = NULL;
+    for (int g = 0; g < model->gears; g++)
+        if (model->gear[g].observed.name && model->gear[g].observed.from <= instance) found = &model->gear[g];
+    return found;
+}
+
+/* number in the body of an amplitude's mode; −1 … −6: rigid motion */
+static int number_of(const gk_model *model, int instance)
+{
+    const gk_observed *o = &observed_of(model, instance)->observed;
+    const int i = instance - o->from;
+    return i < o->own ? o->own_number[i] : o->number[i - o->own];
+}
+
+/* ring.motion.x, ring.mode_12 */
+static size_t append_mode(char *out, size_t size, const gk_model *model, int instance)
+{
+    static const char *const motions[] = {"x", "y", "z", "rx", "ry", "rz"};
+    const int number = number_of(model, instance);
+    size_t n = append(out, size, 0, observed_of(model, instance)->observed.name);
+    if (number < 0) return append(out, size, append(out, size, n, ".motion."), motions[-number - 1]);
+    char digits[8] = {0};
+    int at = (int)sizeof digits - 1;
+    for (int rest = number; rest; rest /= 10) digits[--at] = (char)('0' + rest % 10);
+    return append(out, size, append(out, size, n, ".mode_"), digits + at);
+}
+
 static void expand(char *out, size_t size, const gk_model *model, const gk_row *row, int instance)
 {
     size_t n = 0;
+    if (row->scope == SCOPE_MODE) {
+        out[append_mode(out, size, model, instance)] = 0;
+        return;
+    }
     for (const char *c = row->name; *c; c++) {
         const char one[2] = {*c, 0}, *name = instance_name(model, row, instance);
         if (*c == '%')
@@ -131,7 +179,8 @@ int gk_variable_count(const gk_model *model)
 /* shafts, rotors, engagements, supports one after the other, then the stage */
 static const gk_row *listed(const gk_model *model, int index, int *instance)
 {
-    static const gk_scope order[SCOPES] = {SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_SUPPORT, SCOPE_MESH, SCOPE_STAGE};
+    static const gk_scope order[SCOPES] = {SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_SUPPORT,
+                                           SCOPE_MESH,  SCOPE_STAGE, SCOPE_MODE};
     for (int s = 0; s < SCOPES; s++)
         for (int k = 0; k < instances(model, order[s]); k++)
             for (int i = 0; i < ROWS; i++)
@@ -143,6 +192,7 @@ static const gk_row *listed(const gk_model *model, int index, int *instance)
 /* tilts and moments of a support have units of their own */
 static const char *unit_of(const gk_model *model, const gk_row *row, int instance)
 {
+    if (row->scope == SCOPE_MODE) return number_of(model, instance) < -3 ? "rad" : row->unit;
     if (row->scope != SCOPE_SUPPORT) return row->unit;
     const char *direction = strrchr(model->support_name[instance], '.');
     if (!direction || direction[1] != 'm') return row->unit;
@@ -155,7 +205,7 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
     const gk_row *row = listed(model, index, &instance);
     if (!row) return GK_BAD_VARIABLE;
     memset(info, 0, sizeof *info);
-    info->reference = (uint32_t)(INSTANCES * row->number + instance);
+    info->reference = (uint32_t)((row->scope == SCOPE_MODE ? MODES_FROM : INSTANCES * row->number) + instance);
     info->type = row->type;
     info->causality = row->causality;
     expand(info->name, sizeof info->name, model, row, instance);
@@ -170,7 +220,10 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
 
 gk_outcome gk_defaults(const gk_model *model, gk_data *data)
 {
-    memset(data, 0, gk_data_size(model));
+    const size_t size = gk_data_size(model);
+    memset(data, 0, size);
+    data->amplitudes = (int64_t)((size - sizeof *data) / sizeof(double)) -
+                       model->amplitudes; /* until they have their place */
     data->magic = GK_DATA_MAGIC;
     data->phase = PHASE_NEW;
     for (int i = 0; i < ROWS; i++)

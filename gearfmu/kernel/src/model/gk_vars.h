@@ -3,7 +3,7 @@
 #define GK_VARS_H
 #include "gk.h"
 
-typedef enum gk_scope { SCOPE_STAGE, SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_MESH, SCOPE_SUPPORT, SCOPES } gk_scope;
+typedef enum gk_scope { SCOPE_STAGE, SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_MESH, SCOPE_SUPPORT, SCOPE_MODE, SCOPES } gk_scope;
 
 /* one enumeration a scope: the rows of the other scopes count as nothing */
 enum {
@@ -12,6 +12,7 @@ enum {
 #define GK_IN_STAGE_SHAFT(ID)
 #define GK_IN_STAGE_ROTOR(ID)
 #define GK_IN_STAGE_MESH(ID)
+#define GK_IN_STAGE_MODE(ID)
 #define GK_IN_STAGE_SUPPORT(ID)
 #include "model/gk_variables.inc"
 #undef GK_VAR
@@ -23,6 +24,7 @@ enum {
 #define GK_IN_SHAFT_SHAFT(ID) V_##ID,
 #define GK_IN_SHAFT_ROTOR(ID)
 #define GK_IN_SHAFT_MESH(ID)
+#define GK_IN_SHAFT_MODE(ID)
 #define GK_IN_SHAFT_SUPPORT(ID)
 #include "model/gk_variables.inc"
 #undef GK_VAR
@@ -34,6 +36,7 @@ enum {
 #define GK_IN_ROTOR_SHAFT(ID)
 #define GK_IN_ROTOR_ROTOR(ID) V_##ID,
 #define GK_IN_ROTOR_MESH(ID)
+#define GK_IN_ROTOR_MODE(ID)
 #define GK_IN_ROTOR_SUPPORT(ID)
 #include "model/gk_variables.inc"
 #undef GK_VAR
@@ -45,6 +48,7 @@ enum {
 #define GK_IN_MESH_SHAFT(ID)
 #define GK_IN_MESH_ROTOR(ID)
 #define GK_IN_MESH_MESH(ID) V_##ID,
+#define GK_IN_MESH_MODE(ID)
 #define GK_IN_MESH_SUPPORT(ID)
 #include "model/gk_variables.inc"
 #undef GK_VAR
@@ -56,9 +60,22 @@ enum {
 #define GK_IN_SUPPORT_SHAFT(ID)
 #define GK_IN_SUPPORT_ROTOR(ID)
 #define GK_IN_SUPPORT_MESH(ID)
+#define GK_IN_SUPPORT_MODE(ID)
 #define GK_IN_SUPPORT_SUPPORT(ID) V_##ID,
 #include "model/gk_variables.inc"
 #undef GK_VAR
     SUPPORT_VARS
+};
+enum {
+#define GK_VAR(SCOPE, NUMBER, ID, ...) GK_IN_MODE_##SCOPE(ID)
+#define GK_IN_MODE_STAGE(ID)
+#define GK_IN_MODE_SHAFT(ID)
+#define GK_IN_MODE_ROTOR(ID)
+#define GK_IN_MODE_MESH(ID)
+#define GK_IN_MODE_SUPPORT(ID)
+#define GK_IN_MODE_MODE(ID) V_##ID,
+#include "model/gk_variables.inc"
+#undef GK_VAR
+    MODE_VARS
 };
 #endif

@@ -114,6 +114,12 @@ int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *m
 size_t gk_side_scratch(const gk_model *model);
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
+typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
+    int gear, flank, tooth, strips;
+    double force[MAX_SLICES], roll[MAX_SLICES];
+    gk_strip_weights width;
+} gk_strip_load;
+void gk_side_push(const gk_model *model, const gk_strip_load *load, int first, double *sum);
 /* gk_moves.c */
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 /* gk_rows.c */

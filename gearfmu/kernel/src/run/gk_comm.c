@@ -89,6 +89,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *
     data->time_base = time;
     data->step_H = 0.0;
     data->count = 0;
+    data->amplitudes = (int64_t)setup->amplitudes;
     gk_outputs_start(model, setup, work, data);
     return GK_OK;
 }
@@ -255,5 +256,6 @@ gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const vo
     if (setup->magic != GK_SETUP_MAGIC || size != setup->state_size || size > gk_data_size(model) ||
         size < sizeof(gk_data) || (uintptr_t)bytes % 8)
         return GK_BAD_VALUE;
-    return good_head(bytes) ? GK_OK : GK_BAD_VALUE;
+    const gk_data *data = bytes;
+    return good_head(data) && data->amplitudes == (int64_t)setup->amplitudes ? GK_OK : GK_BAD_VALUE;
 }

@@ -3,9 +3,6 @@
 
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
 
-/* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never pulls. */
-static double reported(const gk_system *s, int i) { return s->force[i] + s->end[i]; }
-
 /* ---- forces ----------------------------------------------------------------------------------------------------------- */
 static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
 {
@@ -17,8 +14,8 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
         const double sense = engaged->place[p].flank ? -1.0 : 1.0;
         int touches = 0;
         for (int i = p * s->strips; i < (p + 1) * s->strips; i++) {
-            side[engaged->place[p].flank] += reported(s, i);
-            v[V_SLICE_1 + i % s->strips] += sense * reported(s, i);
+            side[engaged->place[p].flank] += gk_reported(s, i);
+            v[V_SLICE_1 + i % s->strips] += sense * gk_reported(s, i);
             touches |= s->force[i] > 0.0;
         }
         pairs += touches;
@@ -37,7 +34,8 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
 {
     for (int i = s->contacts; i < s->n; i++) {
         const int port = s->port_of[i], rotor = model->port[port].rotor;
-        const double force = reported(s, i), deflection = s->force[i] * setup->joint[port][s->joint_of[i]].compliance;
+        const double force = gk_reported(s, i),
+                     deflection = s->force[i] * setup->joint[port][s->joint_of[i]].compliance;
         double *v = data->shaft[port], *angle = &data->rotor[rotor][V_GEAR_PHI];
         switch (s->joint_of[i]) {
         case JOINT_PORT:
@@ -91,7 +89,7 @@ static void add_direct_forces(const gk_model *model, const gk_setup *setup, cons
         const gk_engaged *engaged = &work->engaged[e];
         const gk_system *system = &engaged->system;
         double force[MAX_ROWS];
-        for (int i = 0; i < system->n; i++) force[i] = reported(system, i);
+        for (int i = 0; i < system->n; i++) force[i] = gk_reported(system, i);
         for (int w = 0; w < 2; w++) {
             const gk_side *side = &setup->mesh[e].side[w];
             const gk_position *at = &engaged->position[w];
@@ -205,6 +203,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     turn_supports(model, data, 1.0, force);
     support_outputs(model, setup, data, force);
     for (int e = 0; e < model->engagements; e++) data->mesh[e][V_TE] = transmission_error(model, data, e);
+    gk_amplitudes(model, setup, work, data);
     for (int g = 0; g < model->gears; g++) dynamic += setup->modal[g].count;
     v[V_WORK] = data->ledger.work;
     v[V_DISSIPATED] = data->ledger.dissipated;

@@ -125,7 +125,8 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
     lay_out_base(&b, model, &setup->base, ground);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
-    setup->state_size = sizeof(gk_data) + 3 * (size_t)setup->base.n * sizeof(double) + at * sizeof(gk_real);
+    setup->amplitudes = 3 * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
+    setup->state_size = sizeof(gk_data) + (setup->amplitudes + (size_t)model->amplitudes) * sizeof(double);
     return b.used;
 }
 

@@ -194,6 +194,7 @@ struct gk_setup {
     gk_mesh mesh[MAX_ENGAGEMENTS];
     int islands;
     gk_step_function *step; /* of the integrator, in the widest vectors of this processor */
+    size_t amplitudes;      /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
 

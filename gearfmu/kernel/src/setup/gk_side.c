@@ -159,6 +159,57 @@ static void turn_row(const gk_gear *gear, int offset, double *row)
     }
 }
 
+/* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
+static void add_rows(const gk_model *model, const gk_gear *gear, const place *p, int first,
+                     double weight[4][MAX_FUNCTIONS], double *sum)
+{
+    const size_t modes = (size_t)gear->modes;
+    const double *row = gear->rows + (size_t)((p->flank * model->rolls + p->index) * model->functions) * modes;
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < model->functions; a++, row += modes) {
+            for (int k = first; k < gear->modes; k++) sum[k] += weight[i][a] * row[k];
+            weight[i][a] = 0.0;
+        }
+}
+
+/* adds a row of tooth 0 turned to another tooth, modes from `first` on, which begins no pair's second */
+static void add_turned(const gk_gear *gear, int tooth, int first, const double *row, double *sum)
+{
+    double cosine[MAX_TEETH], sine[MAX_TEETH];
+    for (int m = 0; m < gear->z; m++) gk_sincos(2.0 * GK_PI * m / gear->z, &sine[m], &cosine[m]);
+    for (int k = first; k < gear->modes; k++) {
+        const int m = (int)((int64_t)gear->diameter[k] * tooth % gear->z);
+        if (gear->member[k] == 1) {
+            sum[k] += row[k] * cosine[m] - row[k + 1] * sine[m];
+            sum[k + 1] += row[k] * sine[m] + row[k + 1] * cosine[m];
+            k++;
+        } else {
+            sum[k] += row[k] * cosine[m];
+        }
+    }
+}
+
+/* Adds the modal forces of a gear group, modes from `first` on, by outward forces on the strips of a tooth at these
+ * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
+void gk_side_push(const gk_model *model, const gk_strip_load *load, int first, double *sum)
+{
+    const gk_gear *gear = &model->gear[load->gear];
+    double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
+    place p = {.flank = load->flank, .index = -1}, next = p;
+    memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
+    for (int strip = 0; strip < load->strips; strip++) {
+        next.roll = load->roll[strip];
+        grid(model, gear, &next);
+        if (p.index >= 0 && next.index != p.index) add_rows(model, gear, &p, first, weight, row);
+        p = next;
+        for (int i = 0; i < 4; i++)
+            for (int a = 0; a < model->functions; a++)
+                weight[i][a] += load->force[strip] * p.weight[i] * load->width[strip][a];
+    }
+    add_rows(model, gear, &p, first, weight, row);
+    add_turned(gear, load->tooth, first, row, sum);
+}
+
 typedef struct direction { /* in ground axes, at the nominal place of contact */
     double angle;          /* of the tooth */
     double n[3], arm[3];   /* outward normal; point of contact from the gear's centre × normal */

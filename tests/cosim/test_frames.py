@@ -1,0 +1,94 @@
+"""Scenes that record gears deformed: what they may say, frames at their times, FMU against kernel, and no cost else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearfmu import cosim, fmu
+from gearfmu.cosim.frames import frame_plan
+from gearfmu.cosim.scene_run import run_once, stage_model
+from gearfmu.cosim.source import Source
+from gearfmu.errors import CouplingError, SpecError
+from gearfmu.spec.deformation import DeformationChoice
+from gearfmu.spec.scene import SceneSpec, load_scene
+from gearfmu.stage.deformation import Deformation
+
+
+def closure(**deformation: object) -> SceneSpec:
+    """The first 2 ms of a clutch closure."""
+    shipped = load_scene("clutch_closure")
+    changed = {
+        "duration": 2e-3,
+        "settle": 0.0,
+        "stage": shipped.stage.model_copy(update={"level": "fast"}),
+        "deformation": DeformationChoice(**deformation) if deformation else None,
+    }
+    return shipped.model_copy(update=changed)
+
+
+def test_the_papers_scene_asks_for_the_papers_times() -> None:
+    choice = load_scene("planetary_paper").deformation
+    assert choice is not None and choice.gears == ("ring",) and choice.times == pytest.approx((0.033, 0.066, 0.1))
+    assert choice.picture_steps(2e-5) == [1650, 3300, 5000]
+    assert choice.film_steps(2e-5, 5000) == list(range(0, 5001, 100))
+
+
+def test_frames_that_fall_between_steps_take_the_nearest() -> None:
+    choice = DeformationChoice(gears=("ring",), every=2.5e-4)
+    assert choice.film_steps(1e-4, 10) == [0, 2, 5, 8, 10]
+
+
+def test_every_bad_field_at_once(tmp_path: Path) -> None:
+    text = (Path(cosim.__file__).parents[1] / "scenes" / "clutch_closure.toml").read_text(encoding="utf-8")
+    scene = tmp_path / "scene.toml"
+    table = '\n[deformation]\ngears = ["wheel"]\ntimes = ["1 ms", "9 s"]\nevery = "1 us"\n'
+    scene.write_text(text + table, encoding="utf-8")
+    with pytest.raises(SpecError) as error:
+        load_scene(scene)
+    assert {problem.field for problem in error.value.problems} == {"deformation.times[1]", "deformation.every"}
+    scene.write_text(text + '\n[deformation]\ngears = ["wheel"]\n', encoding="utf-8")
+    with pytest.raises(SpecError, match="when"):
+        load_scene(scene)
+
+
+def test_hashes_of_scenes_without_are_those_of_before() -> None:
+    """The hash of a scene that records no deformation does not know of the table."""
+    assert closure().hash != closure(gears=("wheel",), times=(1e-3,)).hash
+    assert "deformation" not in str(load_scene("clutch_closure").hash)
+
+
+def test_fmu_and_kernel_record_the_same_frames_and_the_trace_stays(tmp_path: Path) -> None:
+    asked = closure(gears=("wheel",), times=(1e-3,), every=5e-4)
+    model = stage_model(asked)
+    plan = frame_plan(asked)
+    through_fmu = run_once(asked, Source(model, fmu.export(model, tmp_path / "pair.fmu")), frames=plan)
+    through_kernel = run_once(asked, Source(model), frames=plan)
+    plain = run_once(closure(), Source(stage_model(closure())))
+    found = [run.frames.frames({"wheel": "0" * 64}, {}) for run in (through_fmu, through_kernel) if run.frames]
+    assert len(found) == 2 and plain.frames is None
+    for frames in found:
+        assert frames.time == pytest.approx([0, 5e-4, 1e-3, 1.5e-3, 2e-3])
+        assert frames.pictures.tolist() == [2] and frames.film.tolist() == [0, 1, 2, 3, 4]
+    wheel, other = (frames.gears["wheel"] for frames in found)
+    assert wheel.amplitude.shape[0] == 5 and np.abs(wheel.amplitude[-1]).max() > 1e-9
+    assert np.array_equal(wheel.amplitude, other.amplitude) and np.array_equal(wheel.motion, other.motion)
+    assert list(plain.trace.channels) == list(through_fmu.trace.channels)
+    assert all(np.array_equal(plain.trace[name], through_fmu.trace[name]) for name in plain.trace.channels)
+
+
+def test_a_run_leaves_its_deformation_beside_the_trace(tmp_path: Path) -> None:
+    trace = cosim.run(closure(gears=("pinion", "wheel"), times=(1e-3, 2e-3)), tmp_path, unit="kernel")
+    found = Deformation.load(tmp_path / trace.meta["deformation"])
+    assert set(found.gears) == {"pinion", "wheel"} and found.film.size == 0 and found.time.size == 2
+    assert found.gears["wheel"].body_hash == trace.meta["hashes"]["body wheel"]
+    assert found.meta["model"] == trace.meta["hashes"]["model"]
+
+
+def test_an_fmu_that_does_not_tell_is_refused(tmp_path: Path) -> None:
+    model = stage_model(closure())
+    path = fmu.export(model, tmp_path / "pair.fmu")
+    with pytest.raises(CouplingError, match="--observe wheel"):
+        cosim.run(closure(gears=("wheel",), times=(1e-3,)), fmu_path=path)

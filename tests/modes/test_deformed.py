@@ -1,0 +1,100 @@
+"""Gears deformed by modal amplitudes: against the pictures that the finite elements made, turned, and as .vtu."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+
+from gearfmu.body import load_bodies
+from gearfmu.modes.deformed import DeformedGear, deformed_gear
+from gearfmu.modes.vtu import write_series
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.deformation import Deformation, DeformationError, GearMotion
+
+
+@pytest.fixture(scope="module", params=["sun", "ring"])
+def body(request: pytest.FixtureRequest) -> Any:
+    return load_bodies(load_stage("planetary54"))[("sun", "planet", "ring").index(request.param)]
+
+
+def moved(body: Any, amplitudes: dict[int, float], rigid: tuple[float, ...] = (0.0,) * 6, **at: float) -> DeformedGear:
+    """One frame; amplitudes in kg^½·m by number of the mode, from 0."""
+    modes, values = np.array(list(amplitudes), int), np.array([list(amplitudes.values())], float)
+    motion = GearMotion(body.input_hash, modes + 1, values / math.sqrt(body.mass), np.array([rigid]))
+    return deformed_gear("gear", body, motion, **at)
+
+
+def test_one_mode_is_the_shape_that_the_reduction_drew(body: Any) -> None:
+    """display/modes was unfolded over all teeth from complex sector shapes, in single precision."""
+    for number, index in enumerate(body.display.mode_index):
+        gear = moved(body, {int(index): 1.0})
+        assert np.allclose(gear.surface[0], body.display.points, atol=1e-7)
+        drawn = body.display.modes[number]
+        assert np.abs(gear.elastic(0) - drawn).max() < 1e-5 * np.abs(drawn).max()
+
+
+def test_a_pair_turns_a_tooth_on(body: Any) -> None:
+    """Amplitudes cos ν2π/z and −sin… of a pair: the first member's pattern, one tooth further."""
+    first = int(np.flatnonzero(body.part == 1)[3])
+    angle = 2 * math.pi * body.nodal_diameter[first] / body.teeth
+    turned = moved(body, {first: math.cos(angle), first + 1: math.sin(angle)}).elastic(0)
+    back = moved(body, {first: 1.0}, angle=2 * math.pi / body.teeth).elastic(0)
+    shifted = np.roll(back.reshape(body.teeth, -1, 3), 1, axis=0).reshape(-1, 3)
+    assert np.abs(turned - shifted).max() < 1e-6 * np.abs(turned).max()
+
+
+def test_rigid_motion_and_the_angle_of_the_gear(body: Any) -> None:
+    """Both turn with the gear: lengths and axial parts stay, and a rotation about the axis moves points by r·θ."""
+    amplitudes, rigid = {0: 1e-6, 5: 2e-6}, (1e-6, 0.0, 3e-6, 0.0, 0.0, 1e-4)
+    here, there = moved(body, amplitudes, rigid), moved(body, amplitudes, rigid, angle=0.7)
+    for kind in ("elastic", "rigid"):
+        own, turned = getattr(here, kind)(0), getattr(there, kind)(0)
+        assert np.allclose(np.linalg.norm(own, axis=1), np.linalg.norm(turned, axis=1), rtol=1e-9)
+        assert np.allclose(own[:, 2], turned[:, 2], atol=1e-18) and not np.allclose(own[:, 0], turned[:, 0])
+    only = moved(body, {0: 0.0}, (0.0, 0.0, 0.0, 0.0, 0.0, 1e-4))
+    assert np.allclose(np.linalg.norm(only.rigid(0), axis=1), 1e-4 * np.hypot(*only.surface[0][:, :2].T))
+
+
+def test_another_body_and_one_without_surface_are_refused(body: Any) -> None:
+    motion = moved(body, {0: 1.0}).motion
+    with pytest.raises(DeformationError, match="another reduced body"):
+        deformed_gear("ring", replace(body, input_hash="0" * 64), motion)
+    with pytest.raises(DeformationError, match="gearfmu reduce STAGE --force"):
+        deformed_gear("ring", replace(body, shapes=None), motion)
+
+
+def test_a_series_reads_back(body: Any, tmp_path: Path) -> None:
+    gear = moved(body, {0: 1e-6, 1: 2e-6}, (0.0, 0.0, 1e-6, 0.0, 0.0, 0.0))
+    twice = replace(gear, motion=replace(gear.motion, amplitude=np.vstack([gear.motion.amplitude] * 2),
+                                         motion=np.vstack([gear.motion.motion] * 2)))  # fmt: skip
+    path = write_series(twice, [0.033, 0.066], tmp_path)
+    entries = ElementTree.parse(path).getroot().findall("Collection/DataSet")
+    assert [(e.get("timestep"), e.get("file")) for e in entries] == [
+        ("0.033", "gear_0000.vtu"),
+        ("0.066", "gear_0001.vtu"),
+    ]
+    found = meshio.read(tmp_path / "gear_0001.vtu")
+    assert len(found.points) == len(gear.surface[0]) and len(found.cells[0].data) == len(gear.surface[1])
+    assert np.allclose(found.point_data["elastic"], gear.elastic(0), atol=1e-12)
+    assert np.allclose(found.point_data["displacement"][:, 2] - found.point_data["elastic"][:, 2], 1e-6, atol=1e-12)
+
+
+def test_the_file_of_a_run_reads_back_and_a_damaged_one_is_refused(body: Any, tmp_path: Path) -> None:
+    motion = moved(body, {0: 1e-6, 5: 2e-6}).motion
+    kept = Deformation(np.array([0.0]), np.array([0]), np.array([0]), {"ring": motion}, {"stage": "planetary54"})
+    kept.save(tmp_path / "deformation.h5")
+    again = Deformation.load(tmp_path / "deformation.h5")
+    assert np.array_equal(again.gears["ring"].amplitude, motion.amplitude) and again.meta == kept.meta
+    assert again.gears["ring"].body_hash == body.input_hash
+    bytes_ = bytearray((tmp_path / "deformation.h5").read_bytes())
+    bytes_[len(bytes_) // 2] ^= 1
+    (tmp_path / "deformation.h5").write_bytes(bytes_)
+    with pytest.raises(DeformationError, match="deformation.h5"):
+        Deformation.load(tmp_path / "deformation.h5")
