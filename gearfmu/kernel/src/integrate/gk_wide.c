@@ -23,6 +23,8 @@
 #define gk_flank_move gk_flank_move_avx2
 #define gk_flank_clearance gk_flank_clearance_avx2
 #define gk_still_find gk_still_find_avx2
+#define gk_nodal_leave gk_nodal_leave_avx2
+#define gk_nodal_press gk_nodal_press_avx2
 #define gk_rows_pose gk_rows_pose_avx2
 #define gk_rows_form gk_rows_form_avx2
 #define gk_rows_read gk_rows_read_avx2
@@ -87,6 +89,7 @@
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"
 #include "problem/gk_couple.c"
+#include "force/gk_nodal.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"

@@ -120,6 +120,19 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->far = reals(b, points * (size_t)setup->far);
 }
 
+static void lay_out_nodes(bump *b, const gk_model *model, const gk_gear *gear, gk_nodes *nodes)
+{
+    const size_t along = (size_t)gear->nodes[0], across = (size_t)gear->nodes[1];
+    double **array[] = {&nodes->roll, &nodes->x, &nodes->y, &nodes->length};
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, along);
+    nodes->grid = take(b, along * sizeof *nodes->grid);
+    nodes->z = doubles(b, across);
+    nodes->width = doubles(b, across);
+    for (int w = 0; w < 2; w++) nodes->functions[w] = doubles(b, across * (size_t)model->functions);
+    nodes->lead = doubles(b, 2 * across);
+    nodes->strip = take(b, across * sizeof *nodes->strip);
+}
+
 /* everything after the setup itself; returns the bytes used */
 static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, const int *modes, int ground)
 {
@@ -134,7 +147,10 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
     setup->far_slot = take(&b, (size_t)model->ground[setup->base.set].n * sizeof *setup->far_slot);
     setup->press = doubles(&b, (size_t)(model->supports * model->supports));
     for (int e = 0; e < model->engagements; e++)
-        for (int w = 0; w < 2; w++) lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
+        for (int w = 0; w < 2; w++) {
+            lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
+            lay_out_nodes(&b, model, &model->gear[model->engagement[e].gear[w]], &setup->mesh[e].nodes[w]);
+        }
     setup->state_size = sizeof(gk_data) + 3 * (size_t)setup->base.n * sizeof(double) + at * sizeof(gk_real);
     return b.used;
 }
@@ -177,6 +193,27 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
     engaged->far = doubles(b, rows * (size_t)setup->far);
 }
 
+static void lay_out_field(bump *b, const gk_model *model, gk_field *field)
+{
+    size_t modes = 0, reads = 0, cells = 0;
+    for (int g = 0; g < model->gears; g++) {
+        const gk_gear *gear = &model->gear[g];
+        if (!gear->nodes[0]) continue;
+        cells = (size_t)(model->rolls * model->functions);
+        modes = modes > (size_t)gear->modes ? modes : (size_t)gear->modes;
+        for (int s = 0; s < model->sets; s++)
+            reads = reads > (size_t)gear->ground[s].reads ? reads : (size_t)gear->ground[s].reads;
+    }
+    double **of_cells[] = {&field->at, &field->rate, &field->load}, **of_modes[] = {&field->q, &field->v, &field->f},
+           **of_reads[] = {&field->ground_q, &field->ground_v, &field->ground_f};
+    for (int i = 0; i < 3; i++) {
+        *of_cells[i] = doubles(b, cells);
+        *of_modes[i] = doubles(b, modes);
+        *of_reads[i] = doubles(b, reads);
+    }
+    field->known = take(b, cells ? (size_t)model->rolls : 0);
+}
+
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
 {
     bump b = {base, 0};
@@ -217,6 +254,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     work->sum_ground = doubles(&b, ground);
     work->sum_far = doubles(&b, (size_t)setup->far);
     work->port_far = doubles(&b, (size_t)(model->ports * setup->far));
+    for (int w = 0; w < 2; w++) lay_out_field(&b, model, &work->field[w]);
     return b.used;
 }
 
@@ -636,6 +674,7 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
     gk_strips_fill(model, setup, mesh);
     gk_law_bounds(model, mesh);
     if (engagement->kind != MESH_FLAT) gk_flank_clearance(model, setup, mesh);
+    if (setup->nodal) gk_nodal_fill(model, setup, data, mesh);
 }
 
 /* coefficients of problems in which no time passes: C′ is the quasi-static part alone */
@@ -660,8 +699,47 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
 }
 
 /* ---- level and integrator ---------------------------------------------------------------------------------------------- */
-/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, rk45 (dg4
- * where a clutch hangs on a port) */
+static int has_nodes(const gk_model *model, const gk_data *data)
+{
+    int all = model->engagements > 0;
+    for (int e = 0; e < model->engagements; e++) {
+        all &= data->mesh[e][V_PENALTY] > 0.0;
+        for (int w = 0; w < 2; w++) all &= model->gear[model->engagement[e].gear[w]].nodes[0] > 0;
+    }
+    return all;
+}
+
+/* contact by nodes, where it is asked for or the way of the level; needs an explicit integrator */
+static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+{
+    const gk_contact_law law = (gk_contact_law)(int)data->stage[V_CONTACT_LAW];
+    const int is_explicit = gk_scheme_of(setup->integrator)->is_explicit, there = has_nodes(model, data);
+    setup->nodal = law == CONTACT_NODAL ||
+                   (law == CONTACT_BY_LEVEL && setup->level == LEVEL_PAPER && is_explicit && there);
+    if (!setup->nodal) return GK_OK;
+    if (!there) {
+        snprintf(
+            message, GK_MESSAGE,
+            "contact nodal: this model has no flank nodes, or contact_penalty is 0; make the model again with this "
+            "version of gearfmu, or give contact_penalty");
+        return GK_BAD_VALUE;
+    }
+    if (!is_explicit) {
+        snprintf(message, GK_MESSAGE,
+                 "contact nodal is a force that follows from positions: use integrator rk45 or central (levels paper, "
+                 "explicit) and a stage without a clutch in its ports, or contact line");
+        return GK_BAD_VALUE;
+    }
+    setup->on.residual = 0;
+    snprintf(
+        message, GK_MESSAGE,
+        "contact nodal leaves the static compliance of all higher modes out, its penalty stands for what is local: use "
+        "it for comparison only");
+    return GK_OK;
+}
+
+/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal contact,
+ * rk45 (dg4 and lines of contact where a clutch hangs on a port) */
 static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
 {
     double damping = 0.0;
@@ -681,9 +759,11 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
                  "the chain");
         return GK_BAD_VALUE;
     }
+    if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
+    const gk_outcome outcome = choose_contact(model, data, setup, message);
+    if (outcome || setup->nodal) return outcome;
     if (setup->level == LEVEL_PAPER) {
         setup->on.residual = 0;
-        if (setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
         snprintf(message, GK_MESSAGE,
                  "level paper leaves the static compliance of all higher modes out: tooth stiffness is 15 to 40 %% too "
                  "high; use it for comparison only");

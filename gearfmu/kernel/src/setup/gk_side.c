@@ -70,9 +70,9 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
 
 /* ---- one node ---------------------------------------------------------------------------------------------------- */
 typedef struct place { /* a candidate's strip at a node */
-    int flank, offset, index;
-    double weight[4], middle, nominal,
-        roll;                       /* length of roll on the line of action at mid-width, here; where contact is */
+    int flank, offset;
+    gk_grid grid;                   /* of where contact is */
+    double middle, nominal, roll;   /* length of roll on the line of action at mid-width, here; where contact is */
     double z, width[MAX_FUNCTIONS]; /* middle of the part that carries; its weights on the width functions */
 } place;
 
@@ -110,34 +110,15 @@ size_t gk_side_scratch(const gk_model *model)
     return of_node > of_step ? of_node : of_step;
 }
 
-static void grid(const gk_model *model, const gk_gear *gear, place *p)
-{ /* cubic convolution (Keys 1981, a = −½): exact for parabolas; quadratic extrapolation gives the points at the ends */
-    const double low = gk_min(gear->s_form, gear->s_tip), high = gk_max(gear->s_form, gear->s_tip);
-    const double share = (gk_clamp(p->roll, low, high) - gear->s_form) / (gear->s_tip - gear->s_form);
-    const double u = share * (model->rolls - 1);
-    const int cell = (int)u < model->rolls - 2 ? (int)u : model->rolls - 2;
-    const double x = u - cell, x2 = x * x, x3 = x2 * x;
-    const double k[4] = {-0.5 * x + x2 - 0.5 * x3, 1.0 - 2.5 * x2 + 1.5 * x3, 0.5 * x + 2.0 * x2 - 1.5 * x3,
-                         -0.5 * x2 + 0.5 * x3};
-    double *w = p->weight;
-    p->index = (int)gk_clamp(cell - 1, 0, model->rolls - 4);
-    for (int i = 0; i < 4; i++) w[i] = k[i];
-    if (cell == 0) { /* f(−1) = 3 f0 − 3 f1 + f2 */
-        w[0] = k[1] + 3.0 * k[0], w[1] = k[2] - 3.0 * k[0], w[2] = k[3] + k[0], w[3] = 0.0;
-    } else if (cell == model->rolls - 2) {
-        w[3] = k[2] + 3.0 * k[3], w[2] = k[1] - 3.0 * k[3], w[1] = k[0] + k[3], w[0] = 0.0;
-    }
-}
-
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
 static void blend(const node *n, const double *table, const place *p, int width, double *out)
 {
     const int A = n->model->functions;
-    const double *t = table + (size_t)((p->flank * n->model->rolls + p->index) * A) * width;
+    const double *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
     for (int k = 0; k < width; k++) out[k] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < A; a++, t += width) {
-            const double w = p->weight[i] * p->width[a];
+            const double w = p->grid.weight[i] * p->width[a];
             for (int k = 0; k < width; k++) out[k] += w * t[k];
         }
 }
@@ -262,7 +243,7 @@ static void gather_node(node *n, double position)
         find_part(n, mesh, p, strip);
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * tan_of(n->gear->helix);
         p->roll = corner_roll(n, p);
-        grid(n->model, n->gear, p);
+        p->grid = gk_grid_at(n->model, n->gear, p->roll);
         blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
         if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
         blend(n, n->gear->port_residual, p, n->model->ports, ports);
@@ -303,7 +284,8 @@ static void tabulate(const node *n, const place *p, const place *q, double *cell
     for (int c = 0; c < A * A; c++) cell[c] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++) {
-            const double w = p->weight[i] * q->weight[j], *t = table + ((p->index + i) * R + q->index + j) * A * A;
+            const double w = p->grid.weight[i] * q->grid.weight[j],
+                         *t = table + ((p->grid.index + i) * R + q->grid.index + j) * A * A;
             for (int c = 0; c < A * A; c++) cell[c] += w * t[c];
         }
 }

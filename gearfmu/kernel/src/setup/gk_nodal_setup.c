@@ -1,0 +1,104 @@
+/* Nodes of the flanks for nodal contact: even in arc length along the flank and even across the common face width, as those
+ * of a structured mesh. The area that a node stands for follows from the trapezoidal rule in both directions, so that all
+ * areas together are that of the flank (docs/theory.md, 2.7). */
+#include "setup/gk_setup.h"
+
+/* (2a + 1) P_a at x, −1 … 1, for the width functions of the model: displacement there is their sum with the rows, and a
+ * force there loads the rows by them */
+static void functions_at(const gk_model *model, double x, double *out)
+{
+    for (int a = 0; a < model->functions; a++) {
+        double before = 0.0, now = 1.0;
+        for (int k = 0; k < model->degree[a]; k++) {
+            const double next = ((2.0 * k + 1.0) * x * now - k * before) / (k + 1.0);
+            before = now, now = next;
+        }
+        out[a] = (2.0 * model->degree[a] + 1.0) * now;
+    }
+}
+
+/* weight of entry i of n even ones in the trapezoidal rule */
+static double share_of(int i, int n) { return (i == 0 || i == n - 1 ? 0.5 : 1.0) / (n - 1); }
+
+static void fill_along(const gk_model *model, const gk_gear *gear, gk_nodes *nodes)
+{
+    const double from = gear->s_form * gear->s_form, to = gear->s_tip * gear->s_tip;
+    nodes->along = gear->nodes[0];
+    for (int i = 0; i < nodes->along; i++) {
+        const double s = sqrt(from + (to - from) * i / (nodes->along - 1));
+        double sine, cosine;
+        gk_sincos(s / gear->r_b, &sine, &cosine);
+        nodes->roll[i] = s;
+        nodes->x[i] = gear->r_b * cosine + s * sine;
+        nodes->y[i] = s * cosine - gear->r_b * sine;
+        nodes->length[i] = fabs(to - from) / (2.0 * gear->r_b) * share_of(i, nodes->along);
+        nodes->grid[i] = gk_grid_at(model, gear, s);
+    }
+}
+
+/* the strip that a place across the width belongs to; strips of mirrored halves are those of negative z */
+static int strip_at(const gk_setup *setup, double share, int mirrored)
+{
+    const double at = (mirrored && share > 0.5 ? 1.0 - share : share) * setup->slices;
+    return (int)gk_clamp(at, 0.0, setup->strips - 1);
+}
+
+static void fill_across(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int count,
+                        gk_nodes *nodes)
+{
+    const int mirrored = gk_strips_mirrored(model), A = model->functions;
+    nodes->across = 0;
+    for (int i = mirrored ? count / 2 : 0; i < count; i++) {
+        const int j = nodes->across++, twice = mirrored && 2 * i + 1 != count;
+        const double share = (double)i / (count - 1);
+        nodes->z[j] = e->width * (share - 0.5);
+        nodes->width[j] = e->width * share_of(i, count) * (twice ? 2.0 : 1.0);
+        nodes->strip[j] = strip_at(setup, share, mirrored);
+        nodes->lead[j] = nodes->lead[count + j] = 0.0;
+        for (int w = 0; w < 2; w++) {
+            const gk_gear *gear = &model->gear[e->gear[w]];
+            const double x = 2.0 * nodes->z[j] / gear->width;
+            functions_at(model, x, nodes->functions[w] + j * A);
+            for (int flank = 0; flank < 2; flank++) nodes->lead[flank * count + j] += gk_strips_lead(gear, flank, x);
+        }
+    }
+}
+
+/* 1/ρA + 1/ρB in the normal section at the pitch point */
+static double pitch_curvature(const gk_model *model, const gk_mesh *mesh)
+{
+    const gk_engagement *e = &model->engagement[mesh->index];
+    const double R = gk_base_reach(model, e), L = sqrt(mesh->distance * mesh->distance - R * R);
+    const double a = L * model->gear[e->gear[0]].r_b / R, b = L * model->gear[e->gear[1]].r_b / R;
+    return mesh->cosine * (1.0 / a + e->kind / b);
+}
+
+/* Time in which a node's damper force per rate of its penetration grows to its stiffness: the line of contact at the load
+ * of force_max on one tooth pair, f = 4/3 k √(2R) δ^(3/2) per metre, then has the damping per metre of the stage. A flat
+ * engagement is as stiff as all its nodes. */
+static double retardation_of(const gk_model *model, const gk_mesh *mesh, double penalty)
+{
+    const gk_engagement *e = &model->engagement[mesh->index];
+    if (!(penalty > 0.0)) return 0.0;
+    if (e->kind == MESH_FLAT) {
+        double length = 0.0;
+        for (int i = 0; i < mesh->nodes[0].along; i++) length += mesh->nodes[0].length[i];
+        return mesh->damping / (penalty * length);
+    }
+    const double load = e->force_max * mesh->cosine / e->width, R = 1.0 / pitch_curvature(model, mesh);
+    const double depth = gk_exp(2.0 / 3.0 * gk_log(0.75 * load / (penalty * sqrt(2.0 * R))));
+    return mesh->damping * depth / (1.5 * load);
+}
+
+void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh)
+{
+    const gk_engagement *e = &model->engagement[mesh->index];
+    const double penalty = data->mesh[mesh->index][V_PENALTY];
+    for (int w = 0; w < 2; w++) {
+        const gk_gear *gear = &model->gear[e->gear[w]];
+        fill_along(model, gear, &mesh->nodes[w]);
+        fill_across(model, setup, e, gear->nodes[1], &mesh->nodes[w]);
+        mesh->penalty[w] = penalty * (w ? 1.0 - e->nodes_of_a : e->nodes_of_a);
+    }
+    mesh->retardation = retardation_of(model, mesh, penalty);
+}
