@@ -5,8 +5,8 @@
  *     t′ = arg D − sg arctan(ℓ/r_b),   s′ = r_b sg (β_o − t′),   g = ±(ℓ − s′) + δ_c + δ_o(s′) − e_c − e_o(s′)     (8f)
  * (− where o is a ring) with the outward elastic displacements e of node and foot, and its force on both is
  *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8g)
- * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read over its
- * grid of rolls and width functions, from where interpolation gives those of all its nodes, and forces are gathered there
+ * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a few
+ * points along its flank, by width function, from where interpolation gives those of all its nodes, and forces are gathered there
  * before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are looked for from the
  * line of contact outwards until they are open. */
 #include "problem/gk_work.h"
@@ -16,10 +16,10 @@ static const double NODE_NEAR = 5e-6; /* m: gap up to which the next node outwar
 typedef struct tooth_in_hand { /* one tooth of a place */
     const gk_gear *gear;
     gk_field *field;
-    int g, which, index;         /* index: wrapped number of the tooth */
-    double hollow, tan_helix;    /* hollow: −1 for a ring */
-    double base, toward, psi[3]; /* base angle at mid-width; direction t of the line of action seen from its axis;
-                                          1, cos and sin of the angle of the tooth */
+    int g, which, index;      /* index: wrapped number of the tooth */
+    double hollow, tan_helix; /* hollow: −1 for a ring */
+    double base, toward;      /* base angle at mid-width; direction t of the line of action seen from its axis */
+    double cosine, sine;      /* of the angle of the tooth */
 } tooth_in_hand;
 
 typedef struct nodal_pair { /* a place in hand */
@@ -28,9 +28,10 @@ typedef struct nodal_pair { /* a place in hand */
     const gk_engagement *e;
     const gk_mesh *mesh;
     const gk_place *place;
-    const double *pose; /* where it is taken */
-    double moved[POSE]; /* from there on, gaps are linear: roll_motion off */
-    double rate[POSE];  /* speeds of the pose */
+    const double *ground; /* displacements of the ground group, then speeds */
+    const double *pose;   /* where it is taken */
+    double moved[POSE];   /* from there on, gaps are linear: roll_motion off */
+    double rate[POSE];    /* speeds of the pose */
     int flank;
     double sg, apart[2]; /* apart: from A's axis to B's */
     tooth_in_hand tooth[2];
@@ -43,120 +44,105 @@ typedef struct node_foot { /* of a node on the other flank, without elastic disp
 } node_foot;
 
 /* ---- displacement of a tooth -------------------------------------------------------------------------------------- */
-/* the gear group seen from the tooth: what tooth 0 of a state turned back has (eq. 3) */
-static void see_modes(const gk_modal *m, int tooth, const gk_real *y, double *out)
-{
-    const gk_real *c = m->cosine + (size_t)tooth * (size_t)m->pairs, *s = m->sine + (size_t)tooth * (size_t)m->pairs;
-    for (int k = 0; k < m->count; k++) {
-        const int lane = m->lane[k], i = lane < m->pairs ? lane : lane - m->pairs;
-        const double first = y[i], second = y[m->pairs + i];
-        out[k] = lane < m->pairs ? first * c[i] + second * s[i] : second * c[i] - first * s[i];
-    }
-}
-
-/* the inverse, for forces */
-static void press_modes(const gk_modal *m, int tooth, const double *f, gk_real *force)
-{
-    const gk_real *c = m->cosine + (size_t)tooth * (size_t)m->pairs, *s = m->sine + (size_t)tooth * (size_t)m->pairs;
-    for (int k = 0; k < m->count; k++) {
-        const int lane = m->lane[k], i = lane < m->pairs ? lane : lane - m->pairs;
-        const double along = lane < m->pairs ? c[i] : -s[i], across = lane < m->pairs ? s[i] : c[i];
-        force[i] += (gk_real)(f[k] * along);
-        force[m->pairs + i] += (gk_real)(f[k] * across);
-    }
-}
-
-/* ground oscillators that the tooth's gear reads; 0 when its flanks read none of them elastically */
-static int ground_reads(const gk_setup *setup, const tooth_in_hand *t)
-{
-    return setup->on.elastic ? t->gear->ground[setup->base.set].reads : 0;
-}
-
 static void begin_tooth(const nodal_pair *p, const gk_work *work, const gk_real *const speed[], tooth_in_hand *t)
 {
-    const gk_base *base = &p->setup->base;
     const gk_modal *m = &p->setup->modal[t->g];
-    const int32_t *list = t->gear->ground[base->set].list;
-    const int reads = ground_reads(p->setup, t);
-    memset(t->field->known, 0, (size_t)p->model->rolls);
-    see_modes(m, t->index, work->y[t->g], t->field->q);
-    see_modes(m, t->index, speed[t->g], t->field->v);
-    memset(t->field->f, 0, (size_t)m->count * sizeof(double));
-    for (int k = 0; k < reads; k++) {
-        const int slot = base->slot[list[k]];
-        t->field->ground_q[k] = slot < 0 ? 0.0 : work->ground_trial[slot];
-        t->field->ground_v[k] = slot < 0 ? 0.0 : work->ground_trial[base->n + slot];
-        t->field->ground_f[k] = 0.0;
-    }
+    memset(t->field->known, 0, sizeof t->field->known);
+    if (!GK_LANES(p->setup, t->g)) return;
+    gk_rows_turn_back(m, t->index, work->y[t->g], t->field->q);
+    gk_rows_turn_back(m, t->index, speed[t->g], t->field->v);
 }
 
-/* sums of a row with two vectors */
-static void read_both(const double *row, const double *x, const double *y, int n, double sum[2])
+static size_t cell_of(const nodal_pair *p, int part, int cell)
+{
+    return (size_t)((2 * part + p->flank) * POINTS * p->model->functions + cell);
+}
+
+static const gk_real *modal_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
+{
+    return p->setup->point_rows[t->g].modes + cell_of(p, 0, cell) * (size_t)p->setup->modal[t->g].n;
+}
+
+typedef struct ground_parts { /* rows c0, c_c, c_s of a cell and their factors at the angle of the tooth (eq. 2c) */
+    const gk_four *c0, *cc, *cs;
+    double cosine, sine;
+} ground_parts;
+
+static ground_parts ground_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
+{
+    const gk_real *rows = p->setup->point_rows[t->g].ground;
+    const size_t width = (size_t)p->setup->base.width[t->g];
+    return (ground_parts){(const gk_four *)(rows + cell_of(p, 0, cell) * width),
+                          (const gk_four *)(rows + cell_of(p, 1, cell) * width),
+                          (const gk_four *)(rows + cell_of(p, 2, cell) * width), t->cosine, t->sine};
+}
+
+#define GROUND_QUAD(row, q)                                                                                            \
+    (GK_WIDENED((row)->c0[q]) + (row)->cosine * GK_WIDENED((row)->cc[q]) + (row)->sine * GK_WIDENED((row)->cs[q]))
+
+/* adds the sums of a row with two vectors */
+static void read_ground_row(const ground_parts *row, const double *x, const double *y, int quads, double sum[2])
 {
     gk_quad a = {0}, b = {0};
-    const gk_quad *r = (const gk_quad *)row, *u = (const gk_quad *)x, *v = (const gk_quad *)y;
-    for (int k = 0; k < n / 4; k++) a += r[k] * u[k], b += r[k] * v[k];
-    sum[0] = (a[0] + a[2]) + (a[1] + a[3]), sum[1] = (b[0] + b[2]) + (b[1] + b[3]);
-    for (int k = n / 4 * 4; k < n; k++) sum[0] += row[k] * x[k], sum[1] += row[k] * y[k];
-}
-
-static const double *gear_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
-{
-    return t->gear->rows + (size_t)(p->flank * p->model->rolls * p->model->functions + cell) * (size_t)t->gear->modes;
-}
-
-static const double *ground_row(const nodal_pair *p, const tooth_in_hand *t, int part, int cell)
-{
-    const int set = p->setup->base.set, cells = p->model->rolls * p->model->functions;
-    return t->gear->ground[set].rows +
-           (size_t)((2 * part + p->flank) * cells + cell) * (size_t)t->gear->ground[set].reads;
-}
-
-/* displacement and its rate at one roll of the grid, by width function */
-static void read_roll(const nodal_pair *p, const tooth_in_hand *t, int roll)
-{
-    const gk_field *f = t->field;
-    const int A = p->model->functions, modes = p->setup->modal[t->g].count, reads = ground_reads(p->setup, t);
-    for (int cell = roll * A; cell < (roll + 1) * A; cell++) {
-        double sum[2];
-        read_both(gear_row(p, t, cell), f->q, f->v, modes, sum);
-        f->at[cell] = sum[0], f->rate[cell] = sum[1], f->load[cell] = 0.0;
-        for (int part = 0; part < 3 && reads; part++) {
-            read_both(ground_row(p, t, part, cell), f->ground_q, f->ground_v, reads, sum);
-            f->at[cell] += t->psi[part] * sum[0], f->rate[cell] += t->psi[part] * sum[1];
-        }
+    for (int q = 0; q < quads; q++) {
+        const gk_quad r = GROUND_QUAD(row, q);
+        a += r * ((const gk_quad *)x)[q], b += r * ((const gk_quad *)y)[q];
     }
-    f->known[roll] = 1;
+    sum[0] += (a[0] + a[2]) + (a[1] + a[3]), sum[1] += (b[0] + b[2]) + (b[1] + b[3]);
+}
+
+/* displacement and its rate at a point, by width function */
+static void read_point(const nodal_pair *p, const tooth_in_hand *t, int point)
+{
+    gk_field *f = t->field;
+    const gk_base *base = &p->setup->base;
+    const int A = p->model->functions, n = GK_LANES(p->setup, t->g), quads = base->width[t->g] / 4;
+    const double *x = p->ground + base->from[t->g], *v = x + base->n;
+    for (int cell = point * A; cell < (point + 1) * A; cell++) {
+        double sum[2] = {0.0, 0.0};
+        if (n) sum[0] = gk_dot(modal_row(p, t, cell), f->q, n), sum[1] = gk_dot(modal_row(p, t, cell), f->v, n);
+        const ground_parts ground = ground_row(p, t, cell);
+        read_ground_row(&ground, x, v, quads, sum);
+        f->at[cell] = sum[0], f->rate[cell] = sum[1], f->load[cell] = 0.0;
+    }
+    f->known[point] = 1;
 }
 
 static void know(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *at)
 {
     for (int i = 0; i < 4; i++)
-        if (!t->field->known[at->index + i]) read_roll(p, t, at->index + i);
+        if (!t->field->known[at->index + i]) read_point(p, t, at->index + i);
 }
 
-/* y += f·row */
-static void add_row(double f, const double *row, int n, double *y)
+static void press_modes(const nodal_pair *p, gk_work *work, const tooth_in_hand *t)
 {
-    for (int k = 0; k < n; k++) y[k] += f * row[k];
+    const int n = GK_LANES(p->setup, t->g), A = p->model->functions;
+    const gk_field *field = t->field;
+    gk_half *f = (gk_half *)field->f;
+    memset(field->f, 0, (size_t)n * sizeof *field->f);
+    for (int cell = 0; cell < POINTS * A && n; cell++) {
+        if (!field->known[cell / A] || field->load[cell] == 0.0) continue;
+        const gk_half *row = (const gk_half *)modal_row(p, t, cell);
+        const gk_real load = (gk_real)field->load[cell];
+        for (int k = 0; k < 2 * n / LANES; k++) f[k] -= load * row[k];
+    }
+    const gk_real *turned[2] = {field->f, work->zero};
+    gk_real *sum[2] = {work->force[t->g], work->next[t->g]};
+    if (n) gk_rows_turn_forth(&p->setup->modal[t->g], t->index, turned, sum);
 }
 
 /* what presses on a tooth presses on the oscillators: inward, against the rows */
 static void end_tooth(const nodal_pair *p, gk_work *work, const tooth_in_hand *t)
 {
-    const gk_base *base = &p->setup->base;
+    const int A = p->model->functions, quads = p->setup->base.width[t->g] / 4;
     const gk_field *f = t->field;
-    const int A = p->model->functions, modes = p->setup->modal[t->g].count, reads = ground_reads(p->setup, t);
-    for (int cell = 0; cell < p->model->rolls * A; cell++) {
+    gk_quad *force = (gk_quad *)(work->ground_force + p->setup->base.from[t->g]);
+    press_modes(p, work, t);
+    for (int cell = 0; cell < POINTS * A; cell++) {
         if (!f->known[cell / A] || f->load[cell] == 0.0) continue;
-        add_row(-f->load[cell], gear_row(p, t, cell), modes, f->f);
-        for (int part = 0; part < 3 && reads; part++)
-            add_row(-f->load[cell] * t->psi[part], ground_row(p, t, part, cell), reads, f->ground_f);
-    }
-    press_modes(&p->setup->modal[t->g], t->index, f->f, work->force[t->g]);
-    for (int k = 0; k < reads; k++) {
-        const int slot = base->slot[t->gear->ground[base->set].list[k]];
-        if (slot >= 0) work->ground_force[slot] += f->ground_f[k];
+        const ground_parts row = ground_row(p, t, cell);
+        const double load = f->load[cell];
+        for (int q = 0; q < quads; q++) force[q] -= load * GROUND_QUAD(&row, q);
     }
 }
 
@@ -215,12 +201,13 @@ static int foot_of(const nodal_pair *p, int own, int along, double z, double lea
     gk_sincos(c->base + z * c->tan_helix / c->gear->r_b, &sine, &cosine);
     const double r[2] = {cosine * x - sine * y, sine * x + cosine * y};
     const double D[2] = {sense * p->apart[0] + r[0], sense * p->apart[1] + r[1]}, square = D[0] * D[0] + D[1] * D[1];
-    if (!(square - r_b * r_b > 1e-10)) return 0;
+    if (!(square - r_b * r_b > 1e-10) || !(square < 1e4)) return 0;
     const double length = sqrt(square - r_b * r_b);
     const double ct = (D[0] * r_b + p->sg * D[1] * length) / square, st = (D[1] * r_b - p->sg * D[0] * length) / square;
     gk_sincos(o->toward, &sine, &cosine);
     const double turn = gk_atan2(st * cosine - ct * sine, ct * cosine + st * sine);
     foot->roll = r_b * p->sg * (o->base + z * o->tan_helix / r_b - o->toward - turn);
+    if (!(fabs(foot->roll) < 1e3)) return 0;
     const double nx = -o->hollow * p->sg * st, ny = o->hollow * p->sg * ct; /* out of the material of o */
     foot->gap = o->hollow * (length - foot->roll) + depth_at(p, c->gear, nodes->roll[along], &unused) +
                 depth_at(p, o->gear, foot->roll, &slope) + lead + (p->flank ? p->mesh->allowance : 0.0);
@@ -304,7 +291,7 @@ static double press_row(nodal_pair *p, int own, int along, int first, int last)
     const double lead = nodes->lead[p->flank * p->model->gear[p->e->gear[own]].nodes[1] + first];
     if (!foot_at(p, own, along, p->setup->spatial ? nodes->z[first] : 0.0, lead, &foot)) return INFINITY;
     for (int d = 0; d < POSE; d++) foot.gap += foot.gradient[d] * p->moved[d];
-    const gk_grid at = gk_grid_at(p->model, o->gear, foot.roll);
+    const gk_grid at = gk_grid_points(o->gear, foot.roll);
     const flank_reading here = reading_at(p, c, &nodes->grid[along]), there = reading_at(p, o, &at);
     double rate = 0.0, roll_rate = 0.0;
     for (int d = 0; d < POSE; d++)
@@ -339,7 +326,8 @@ static int nearest_node(const nodal_pair *p, int own, double z)
     const double s = gear->r_b * p->sg * (t->base - t->toward) + p->sg * z * t->tan_helix;
     const int last = p->mesh->nodes[own].along - 1;
     if (p->e->kind == MESH_FLAT) return 0;
-    return (int)(gk_clamp((gk_max(s, 0.0) * s - from) / (to - from), 0.0, 1.0) * last + 0.5);
+    const double share = (gk_max(s, 0.0) * s - from) / (to - from);
+    return share > 0.0 ? (int)(gk_min(share, 1.0) * last + 0.5) : 0;
 }
 
 /* nodes of layers of the same section, from the line of contact outwards */
@@ -375,8 +363,7 @@ static void take_tooth(nodal_pair *p, gk_work *work, int which)
                          2.0 * GK_PI / t->gear->z * place->number[which];
     t->base = angle + p->sg * t->gear->psi_b;
     if (t->gear->index) t->base += t->gear->index[p->flank * t->gear->z + t->index];
-    t->psi[0] = 1.0;
-    gk_sincos(angle, &t->psi[2], &t->psi[1]);
+    gk_sincos(angle, &t->sine, &t->cosine);
 }
 
 /* forces on the poses of an engagement to spins and ground oscillators */
@@ -414,6 +401,7 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
     gk_engaged *engaged = &work->engaged[e];
     const int still = !GK_ON(setup, roll_motion);
     nodal_pair p = {.model = model, .setup = setup, .e = &model->engagement[e], .mesh = &setup->mesh[e]};
+    p.ground = work->ground_trial;
     p.pose = still ? data->meshing[e].still : engaged->pose;
     for (int d = 0; d < POSE && still; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
     gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p.rate);

@@ -31,6 +31,8 @@
 #define gk_rows_form_ground gk_rows_form_ground_avx2
 #define gk_rows_without_rigid gk_rows_without_rigid_avx2
 #define gk_rows_scatter gk_rows_scatter_avx2
+#define gk_rows_turn_back gk_rows_turn_back_avx2
+#define gk_rows_turn_forth gk_rows_turn_forth_avx2
 #define gk_side_step gk_side_step_avx2
 #define gk_compliance_form gk_compliance_form_avx2
 #define gk_compliance_mirror gk_compliance_mirror_avx2

@@ -27,13 +27,12 @@ static inline const gk_point *gk_point_of(const gk_setup *setup, const gk_place 
     return &place->point[setup->spatial ? strip : 0];
 }
 
-/* Displacement of the flank of one tooth along its outward normal, over the grid of rolls and the width functions, and the
- * forces that press on it (gk_nodal.c); what no node has asked for is not known */
+/* Displacement of the flank of one tooth along its outward normal, at its points and by width function, and the forces
+ * that press on it (gk_nodal.c); what no node has asked for is not known */
 typedef struct gk_field {
-    double *at, *rate, *load;               /* (rolls, functions) */
-    unsigned char *known;                   /* (rolls) */
-    double *q, *v, *f;                      /* (modes) gear group in the frame of the tooth, in the model's order */
-    double *ground_q, *ground_v, *ground_f; /* (reads) ground oscillators that the gear reads */
+    double at[POINTS * MAX_FUNCTIONS], rate[POINTS * MAX_FUNCTIONS], load[POINTS * MAX_FUNCTIONS];
+    unsigned char known[POINTS];
+    gk_real *q, *v, *f; /* lanes: gear group in the frame of the tooth; force on it */
 } gk_field;
 
 /* where a side stands in its table */
@@ -129,6 +128,8 @@ void gk_side_port_far(const gk_model *model, const gk_setup *setup, gk_work *wor
 /* gk_moves.c */
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 /* gk_rows.c */
+void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
+void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);
 void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
                   double *pose);
 void gk_rows_form(const gk_setup *setup, gk_work *work, int e);

@@ -151,6 +151,11 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
             lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
             lay_out_nodes(&b, model, &model->gear[model->engagement[e].gear[w]], &setup->mesh[e].nodes[w]);
         }
+    for (int g = 0; g < model->gears; g++) {
+        const size_t cells = model->gear[g].nodes[0] ? 2 * (size_t)(POINTS * model->functions) : 0;
+        setup->point_rows[g].modes = reals(&b, cells * (size_t)setup->modal[g].n);
+        setup->point_rows[g].ground = reals(&b, 3 * cells * (size_t)setup->base.n);
+    }
     setup->state_size = sizeof(gk_data) + 3 * (size_t)setup->base.n * sizeof(double) + at * sizeof(gk_real);
     return b.used;
 }
@@ -193,27 +198,6 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
     engaged->far = doubles(b, rows * (size_t)setup->far);
 }
 
-static void lay_out_field(bump *b, const gk_model *model, gk_field *field)
-{
-    size_t modes = 0, reads = 0, cells = 0;
-    for (int g = 0; g < model->gears; g++) {
-        const gk_gear *gear = &model->gear[g];
-        if (!gear->nodes[0]) continue;
-        cells = (size_t)(model->rolls * model->functions);
-        modes = modes > (size_t)gear->modes ? modes : (size_t)gear->modes;
-        for (int s = 0; s < model->sets; s++)
-            reads = reads > (size_t)gear->ground[s].reads ? reads : (size_t)gear->ground[s].reads;
-    }
-    double **of_cells[] = {&field->at, &field->rate, &field->load}, **of_modes[] = {&field->q, &field->v, &field->f},
-           **of_reads[] = {&field->ground_q, &field->ground_v, &field->ground_f};
-    for (int i = 0; i < 3; i++) {
-        *of_cells[i] = doubles(b, cells);
-        *of_modes[i] = doubles(b, modes);
-        *of_reads[i] = doubles(b, reads);
-    }
-    field->known = take(b, cells ? (size_t)model->rolls : 0);
-}
-
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
 {
     bump b = {base, 0};
@@ -254,7 +238,10 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     work->sum_ground = doubles(&b, ground);
     work->sum_far = doubles(&b, (size_t)setup->far);
     work->port_far = doubles(&b, (size_t)(model->ports * setup->far));
-    for (int w = 0; w < 2; w++) lay_out_field(&b, model, &work->field[w]);
+    for (int w = 0; w < 2; w++) {
+        gk_real **of_field[] = {&work->field[w].q, &work->field[w].v, &work->field[w].f};
+        for (int i = 0; i < 3; i++) *of_field[i] = reals(&b, widest);
+    }
     return b.used;
 }
 
@@ -809,6 +796,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     fill_ports(model, setup);
     for (int e = 0; e < model->engagements; e++) fill_mesh(model, setup, data, e);
     fill_far(model, setup);
+    for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);
     for (int p = 0; p < model->ports && setup->far; p++) gk_side_port_far(model, setup, work, p);

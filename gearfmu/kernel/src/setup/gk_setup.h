@@ -200,6 +200,7 @@ struct gk_setup {
     gk_modal modal[MAX_GEARS];
     gk_base base;
     gk_mesh mesh[MAX_ENGAGEMENTS];
+    gk_point_rows point_rows[MAX_GEARS]; /* nodal contact */
     int islands, far;  /* far: length of the rows through which residuals of different engagements meet, 0: none do */
     int32_t *far_slot; /* (all ground oscillators) their columns there, −1: dynamic, or read by one engagement only */
     int far_supports;  /* column of the first support */
@@ -244,6 +245,7 @@ gk_effects gk_effects_of(const gk_data *data);
 const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
 const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
 /* gk_nodal_setup.c */
+void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g);
 void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh);
 /* gk_strips.c */
 int gk_strips_mirrored(const gk_model *model);
