@@ -19,6 +19,7 @@ typedef struct tooth_in_hand { /* one tooth of a place */
     int g, which, index;      /* index: wrapped number of the tooth */
     double hollow, tan_helix; /* hollow: −1 for a ring */
     double base, toward;      /* base angle at mid-width; direction t of the line of action seen from its axis */
+    double along[2];          /* cos and sin of that direction */
     double cosine, sine;      /* of the angle of the tooth */
 } tooth_in_hand;
 
@@ -38,6 +39,12 @@ typedef struct nodal_pair { /* a place in hand */
     double push[POSE], energy; /* forces on the pose */
     double strip[MAX_SLICES];
 } nodal_pair;
+
+typedef struct nodal_layer { /* nodes of tooth `own` across the width that share a transverse section */
+    int own, first, last;    /* from `first` to before `last` */
+    double z, lead;          /* of the section; what leads open there */
+    double cosine, sine;     /* of the base angle of the tooth there */
+} nodal_layer;
 
 typedef struct node_foot { /* of a node on the other flank, without elastic displacement */
     double gap, gradient[POSE], roll, roll_gradient[POSE];
@@ -190,27 +197,25 @@ static void roll_gradient(const nodal_pair *p, int own, const double r[2], const
     of_other[XA] = -tx, of_other[YA] = -ty, of_other[PHIA] = k;
 }
 
-/* (8f) without elastic displacements, for node `along` of tooth `own` in the transverse section at z, leads there `lead`; 0
- * where it has no foot */
-static int foot_of(const nodal_pair *p, int own, int along, double z, double lead, node_foot *foot)
+/* (8f) without elastic displacements, for a node of a layer; 0 where it has no foot */
+static int foot_of(const nodal_pair *p, const nodal_layer *layer, int along, node_foot *foot)
 {
+    const int own = layer->own;
     const gk_nodes *nodes = &p->mesh->nodes[own];
     const tooth_in_hand *c = &p->tooth[own], *o = &p->tooth[1 - own];
     const double r_b = o->gear->r_b, sense = own ? 1.0 : -1.0, x = nodes->x[along], y = p->sg * nodes->y[along];
-    double sine, cosine, slope, unused;
-    gk_sincos(c->base + z * c->tan_helix / c->gear->r_b, &sine, &cosine);
-    const double r[2] = {cosine * x - sine * y, sine * x + cosine * y};
+    const double r[2] = {layer->cosine * x - layer->sine * y, layer->sine * x + layer->cosine * y};
     const double D[2] = {sense * p->apart[0] + r[0], sense * p->apart[1] + r[1]}, square = D[0] * D[0] + D[1] * D[1];
+    double slope, unused;
     if (!(square - r_b * r_b > 1e-10) || !(square < 1e4)) return 0;
     const double length = sqrt(square - r_b * r_b);
     const double ct = (D[0] * r_b + p->sg * D[1] * length) / square, st = (D[1] * r_b - p->sg * D[0] * length) / square;
-    gk_sincos(o->toward, &sine, &cosine);
-    const double turn = gk_atan2(st * cosine - ct * sine, ct * cosine + st * sine);
-    foot->roll = r_b * p->sg * (o->base + z * o->tan_helix / r_b - o->toward - turn);
+    const double turn = gk_atan2(st * o->along[0] - ct * o->along[1], ct * o->along[0] + st * o->along[1]);
+    foot->roll = r_b * p->sg * (o->base + layer->z * o->tan_helix / r_b - o->toward - turn);
     if (!(fabs(foot->roll) < 1e3)) return 0;
     const double nx = -o->hollow * p->sg * st, ny = o->hollow * p->sg * ct; /* out of the material of o */
     foot->gap = o->hollow * (length - foot->roll) + depth_at(p, c->gear, nodes->roll[along], &unused) +
-                depth_at(p, o->gear, foot->roll, &slope) + lead + (p->flank ? p->mesh->allowance : 0.0);
+                depth_at(p, o->gear, foot->roll, &slope) + layer->lead + (p->flank ? p->mesh->allowance : 0.0);
     roll_gradient(p, own, r, D, length, foot->roll_gradient);
     memset(foot->gradient, 0, sizeof foot->gradient);
     double *of_own = foot->gradient + SPACE * own, *of_other = foot->gradient + SPACE * (1 - own);
@@ -220,18 +225,18 @@ static int foot_of(const nodal_pair *p, int own, int along, double z, double lea
     const double normal[2] = {own ? nx : -nx, own ? ny : -ny}; /* of the force on B */
     double at[2][2];
     memcpy(at[own], r, sizeof r), memcpy(at[1 - own], D, sizeof D);
-    lean_node(p, z, normal, at, foot);
+    lean_node(p, layer->z, normal, at, foot);
     return 1;
 }
 
 /* a flat engagement has one gap for all nodes */
-static int foot_at(const nodal_pair *p, int own, int along, double z, double lead, node_foot *foot)
+static int foot_at(const nodal_pair *p, const nodal_layer *layer, int along, node_foot *foot)
 {
-    if (p->e->kind != MESH_FLAT) return foot_of(p, own, along, z, lead, foot);
+    if (p->e->kind != MESH_FLAT) return foot_of(p, layer, along, foot);
     memset(foot, 0, sizeof *foot);
     foot->gap = p->place->point[0].gap;
     foot->gradient[PHIA] = -1.0, foot->gradient[PHIB] = 1.0;
-    foot->roll = p->mesh->nodes[own].roll[along];
+    foot->roll = p->mesh->nodes[layer->own].roll[along];
     return 1;
 }
 
@@ -262,6 +267,13 @@ static double by_functions(const double *functions, const double *values, int n)
     return sum;
 }
 
+static double by_pose(const double gradient[POSE], const double moved[POSE])
+{
+    double sum = 0.0;
+    for (int d = 0; d < POSE; d++) sum += gradient[d] * moved[d];
+    return sum;
+}
+
 static void gather_load(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *grid, const double *load)
 {
     const int A = p->model->functions;
@@ -278,34 +290,29 @@ static double force_of(nodal_pair *p, double stiffness, double depth, double rat
     return GK_ON(p->setup, contact_damping) ? elastic + gk_clamp(damper, -elastic, elastic) : elastic;
 }
 
-/* Nodes of row `along` of tooth `own` in the layers from `first` to before `last`, which have the transverse section of the
- * first of them. Returns the smallest gap. */
-static double press_row(nodal_pair *p, int own, int along, int first, int last)
+/* Nodes of a layer in row `along`. Returns the smallest gap. */
+static double press_row(nodal_pair *p, const nodal_layer *layer, int along)
 {
+    const int own = layer->own, other = 1 - own, A = p->model->functions;
     const gk_nodes *nodes = &p->mesh->nodes[own];
-    const tooth_in_hand *c = &p->tooth[own], *o = &p->tooth[1 - own];
-    const int A = p->model->functions, other = 1 - own;
+    const tooth_in_hand *c = &p->tooth[own], *o = &p->tooth[other];
     const int linear = !GK_ON(p->setup, roll_motion) || p->e->kind == MESH_FLAT; /* the foot stays where it is */
     double smallest = INFINITY, own_load[MAX_FUNCTIONS] = {0}, other_load[MAX_FUNCTIONS] = {0}, sum = 0.0, slide = 0.0;
     node_foot foot;
-    const double lead = nodes->lead[p->flank * p->model->gear[p->e->gear[own]].nodes[1] + first];
-    if (!foot_at(p, own, along, p->setup->spatial ? nodes->z[first] : 0.0, lead, &foot)) return INFINITY;
-    for (int d = 0; d < POSE; d++) foot.gap += foot.gradient[d] * p->moved[d];
+    if (!foot_at(p, layer, along, &foot)) return INFINITY;
+    foot.gap += by_pose(foot.gradient, p->moved);
     const gk_grid at = gk_grid_points(o->gear, foot.roll);
     const flank_reading here = reading_at(p, c, &nodes->grid[along]), there = reading_at(p, o, &at);
-    double rate = 0.0, roll_rate = 0.0;
-    for (int d = 0; d < POSE; d++)
-        rate -= foot.gradient[d] * p->rate[d], roll_rate += foot.roll_gradient[d] * p->rate[d];
-    for (int j = first; j < last; j++) {
+    const double stiffness = p->mesh->penalty[own] * nodes->length[along] / p->mesh->cosine;
+    for (int j = layer->first; j < layer->last; j++) {
         const double *of_own = nodes->functions[own] + j * A, *of_other = nodes->functions[other] + j * A;
         const double gap = foot.gap - by_functions(of_own, here.at, A) - by_functions(of_other, there.at, A);
         smallest = gk_min(smallest, gap);
         if (!(gap < 0.0)) continue;
         const double slope = linear ? 0.0 : by_functions(of_other, there.slope, A);
-        const double deeper = rate + slope * roll_rate + by_functions(of_own, here.rate, A) +
-                              by_functions(of_other, there.rate, A);
-        const double area = nodes->length[along] * nodes->width[j] / p->mesh->cosine;
-        const double force = force_of(p, p->mesh->penalty[own] * area, -gap, deeper);
+        const double rate = slope * by_pose(foot.roll_gradient, p->rate) - by_pose(foot.gradient, p->rate) +
+                            by_functions(of_own, here.rate, A) + by_functions(of_other, there.rate, A);
+        const double force = force_of(p, stiffness * nodes->width[j], -gap, rate);
         sum += force, slide += force * slope;
         p->strip[nodes->strip[j]] += force;
         for (int a = 0; a < A; a++) own_load[a] += force * of_own[a], other_load[a] += force * of_other[a];
@@ -318,34 +325,38 @@ static double press_row(nodal_pair *p, int own, int along, int first, int last)
 }
 
 /* the node of a tooth that is nearest to the line of contact in the section at z */
-static int nearest_node(const nodal_pair *p, int own, double z)
+static int nearest_node(const nodal_pair *p, const nodal_layer *layer)
 {
-    const tooth_in_hand *t = &p->tooth[own];
+    const tooth_in_hand *t = &p->tooth[layer->own];
     const gk_gear *gear = t->gear;
     const double from = gear->s_form * gear->s_form, to = gear->s_tip * gear->s_tip;
-    const double s = gear->r_b * p->sg * (t->base - t->toward) + p->sg * z * t->tan_helix;
-    const int last = p->mesh->nodes[own].along - 1;
+    const double s = gear->r_b * p->sg * (t->base - t->toward) + p->sg * layer->z * t->tan_helix;
+    const int last = p->mesh->nodes[layer->own].along - 1;
     if (p->e->kind == MESH_FLAT) return 0;
     const double share = (gk_max(s, 0.0) * s - from) / (to - from);
     return share > 0.0 ? (int)(gk_min(share, 1.0) * last + 0.5) : 0;
 }
 
-/* nodes of layers of the same section, from the line of contact outwards */
-static void press_layers(nodal_pair *p, int own, int first, int last)
+/* nodes of a layer, from the line of contact outwards */
+static void press_layer(nodal_pair *p, int own, int first, int last)
 {
-    const int middle = nearest_node(p, own, p->setup->spatial ? p->mesh->nodes[own].z[first] : 0.0);
-    for (int i = middle; i < p->mesh->nodes[own].along; i++)
-        if (press_row(p, own, i, first, last) > NODE_NEAR && i > middle) break;
+    const gk_nodes *nodes = &p->mesh->nodes[own];
+    const tooth_in_hand *t = &p->tooth[own];
+    nodal_layer layer = {.own = own, .first = first, .last = last, .z = p->setup->spatial ? nodes->z[first] : 0.0};
+    layer.lead = nodes->lead[p->flank * t->gear->nodes[1] + first];
+    gk_sincos(t->base + layer.z * t->tan_helix / t->gear->r_b, &layer.sine, &layer.cosine);
+    const int middle = nearest_node(p, &layer);
+    for (int i = middle; i < nodes->along; i++)
+        if (press_row(p, &layer, i) > NODE_NEAR && i > middle) break;
     for (int i = middle - 1; i >= 0; i--)
-        if (press_row(p, own, i, first, last) > NODE_NEAR) break;
+        if (press_row(p, &layer, i) > NODE_NEAR) break;
 }
 
+/* those of a planar model have one section all over the width, those of others one each */
 static void press_nodes(nodal_pair *p, int own)
 {
-    const int across = p->mesh->nodes[own].across;
-    if (!(p->mesh->penalty[own] > 0.0)) return;
-    if (!p->setup->spatial) press_layers(p, own, 0, across);
-    for (int j = 0; j < across && p->setup->spatial; j++) press_layers(p, own, j, j + 1);
+    const int across = p->mesh->nodes[own].across, each = p->setup->spatial ? 1 : across;
+    for (int j = 0; j < across && p->mesh->penalty[own] > 0.0; j += each) press_layer(p, own, j, j + each);
 }
 
 /* ---- engagements ---------------------------------------------------------------------------------------------------------- */
@@ -361,6 +372,7 @@ static void take_tooth(nodal_pair *p, gk_work *work, int which)
     t->toward = place->action + (which && !internal ? GK_PI : 0.0);
     const double angle = p->pose[SPACE * which + PHIA] + t->gear->phase +
                          2.0 * GK_PI / t->gear->z * place->number[which];
+    gk_sincos(t->toward, &t->along[1], &t->along[0]);
     t->base = angle + p->sg * t->gear->psi_b;
     if (t->gear->index) t->base += t->gear->index[p->flank * t->gear->z + t->index];
     gk_sincos(angle, &t->sine, &t->cosine);
