@@ -99,6 +99,7 @@ def run_once(scene: SceneSpec, source: UnitSource, progress: Progress | None = N
     parameters = {
         "level": choice.level,
         "integrator": choice.integrator,
+        "contact": choice.contact,
         "slices": choice.slices,
         "h": choice.h,
         **{f"effect.{name}": 0.0 for name in choice.effects.off},

@@ -73,21 +73,19 @@ static double pitch_curvature(const gk_model *model, const gk_mesh *mesh)
     return mesh->cosine * (1.0 / a + e->kind / b);
 }
 
-/* Time in which a node's damper force per rate of its penetration grows to its stiffness: the line of contact at the load
- * of force_max on one tooth pair, f = 4/3 k √(2R) δ^(3/2) per metre, then has the damping per metre of the stage. A flat
+/* dδ/df (m²/N) of the line of contact at the load of force_max on one tooth pair, f = 4/3 k √(2R) δ^(3/2) per metre. A flat
  * engagement is as stiff as all its nodes. */
-static double retardation_of(const gk_model *model, const gk_mesh *mesh, double penalty)
+static double line_compliance(const gk_model *model, const gk_mesh *mesh, double penalty)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
-    if (!(penalty > 0.0)) return 0.0;
     if (e->kind == MESH_FLAT) {
         double length = 0.0;
         for (int i = 0; i < mesh->nodes[0].along; i++) length += mesh->nodes[0].length[i];
-        return mesh->damping / (penalty * length);
+        return 1.0 / (penalty * length);
     }
     const double load = e->force_max * mesh->cosine / e->width, R = 1.0 / pitch_curvature(model, mesh);
     const double depth = gk_exp(2.0 / 3.0 * gk_log(0.75 * load / (penalty * sqrt(2.0 * R))));
-    return mesh->damping * depth / (1.5 * load);
+    return depth / (1.5 * load);
 }
 
 /* ---- rows at points ------------------------------------------------------------------------------------------------ */
@@ -161,5 +159,6 @@ void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *
         fill_across(model, setup, e, gear->nodes[1], &mesh->nodes[w]);
         mesh->penalty[w] = penalty * (w ? 1.0 - e->nodes_of_a : e->nodes_of_a);
     }
-    mesh->retardation = retardation_of(model, mesh, penalty);
+    mesh->compliance = line_compliance(model, mesh, penalty);
+    mesh->retardation = mesh->damping * mesh->compliance; /* with it that line has the damping per metre of the stage */
 }

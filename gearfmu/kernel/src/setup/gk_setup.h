@@ -134,9 +134,10 @@ typedef struct gk_mesh { /* an engagement */
     double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
-        log_high;                   /* bounds of b² in the local law, and their ln */
-    gk_nodes nodes[2];              /* nodal contact: of gear A and of gear B */
-    double penalty[2], retardation; /* N/m³ of the nodes of A and of B; s, damper force over elastic force and rate */
+        log_high;                               /* bounds of b² in the local law, and their ln */
+    gk_nodes nodes[2];                          /* nodal contact: of gear A and of gear B */
+    double penalty[2], compliance, retardation; /* N/m³ of the nodes of A and of B; m²/N of a line; s, damper force over
+                                                   elastic force and rate */
 } gk_mesh;
 
 typedef struct gk_joint {
