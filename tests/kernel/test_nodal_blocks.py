@@ -56,7 +56,7 @@ def run(blob: bytes, h: float, steps: int, names: tuple[str, ...], **parameters:
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("nodes", [(2, 2), (9, 5), (40, 33)])
 def test_rigid_blocks_are_a_spring_of_penalty_times_area(share: float, nodes: tuple[int, int]) -> None:
-    """Whoever's nodes and however many: half a sine of amplitude v √(m K), K = k A, and the blocks leave as they must."""
+    """Whoever's nodes and however many: half a sine of amplitude v √(m K), K = k A; momentum and energy are kept."""
     reduced, stiffness = MASSES[0] * MASSES[1] / sum(MASSES), PENALTY * AREA
     h = 2e-6
     found = run(with_nodes(blocks(), share, nodes), h, 1400, ("mesh.force", "left.w", "right.w"))

@@ -2,9 +2,9 @@
  * gear, the way of Schurr et al. (ICSV22, 2015), on every engagement.
  *
  * A node of gear c at P finds its foot on the involute of gear o in closed form, D = P − C_o, ℓ = √(D² − r_b²):
- *     t′ = arg D − sg arctan(ℓ/r_b),   s′ = r_b sg (β_o − t′),   g = ±(ℓ − s′) + δ_c + δ_o(s′) − e_c − e_o(s′)     (8f)
+ *     t′ = arg D − sg arctan(ℓ/r_b),   s′ = r_b sg (β_o − t′),   g = ±(ℓ − s′) + δ_c + δ_o(s′) − e_c − e_o(s′)     (8h)
  * (− where o is a ring) with the outward elastic displacements e of node and foot, and its force on both is
- *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8g)
+ *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8i)
  * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a few
  * points along its flank, by width function, from where interpolation gives those of all its nodes, and forces are gathered there
  * before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are looked for from the
@@ -197,7 +197,7 @@ static void roll_gradient(const nodal_pair *p, int own, const double r[2], const
     of_other[XA] = -tx, of_other[YA] = -ty, of_other[PHIA] = k;
 }
 
-/* (8f) without elastic displacements, for a node of a layer; 0 where it has no foot */
+/* (8h) without elastic displacements, for a node of a layer; 0 where it has no foot */
 static int foot_of(const nodal_pair *p, const nodal_layer *layer, int along, node_foot *foot)
 {
     const int own = layer->own;
@@ -281,7 +281,7 @@ static void gather_load(const nodal_pair *p, const tooth_in_hand *t, const gk_gr
         for (int a = 0; a < A; a++) t->field->load[(grid->index + i) * A + a] += grid->weight[i] * load[a];
 }
 
-/* (8g) of one node that is `depth` deep and gets deeper at `rate`; the damper never pulls and never more than doubles the
+/* (8i) of one node that is `depth` deep and gets deeper at `rate`; the damper never pulls and never more than doubles the
  * force (8a) */
 static double force_of(nodal_pair *p, double stiffness, double depth, double rate)
 {
