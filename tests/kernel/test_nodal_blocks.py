@@ -7,29 +7,20 @@ import math
 
 import numpy as np
 import pytest
-from small_model import pair_blob
+from small_model import pair_blob, with_nodes
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage.blob import read_blob, write_blob
-from gearfmu.stage.fields import fields, order_sections
+from gearfmu.stage.fields import order_sections
 from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
 
 DG4, RK45, CENTRAL = 0, 3, 4
 FULL, PAPER = 3, 4
 LINE, NODAL = 1, 2
-PENALTY, SPEED = 2e9, 0.1  # N/m³, m/s
+PENALTY, SPEED = 2e9, 0.1  # N/m³, m/s; the penalty of with_nodes
 AREA = 1.0 * 0.01**2 / (2 * 0.01)  # m²: face width times arc length of the flank that a flat body has in name
 MASSES = (0.8, 1.7)
-
-
-def with_nodes(blob: bytes, share: float = 0.5, nodes: tuple[int, int] = (9, 5), penalty: float = PENALTY) -> bytes:
-    """The blob with nodes on both gears' flanks; share: of those of gear A."""
-    shapes = {field.name: field.dimensions for field in fields()}
-    sections = dict(read_blob(blob)) | {"nodal": np.array([penalty, share])}
-    sections |= {f"nodes{g}": np.array(nodes, np.int32) for g in (0, 1)}
-    assert shapes["nodal"] == ("engagements", "2") and shapes["nodes"] == ("2",)
-    return write_blob(sections)
 
 
 def blocks(omega: float = 0.0, damping: float = 0.0) -> bytes:
