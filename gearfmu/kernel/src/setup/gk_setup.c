@@ -718,10 +718,10 @@ static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_
         return GK_BAD_VALUE;
     }
     setup->on.residual = 0;
-    snprintf(
-        message, GK_MESSAGE,
-        "contact nodal leaves the static compliance of all higher modes out, its penalty stands for what is local: use "
-        "it for comparison only");
+    snprintf(message, GK_MESSAGE,
+             "contact nodal leaves the static compliance of all higher modes out: teeth are too stiff, and nodes make "
+             "noise; use "
+             "it for comparison only");
     return GK_OK;
 }
 
