@@ -128,6 +128,7 @@ def run_once(
     parameters = {
         "level": choice.level,
         "integrator": choice.integrator,
+        "contact": choice.contact,
         "slices": choice.slices,
         "h": choice.h,
         **{f"effect.{name}": 0.0 for name in choice.effects.off},

@@ -38,6 +38,7 @@ def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
         "stage": scene.stage.name,
         "level": scene.stage.level,
         "integrator": scene.stage.integrator,
+        "contact": scene.stage.contact,
         "slices": scene.stage.slices,
         "effects_off": list(scene.stage.effects.off),
         "H": scene.coupling.step,

@@ -48,6 +48,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
         description=spec.description,
         source=spec.source,
         slices=spec.contact.slices,
+        nodal=spec.contact.nodal,
         bodies=bodies,
         rotors={g.name: RotorSpec(axis=axis, bodies={g.name: 0.0}) for g, axis in zip(spec.gears, axes, strict=True)},
         engagements=(
@@ -101,6 +102,7 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
         description=spec.description,
         source=spec.source,
         slices=spec.contact.slices,
+        nodal=spec.contact.nodal,
         bodies=bodies,
         rotors=_set_rotors(spec, planets),
         engagements=_set_meshes(spec, planets),

@@ -15,7 +15,7 @@ from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size, SurfaceCoupling
 from gearfmu.spec.lead import LeadSpec, Misalignment
 from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
-from gearfmu.spec.ports import Frequency, LevelSpec, PortSpec
+from gearfmu.spec.ports import Frequency, LevelSpec, NodalSpec, PortSpec
 
 Place = Annotated[float, Quantity("m")]
 Spring = Annotated[float, Quantity("N/m", above=0, words=("rigid",))]
@@ -217,6 +217,7 @@ class GeneralStage(Spec):
     source: Path
     kind: Literal["general"] = Field(default="general", description="kind of stage")
     slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
+    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
     bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody, Field(discriminator="kind")]] = Field(
         description="bodies by name"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, model_validator
 
@@ -14,6 +14,26 @@ Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
 Frequency = Annotated[float, Quantity("Hz", above=0)]
 
 
+class NodalSpec(Spec):
+    """Nodal contact with a penalty stiffness: flank nodes against the deformed flank of the other gear."""
+
+    along: Annotated[Count, Field(ge=2, le=513)] | None = Field(
+        default=None,
+        description="nodes along a flank, equally far apart; those of the gear's own mesh, 2 flank + 1, when absent",
+    )
+    across: Annotated[Count, Field(ge=2, le=513)] | None = Field(
+        default=None,
+        description="nodes across the common face width; those of the gear's own mesh, 2 width + 1, when absent",
+    )
+    penalty: Annotated[float, Quantity("N/m^3", above=0, words=("hertz",))] = Field(
+        default=cast(Any, "hertz"),  # the assembly puts the stiffness in its place
+        description='stiffness per area of flank, or "hertz": with it the contact is as wide as Hertz\'s at torque_max',
+    )
+    nodes_of: Literal["both", "a", "b"] = Field(
+        default="both", description="gear whose nodes are in contact; of both each has half of the penalty"
+    )
+
+
 class ContactSpec(Spec):
     """Tooth contact."""
 
@@ -22,6 +42,7 @@ class ContactSpec(Spec):
         description="contact damping per metre of face width"
     )
     law: Literal["line"] = Field(default="line", description="contact law")
+    nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
 
 
 class ChainSpec(Spec):

@@ -21,6 +21,7 @@ SHIPPED = Path(__file__).parent.parent / "scenes"
 DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
+Contact = Literal["by_level", "line", "nodal"]
 Seconds = Annotated[float, Quantity("s", at_least=0)]
 
 
@@ -47,11 +48,13 @@ class Effects(Spec):
 
 
 class StageChoice(Spec):
-    """Which stage, and how it is computed. h = 0: the step that suits model and level."""
+    """Which stage, and how it is computed. h = 0: the step that suits model and level; contact:
+    docs/howto-nodal.md."""
 
     name: Annotated[Text, Field(description='a path or the name of a shipped stage, e.g. "fzg_c/stage_relief"')]
     level: Level = "standard"
     integrator: Integrator = "dg4"
+    contact: Contact = "by_level"
     slices: Annotated[Count, Field(ge=1, le=10)] = 5
     h: Seconds = 0.0
     effects: Effects = Effects()
@@ -104,6 +107,8 @@ class SceneSpec(Spec):
         values = self.model_dump()
         if not self.stage.effects.off:
             del values["stage"]["effects"]
+        if self.stage.contact == "by_level":
+            del values["stage"]["contact"]
         for load in (values["shaft_loads"] or {}).values():
             if load["speed_control"] is None:
                 del load["speed_control"]

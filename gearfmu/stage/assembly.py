@@ -25,6 +25,7 @@ from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, familie
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
+from gearfmu.stage.nodal import nodal_sections
 from gearfmu.stage.observed import observed_number, observed_sections
 from gearfmu.stage.tables import ROLLS
 from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
@@ -70,7 +71,7 @@ def general_sections(
     nodes = port_nodes(stage, carriers)
     groups = mount_sets(layout)
     degrees = width_degrees(stage, bodies)
-    sections = stage_sections(stage) | _port_sections(stage, groups[0], nodes)
+    sections = stage_sections(stage) | nodal_sections(stage) | _port_sections(stage, groups[0], nodes)
     sections |= {
         "counts": np.array(
             [MODEL_VERSION, stage.slices, len(stage.rotors), len(stage.gears), len(stage.engagements),

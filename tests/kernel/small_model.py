@@ -14,7 +14,7 @@ import numpy as np
 from exact_bars import Bar
 
 from gearfmu.stage.assembly import MODEL_VERSION, flank_sections, port_compliances, set_sections
-from gearfmu.stage.blob import write_blob
+from gearfmu.stage.blob import read_blob, write_blob
 from gearfmu.stage.fields import gear_numbers, order_sections
 from gearfmu.stage.free import FreeBody, free_gear
 from gearfmu.stage.groups import Group, Layout, Support, mount
@@ -77,6 +77,13 @@ def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: 
         for b, n in zip(bars, modes, strict=True)
     ]
     return flat_blob("bars", bodies, FlatContact(gap=gap, local=local))
+
+
+def with_nodes(blob: bytes, share: float = 0.5, nodes: tuple[int, int] = (9, 5), penalty: float = 2e9) -> bytes:
+    """The blob of a pair with flank nodes along and across, for nodal contact of a penalty (N/m³); share: of it that
+    gear A's nodes have."""
+    sections = dict(read_blob(blob)) | {"nodal": np.array([penalty, share])}
+    return write_blob(sections | {f"nodes{g}": np.array(nodes, np.int32) for g in (0, 1)})
 
 
 def _coast_shift() -> int:

@@ -17,7 +17,7 @@ import pytest
 from exact_bars import Bar
 from mutations import mutated
 from probes import compile_c, compilers, source_folder
-from small_model import bars_blob, pair_blob
+from small_model import bars_blob, pair_blob, with_nodes
 
 from gearfmu.kernel.build import FLAGS
 
@@ -33,6 +33,7 @@ def originals() -> tuple[bytes, ...]:
         pair_blob(("torque", "fixed")),
         pair_blob(("spring", "torque")),
         bars_blob((Bar(0.1), Bar(0.2)), (5, 10), 1e-6),
+        with_nodes(pair_blob(("torque", "spring")), penalty=1e14),
     )
 
 

@@ -349,6 +349,7 @@ static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, g
     double roll[2] = {s->roll[0] + s->sg * k * s->p_b, s->roll[1] + s->step * s->sg * k * s->p_b};
     p->key.flank = p->flank = s->flank;
     p->key.tooth = k;
+    p->action = s->l.t;
     p->number[0] = k, p->number[1] = s->shift + s->step * k;
     for (int i = 0; i < 2; i++) p->tooth[i] = modulo(p->number[i], q->gear[i]->z);
     const double closer = q->gear[0]->index || q->gear[1]->index ? misplace(q, s->sg, p, beta, roll) : 0.0;

@@ -128,7 +128,7 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
 }
 
 /* a gear group's state in the frame of a tooth: what tooth 0 of a state turned back would have */
-static void turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out)
+void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out)
 {
     const int half = m->n / LANES; /* halves of LANES in one half of the lanes */
     const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
@@ -141,7 +141,7 @@ static void turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *o
 }
 
 /* adds two forces in the frame of a tooth to the group's */
-static void turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2])
+void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2])
 {
     const int half = m->n / LANES;
     const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
@@ -193,7 +193,7 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
     for (int w = 0; w < 2; w++) {
         const int g = setup->mesh[e].side[w].gear, n = GK_LANES(setup, g);
         if (!n || !s->contacts) continue;
-        turn_back(&setup->modal[g], engaged->position[w].tooth, y[g], work->turned);
+        gk_rows_turn_back(&setup->modal[g], engaged->position[w].tooth, y[g], work->turned);
         const gk_real *row = engaged->basis[w];
         for (int i = 0; i < s->contacts; i++, row += n) read[i] -= gk_dot(row, work->turned, n);
     }
@@ -317,7 +317,7 @@ void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, 
     list_pushes(x, y, engaged->system.contacts, &p);
     if (!GK_LANES(setup, side->gear) || !p.count) return;
     contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
-    turn_forth(&setup->modal[side->gear], engaged->position[which].tooth, turned, sum);
+    gk_rows_turn_forth(&setup->modal[side->gear], engaged->position[which].tooth, turned, sum);
 }
 
 /* adds what the contacts read of displacements y of a gear group */
@@ -327,7 +327,7 @@ void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, 
     const int g = setup->mesh[e].side[which].gear, n = GK_LANES(setup, g);
     const gk_real *row = engaged->basis[which];
     if (!n || !engaged->system.contacts) return;
-    turn_back(&setup->modal[g], engaged->position[which].tooth, y, work->turned);
+    gk_rows_turn_back(&setup->modal[g], engaged->position[which].tooth, y, work->turned);
     for (int i = 0; i < engaged->system.contacts; i++, row += n) read[i] -= gk_dot(row, work->turned, n);
 }
 
@@ -393,7 +393,7 @@ void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
             contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
             const gk_real *turned[2] = {work->turned, work->turned_next};
             gk_real *sum[2] = {work->force[side->gear], work->next[side->gear]};
-            turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, turned, sum);
+            gk_rows_turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, turned, sum);
         }
     }
 }

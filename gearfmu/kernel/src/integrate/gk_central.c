@@ -137,6 +137,11 @@ static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, i
         s->slope[i] = i < s->contacts ? gk_law_slope(s, i, full * s->width[i]) : 0.0;
     }
     gk_limit_compliance(s, s->A, full, 0, s->J);
+    for (int i = 0; i < s->contacts && setup->nodal; i++) { /* the penalty in place of the law */
+        const double slope = setup->mesh[e].compliance * s->per_width[i];
+        s->J[i * s->n + i] += slope - s->slope[i];
+        s->slope[i] = slope;
+    }
     return gk_limit_cholesky(s->J, s->n);
 }
 

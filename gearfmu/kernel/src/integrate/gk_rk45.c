@@ -69,6 +69,7 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
     gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, &work->explicit_rows, work, e);
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;
+    if (setup->nodal) gk_nodal_leave(s);
     gk_step_recall(setup, work, data, e, s);
     for (int r = 0; r < s->n; r++)
         if (s->kind[r] == ROW_SPRING) s->clip[r] = 2;
@@ -141,6 +142,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work
     solve_contacts(model, setup, work, speed);
     spin_rates(model, setup, work, i);
     gk_rows_scatter(model, setup, work, gk_step_z, gk_step_z);
+    if (setup->nodal) gk_nodal_press(model, setup, work, data, speed, work->stage_spin[i] + MAX_SPINS);
     ground_rates(model, setup, work, i);
     for (int g = 0; g < model->gears; g++) {
         const gk_modal *m = &setup->modal[g];

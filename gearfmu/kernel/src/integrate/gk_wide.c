@@ -23,12 +23,16 @@
 #define gk_flank_move gk_flank_move_avx2
 #define gk_flank_clearance gk_flank_clearance_avx2
 #define gk_still_find gk_still_find_avx2
+#define gk_nodal_leave gk_nodal_leave_avx2
+#define gk_nodal_press gk_nodal_press_avx2
 #define gk_rows_pose gk_rows_pose_avx2
 #define gk_rows_form gk_rows_form_avx2
 #define gk_rows_read gk_rows_read_avx2
 #define gk_rows_form_ground gk_rows_form_ground_avx2
 #define gk_rows_without_rigid gk_rows_without_rigid_avx2
 #define gk_rows_scatter gk_rows_scatter_avx2
+#define gk_rows_turn_back gk_rows_turn_back_avx2
+#define gk_rows_turn_forth gk_rows_turn_forth_avx2
 #define gk_side_step gk_side_step_avx2
 #define gk_compliance_form gk_compliance_form_avx2
 #define gk_compliance_mirror gk_compliance_mirror_avx2
@@ -87,6 +91,7 @@
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"
 #include "problem/gk_couple.c"
+#include "force/gk_nodal.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"

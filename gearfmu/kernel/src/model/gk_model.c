@@ -229,6 +229,28 @@ static void read_index(reader *r, gk_gear *g)
     }
 }
 
+static void read_nodes(reader *r, gk_gear *g)
+{
+    const int32_t *nodes = take(r, F_GEAR_nodes);
+    for (int i = 0; nodes && i < 2; i++) {
+        demand(r, counted(nodes + i, 2, MAX_NODES), "nodes of a flank");
+        if (!r->outcome) g->nodes[i] = nodes[i];
+    }
+}
+
+/* penalty and nodes are there together */
+static void read_nodal(reader *r, gk_model *m)
+{
+    const double *v = take(r, F_MODEL_nodal);
+    for (int i = 0; v && i < m->engagements && !r->outcome; i++) {
+        gk_engagement *e = &m->engagement[i];
+        demand(r, between(v[2 * i], 1e6, 1e22) && between(v[2 * i + 1], 0, 1), "numbers of nodal contact");
+        for (int w = 0; w < 2; w++)
+            if (!m->gear[e->gear[w]].nodes[0]) refuse(r, "nodes of a flank", "are missing");
+        e->penalty = v[2 * i], e->nodes_of_a = v[2 * i + 1];
+    }
+}
+
 static void read_lead(reader *r, gk_gear *g)
 {
     g->lead = take(r, F_GEAR_lead);
@@ -312,6 +334,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     if (!r->outcome) read_index(r, g);
     if (!r->outcome) read_lead(r, g);
     if (!r->outcome) read_observed(r, m, g);
+    if (!r->outcome) read_nodes(r, g);
 }
 
 static void read_ground(reader *r, gk_model *m, int set)
@@ -407,6 +430,7 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     for (int i = 0; i < model->sets && !r.outcome; i++) read_ground(&r, model, i);
     for (int i = 0; i < model->gears && !r.outcome; i++) read_gear(&r, model, i);
     if (!r.outcome) read_engagements(&r, model);
+    if (!r.outcome) read_nodal(&r, model);
     if (!r.outcome) model->spatial = is_spatial(model);
     return r.outcome;
 }

@@ -20,7 +20,8 @@ enum {
     MAX_OWN = 1000, /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
     OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */
     SETS = 2,       /* of ground oscillators: as supported; with the supports held */
-    NAME_LENGTH = 32
+    NAME_LENGTH = 32,
+    MAX_NODES = 513 /* of a flank along or across */
 };
 
 /* what the outputs tell of a gear's own motion; name NULL: nothing */
@@ -40,6 +41,7 @@ typedef struct gk_gear {
     double edge, corner_radius, corner_angle; /* tip edge: arc radius, polar position of its centre */
     double z_mid, helix;                      /* axial place of mid-width; base helix angle, right-hand positive */
     int rotor, z, modes;
+    int nodes[2]; /* of a flank for nodal contact: along, across; 0: none */
     const double *omega, *zeta, *rows, *residual, *support_residual, *port_residual;
     const int32_t *diameter, *member;
     const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
@@ -64,7 +66,8 @@ typedef struct gk_engagement {
     double backlash, nominal_backlash, damping, force_max; /* backlash j_wt: of the pair; of the teeth as they are */
     double width;                                          /* common face width */
     double tilt[2];                                        /* of B's axis against A's, about x and y */
-    double overlap_max;                                    /* teeth that overlap by more mean nothing */
+    double penalty, nodes_of_a; /* nodal contact, N/m³; share of A's nodes in it; penalty 0: there is none */
+    double overlap_max;         /* teeth that overlap by more mean nothing */
 } gk_engagement;
 
 typedef enum gk_port_kind { PORT_SPRING, PORT_TORQUE, PORT_FIXED } gk_port_kind;

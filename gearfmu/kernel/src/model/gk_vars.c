@@ -94,6 +94,7 @@ static double start_of(const gk_model *model, const gk_row *row, int instance)
     if (row->scope == SCOPE_STAGE && row->place == V_SLICES) return model->slices;
     if (row->scope == SCOPE_MESH && row->place == V_BACKLASH) return model->engagement[instance].backlash;
     if (row->scope == SCOPE_MESH && row->place == V_DAMPING) return model->engagement[instance].damping;
+    if (row->scope == SCOPE_MESH && row->place == V_PENALTY) return model->engagement[instance].penalty;
     return row->start;
 }
 

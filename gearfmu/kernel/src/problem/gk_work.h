@@ -18,6 +18,7 @@ typedef struct gk_place { /* a tooth pair on one flank that may touch, at the pr
     gk_point point[MAX_SLICES];     /* of every strip; one for all where the model is planar */
     int tooth[2], number[2], flank; /* tooth of each gear: wrapped to 0 … z−1, and as counted */
     int candidate[2];               /* its place in the tables of both sides */
+    double action;                  /* angle t of the line of action */
     int memory;                     /* its entry in the memory of the engagement, −1 if new */
 } gk_place;
 
@@ -25,6 +26,14 @@ static inline const gk_point *gk_point_of(const gk_setup *setup, const gk_place 
 {
     return &place->point[setup->spatial ? strip : 0];
 }
+
+/* Displacement of the flank of one tooth along its outward normal, at its points and by width function, and the forces
+ * that press on it (gk_nodal.c); what no node has asked for is not known */
+typedef struct gk_field {
+    double at[POINTS * MAX_FUNCTIONS], rate[POINTS * MAX_FUNCTIONS], load[POINTS * MAX_FUNCTIONS];
+    unsigned char known[POINTS];
+    gk_real *q, *v, *f; /* lanes: gear group in the frame of the tooth; force on it */
+} gk_field;
 
 /* where a side stands in its table */
 typedef struct gk_position {
@@ -99,6 +108,7 @@ struct gk_work {
     double *columns; /* room for a node's rows and their products */
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     gk_bores sum_bores;
+    gk_field field[2];             /* nodal contact: teeth of A and B in hand */
     uint64_t cycles[PHASES], mark; /* phase profile, filled by a build with GK_PROFILE */
 };
 
@@ -107,6 +117,10 @@ void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *m
 void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
                   gk_position position[2], gk_place *place);
+/* gk_nodal.c */
+void gk_nodal_leave(gk_system *s);
+void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                    const gk_real *const speed[], double spin_rate[]);
 /* gk_still.c */
 int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *still,
                   const double *pose, gk_position position[2], gk_place *place);
@@ -120,9 +134,13 @@ typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     gk_strip_weights width;
 } gk_strip_load;
 void gk_side_push(const gk_model *model, const gk_strip_load *load, int first, double *sum);
+void gk_side_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
+                         double *sum);
 /* gk_moves.c */
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 /* gk_rows.c */
+void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
+void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);
 void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
                   double *pose);
 void gk_rows_form(const gk_setup *setup, gk_work *work, int e);

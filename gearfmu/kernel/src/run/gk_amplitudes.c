@@ -1,12 +1,56 @@
 /* Motion of the gears that the model observes, in their own axes, as outputs: rigid motion and amplitudes of all stored
  * modes of the free body, so that its displacement is their sum over the mode shapes. Patterns of nodal diameter 0 and 1
  * are those of the ground oscillators, turned into the gear's axes; modes of the gear group are its own. What is not
- * dynamic follows the forces at once: of the gear group −N λ/ω², of the ground oscillators those that several engagements
- * hear of, whose rows a step has. Left out: the other ground oscillators above the cut (of a gear with one engagement),
- * and the residual beyond all stored modes. */
+ * dynamic follows the forces at once, −N λ/ω². Left out: the residual beyond all stored modes. */
 #include "run/gk_run.h"
 
-/* displacements of all ground oscillators: dynamic ones free of the step's correction; others by the far rows, W/Ω */
+/* forces on the strips of a tooth of one gear of an engagement: contacts press, so outward they pull */
+static double strip_load(const gk_setup *setup, const gk_engaged *engaged, int p, int which, gk_strip_load *load)
+{
+    const gk_system *s = &engaged->system;
+    const gk_place *place = &engaged->place[p];
+    double most = 0.0;
+    load->flank = place->flank, load->tooth = place->tooth[which];
+    for (int strip = 0; strip < s->strips; strip++) {
+        load->force[strip] = -gk_reported(s, p * s->strips + strip);
+        load->roll[strip] = gk_point_of(setup, place, strip)->roll[which];
+        most = gk_max(most, fabs(load->force[strip]));
+    }
+    return most;
+}
+
+/* adds the forces of the contacts of one engagement: on modes of the gear above the cut, and on the ground oscillators
+ * that it reads and that are not dynamic */
+static void push_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
+                          double *modes, double *ground)
+{
+    const gk_engaged *engaged = &work->engaged[e];
+    const int g = model->engagement[e].gear[which];
+    gk_strip_load load = {.gear = g, .strips = engaged->system.strips};
+    gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
+    for (int p = 0; p < engaged->places; p++)
+        if (strip_load(setup, engaged, p, which, &load) > 0.0) {
+            gk_side_push(model, &load, setup->modal[g].count, modes);
+            gk_side_push_ground(model, setup, e, which, &load, ground);
+        }
+}
+
+/* what moments on ports do to ground oscillators that are not dynamic */
+static void push_ports(const gk_model *model, const gk_setup *setup, const gk_work *work, double *ground)
+{
+    const gk_ground *all = &model->ground[setup->base.set];
+    for (int e = 0; e < model->engagements; e++) {
+        const gk_system *s = &work->engaged[e].system;
+        for (int i = s->contacts; i < s->n; i++) {
+            const double moment = gk_rows_at_bore(setup, s, i) ? gk_reported(s, i) : 0.0;
+            for (int k = 0; k < all->n && moment != 0.0; k++)
+                if (setup->base.slot[k] < 0) ground[k] += moment * all->port_rows[s->port_of[i] * all->n + k];
+        }
+    }
+}
+
+/* displacements of the ground oscillators by forces on those that are not dynamic; dynamic ones free of the step's
+ * correction */
 static void ground_motion(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                           double *moved)
 {
@@ -14,17 +58,9 @@ static void ground_motion(const gk_model *model, const gk_setup *setup, const gk
     const gk_ground *ground = &model->ground[base->set];
     const double *x = gk_ground_seen(data), *f = x + 2 * base->n;
     const double *kappa = gk_flow_known(work, data->state_h, data->state_gamma)->ground.kappa;
-    double far[MAX_FAR] = {0};
-    for (int e = 0; e < model->engagements && setup->far && setup->on.residual; e++) {
-        const gk_system *s = &work->engaged[e].system;
-        for (int i = 0; i < s->n; i++) {
-            const double *row = work->engaged[e].far + (size_t)i * (size_t)setup->far, force = gk_reported(s, i);
-            for (int c = 0; c < setup->far_supports; c++) far[c] += force * row[c];
-        }
-    }
     for (int k = 0; k < ground->n; k++) {
-        const int slot = base->slot[k], column = setup->far ? setup->far_slot[k] : -1;
-        moved[k] = slot >= 0 ? x[slot] - kappa[slot] * f[slot] : column >= 0 ? far[column] / ground->omega[k] : 0.0;
+        const int slot = base->slot[k];
+        moved[k] = slot >= 0 ? x[slot] - kappa[slot] * f[slot] : moved[k] / (ground->omega[k] * ground->omega[k]);
     }
 }
 
@@ -62,52 +98,34 @@ static void dynamic_modes(const gk_setup *setup, const gk_coefficients *k, const
     }
 }
 
-/* adds the modal forces of the contacts of one engagement on modes above the cut */
-static void push_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
-                          double *force)
+/* modal forces of all contacts on one gear: what is not dynamic follows them at once */
+static void push_static(const gk_model *model, const gk_setup *setup, const gk_work *work, int g, double *modes,
+                        double *ground)
 {
-    const gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    const int g = model->engagement[e].gear[which];
-    gk_strip_load load = {.gear = g, .strips = s->strips};
-    gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
-    for (int p = 0; p < engaged->places; p++) {
-        const gk_place *place = &engaged->place[p];
-        double most = 0.0;
-        load.flank = place->flank, load.tooth = place->tooth[which];
-        for (int strip = 0; strip < s->strips; strip++) {
-            load.force[strip] = -gk_reported(s, p * s->strips + strip); /* contacts press */
-            load.roll[strip] = gk_point_of(setup, place, strip)->roll[which];
-            most = gk_max(most, fabs(load.force[strip]));
-        }
-        if (most > 0.0) gk_side_push(model, &load, setup->modal[g].count, force);
-    }
-}
-
-static void static_modes(const gk_model *model, const gk_setup *setup, const gk_work *work, int g, double *out)
-{
-    const gk_gear *gear = &model->gear[g];
-    const int first = setup->modal[g].count;
+    if (!setup->on.residual) return;
+    push_ports(model, setup, work, ground);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++)
             if (model->engagement[e].gear[w] == g && model->engagement[e].kind != MESH_FLAT)
-                push_contacts(model, setup, work, e, w, out);
-    for (int k = first; k < gear->modes; k++) out[k] *= gear->observed.scale / (gear->omega[k] * gear->omega[k]);
+                push_contacts(model, setup, work, e, w, modes, ground);
 }
 
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     if (!model->amplitudes) return;
     const gk_coefficients *k = gk_flow_known(work, data->state_h, data->state_gamma);
-    double moved[MAX_GROUND];
-    ground_motion(model, setup, work, data, moved);
     for (int g = 0; g < model->gears; g++) {
-        const gk_observed *o = &model->gear[g].observed;
+        const gk_gear *gear = &model->gear[g];
+        const gk_observed *o = &gear->observed;
+        double moved[MAX_GROUND] = {0};
         if (!o->name) continue;
         double *own = data->oscillator + data->amplitudes + o->from, *modes = own + o->own;
+        memset(modes, 0, (size_t)gear->modes * sizeof *modes);
+        push_static(model, setup, work, g, modes, moved);
+        for (int i = setup->modal[g].count; i < gear->modes; i++)
+            modes[i] *= o->scale / (gear->omega[i] * gear->omega[i]);
+        ground_motion(model, setup, work, data, moved);
         own_motion(model, setup, data, g, moved, own);
-        memset(modes, 0, (size_t)model->gear[g].modes * sizeof *modes);
         dynamic_modes(setup, k, data, g, o->scale, modes);
-        if (setup->on.residual) static_modes(model, setup, work, g, modes);
     }
 }

@@ -112,6 +112,19 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->support = doubles(b, points * (size_t)model->supports);
 }
 
+static void lay_out_nodes(bump *b, const gk_model *model, const gk_gear *gear, gk_nodes *nodes)
+{
+    const size_t along = (size_t)gear->nodes[0], across = (size_t)gear->nodes[1];
+    double **array[] = {&nodes->roll, &nodes->x, &nodes->y, &nodes->length};
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, along);
+    nodes->grid = take(b, along * sizeof *nodes->grid);
+    nodes->z = doubles(b, across);
+    nodes->width = doubles(b, across);
+    for (int w = 0; w < 2; w++) nodes->functions[w] = doubles(b, across * (size_t)model->functions);
+    nodes->lead = doubles(b, 2 * across);
+    nodes->strip = take(b, across * sizeof *nodes->strip);
+}
+
 /* everything after the setup itself; returns the bytes used */
 static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, const int *modes, int ground)
 {
@@ -124,7 +137,15 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
     }
     lay_out_base(&b, model, &setup->base, ground);
     for (int e = 0; e < model->engagements; e++)
-        for (int w = 0; w < 2; w++) lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
+        for (int w = 0; w < 2; w++) {
+            lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
+            lay_out_nodes(&b, model, &model->gear[model->engagement[e].gear[w]], &setup->mesh[e].nodes[w]);
+        }
+    for (int g = 0; g < model->gears; g++) {
+        const size_t cells = model->gear[g].nodes[0] ? 2 * (size_t)(POINTS * model->functions) : 0;
+        setup->point_rows[g].modes = reals(&b, cells * (size_t)setup->modal[g].n);
+        setup->point_rows[g].ground = reals(&b, 3 * cells * (size_t)setup->base.n);
+    }
     setup->amplitudes = 3 * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
     setup->state_size = sizeof(gk_data) + (setup->amplitudes + (size_t)model->amplitudes) * sizeof(double);
     return b.used;
@@ -204,6 +225,10 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
     work->columns = doubles(&b, gk_side_scratch(model));
     work->sum_ground = doubles(&b, ground);
+    for (int w = 0; w < 2; w++) {
+        gk_real **of_field[] = {&work->field[w].q, &work->field[w].v, &work->field[w].f};
+        for (int i = 0; i < 3; i++) *of_field[i] = reals(&b, widest);
+    }
     return b.used;
 }
 
@@ -565,6 +590,7 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
     gk_strips_fill(model, setup, mesh);
     gk_law_bounds(model, mesh);
     if (engagement->kind != MESH_FLAT) gk_flank_clearance(model, setup, mesh);
+    if (setup->nodal) gk_nodal_fill(model, setup, data, mesh);
 }
 
 /* coefficients of problems in which no time passes: C′ is the quasi-static part alone */
@@ -589,8 +615,47 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
 }
 
 /* ---- level and integrator ---------------------------------------------------------------------------------------------- */
-/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, rk45 (dg4
- * where a clutch hangs on a port) */
+static int has_nodes(const gk_model *model, const gk_data *data)
+{
+    int all = model->engagements > 0;
+    for (int e = 0; e < model->engagements; e++) {
+        all &= data->mesh[e][V_PENALTY] > 0.0;
+        for (int w = 0; w < 2; w++) all &= model->gear[model->engagement[e].gear[w]].nodes[0] > 0;
+    }
+    return all;
+}
+
+/* contact by nodes, where it is asked for or the way of the level; needs an explicit integrator */
+static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+{
+    const gk_contact_law law = (gk_contact_law)(int)data->stage[V_CONTACT_LAW];
+    const int is_explicit = gk_scheme_of(setup->integrator)->is_explicit, there = has_nodes(model, data);
+    setup->nodal = law == CONTACT_NODAL ||
+                   (law == CONTACT_BY_LEVEL && setup->level == LEVEL_PAPER && is_explicit && there);
+    if (!setup->nodal) return GK_OK;
+    if (!there) {
+        snprintf(
+            message, GK_MESSAGE,
+            "contact nodal: this model has no flank nodes, or contact_penalty is 0; make the model again with this "
+            "version of gearfmu, or give contact_penalty");
+        return GK_BAD_VALUE;
+    }
+    if (!is_explicit) {
+        snprintf(message, GK_MESSAGE,
+                 "contact nodal is a force that follows from positions: use integrator rk45 or central (levels paper, "
+                 "explicit) and a stage without a clutch in its ports, or contact line");
+        return GK_BAD_VALUE;
+    }
+    setup->on.residual = 0;
+    snprintf(message, GK_MESSAGE,
+             "contact nodal leaves the static compliance of all higher modes out: teeth are too stiff, and nodes make "
+             "noise; use "
+             "it for comparison only");
+    return GK_OK;
+}
+
+/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal contact,
+ * rk45 (dg4 and lines of contact where a clutch hangs on a port) */
 static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
 {
     double damping = 0.0;
@@ -610,9 +675,11 @@ static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *s
                  "the chain");
         return GK_BAD_VALUE;
     }
+    if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
+    const gk_outcome outcome = choose_contact(model, data, setup, message);
+    if (outcome || setup->nodal) return outcome;
     if (setup->level == LEVEL_PAPER) {
         setup->on.residual = 0;
-        if (setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
         snprintf(message, GK_MESSAGE,
                  "level paper leaves the static compliance of all higher modes out: tooth stiffness is 15 to 40 %% too "
                  "high; use it for comparison only");
@@ -657,6 +724,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     fill_base(model, setup, which);
     fill_ports(model, setup);
     for (int e = 0; e < model->engagements; e++) fill_mesh(model, setup, data, e);
+    for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);
     fill_explicit(model, setup, work);

@@ -4,6 +4,7 @@
 #define GK_SETUP_H
 #include "base/gk_math.h"
 #include "model/gk_data.h"
+#include "setup/gk_nodal.h"
 
 enum {
     NODES = 88,          /* of a side's table in one pitch */
@@ -129,7 +130,10 @@ typedef struct gk_mesh { /* an engagement */
     double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
-        log_high; /* bounds of b² in the local law, and their ln */
+        log_high;                               /* bounds of b² in the local law, and their ln */
+    gk_nodes nodes[2];                          /* nodal contact: of gear A and of gear B */
+    double penalty[2], compliance, retardation; /* N/m³ of the nodes of A and of B; m²/N of a line; s, damper force over
+                                                   elastic force and rate */
 } gk_mesh;
 
 typedef struct gk_joint {
@@ -176,6 +180,7 @@ struct gk_setup {
     gk_integrator integrator;
     gk_effects on;
     int slices;
+    int nodal; /* contact by nodes and penalty, else by lines */
     int spatial; /* axial motion and tilt count, every strip has a gap of its own; else the strips of a tooth pair share it */
     int engagements_of[MAX_GEARS];
     int strips; /* contact rows of a tooth pair: slices, or half of them where both halves of the face width do the same */
@@ -193,8 +198,9 @@ struct gk_setup {
     gk_base base;
     gk_mesh mesh[MAX_ENGAGEMENTS];
     int islands;
-    gk_step_function *step; /* of the integrator, in the widest vectors of this processor */
-    size_t amplitudes;      /* their place in the data, in doubles from the first oscillator on */
+    gk_point_rows point_rows[MAX_GEARS]; /* nodal contact */
+    gk_step_function *step;              /* of the integrator, in the widest vectors of this processor */
+    size_t amplitudes;                   /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
 
@@ -233,7 +239,12 @@ gk_effects gk_effects_of(const gk_data *data);
 /* gk_flow.c */
 const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
 const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
+/* gk_nodal_setup.c */
+void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g);
+void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh);
 /* gk_strips.c */
+int gk_strips_mirrored(const gk_model *model);
+double gk_strips_lead(const gk_gear *gear, int flank, double x);
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,

@@ -71,9 +71,9 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
 
 /* ---- one node ---------------------------------------------------------------------------------------------------- */
 typedef struct place { /* a candidate's strip at a node */
-    int flank, offset, index;
-    double weight[4], middle, nominal,
-        roll;                       /* length of roll on the line of action at mid-width, here; where contact is */
+    int flank, offset;
+    gk_grid grid;                   /* of where contact is */
+    double middle, nominal, roll;   /* length of roll on the line of action at mid-width, here; where contact is */
     double z, width[MAX_FUNCTIONS]; /* middle of the part that carries; its weights on the width functions */
 } place;
 
@@ -110,34 +110,15 @@ size_t gk_side_scratch(const gk_model *model)
     return of_node > of_step ? of_node : of_step;
 }
 
-static void grid(const gk_model *model, const gk_gear *gear, place *p)
-{ /* cubic convolution (Keys 1981, a = −½): exact for parabolas; quadratic extrapolation gives the points at the ends */
-    const double low = gk_min(gear->s_form, gear->s_tip), high = gk_max(gear->s_form, gear->s_tip);
-    const double share = (gk_clamp(p->roll, low, high) - gear->s_form) / (gear->s_tip - gear->s_form);
-    const double u = share * (model->rolls - 1);
-    const int cell = (int)u < model->rolls - 2 ? (int)u : model->rolls - 2;
-    const double x = u - cell, x2 = x * x, x3 = x2 * x;
-    const double k[4] = {-0.5 * x + x2 - 0.5 * x3, 1.0 - 2.5 * x2 + 1.5 * x3, 0.5 * x + 2.0 * x2 - 1.5 * x3,
-                         -0.5 * x2 + 0.5 * x3};
-    double *w = p->weight;
-    p->index = (int)gk_clamp(cell - 1, 0, model->rolls - 4);
-    for (int i = 0; i < 4; i++) w[i] = k[i];
-    if (cell == 0) { /* f(−1) = 3 f0 − 3 f1 + f2 */
-        w[0] = k[1] + 3.0 * k[0], w[1] = k[2] - 3.0 * k[0], w[2] = k[3] + k[0], w[3] = 0.0;
-    } else if (cell == model->rolls - 2) {
-        w[3] = k[2] + 3.0 * k[3], w[2] = k[1] - 3.0 * k[3], w[1] = k[0] + k[3], w[0] = 0.0;
-    }
-}
-
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
 static void blend(const node *n, const double *table, const place *p, int width, double *out)
 {
     const int A = n->model->functions;
-    const double *t = table + (size_t)((p->flank * n->model->rolls + p->index) * A) * width;
+    const double *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
     for (int k = 0; k < width; k++) out[k] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < A; a++, t += width) {
-            const double w = p->weight[i] * p->width[a];
+            const double w = p->grid.weight[i] * p->width[a];
             for (int k = 0; k < width; k++) out[k] += w * t[k];
         }
 }
@@ -164,7 +145,7 @@ static void add_rows(const gk_model *model, const gk_gear *gear, const place *p,
                      double weight[4][MAX_FUNCTIONS], double *sum)
 {
     const size_t modes = (size_t)gear->modes;
-    const double *row = gear->rows + (size_t)((p->flank * model->rolls + p->index) * model->functions) * modes;
+    const double *row = gear->rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * modes;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < model->functions; a++, row += modes) {
             for (int k = first; k < gear->modes; k++) sum[k] += weight[i][a] * row[k];
@@ -195,16 +176,15 @@ void gk_side_push(const gk_model *model, const gk_strip_load *load, int first, d
 {
     const gk_gear *gear = &model->gear[load->gear];
     double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
-    place p = {.flank = load->flank, .index = -1}, next = p;
+    place p = {.flank = load->flank, .grid.index = -1}, next = p;
     memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
     for (int strip = 0; strip < load->strips; strip++) {
-        next.roll = load->roll[strip];
-        grid(model, gear, &next);
-        if (p.index >= 0 && next.index != p.index) add_rows(model, gear, &p, first, weight, row);
+        next.grid = gk_grid_at(model, gear, load->roll[strip]);
+        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(model, gear, &p, first, weight, row);
         p = next;
         for (int i = 0; i < 4; i++)
             for (int a = 0; a < model->functions; a++)
-                weight[i][a] += load->force[strip] * p.weight[i] * load->width[strip][a];
+                weight[i][a] += load->force[strip] * p.grid.weight[i] * load->width[strip][a];
     }
     add_rows(model, gear, &p, first, weight, row);
     add_turned(gear, load->tooth, first, row, sum);
@@ -263,6 +243,32 @@ static void ground_point(const node *n, const place *p, double *row, double *rig
     }
 }
 
+/* adds the forces on ground oscillators that are not dynamic, by outward forces on the strips of a tooth of one gear */
+void gk_side_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
+                         double *sum)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    const node n = {.model = model,
+                    .setup = setup,
+                    .e = &model->engagement[e],
+                    .gear = &model->gear[load->gear],
+                    .side = &mesh->side[which]};
+    const int reads = n.gear->ground[setup->base.set].reads;
+    const int32_t *list = n.gear->ground[setup->base.set].list;
+    double row[MAX_GROUND], rigid[MAX_GROUND], support[MAX_SUPPORTS];
+    for (int strip = 0; strip < load->strips; strip++) {
+        const double roll = load->roll[strip], z = mesh->strip_middle[strip], sg = load->flank ? -1.0 : 1.0;
+        place p = {
+            .flank = load->flank, .grid = gk_grid_at(model, n.gear, roll), .nominal = roll, .roll = roll, .z = z};
+        p.middle = roll - sg * z * tan_of(n.gear->helix);
+        memcpy(p.width, load->width[strip], sizeof p.width);
+        if (load->force[strip] == 0.0) continue;
+        ground_point(&n, &p, row, rigid, support);
+        for (int k = 0; k < reads; k++)
+            if (setup->base.slot[list[k]] < 0) sum[list[k]] += load->force[strip] * row[k];
+    }
+}
+
 /* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
  * action (docs/theory.md, eq. 6, with the gap closed) */
 static double corner_roll(const node *n, const place *p)
@@ -316,7 +322,7 @@ static void gather_node(node *n, double position)
         find_part(n, mesh, p, strip);
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * tan_of(n->gear->helix);
         p->roll = corner_roll(n, p);
-        grid(n->model, n->gear, p);
+        p->grid = gk_grid_at(n->model, n->gear, p->roll);
         blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
         if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
         blend(n, n->gear->port_residual, p, n->model->ports, ports);
@@ -357,7 +363,8 @@ static void tabulate(const node *n, const place *p, const place *q, double *cell
     for (int c = 0; c < A * A; c++) cell[c] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++) {
-            const double w = p->weight[i] * q->weight[j], *t = table + ((p->index + i) * R + q->index + j) * A * A;
+            const double w = p->grid.weight[i] * q->grid.weight[j],
+                         *t = table + ((p->grid.index + i) * R + q->grid.index + j) * A * A;
             for (int c = 0; c < A * A; c++) cell[c] += w * t[c];
         }
 }

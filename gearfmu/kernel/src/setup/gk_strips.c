@@ -4,14 +4,14 @@
 
 /* Only even width functions: slice s and its mirror image read, carry and deform the same, so both together are one row
  * of twice the length. */
-static int mirrored(const gk_model *model)
+int gk_strips_mirrored(const gk_model *model)
 {
     for (int a = 0; a < model->functions; a++)
         if (model->degree[a] % 2) return 0;
     return !model->spatial;
 }
 
-int gk_strips_count(const gk_model *model, int slices) { return mirrored(model) ? (slices + 1) / 2 : slices; }
+int gk_strips_count(const gk_model *model, int slices) { return gk_strips_mirrored(model) ? (slices + 1) / 2 : slices; }
 
 static double tan_of(double angle)
 {
@@ -90,19 +90,23 @@ static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_g
     return outwards * gear->strip * gk_max(1.0, gear->strip / gk_max(span, least));
 }
 
-/* mean of a gear's lead over −1 … 1 of its half-width, from … to */
+/* a gear's lead at x, −1 … 1 of its half-width */
+double gk_strips_lead(const gk_gear *gear, int flank, double x)
+{
+    if (!gear->lead) return 0.0;
+    const double u = gk_clamp(0.5 * (x + 1.0), 0.0, 1.0) * (LEADS - 1);
+    const int at = (int)u < LEADS - 1 ? (int)u : LEADS - 2;
+    const double *depth = gear->lead + flank * LEADS + at;
+    return depth[0] + (u - at) * (depth[1] - depth[0]);
+}
+
+/* its mean, from … to */
 static double lead_over(const gk_gear *gear, int flank, double from, double to)
 {
     enum { SAMPLES = 16 };
     double sum = 0.0;
-    if (!gear->lead) return 0.0;
-    for (int i = 0; i < SAMPLES; i++) {
-        const double x = from + (to - from) * (i + 0.5) / SAMPLES,
-                     u = gk_clamp(0.5 * (x + 1.0), 0.0, 1.0) * (LEADS - 1);
-        const int at = (int)u < LEADS - 1 ? (int)u : LEADS - 2;
-        const double *depth = gear->lead + flank * LEADS + at;
-        sum += depth[0] + (u - at) * (depth[1] - depth[0]);
-    }
+    for (int i = 0; i < SAMPLES && gear->lead; i++)
+        sum += gk_strips_lead(gear, flank, from + (to - from) * (i + 0.5) / SAMPLES);
     return sum / SAMPLES;
 }
 
@@ -112,7 +116,8 @@ void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
     mesh->strip_term = 0.0;
     gk_sincos(model->gear[e->gear[0]].helix, &mesh->sine, &mesh->cosine);
     for (int s = 0; s < setup->strips; s++)
-        mesh->strip_width[s] = e->width / setup->slices * (mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
+        mesh->strip_width[s] = e->width / setup->slices *
+                               (gk_strips_mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
     for (int s = 0; s < setup->strips; s++) mesh->strip_middle[s] = e->width * ((s + 0.5) / setup->slices - 0.5);
     memset(mesh->lead, 0, sizeof mesh->lead);
     for (int w = 0; w < 2; w++) {

@@ -1,0 +1,446 @@
+/* Nodal contact with a penalty stiffness (docs/theory.md, 2.7): nodes of a flank against the deformed involute of the other
+ * gear, the way of Schurr et al. (ICSV22, 2015), on every engagement.
+ *
+ * A node of gear c at P finds its foot on the involute of gear o in closed form, D = P − C_o, ℓ = √(D² − r_b²):
+ *     t′ = arg D − sg arctan(ℓ/r_b),   s′ = r_b sg (β_o − t′),   g = ±(ℓ − s′) + δ_c + δ_o(s′) − e_c − e_o(s′)     (8h)
+ * (− where o is a ring) with the outward elastic displacements e of node and foot, and its force on both is
+ *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8i)
+ * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a few
+ * points along its flank, by width function, from where interpolation gives those of all its nodes, and forces are gathered there
+ * before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are looked for from the
+ * line of contact outwards until they are open. */
+#include "problem/gk_work.h"
+
+static const double NODE_NEAR = 5e-6; /* m: gap up to which the next node outwards is looked at too */
+
+typedef struct tooth_in_hand { /* one tooth of a place */
+    const gk_gear *gear;
+    gk_field *field;
+    int g, which, index;      /* index: wrapped number of the tooth */
+    double hollow, tan_helix; /* hollow: −1 for a ring */
+    double base, toward;      /* base angle at mid-width; direction t of the line of action seen from its axis */
+    double along[2];          /* cos and sin of that direction */
+    double cosine, sine;      /* of the angle of the tooth */
+} tooth_in_hand;
+
+typedef struct nodal_pair { /* a place in hand */
+    const gk_model *model;
+    const gk_setup *setup;
+    const gk_engagement *e;
+    const gk_mesh *mesh;
+    const gk_place *place;
+    const double *ground; /* displacements of the ground group, then speeds */
+    const double *pose;   /* where it is taken */
+    double moved[POSE];   /* from there on, gaps are linear: roll_motion off */
+    double rate[POSE];    /* speeds of the pose */
+    int flank;
+    double sg, apart[2]; /* apart: from A's axis to B's */
+    tooth_in_hand tooth[2];
+    double push[POSE], energy; /* forces on the pose */
+    double strip[MAX_SLICES];
+} nodal_pair;
+
+typedef struct nodal_layer { /* nodes of tooth `own` across the width that share a transverse section */
+    int own, first, last;    /* from `first` to before `last` */
+    double z, lead;          /* of the section; what leads open there */
+    double cosine, sine;     /* of the base angle of the tooth there */
+} nodal_layer;
+
+typedef struct node_foot { /* of a node on the other flank, without elastic displacement */
+    double gap, gradient[POSE], roll, roll_gradient[POSE];
+} node_foot;
+
+/* ---- displacement of a tooth -------------------------------------------------------------------------------------- */
+static void begin_tooth(const nodal_pair *p, const gk_work *work, const gk_real *const speed[], tooth_in_hand *t)
+{
+    const gk_modal *m = &p->setup->modal[t->g];
+    memset(t->field->known, 0, sizeof t->field->known);
+    if (!GK_LANES(p->setup, t->g)) return;
+    gk_rows_turn_back(m, t->index, work->y[t->g], t->field->q);
+    gk_rows_turn_back(m, t->index, speed[t->g], t->field->v);
+}
+
+static size_t cell_of(const nodal_pair *p, int part, int cell)
+{
+    return (size_t)((2 * part + p->flank) * POINTS * p->model->functions + cell);
+}
+
+static const gk_real *modal_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
+{
+    return p->setup->point_rows[t->g].modes + cell_of(p, 0, cell) * (size_t)p->setup->modal[t->g].n;
+}
+
+typedef struct ground_parts { /* rows c0, c_c, c_s of a cell and their factors at the angle of the tooth (eq. 2c) */
+    const gk_four *c0, *cc, *cs;
+    double cosine, sine;
+} ground_parts;
+
+static ground_parts ground_row(const nodal_pair *p, const tooth_in_hand *t, int cell)
+{
+    const gk_real *rows = p->setup->point_rows[t->g].ground;
+    const size_t width = (size_t)p->setup->base.width[t->g];
+    return (ground_parts){(const gk_four *)(rows + cell_of(p, 0, cell) * width),
+                          (const gk_four *)(rows + cell_of(p, 1, cell) * width),
+                          (const gk_four *)(rows + cell_of(p, 2, cell) * width), t->cosine, t->sine};
+}
+
+#define GROUND_QUAD(row, q)                                                                                            \
+    (GK_WIDENED((row)->c0[q]) + (row)->cosine * GK_WIDENED((row)->cc[q]) + (row)->sine * GK_WIDENED((row)->cs[q]))
+
+/* adds the sums of a row with two vectors */
+static void read_ground_row(const ground_parts *row, const double *x, const double *y, int quads, double sum[2])
+{
+    gk_quad a = {0}, b = {0};
+    for (int q = 0; q < quads; q++) {
+        const gk_quad r = GROUND_QUAD(row, q);
+        a += r * ((const gk_quad *)x)[q], b += r * ((const gk_quad *)y)[q];
+    }
+    sum[0] += (a[0] + a[2]) + (a[1] + a[3]), sum[1] += (b[0] + b[2]) + (b[1] + b[3]);
+}
+
+/* displacement and its rate at a point, by width function */
+static void read_point(const nodal_pair *p, const tooth_in_hand *t, int point)
+{
+    gk_field *f = t->field;
+    const gk_base *base = &p->setup->base;
+    const int A = p->model->functions, n = GK_LANES(p->setup, t->g), quads = base->width[t->g] / 4;
+    const double *x = p->ground + base->from[t->g], *v = x + base->n;
+    for (int cell = point * A; cell < (point + 1) * A; cell++) {
+        double sum[2] = {0.0, 0.0};
+        if (n) sum[0] = gk_dot(modal_row(p, t, cell), f->q, n), sum[1] = gk_dot(modal_row(p, t, cell), f->v, n);
+        const ground_parts ground = ground_row(p, t, cell);
+        read_ground_row(&ground, x, v, quads, sum);
+        f->at[cell] = sum[0], f->rate[cell] = sum[1], f->load[cell] = 0.0;
+    }
+    f->known[point] = 1;
+}
+
+static void know(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *at)
+{
+    for (int i = 0; i < 4; i++)
+        if (!t->field->known[at->index + i]) read_point(p, t, at->index + i);
+}
+
+static void press_modes(const nodal_pair *p, gk_work *work, const tooth_in_hand *t)
+{
+    const int n = GK_LANES(p->setup, t->g), A = p->model->functions;
+    const gk_field *field = t->field;
+    gk_half *f = (gk_half *)field->f;
+    memset(field->f, 0, (size_t)n * sizeof *field->f);
+    for (int cell = 0; cell < POINTS * A && n; cell++) {
+        if (!field->known[cell / A] || field->load[cell] == 0.0) continue;
+        const gk_half *row = (const gk_half *)modal_row(p, t, cell);
+        const gk_real load = (gk_real)field->load[cell];
+        for (int k = 0; k < 2 * n / LANES; k++) f[k] -= load * row[k];
+    }
+    const gk_real *turned[2] = {field->f, work->zero};
+    gk_real *sum[2] = {work->force[t->g], work->next[t->g]};
+    if (n) gk_rows_turn_forth(&p->setup->modal[t->g], t->index, turned, sum);
+}
+
+/* what presses on a tooth presses on the oscillators: inward, against the rows */
+static void end_tooth(const nodal_pair *p, gk_work *work, const tooth_in_hand *t)
+{
+    const int A = p->model->functions, quads = p->setup->base.width[t->g] / 4;
+    const gk_field *f = t->field;
+    gk_quad *force = (gk_quad *)(work->ground_force + p->setup->base.from[t->g]);
+    press_modes(p, work, t);
+    for (int cell = 0; cell < POINTS * A; cell++) {
+        if (!f->known[cell / A] || f->load[cell] == 0.0) continue;
+        const ground_parts row = ground_row(p, t, cell);
+        const double load = f->load[cell];
+        for (int q = 0; q < quads; q++) force[q] -= load * GROUND_QUAD(&row, q);
+    }
+}
+
+/* ---- gap of a node ---------------------------------------------------------------------------------------------------- */
+/* depth that a flank has lost to its relief, and past its tip to the tip edge: an arc tangent to the flank, followed as a
+ * parabola of the length of arc */
+static double depth_at(const nodal_pair *p, const gk_gear *gear, double s, double *slope)
+{
+    const double outward = gear->s_tip > gear->s_form ? 1.0 : -1.0;
+    const double over = GK_ON(p->setup, tip_relief) ? gk_max(0.0, outward * (s - gear->relief_start)) : 0.0;
+    const double past = gk_max(0.0, outward * (s * s - gear->s_tip * gear->s_tip) / (2.0 * gear->r_b));
+    *slope = outward * (2.0 * gear->relief * over + past * s / (gear->r_b * gear->edge));
+    return gear->relief * over * over + past * past / (2.0 * gear->edge);
+}
+
+/* to the normal section: the gap along the common normal, and what axial motion and tilts do to it (gk_flank.c, lean) */
+static void lean_node(const nodal_pair *p, double z, const double normal[2], double at[2][2], node_foot *foot)
+{
+    const gk_mesh *mesh = p->mesh;
+    const double nx = mesh->cosine * normal[0], ny = mesh->cosine * normal[1], nz = -p->sg * mesh->sine;
+    foot->gap *= mesh->cosine;
+    for (int d = 0; d < POSE; d++) foot->gradient[d] *= mesh->cosine;
+    for (int w = 0; w < 2 && p->setup->spatial; w++) {
+        const double sense = w ? 1.0 : -1.0, *pose = p->pose + SPACE * w, up = z - pose[ZA];
+        double *gradient = foot->gradient + SPACE * w;
+        gradient[ZA] = sense * nz;
+        gradient[RXA] = sense * (at[w][1] * nz - up * ny);
+        gradient[RYA] = sense * (up * nx - at[w][0] * nz);
+        for (int c = PLANE; c < SPACE; c++)
+            foot->gap += gradient[c] * (pose[c] + (w && c > ZA ? p->e->tilt[c - RXA] : 0.0));
+    }
+}
+
+/* derivatives of c·s′, s′ = sg r_b (β_o − t′), D = (dx, dy), node at r from the axis of its own gear */
+static void roll_gradient(const nodal_pair *p, int own, const double r[2], const double D[2], double length,
+                          double *out)
+{
+    const gk_gear *gear = p->tooth[1 - own].gear;
+    const double k = p->sg * gear->r_b, square = D[0] * D[0] + D[1] * D[1];
+    const double radial = -p->sg * gear->r_b / (length * square);
+    const double tx = -k * (-D[1] / square + radial * D[0]), ty = -k * (D[0] / square + radial * D[1]);
+    memset(out, 0, POSE * sizeof *out);
+    double *of_own = out + SPACE * own, *of_other = out + SPACE * (1 - own);
+    of_own[XA] = tx, of_own[YA] = ty, of_own[PHIA] = ty * r[0] - tx * r[1];
+    of_other[XA] = -tx, of_other[YA] = -ty, of_other[PHIA] = k;
+}
+
+/* (8h) without elastic displacements, for a node of a layer; 0 where it has no foot */
+static int foot_of(const nodal_pair *p, const nodal_layer *layer, int along, node_foot *foot)
+{
+    const int own = layer->own;
+    const gk_nodes *nodes = &p->mesh->nodes[own];
+    const tooth_in_hand *c = &p->tooth[own], *o = &p->tooth[1 - own];
+    const double r_b = o->gear->r_b, sense = own ? 1.0 : -1.0, x = nodes->x[along], y = p->sg * nodes->y[along];
+    const double r[2] = {layer->cosine * x - layer->sine * y, layer->sine * x + layer->cosine * y};
+    const double D[2] = {sense * p->apart[0] + r[0], sense * p->apart[1] + r[1]}, square = D[0] * D[0] + D[1] * D[1];
+    double slope, unused;
+    if (!(square - r_b * r_b > 1e-10) || !(square < 1e4)) return 0;
+    const double length = sqrt(square - r_b * r_b);
+    const double ct = (D[0] * r_b + p->sg * D[1] * length) / square, st = (D[1] * r_b - p->sg * D[0] * length) / square;
+    const double turn = gk_atan2(st * o->along[0] - ct * o->along[1], ct * o->along[0] + st * o->along[1]);
+    foot->roll = r_b * p->sg * (o->base + layer->z * o->tan_helix / r_b - o->toward - turn);
+    if (!(fabs(foot->roll) < 1e3)) return 0;
+    const double nx = -o->hollow * p->sg * st, ny = o->hollow * p->sg * ct; /* out of the material of o */
+    foot->gap = o->hollow * (length - foot->roll) + depth_at(p, c->gear, nodes->roll[along], &unused) +
+                depth_at(p, o->gear, foot->roll, &slope) + layer->lead + (p->flank ? p->mesh->allowance : 0.0);
+    roll_gradient(p, own, r, D, length, foot->roll_gradient);
+    memset(foot->gradient, 0, sizeof foot->gradient);
+    double *of_own = foot->gradient + SPACE * own, *of_other = foot->gradient + SPACE * (1 - own);
+    of_own[XA] = nx, of_own[YA] = ny, of_own[PHIA] = ny * r[0] - nx * r[1];
+    of_other[XA] = -nx, of_other[YA] = -ny, of_other[PHIA] = -o->hollow * p->sg * r_b;
+    for (int d = 0; d < POSE; d++) foot->gradient[d] += slope * foot->roll_gradient[d];
+    const double normal[2] = {own ? nx : -nx, own ? ny : -ny}; /* of the force on B */
+    double at[2][2];
+    memcpy(at[own], r, sizeof r), memcpy(at[1 - own], D, sizeof D);
+    lean_node(p, layer->z, normal, at, foot);
+    return 1;
+}
+
+/* a flat engagement has one gap for all nodes */
+static int foot_at(const nodal_pair *p, const nodal_layer *layer, int along, node_foot *foot)
+{
+    if (p->e->kind != MESH_FLAT) return foot_of(p, layer, along, foot);
+    memset(foot, 0, sizeof *foot);
+    foot->gap = p->place->point[0].gap;
+    foot->gradient[PHIA] = -1.0, foot->gradient[PHIB] = 1.0;
+    foot->roll = p->mesh->nodes[layer->own].roll[along];
+    return 1;
+}
+
+/* ---- forces ------------------------------------------------------------------------------------------------------------ */
+typedef struct flank_reading { /* of a tooth at one length of roll, by width function */
+    double at[MAX_FUNCTIONS], slope[MAX_FUNCTIONS], rate[MAX_FUNCTIONS];
+} flank_reading;
+
+static flank_reading reading_at(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *grid)
+{
+    const int A = p->model->functions;
+    flank_reading r = {{0}, {0}, {0}};
+    know(p, t, grid);
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < A; a++) {
+            const int cell = (grid->index + i) * A + a;
+            r.at[a] += grid->weight[i] * t->field->at[cell];
+            r.slope[a] += grid->slope[i] * t->field->at[cell];
+            r.rate[a] += grid->weight[i] * t->field->rate[cell];
+        }
+    return r;
+}
+
+static double by_functions(const double *functions, const double *values, int n)
+{
+    double sum = 0.0;
+    for (int a = 0; a < n; a++) sum += functions[a] * values[a];
+    return sum;
+}
+
+static double by_pose(const double gradient[POSE], const double moved[POSE])
+{
+    double sum = 0.0;
+    for (int d = 0; d < POSE; d++) sum += gradient[d] * moved[d];
+    return sum;
+}
+
+static void gather_load(const nodal_pair *p, const tooth_in_hand *t, const gk_grid *grid, const double *load)
+{
+    const int A = p->model->functions;
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < A; a++) t->field->load[(grid->index + i) * A + a] += grid->weight[i] * load[a];
+}
+
+/* (8i) of one node that is `depth` deep and gets deeper at `rate`; the damper never pulls and never more than doubles the
+ * force (8a) */
+static double force_of(nodal_pair *p, double stiffness, double depth, double rate)
+{
+    const double elastic = stiffness * depth, damper = stiffness * p->mesh->retardation * rate;
+    p->energy += 0.5 * elastic * depth;
+    return GK_ON(p->setup, contact_damping) ? elastic + gk_clamp(damper, -elastic, elastic) : elastic;
+}
+
+/* Nodes of a layer in row `along`. Returns the smallest gap. */
+static double press_row(nodal_pair *p, const nodal_layer *layer, int along)
+{
+    const int own = layer->own, other = 1 - own, A = p->model->functions;
+    const gk_nodes *nodes = &p->mesh->nodes[own];
+    const tooth_in_hand *c = &p->tooth[own], *o = &p->tooth[other];
+    const int linear = !GK_ON(p->setup, roll_motion) || p->e->kind == MESH_FLAT; /* the foot stays where it is */
+    double smallest = INFINITY, own_load[MAX_FUNCTIONS] = {0}, other_load[MAX_FUNCTIONS] = {0}, sum = 0.0, slide = 0.0;
+    node_foot foot;
+    if (!foot_at(p, layer, along, &foot)) return INFINITY;
+    foot.gap += by_pose(foot.gradient, p->moved);
+    const gk_grid at = gk_grid_points(o->gear, foot.roll);
+    const flank_reading here = reading_at(p, c, &nodes->grid[along]), there = reading_at(p, o, &at);
+    const double stiffness = p->mesh->penalty[own] * nodes->length[along] / p->mesh->cosine;
+    for (int j = layer->first; j < layer->last; j++) {
+        const double *of_own = nodes->functions[own] + j * A, *of_other = nodes->functions[other] + j * A;
+        const double gap = foot.gap - by_functions(of_own, here.at, A) - by_functions(of_other, there.at, A);
+        smallest = gk_min(smallest, gap);
+        if (!(gap < 0.0)) continue;
+        const double slope = linear ? 0.0 : by_functions(of_other, there.slope, A);
+        const double rate = slope * by_pose(foot.roll_gradient, p->rate) - by_pose(foot.gradient, p->rate) +
+                            by_functions(of_own, here.rate, A) + by_functions(of_other, there.rate, A);
+        const double force = force_of(p, stiffness * nodes->width[j], -gap, rate);
+        sum += force, slide += force * slope;
+        p->strip[nodes->strip[j]] += force;
+        for (int a = 0; a < A; a++) own_load[a] += force * of_own[a], other_load[a] += force * of_other[a];
+    }
+    if (sum == 0.0) return smallest;
+    for (int d = 0; d < POSE; d++) p->push[d] += sum * foot.gradient[d] - slide * foot.roll_gradient[d];
+    gather_load(p, c, &nodes->grid[along], own_load);
+    gather_load(p, o, &at, other_load);
+    return smallest;
+}
+
+/* the node of a tooth that is nearest to the line of contact in the section at z */
+static int nearest_node(const nodal_pair *p, const nodal_layer *layer)
+{
+    const tooth_in_hand *t = &p->tooth[layer->own];
+    const gk_gear *gear = t->gear;
+    const double from = gear->s_form * gear->s_form, to = gear->s_tip * gear->s_tip;
+    const double s = gear->r_b * p->sg * (t->base - t->toward) + p->sg * layer->z * t->tan_helix;
+    const int last = p->mesh->nodes[layer->own].along - 1;
+    if (p->e->kind == MESH_FLAT) return 0;
+    const double share = (gk_max(s, 0.0) * s - from) / (to - from);
+    return share > 0.0 ? (int)(gk_min(share, 1.0) * last + 0.5) : 0;
+}
+
+/* nodes of a layer, from the line of contact outwards */
+static void press_layer(nodal_pair *p, int own, int first, int last)
+{
+    const gk_nodes *nodes = &p->mesh->nodes[own];
+    const tooth_in_hand *t = &p->tooth[own];
+    nodal_layer layer = {.own = own, .first = first, .last = last, .z = p->setup->spatial ? nodes->z[first] : 0.0};
+    layer.lead = nodes->lead[p->flank * t->gear->nodes[1] + first];
+    gk_sincos(t->base + layer.z * t->tan_helix / t->gear->r_b, &layer.sine, &layer.cosine);
+    const int middle = nearest_node(p, &layer);
+    for (int i = middle; i < nodes->along; i++)
+        if (press_row(p, &layer, i) > NODE_NEAR && i > middle) break;
+    for (int i = middle - 1; i >= 0; i--)
+        if (press_row(p, &layer, i) > NODE_NEAR) break;
+}
+
+/* those of a planar model have one section all over the width, those of others one each */
+static void press_nodes(nodal_pair *p, int own)
+{
+    const int across = p->mesh->nodes[own].across, each = p->setup->spatial ? 1 : across;
+    for (int j = 0; j < across && p->mesh->penalty[own] > 0.0; j += each) press_layer(p, own, j, j + each);
+}
+
+/* ---- engagements ---------------------------------------------------------------------------------------------------------- */
+static void take_tooth(nodal_pair *p, gk_work *work, int which)
+{
+    tooth_in_hand *t = &p->tooth[which];
+    const gk_place *place = p->place;
+    const int internal = p->e->kind == MESH_INTERNAL;
+    t->g = p->e->gear[which], t->which = which, t->gear = &p->model->gear[t->g], t->field = &work->field[which];
+    t->index = place->tooth[which];
+    t->hollow = internal && which ? -1.0 : 1.0;
+    t->tan_helix = p->mesh->helix[which];
+    t->toward = place->action + (which && !internal ? GK_PI : 0.0);
+    const double angle = p->pose[SPACE * which + PHIA] + t->gear->phase +
+                         2.0 * GK_PI / t->gear->z * place->number[which];
+    gk_sincos(t->toward, &t->along[1], &t->along[0]);
+    t->base = angle + p->sg * t->gear->psi_b;
+    if (t->gear->index) t->base += t->gear->index[p->flank * t->gear->z + t->index];
+    gk_sincos(angle, &t->sine, &t->cosine);
+}
+
+/* forces on the poses of an engagement to spins and ground oscillators */
+static void press_pose(const gk_setup *setup, gk_work *work, const gk_mesh *mesh, const double *push, double *spin_rate)
+{
+    const gk_base *base = &setup->base;
+    const int rotor[2] = {mesh->spin[0], mesh->spin[1]};
+    for (int w = 0; w < 2; w++) {
+        const int g = mesh->side[w].gear;
+        const double torque = push[SPACE * w + PHIA];
+        spin_rate[rotor[w]] += torque * setup->inverse_inertia[rotor[w]];
+        if (mesh->frame >= 0) spin_rate[mesh->frame] -= torque * setup->inverse_inertia[mesh->frame];
+        for (int m = 0; m < base->motions[g]; m++) {
+            const int c = base->motion[g][m];
+            gk_axpy(push[SPACE * w + c], base->moved[g][c], work->ground_force + base->from[g], 0, base->width[g] / 4);
+        }
+    }
+}
+
+/* rows of the place's strips say what its nodes carry */
+static void report(const gk_setup *setup, const nodal_pair *p, int place, gk_system *s)
+{
+    for (int i = 0; i < setup->strips; i++) {
+        const int row = place * setup->strips + i;
+        s->force[row] = s->z[row] = p->strip[i];
+        s->Al[row] = s->linear[row] = s->beyond[row] = s->end[row] = 0.0;
+        s->potential[row] = i ? 0.0 : p->energy;
+        if (!i && p->strip[0] == 0.0 && p->energy > 0.0) s->force[row] = 1e-300; /* energy is counted where force is */
+    }
+}
+
+static void press_engagement(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e,
+                             const gk_real *const speed[], double *spin_rate)
+{
+    gk_engaged *engaged = &work->engaged[e];
+    const int still = !GK_ON(setup, roll_motion);
+    nodal_pair p = {.model = model, .setup = setup, .e = &model->engagement[e], .mesh = &setup->mesh[e]};
+    p.ground = work->ground_trial;
+    p.pose = still ? data->meshing[e].still : engaged->pose;
+    for (int d = 0; d < POSE && still; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
+    gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p.rate);
+    for (int c = 0; c < 2; c++)
+        p.apart[c] = p.e->position[1][c] + p.pose[XB + c] - (p.e->position[0][c] + p.pose[XA + c]);
+    for (int i = 0; i < engaged->places; i++) {
+        p.place = &engaged->place[i];
+        p.flank = p.place->flank, p.sg = p.flank ? -1.0 : 1.0, p.energy = 0.0;
+        memset(p.strip, 0, sizeof p.strip);
+        memset(p.push, 0, sizeof p.push);
+        for (int w = 0; w < 2; w++) take_tooth(&p, work, w), begin_tooth(&p, work, speed, &p.tooth[w]);
+        for (int w = 0; w < 2; w++) press_nodes(&p, w);
+        for (int w = 0; w < 2; w++) end_tooth(&p, work, &p.tooth[w]);
+        press_pose(setup, work, p.mesh, p.push, spin_rate);
+        report(setup, &p, i, &engaged->system);
+    }
+}
+
+/* takes the strips' own forces out of the problem of an engagement, which joints are left in: they only report */
+void gk_nodal_leave(gk_system *s)
+{
+    for (int i = 0; i < s->contacts; i++) s->g[i] = 1.0, s->force0[i] = s->dash0[i] = s->end0[i] = 0.0;
+}
+
+/* adds the forces of nodal contact at the trial state to modal forces, ground forces and rates of the spins' speeds */
+void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                    const gk_real *const speed[], double spin_rate[])
+{
+    for (int e = 0; e < model->engagements; e++) press_engagement(model, setup, work, data, e, speed, spin_rate);
+}

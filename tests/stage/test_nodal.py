@@ -1,0 +1,142 @@
+"""Nodal contact on gears: exact answer for rigid flanks and its convergence, energy through changes of contact, the
+same mean loaded transmission as the line contact of the same modes, helical gears, and the planetary set of the
+paper."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gearfmu.body import ReducedBody, load_bodies, load_stage_bodies
+from gearfmu.geometry import PairGeometry
+from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
+from gearfmu.spec.expand import expand_pair
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stage.nodal import flank_nodes, mesh_penalty
+
+PAPER, LINE, NODAL = 4, 1, 2
+SPEED, TORQUE = 209.44, 302.0  # rad/s, N·m of the pinion
+PENALTY = 2e14  # N/m³
+
+
+def with_nodes(spec: StageSpec, **nodal: object) -> StageSpec:
+    """The stage with other numbers of [contact.nodal]."""
+    contact = spec.contact
+    return spec.model_copy(
+        update={"contact": contact.model_copy(update={"nodal": contact.nodal.model_copy(update=nodal)})}
+    )
+
+
+def test_default_penalty_gives_hertz_half_width(relief_spec: StageSpec, pair: PairGeometry) -> None:
+    """An elastic foundation p = k (δ − x²/2R) carries 2/3 k b³/R on ±b; with Hertz's b² = 4 f R/(π E*) that is f."""
+    stage = expand_pair(relief_spec)
+    penalty = mesh_penalty(stage, stage.engagements[0])
+    load = relief_spec.torque_max / pair.gears[0].r_b / relief_spec.gears[0].face_width
+    pitch = pair.path["C"]
+    radius, modulus = pitch * (pair.length - pitch) / pair.length, 206e9 / (2 * (1 - 0.3**2))
+    half = math.sqrt(4 * load * radius / (math.pi * modulus))
+    assert 2 / 3 * penalty * half**3 / radius == pytest.approx(load, rel=1e-12)
+    assert [flank_nodes(stage, gear) for gear in stage.gears] == [(41, 13), (41, 13)]
+
+
+def rigid_error(spec: StageSpec, bodies: list[ReducedBody], along: int, nodes_of: str = "both") -> float:
+    """Largest error of the force (share of the largest) while rigid teeth meet and part, one pair in contact."""
+    pair = PairGeometry.of(spec)
+    a = pair.gears[0]
+    roll = a.r_b * (a.psi_b + pair.alpha_wt + math.pi / a.z)  # half a pitch after the flanks of tooth 0 met
+    radius = roll * (pair.length - roll) / pair.length
+    free = free_pair(with_nodes(spec, along=along, across=5, penalty=PENALTY, nodes_of=nodes_of), bodies)
+    off = {"effect.elastic": 0.0, "effect.bearings": 0.0, "effect.roll_motion": 1.0}
+    kernel = started(free, Rattle(position=0.5, speed=0.05, offset=28e-6), {"level": PAPER, **off})
+    found = []
+    for i in range(300):
+        kernel.step(i * 2e-6, 2e-6)
+        found.append([kernel.get("mesh.force"), kernel.get("mesh.te") - 2e-6, kernel.get("mesh.pairs")])
+    force, depth, pairs = np.array(found).T
+    depth = np.maximum(depth, 0.0)
+    exact = spec.gears[0].face_width * 4 * math.sqrt(2) / 3 * PENALTY * math.sqrt(radius) * depth**1.5
+    assert pairs.max() == 1 and force.max() > 500
+    return float(np.abs(force - exact).max() / force.max())
+
+
+def test_rigid_flanks_are_an_elastic_foundation(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """f = 4/3 b k √(2R) δ^(3/2): the error falls with the distance of the nodes, of one gear or of both."""
+    errors = {along: rigid_error(spec, bodies, along) for along in (41, 161, 513)}
+    one_sided = rigid_error(spec, bodies, 513, "a")
+    print(f"errors by nodes along {errors}, of A's nodes alone {one_sided:.4f}")
+    assert errors[513] < 0.01 < errors[41] and errors[513] < errors[161] and one_sided < 0.015
+
+
+@pytest.mark.parametrize("elastic", [0.0, 1.0])
+def test_energy_through_impacts_on_both_flanks(spec: StageSpec, bodies: list[ReducedBody], elastic: float) -> None:
+    """Undamped free rattle, places of contact moving: what is left is the error of the integrator, which central
+    differences have at second order (tests/kernel/test_nodal_blocks.py)."""
+    free = free_pair(with_nodes(spec, along=81), bodies)
+    settings = {"level": PAPER, "effect.elastic": elastic, "effect.roll_motion": 1.0}
+    kernel = started(free, Rattle(position=0.5, speed=0.2), settings)
+    run = energies(kernel, 4e-6, 1.2e-3)
+    print(f"drift {run.drift:.1e} over {run.changes} changes of contact")
+    assert run.changes >= 3 and run.drift < 5e-4
+
+
+def mean_te(model: StageModel, torque: float, **parameters: float) -> tuple[float, float]:
+    """Mean transmission error (m) and mesh force (N) over a mesh period after one to settle."""
+    teeth = model.spec.gears[0].teeth
+    period = 2 * math.pi / (SPEED * teeth)
+    settings = {"level": PAPER, "integrator": 3} | parameters
+    trace = simulate(model, Steady(model, SPEED, torque), 2 * period, period / 200, settings)
+    assert trace.meta["outcome"] == "completed"
+    return float(trace["mesh.te"][-200:].mean()), float(trace["mesh.force"][-200:].mean())
+
+
+def test_mean_transmission_is_that_of_line_contact(relief_spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Same truncated modes, one mesh period: 81 nodes against five slices with the local law of Hertz. Measured: 0.2 %
+    of the mean transmission error, 0.1 % of the mean force."""
+    model = assemble(with_nodes(relief_spec, along=81), bodies)
+    line, nodal = mean_te(model, TORQUE, contact=LINE), mean_te(model, TORQUE)
+    print(f"te {1e6 * line[0]:.3f}, {1e6 * nodal[0]:.3f} µm; force {line[1]:.1f}, {nodal[1]:.1f} N")
+    assert nodal == pytest.approx(line, rel=5e-3) and nodal != line
+
+
+def test_helical_gears_and_their_axial_force() -> None:
+    """Mean transmission as with line contact; the bearings carry the axial force of a normal to the flank."""
+    spec = load_stage("helical_demo")
+    model = assemble(spec, load_stage_bodies(spec))
+    runs = []
+    for law in (LINE, NODAL):
+        trace = simulate(model, Steady(model, SPEED, 150.0), 6e-4, 2e-6, {"level": PAPER, "contact": law})
+        runs.append([trace[name][100:].mean() for name in ("mesh.te", "mesh.force", "bearing.pinion.fz")])
+    print(f"te, force, axial force: {runs}")
+    assert runs[1] == pytest.approx(runs[0], rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def planetary() -> SimpleNamespace:
+    spec = load_stage("planetary54")
+    return SimpleNamespace(model=assemble(spec, load_bodies(spec)))
+
+
+def test_the_papers_planetary_set(planetary: SimpleNamespace) -> None:
+    """Level paper: 400 modes a gear, carrier of 120, nodal contact in all eight meshes, rk45; 600 N·m on the carrier at
+    85 rad/s. Forces stay around those of the static balance, opposite planets carry the same."""
+    kernel = planetary.model.kernel(level=PAPER)
+    for name, value in (("carrier.tau", 600.0), ("sun.tau", -150.0)):
+        kernel.set(name, value)
+    kernel.set("carrier.w_start", 85.0)
+    kernel.set("sun.w_start", 340.0)
+    kernel.initialize(0.0)
+    assert "nodal" in kernel.warning and kernel.get("solver.n_dyn") > 2500
+    meshes = [f"{central}_planet{k}" for central in ("sun", "ring") for k in (1, 2, 3, 4)]
+    found = []
+    for i in range(6):
+        kernel.step(i * 1e-5, 1e-5)
+        found.append([kernel.get(f"{mesh}.force") for mesh in meshes])
+    force = np.array(found)
+    print(np.round(force[-1]))
+    assert np.all(force[:, :4] < -1000) and np.all(force[:, 4:] > 1000)
+    for mesh in (0, 1, 4, 5):
+        assert np.allclose(force[:, mesh], force[:, mesh + 2], rtol=0.02)
