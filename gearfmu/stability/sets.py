@@ -25,10 +25,11 @@ MESHES = {central: tuple(f"{central}_planet{k + 1}" for k in range(PLANETS)) for
 WATCHED = Watched(tuple(mesh for own in MESHES.values() for mesh in own), SHAFTS)
 SOFTNESS = {"sun": 11.4e-9, "ring": 17.4e-9}  # m/N: transmission error beyond the touch, at rest under 1774 N a mesh
 MARGIN = 1.5  # of that: inertia of planets between mesh and pin, softer flanks near their tips
-# of level fast at 2.5 to 5 µs, where shares of the sun's meshes scatter by 0.013 about these; limits: twice the scatter
+# of level fast at 2.5 to 5 µs, where shares of the sun's meshes scatter by 0.013 about these; limits: twice the scatter,
+# for the sun's more: at levels standard and full and the default step of 6.7 µs it is 0.27
 EXPECTED = {
     "carrier_speed": Expected(98.07, 0.1),
-    "sun_open_share": Expected(0.302, 0.026),
+    "sun_open_share": Expected(0.302, 0.045),
     "ring_open_share": Expected(0.168, 0.008),
     "sun_drive_share": Expected(0.016, 0.007),
     "ring_drive_share": Expected(0.5345, 0.005),
