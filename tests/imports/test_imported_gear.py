@@ -171,7 +171,7 @@ def test_the_hash_covers_the_contents_of_the_file(tmp_path: Path) -> None:
 
 
 def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path) -> None:
-    """Transmission error and a few mesh periods in time: as with the native body."""
+    """Transmission error, a few mesh periods in time, and nodal contact: as with the native body."""
     hex20_deck(tmp_path / "pinion.inp")
     spec, own = stage(tmp_path, SECTION), stage(tmp_path / "native")
     bodies = reduce_stage(spec)
@@ -182,3 +182,6 @@ def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path) -> None:
     runs = [simulate(model, Steady(model, 100.0, 302.0), 0.012, 1e-4, {"level": 1}) for model in models]
     assert np.abs(runs[0]["mesh.te"] - runs[1]["mesh.te"]).max() < 1e-6 * np.abs(runs[1]["mesh.te"]).max()
     assert runs[0]["mesh.force"].mean() == pytest.approx(302.0 / 0.033829, rel=0.05)
+    nodal = [simulate(model, Steady(model, 100.0, 302.0), 2e-4, 1e-5, {"level": 4, "contact": 2}) for model in models]
+    assert np.abs(nodal[0]["mesh.te"] - nodal[1]["mesh.te"]).max() < 1e-5 * np.abs(nodal[1]["mesh.te"]).max()
+    assert nodal[0]["mesh.pairs"].min() >= 1

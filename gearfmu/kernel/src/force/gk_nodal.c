@@ -6,9 +6,9 @@
  * (− where o is a ring) with the outward elastic displacements e of node and foot, and its force on both is
  *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8i)
  * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a few
- * points along its flank, by width function, from where interpolation gives those of all its nodes, and forces are gathered there
- * before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are looked for from the
- * line of contact outwards until they are open. */
+ * points along its flank, by width function. Interpolation gives those of all its nodes from there, and forces are
+ * gathered there before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are looked
+ * for from the line of contact outwards until they are open. */
 #include "problem/gk_work.h"
 
 static const double NODE_NEAR = 5e-6; /* m: gap up to which the next node outwards is looked at too */
