@@ -14,8 +14,8 @@ from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
-from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.frames import FramePlan, frame_plan
+from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.parts import part_network, part_ports
 from gearfmu.cosim.py_unit import PyUnit

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from gearfmu.report import metrics
 from gearfmu.report.plots import Plot, columns, finish
 from gearfmu.report.plots_nvh import SHOWN_TO, level_axis, segment
-from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window
+from gearfmu.report.signals import GEAR_SPEED, Window
 from gearfmu.report.style import COLOURS, MUTED, WIDTH, panels, styled, svg
 from gearfmu.spec.turning import Meshing
 from gearfmu.stage.trace import Trace
