@@ -28,7 +28,7 @@ with styled(), rc_context({"svg.hashsalt": "cost"}):
     for name, panel in zip(("te", "force"), axes, strict=True):
         draw(panel, rows, SLICES, name)
         for level, dashes in LEVELS.items():
-            line = sorted((row for row in of_set if row.level == level), key=lambda row: row.h_s)
+            line = sorted((row for row in of_set if row.level == level and row.te_error < 1), key=lambda row: row.h_s)
             error = [100 * getattr(row, f"{name}_error") for row in line]
             time = [row.realtime_factor for row in line]
             panel.loglog(

@@ -71,7 +71,6 @@ def test_the_list_in_the_repository_says_what_the_page_says() -> None:
     fast = next(row for row in ladder(rows, 4) if row.level == "fast" and row.h_s == pytest.approx(5e-6))
     dropped = {row.speed: row for row in rows if row.off == "coriolis"}
     assert fast.realtime_factor > 1 and dropped[300.0].force_error > 2 * dropped[85.0].force_error > 0
-    assert {row.planets for row in rows} >= {3, 4, 5} and {row.slices for row in rows} >= {1, 5, 10}
 
 
 @pytest.mark.full
