@@ -14,6 +14,7 @@ from gearfmu.spec.shapes import mesh_shape, toothed
 
 SHARE_OF_A = {"both": 0.5, "a": 1.0, "b": 0.0}
 MOST = 513  # nodes that the kernel takes along or across
+STIFFEST = 1e22  # N/m³ that it takes
 
 
 def nodal_sections(stage: GeneralStage) -> dict[str, Any]:
@@ -47,4 +48,4 @@ def mesh_penalty(stage: GeneralStage, mesh: EngagementSpec) -> float:
     second = first + shape.length if isinstance(shape, RingMesh) else shape.length - first
     radius = first * second / shape.length / math.cos(shape.gears[0].beta_b)
     load = mesh.torque_max / shape.gears[0].r_b / min(gear.face_width for gear in gears)
-    return 3 * math.pi * e_star / (8 * half_width(load, radius, e_star))
+    return min(3 * math.pi * e_star / (8 * half_width(load, radius, e_star)), STIFFEST)

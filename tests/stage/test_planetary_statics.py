@@ -95,7 +95,7 @@ def test_mean_mesh_force_holds_the_torque(ideal: SetTeResult) -> None:
     """T_s/(N r_b); 1e-3: the slope of the tip relief in the arm of the torque; 2e-3 where a tip edge carries, off the
     line of action."""
     assert np.allclose(ideal.force, MEAN, rtol=2e-3)
-    assert np.allclose(ideal.force.mean(axis=1), MEAN, rtol=3e-4)
+    assert np.allclose(ideal.force.mean(axis=1), MEAN, rtol=6e-4)
 
 
 def test_planets_opposite_each_other_carry_alike(ideal: SetTeResult) -> None:
