@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import time as clock
-from dataclasses import replace
 
 import numpy as np
 
+from gearfmu.kernel import Kernel
+from gearfmu.stability.astray import run_astray
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import at_most
 from gearfmu.stability.motion import Constant
-from gearfmu.stability.record import Record, Run, Stopped, run, run_times
+from gearfmu.stability.record import Record, Stopped, run_times
 from gearfmu.stability.set_bench import (
     ALL_MESHES,
     NOMINAL,
@@ -30,7 +30,7 @@ TURNING = Carried(Constant(SPEED), steady(NOMINAL))
 MESH_PERIOD = 2 * math.pi / (SPEED * 54)  # s
 PER_PERIOD = 64  # communication steps in a mesh period
 INTERNAL_STEPS = 20_000
-ROLLBACKS, ROLLBACK_STEP, LONGEST_WANDER = 400, 2e-5, 3
+ROLLBACKS = 400
 SHORTEST, LONGEST, EQUAL = 1e-6, 3e-4, 2e-5  # s, communication steps
 
 
@@ -96,25 +96,12 @@ def _apart(made: Record, equal: Record, name: str) -> float:
 def set_rollbacks(case: Case) -> Finding:
     """600 N·m at 85 rad/s; at every step the state is saved, the run goes astray for 1 to 3 steps under other torques
     through the backlash and returns: 400 times, and the end is bit for bit that of the straight run."""
-    start = {"sun.w_start": RATIO * SPEED}
-    straight = set_kernel(PLAIN_SET, case, start)
-    calm = run(straight, TURNING, ROLLBACKS * ROLLBACK_STEP, ROLLBACK_STEP, PLAIN_SET.watched)
-    random, astray = np.random.default_rng(2), set_kernel(PLAIN_SET, case, start)
-    going, started = Run(astray, ROLLBACKS, PLAIN_SET.watched), clock.process_time()
-    going.set(TURNING(0.0))
-    astray.initialize(0.0)
-    going.take(0.0)
-    for i in range(ROLLBACKS):
-        now = i * ROLLBACK_STEP
-        saved = astray.save()
-        for k in range(int(random.integers(1, LONGEST_WANDER + 1))):
-            going.set({"carrier.w": SPEED + random.normal(0.0, 5.0), "sun.tau": random.normal(0.0, 300.0)})
-            astray.step(now + k * ROLLBACK_STEP, ROLLBACK_STEP)
-        astray.restore(saved)
-        going.set(TURNING(now))
-        astray.step(now, ROLLBACK_STEP)
-        going.take(now + ROLLBACK_STEP)
-    made = replace(going.record(calm.outcome, clock.process_time() - started), throughput=calm.throughput)
-    same = astray.save() == straight.save() and all(np.array_equal(made[name], calm[name]) for name in made.values)
-    said = [] if same else [f"the run with {ROLLBACKS} rollbacks does not end in the state of the straight run"]
+
+    def wander(random: np.random.Generator) -> dict[str, float]:
+        return {"carrier.w": SPEED + random.normal(0.0, 5.0), "sun.tau": random.normal(0.0, 300.0)}
+
+    def fresh() -> Kernel:
+        return set_kernel(PLAIN_SET, case, {"sun.w_start": RATIO * SPEED})
+
+    made, said = run_astray(fresh, TURNING, wander, ROLLBACKS, PLAIN_SET.watched)
     return set_finding(PLAIN_SET, made, said, {"rollbacks": float(ROLLBACKS)})

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import mmap
-import time as clock
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from gearfmu.stability.astray import run_astray
 from gearfmu.stability.bench import Variant, geometry, kernel, model
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import at_most, finding, mean_torque, near
 from gearfmu.stability.loads import DRAG, DRIVEN, LOOSE, NOMINAL, RELIEVED, SWING, swinging
 from gearfmu.stability.motion import RPM, Constant, loaded
-from gearfmu.stability.record import Run, run, run_times
+from gearfmu.stability.record import run, run_times
 
 SPEED = 2000 * RPM
 MESH_PERIOD = 60.0 / 2000 / 16  # s
 INTERNAL_STEPS = 10_000_000
-ROLLBACKS, ROLLBACK_STEP, LONGEST_WANDER = 10_000, 2e-5, 3
+ROLLBACKS = 10_000
 SHORTEST, LONGEST, EQUAL = 1e-6, 1e-3, 2e-5  # s, communication steps
 
 
@@ -49,27 +48,11 @@ def rollbacks(case: Case) -> Finding:
     10⁴ times, and the end is bit for bit that of the straight run."""
     variant = Variant(ports=(DRIVEN, LOOSE))
     inputs, start = swinging(1500 * RPM, 53.0, SWING, DRAG)
-    straight = kernel(model(variant), case, start)
-    calm = run(straight, inputs, ROLLBACKS * ROLLBACK_STEP, ROLLBACK_STEP)
-    random, astray = np.random.default_rng(2), kernel(model(variant), case, start)
-    going, started = Run(astray, ROLLBACKS), clock.process_time()
-    going.set(inputs(0.0))
-    astray.initialize(0.0)
-    going.take(0.0)
-    for i in range(ROLLBACKS):
-        now = i * ROLLBACK_STEP
-        saved = astray.save()
-        for k in range(int(random.integers(1, LONGEST_WANDER + 1))):
-            going.set({"pinion.w": 1500 * RPM + random.normal(0.0, 5.0), "wheel.tau": random.normal(0.0, 20.0)})
-            astray.step(now + k * ROLLBACK_STEP, ROLLBACK_STEP)
-        astray.restore(saved)
-        going.set(inputs(now))
-        astray.step(now, ROLLBACK_STEP)
-        going.take(now + ROLLBACK_STEP)
-    made = going.record(calm.outcome, clock.process_time() - started)
-    same = astray.save() == straight.save() and all(np.array_equal(made[name], calm[name]) for name in made.values)
-    said = [] if same else [f"the run with {ROLLBACKS} rollbacks does not end in the state of the straight run"]
-    made = replace(made, throughput=calm.throughput)
+
+    def wander(random: np.random.Generator) -> dict[str, float]:
+        return {"pinion.w": 1500 * RPM + random.normal(0.0, 5.0), "wheel.tau": random.normal(0.0, 20.0)}
+
+    made, said = run_astray(lambda: kernel(model(variant), case, start), inputs, wander, ROLLBACKS)
     return finding(made, geometry(variant), said, {"rollbacks": float(ROLLBACKS)})
 
 
