@@ -1,14 +1,14 @@
-/* Nodal contact with a penalty stiffness (docs/theory.md, 2.7): nodes of a flank against the deformed involute of the other
- * gear, the way of Schurr et al. (ICSV22, 2015), on every engagement.
+/* Nodal contact with a penalty stiffness (docs/theory.md, 2.7): nodes of a flank against the deformed involute of the
+ * other gear, the way of Schurr et al. (ICSV22, 2015), on every engagement.
  *
  * A node of gear c at P finds its foot on the involute of gear o in closed form, D = P − C_o, ℓ = √(D² − r_b²):
  *     t′ = arg D − sg arctan(ℓ/r_b),   s′ = r_b sg (β_o − t′),   g = ±(ℓ − s′) + δ_c + δ_o(s′) − e_c − e_o(s′)     (8h)
  * (− where o is a ring) with the outward elastic displacements e of node and foot, and its force on both is
  *     f = k A max(0, −g),   U = ½ k A max(0, −g)²,   on a coordinate x: −∂U/∂x = f ∂g/∂x                          (8i)
- * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a few
- * points along its flank, by width function. Interpolation gives those of all its nodes from there, and forces are
- * gathered there before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are looked
- * for from the line of contact outwards until they are open. */
+ * gradients being exact, slopes of relief and of e_o along the flank included. Displacements of a tooth are read at a
+ * few points along its flank, by width function. Interpolation gives those of all its nodes from there, and forces are
+ * gathered there before they press on the modes: modes are read once a tooth, however many nodes it has. Nodes are
+ * looked for from the line of contact outwards until they are open. */
 #include "problem/gk_work.h"
 
 static const double NODE_NEAR = 5e-6; /* m: gap up to which the next node outwards is looked at too */
@@ -50,7 +50,7 @@ typedef struct node_foot { /* of a node on the other flank, without elastic disp
     double gap, gradient[POSE], roll, roll_gradient[POSE];
 } node_foot;
 
-/* ---- displacement of a tooth -------------------------------------------------------------------------------------- */
+/* ---- displacement of a tooth -------------------- */
 static void begin_tooth(const nodal_pair *p, const gk_work *work, const gk_real *const speed[], tooth_in_hand *t)
 {
     const gk_modal *m = &p->setup->modal[t->g];
@@ -153,9 +153,9 @@ static void end_tooth(const nodal_pair *p, gk_work *work, const tooth_in_hand *t
     }
 }
 
-/* ---- gap of a node ---------------------------------------------------------------------------------------------------- */
-/* depth that a flank has lost to its relief, and past its tip to the tip edge: an arc tangent to the flank, followed as a
- * parabola of the length of arc */
+/* ---- gap of a node -------------------- */
+/* depth that a flank has lost to its relief, and past its tip to the tip edge: an arc tangent to the flank, followed as
+ * a parabola of the length of arc */
 static double depth_at(const nodal_pair *p, const gk_gear *gear, double s, double *slope)
 {
     const double outward = gear->s_tip > gear->s_form ? 1.0 : -1.0;
@@ -165,7 +165,8 @@ static double depth_at(const nodal_pair *p, const gk_gear *gear, double s, doubl
     return gear->relief * over * over + past * past / (2.0 * gear->edge);
 }
 
-/* to the normal section: the gap along the common normal, and what axial motion and tilts do to it (gk_flank.c, lean) */
+/* to the normal section: the gap along the common normal, and what axial motion and tilts do to it (gk_flank.c, lean)
+ * */
 static void lean_node(const nodal_pair *p, double z, const double normal[2], double at[2][2], node_foot *foot)
 {
     const gk_mesh *mesh = p->mesh;
@@ -240,7 +241,7 @@ static int foot_at(const nodal_pair *p, const nodal_layer *layer, int along, nod
     return 1;
 }
 
-/* ---- forces ------------------------------------------------------------------------------------------------------------ */
+/* ---- forces -------------------- */
 typedef struct flank_reading { /* of a tooth at one length of roll, by width function */
     double at[MAX_FUNCTIONS], slope[MAX_FUNCTIONS], rate[MAX_FUNCTIONS];
 } flank_reading;
@@ -281,8 +282,8 @@ static void gather_load(const nodal_pair *p, const tooth_in_hand *t, const gk_gr
         for (int a = 0; a < A; a++) t->field->load[(grid->index + i) * A + a] += grid->weight[i] * load[a];
 }
 
-/* (8i) of one node that is `depth` deep and gets deeper at `rate`; the damper never pulls and never more than doubles the
- * force (8a) */
+/* (8i) of one node that is `depth` deep and gets deeper at `rate`; the damper never pulls and never more than doubles
+ * the force (8a) */
 static double force_of(nodal_pair *p, double stiffness, double depth, double rate)
 {
     const double elastic = stiffness * depth, damper = stiffness * p->mesh->retardation * rate;
@@ -359,7 +360,7 @@ static void press_nodes(nodal_pair *p, int own)
     for (int j = 0; j < across && p->mesh->penalty[own] > 0.0; j += each) press_layer(p, own, j, j + each);
 }
 
-/* ---- engagements ---------------------------------------------------------------------------------------------------------- */
+/* ---- engagements -------------------- */
 static void take_tooth(nodal_pair *p, gk_work *work, int which)
 {
     tooth_in_hand *t = &p->tooth[which];

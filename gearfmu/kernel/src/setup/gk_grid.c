@@ -1,5 +1,5 @@
-/* Interpolation on even grids along the flank: cubic convolution (Keys 1981, a = −½), continuously differentiable and exact
- * for parabolas; quadratic extrapolation gives the points at the ends. */
+/* Interpolation on even grids along the flank: cubic convolution (Keys 1981, a = −½), continuously differentiable and
+ * exact for parabolas; quadratic extrapolation gives the points at the ends. */
 #include "setup/gk_setup.h"
 
 /* f(−1) = 3 f0 − 3 f1 + f2 where the grid begins, and likewise where it ends */

@@ -1,6 +1,6 @@
-/* Nodes of the flanks for nodal contact: even in arc length along the flank and even across the common face width, as those
- * of a structured mesh. The area that a node stands for follows from the trapezoidal rule in both directions, so that all
- * areas together are that of the flank (docs/theory.md, 2.7). */
+/* Nodes of the flanks for nodal contact: even in arc length along the flank and even across the common face width, as
+ * those of a structured mesh. The area that a node stands for follows from the trapezoidal rule in both directions, so
+ * that all areas together are that of the flank (docs/theory.md, 2.7). */
 #include "setup/gk_setup.h"
 
 /* (2a + 1) P_a at x, −1 … 1, for the width functions of the model: displacement there is their sum with the rows, and a
@@ -73,8 +73,8 @@ static double pitch_curvature(const gk_model *model, const gk_mesh *mesh)
     return mesh->cosine * (1.0 / a + e->kind / b);
 }
 
-/* dδ/df (m²/N) of the line of contact at the load of force_max on one tooth pair, f = 4/3 k √(2R) δ^(3/2) per metre. A flat
- * engagement is as stiff as all its nodes. */
+/* dδ/df (m²/N) of the line of contact at the load of force_max on one tooth pair, f = 4/3 k √(2R) δ^(3/2) per metre. A
+ * flat engagement is as stiff as all its nodes. */
 static double line_compliance(const gk_model *model, const gk_mesh *mesh, double penalty)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
@@ -88,10 +88,10 @@ static double line_compliance(const gk_model *model, const gk_mesh *mesh, double
     return depth / (1.5 * load);
 }
 
-/* ---- rows at points ------------------------------------------------------------------------------------------------ */
+/* ---- rows at points -------------------- */
 /* Weights of the model's rolls for the displacement at a point of the flank, at the arc length p from its form circle.
- * Rows are means over the load strip, p ± w, clipped at the ends of the flank: the value at a point is that of the strip
- * whose middle it is; within w/2 of an end, where there is none, it goes on straight. */
+ * Rows are means over the load strip, p ± w, clipped at the ends of the flank: the value at a point is that of the
+ * strip whose middle it is; within w/2 of an end, where there is none, it goes on straight. */
 static gk_grid weights_at(const gk_model *model, const gk_gear *gear, double p, double length)
 {
     const double outward = gear->s_tip > gear->s_form ? 1.0 : -1.0, w = gk_min(gear->strip, 0.5 * length);
@@ -148,7 +148,7 @@ void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g)
     }
 }
 
-/* ---- an engagement ------------------------------------------------------------------------------------------------- */
+/* ---- an engagement -------------------- */
 void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
