@@ -86,6 +86,14 @@ def test_files_and_functions_stay_short(path: Path) -> None:
     assert not wide, f"functions of more than six arguments: {wide}"
 
 
+def test_lines_of_the_kernel_fit_the_page() -> None:
+    """120 columns; clang-format leaves comments alone."""
+    sources = [p for p in (ROOT / "gearfmu" / "kernel" / "src").rglob("*") if p.suffix in (".c", ".h")]
+    lines = [(p, n, line) for p in sources for n, line in enumerate(p.read_text(encoding="utf-8").splitlines(), 1)]
+    wide = [f"{p.name}:{n}" for p, n, line in lines if len(line) > 120]
+    assert sources and not wide, f"lines of more than 120 columns: {wide}"
+
+
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_modules_say_what_they_are(path: Path) -> None:
     text = path.read_text(encoding="utf-8")

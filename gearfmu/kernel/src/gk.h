@@ -1,7 +1,7 @@
 /* gearfmu kernel: elastic gear stage, reduced bodies, tooth contact, one fixed-step solver.
  *
- * Four kinds of memory, all owned by the caller; the kernel allocates nothing, opens nothing, starts nothing and keeps no
- * globals:
+ * Four kinds of memory, all owned by the caller; the kernel allocates nothing, opens nothing, starts nothing and keeps
+ * no globals:
  *   gk_model   pointers into a constant, checked blob (geometry, modes, static compliance)
  *   gk_setup   what is fixed once level, effects and step are chosen (tables for the chosen modes and slices)
  *   gk_data    everything that changes, without pointers: a copy of its bytes is a snapshot and is the FMU state
@@ -92,16 +92,16 @@ GK_API gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work 
                           double H);
 GK_API double gk_time(const gk_data *data);
 
-/* Quasi-static loaded transmission error of an engagement: torque on the bore of the first port, the bore of the second
- * held at phi_out, further ports free; by the contact routine of the step. After gk_prepare; `keep` continues from the
- * last call. out[0] = te (m), out[1] = angle of the first port's bore (rad), then for each of *places tooth pairs {flank
- * 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most 2 + 8·12 numbers. */
+/* Quasi-static loaded transmission error of an engagement: torque on the bore of the first port, the bore of the
+ * second held at phi_out, further ports free; by the contact routine of the step. After gk_prepare; `keep` continues
+ * from the last call. out[0] = te (m), out[1] = angle of the first port's bore (rad), then for each of *places tooth
+ * pairs {flank 0 drive 1 coast, tooth number of gear A, force of each slice (N)}; at most 2 + 8·12 numbers. */
 GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                         double torque, int engagement, int keep, double *out, int *places);
 
-/* Static equilibrium with the torque[p] (N m) on the bore of every port p, chains left out; phi[p] (rad): angles of the
- * bores. The torques balance where nothing holds the rotors: Σ torque × speed = 0 in every motion that the meshes allow.
- * After gk_prepare. */
+/* Static equilibrium with the torque[p] (N m) on the bore of every port p, chains left out; phi[p] (rad): angles of
+ * the bores. The torques balance where nothing holds the rotors: Σ torque × speed = 0 in every motion that the
+ * meshes allow. After gk_prepare. */
 GK_API gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                           const double *torque, double *phi);
 

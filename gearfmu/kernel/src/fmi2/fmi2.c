@@ -6,7 +6,7 @@
 #include "fmi2/fmi2_face.h"
 #include <string.h>
 
-/* ---- who may call when (FMI 2.0.4, 4.2.4) ---- */
+/* ---- who may call when (FMI 2.0.4, 4.2.4) ------------------------------------------------------------------------ */
 enum {
     I = MODE_INSTANTIATED,
     N = MODE_INITIALIZATION,
@@ -107,7 +107,7 @@ static face *enter(fmi2Component c, int call)
 #define NEED(f, pointer)                                                                                               \
     if (!(pointer)) return REFUSE(f, "%s: the argument " #pointer " is NULL", __func__)
 
-/* ---- life ---- */
+/* ---- life -------------------------------------------------------------------------------------------------------- */
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
@@ -212,7 +212,7 @@ fmi2Status fmi2Reset(fmi2Component c)
     return face_reset(f);
 }
 
-/* ---- variables ---- */
+/* ---- variables --------------------------------------------------------------------------------------------------- */
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     ENTER(Get);
@@ -269,7 +269,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return nvr ? REFUSE(f, "set String: this model has no String variables") : fmi2OK;
 }
 
-/* ---- saved states ---- */
+/* ---- saved states ------------------------------------------------------------------------------------------------ */
 #define OWN(f, state)                                                                                                  \
     face_state *own = face_state_find(f, state);                                                                       \
     if (!own) return REFUSE(f, "%s: this is not a saved state of this instance, or it was freed", __func__)
@@ -336,7 +336,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     return status;
 }
 
-/* ---- steps ---- */
+/* ---- steps ------------------------------------------------------------------------------------------------------- */
 static int given_up(gk_outcome outcome)
 {
     return outcome == GK_DIVERGED || outcome == GK_PENETRATION || outcome == GK_ENERGY;
@@ -412,7 +412,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
     return fmi2OK;
 }
 
-/* ---- what modelDescription.xml does not declare ---- */
+/* ---- what modelDescription.xml does not declare ------------------------------------------------------------------ */
 static fmi2Status not_offered(fmi2Component c, const char *what)
 {
     ENTER(NotOffered);

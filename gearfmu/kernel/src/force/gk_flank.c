@@ -25,8 +25,8 @@ typedef struct line {              /* line of action of one side */
     double dt_x, dt_y;             /* ∂t/∂(C_B − C_A) */
 } line;
 
-/* Where a transverse section touches: direction of the force on B, and the point halfway between the teeth from the axis
- * of either gear, the same for both */
+/* Where a transverse section touches: direction of the force on B, and the point halfway between the teeth from the
+ * axis of either gear, the same for both */
 typedef struct touch {
     double n[2], at[2][2];
 } touch;
@@ -283,13 +283,13 @@ static int section(const pair *q, const flank_side *s, const double beta[2], dou
     return 1;
 }
 
-/* ---- slices of helical or tilted teeth ------------------------------------------------------------------------------ */
+/* ---- slices of helical or tilted teeth --------------------------------------------------------------------------- */
 static const double LEAN = 0.2e-3; /* m: what tilts may close of a gap */
 static const double OPEN = 1e-3;   /* m: gap of a strip that has left its flanks */
 
-/* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves along its
- * axis or tilts about its mid-width moves the point of contact along it. Both gears have the point halfway between their
- * teeth, so that contact forces are in balance with their moments. */
+/* From the transverse section at z into space: the normal is n = cos β_b n_t − sg sin β_b e_z, a gear that moves
+ * along its axis or tilts about its mid-width moves the point of contact along it. Both gears have the point halfway
+ * between their teeth, so that contact forces are in balance with their moments. */
 static void lean(const pair *q, double sg, const touch *t, double z, gk_point *p)
 {
     const gk_mesh *mesh = q->mesh;
@@ -438,8 +438,8 @@ static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *d
            reach + SURE + BENDS * apart * apart / mesh->distance;
 }
 
-/* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their tables; −1
- * when the poses are meaningless. The spins of a flat engagement are translations. */
+/* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their
+ * tables; −1 when the poses are meaningless. The spins of a flat engagement are translations. */
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
                   gk_position position[2], gk_place *place)
 {

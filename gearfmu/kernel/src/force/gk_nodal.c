@@ -50,7 +50,7 @@ typedef struct node_foot { /* of a node on the other flank, without elastic disp
     double gap, gradient[POSE], roll, roll_gradient[POSE];
 } node_foot;
 
-/* ---- displacement of a tooth -------------------- */
+/* ---- displacement of a tooth ------------------------------------------------------------------------------------- */
 static void begin_tooth(const nodal_pair *p, const gk_work *work, const gk_real *const speed[], tooth_in_hand *t)
 {
     const gk_modal *m = &p->setup->modal[t->g];
@@ -153,7 +153,7 @@ static void end_tooth(const nodal_pair *p, gk_work *work, const tooth_in_hand *t
     }
 }
 
-/* ---- gap of a node -------------------- */
+/* ---- gap of a node ----------------------------------------------------------------------------------------------- */
 /* depth that a flank has lost to its relief, and past its tip to the tip edge: an arc tangent to the flank, followed as
  * a parabola of the length of arc */
 static double depth_at(const nodal_pair *p, const gk_gear *gear, double s, double *slope)
@@ -241,7 +241,7 @@ static int foot_at(const nodal_pair *p, const nodal_layer *layer, int along, nod
     return 1;
 }
 
-/* ---- forces -------------------- */
+/* ---- forces ------------------------------------------------------------------------------------------------------ */
 typedef struct flank_reading { /* of a tooth at one length of roll, by width function */
     double at[MAX_FUNCTIONS], slope[MAX_FUNCTIONS], rate[MAX_FUNCTIONS];
 } flank_reading;
@@ -360,7 +360,7 @@ static void press_nodes(nodal_pair *p, int own)
     for (int j = 0; j < across && p->mesh->penalty[own] > 0.0; j += each) press_layer(p, own, j, j + each);
 }
 
-/* ---- engagements -------------------- */
+/* ---- engagements ------------------------------------------------------------------------------------------------- */
 static void take_tooth(nodal_pair *p, gk_work *work, int which)
 {
     tooth_in_hand *t = &p->tooth[which];

@@ -60,8 +60,8 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* adds the rows of the contacts on the part of the ground group that one gear reads; strips of a place whose gradient is the
- * same: all, or each has its own */
+/* adds the rows of the contacts on the part of the ground group that one gear reads; strips of a place whose
+ * gradient is the same: all, or each has its own */
 GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
                               const int motions, const int each, const int strips)
 {
@@ -153,23 +153,21 @@ void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_re
         }
 }
 
-/* adds sign · row·x over a span to what each row reads: `each` rows side by side, whose sums do not wait for each other */
-GK_INLINE void read_some(const double *rows, size_t stride, gk_span span, const double *x, double sign, double *read,
-                         const int each)
+/* adds row·x to what each row reads: `each` rows side by side, whose sums do not wait for each other */
+GK_INLINE void read_some(const double *rows, int width, const double *x, double *read, const int each)
 {
-    const gk_quad *b = (const gk_quad *)(x + span.from);
+    const gk_quad *b = (const gk_quad *)x;
     gk_quad sum[4] = {{0}};
-    for (int q = 0; q < span.width / 4; q++)
-        for (int i = 0; i < each; i++) sum[i] += ((const gk_quad *)(rows + (size_t)i * stride + span.from))[q] * b[q];
-    for (int i = 0; i < each; i++) read[i] += sign * ((sum[i][0] + sum[i][2]) + (sum[i][1] + sum[i][3]));
+    for (int q = 0; q < width / 4; q++)
+        for (int i = 0; i < each; i++) sum[i] += ((const gk_quad *)(rows + (size_t)i * (size_t)width))[q] * b[q];
+    for (int i = 0; i < each; i++) read[i] += (sum[i][0] + sum[i][2]) + (sum[i][1] + sum[i][3]);
 }
 
-static void read_rows(const double *rows, int n, size_t stride, gk_span span, const double *x, double sign,
-                      double *read)
+static void read_rows(const double *rows, int n, int width, const double *x, double *read)
 {
     int i = 0;
-    for (; i + 4 <= n; i += 4) read_some(rows + (size_t)i * stride, stride, span, x, sign, read + i, 4);
-    for (; i < n; i++) read_some(rows + (size_t)i * stride, stride, span, x, sign, read + i, 1);
+    for (; i + 4 <= n; i += 4) read_some(rows + (size_t)i * (size_t)width, width, x, read + i, 4);
+    for (; i < n; i++) read_some(rows + (size_t)i * (size_t)width, width, x, read + i, 1);
 }
 
 /* what the rows of an engagement read of displacements (or speeds) of the ground group */
@@ -180,7 +178,7 @@ void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e
     double local[MAX_GROUND + 4 * MAX_ROTORS];
     gk_local_gather(mesh, ground, local);
     for (int i = 0; i < s->stride; i++) read[i] = 0.0;
-    read_rows(engaged->ground, s->n, (size_t)mesh->local, (gk_span){0, mesh->local}, local, 1.0, read);
+    read_rows(engaged->ground, s->n, mesh->local, local, read);
 }
 
 /* the same with displacements (or speeds) y of the gear groups */
@@ -221,7 +219,7 @@ void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const g
         }
 }
 
-/* ---- bores ---------------------------------------------------------------------------------------------------------- */
+/* ---- bores ------------------------------------------------------------------------------------------------------- */
 /* what a moment on the port of a side's rotor turns its contacts outward at once */
 GK_INLINE void bore_column(const gk_side *side, const gk_engaged *engaged, double *out, const int strips)
 {

@@ -106,8 +106,8 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
 }
 
 #ifndef GK_WIDE
-/* What the undamped scheme keeps while contacts keep their status and the law is straight: ½ v M v + V(x) − ⅛h² a M a, V
- * with the contacts' energy */
+/* What the undamped scheme keeps while contacts keep their status and the law is straight: ½ v M v + V(x) − ⅛h² a M
+ * a, V with the contacts' energy */
 double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                          double h)
 {
@@ -123,8 +123,8 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
     return gk_step_energy(model, setup, data, &work->explicit_rows) - 0.125 * h * h * sum;
 }
 
-/* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the full load
- * (that is stiffest); 0: not positive */
+/* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the
+ * full load (that is stiffest); 0: not positive */
 static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, int e, double position)
 {
     gk_system *s = &work->engaged[e].system;
@@ -222,8 +222,8 @@ static void gear_round(const gk_setup *setup, gk_work *work, int g, double h, sh
     }
 }
 
-/* One round of power iteration with ¼h² M⁻¹(K + WᵀC⁻¹W) + h M⁻¹(damping + WᵀC⁻¹ S c S C⁻¹W) on the trial speeds; returns
- * Rayleigh's quotients of both parts */
+/* One round of power iteration with ¼h² M⁻¹(K + WᵀC⁻¹W) + h M⁻¹(damping + WᵀC⁻¹ S c S C⁻¹W) on the trial speeds;
+ * returns Rayleigh's quotients of both parts */
 static quotient round_of_power(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
 {
     shape of = {0};
@@ -252,8 +252,8 @@ static void first_shape(const gk_model *model, const gk_setup *setup, gk_work *w
             work->trial[g][setup->modal[g].n + j] = setup->modal[g].omega[j] > 0.0 ? (gk_real)(1.0 + 0.1 * (j % 7)) : 0;
 }
 
-/* Largest stable step over the roll positions, all candidate contacts closed (fewer are softer): ¼h²ω² + hχ = 1 (eq. 16a)
- * for the shape that is worst at this h */
+/* Largest stable step over the roll positions, all candidate contacts closed (fewer are softer): ¼h²ω² + hχ = 1 (eq.
+ * 16a) for the shape that is worst at this h */
 double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     double smallest = INFINITY;

@@ -1,6 +1,7 @@
 /* What the axes of a turning carrier do to the masses in them (docs/theory.md, 3.10), half a step each beside the
- * dashpots of the supports. Coriolis force −2Ω m J times the speed, J a quarter turn, on P v, P = √m Φ_xy of every carried
- * body (17f): turned exactly by Cayley's form of the low-rank rotation, without energy. Centrifugal load m Ω² a (17g). */
+ * dashpots of the supports. Coriolis force −2Ω m J times the speed, J a quarter turn, on P v, P = √m Φ_xy of every
+ * carried body (17f): turned exactly by Cayley's form of the low-rank rotation, without energy. Centrifugal load m
+ * Ω² a (17g). */
 #include "integrate/gk_integrate.h"
 
 enum { ROUNDS = 5 }; /* Ωh is some 1e-3: every round three digits */

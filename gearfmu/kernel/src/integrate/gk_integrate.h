@@ -5,8 +5,8 @@
 
 /* what an integrator is; gk_scheme.c */
 typedef struct gk_scheme {
-    int is_explicit; /* forces follow from positions; limited by stability; keeps no account of works; knows no clutch */
-    int corrected;   /* γ > 0: corrected for time within the step */
+    int is_explicit;  /* forces follow from positions; limited by stability; no account of work; knows no clutch */
+    int corrected;    /* γ > 0: corrected for time within the step */
     int linear_force; /* forces are linear in the step, else constant */
     int adaptive;     /* chooses its own inner steps */
 } gk_scheme;

@@ -1,9 +1,9 @@
-/* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): the potential energy of a stage at rest is
- * least. Outer unknowns are the spins, the dynamic oscillators of the ground group and the soft modes of gears with
- * several engagements, through which these meet; at given ones each engagement has
- * its contact problem, everything else being compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces
- * that are left, with the tangents of the engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W; islands come to rest one after the
- * other: they know nothing of each other. */
+/* Static equilibrium by the same contact routine as the step (docs/theory.md, 4): the potential energy of a stage at
+ * rest is least. Outer unknowns are the spins, the dynamic oscillators of the ground group and the soft modes of
+ * gears with several engagements, through which these meet; at given ones each engagement has its contact problem,
+ * everything else being compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces that are left,
+ * with the tangents of the engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W; islands come to rest one after the other: they
+ * know nothing of each other. */
 #include "integrate/gk_integrate.h"
 #include "setup/gk_kinematics.h"
 
@@ -58,7 +58,7 @@ static int any_moves(const rest *r, int motion)
     return 0;
 }
 
-/* ---- motions ------------------------------------------------------------------------------------------------------ */
+/* ---- motions ----------------------------------------------------------------------------------------------------- */
 static int grounded(const rest *r, int p)
 {
     return r->boundary[p].kind != PORT_TORQUE && (!r->setup.chained[p] || r->setup.joint[p][JOINT_CLUTCH].live);
@@ -206,7 +206,7 @@ static void unroll(rest *r)
     }
 }
 
-/* ---- one iteration -------------------------------------------------------------------------------------------------- */
+/* ---- one iteration ----------------------------------------------------------------------------------------------- */
 static int form(rest *r, int e)
 {
     gk_work *work = r->work;
@@ -294,7 +294,8 @@ static void find_soft_rows(rest *r, int e, soft_rows rows)
     }
 }
 
-/* the unknowns that an engagement's rows read: spins, lanes of its part of the ground group, soft modes of both gears */
+/* the unknowns that an engagement's rows read: spins, lanes of its part of the ground group, soft modes of both
+ * gears */
 static int own_unknowns(const rest *r, int e)
 {
     const gk_mesh *mesh = &r->setup.mesh[e];
@@ -510,9 +511,9 @@ static void spread(rest *r)
     }
 }
 
-/* ---- the search -------------------------------------------------------------------------------------------------------- */
-/* Modes of a gear with several engagements through which these feel each other: softer, with the gear's own mass, than a
- * few per cent of a contact */
+/* ---- the search -------------------------------------------------------------------------------------------------- */
+/* Modes of a gear with several engagements through which these feel each other: softer, with the gear's own mass,
+ * than a few per cent of a contact */
 static void find_soft(rest *r)
 {
     const gk_base *base = &r->setup.base;
@@ -594,9 +595,9 @@ static int search(rest *r)
     return close_to_rest(r, length);
 }
 
-/* Equilibrium under the given boundary: for each port a spring of stiffness k at angle phi, a held angle (PORT_FIXED, k =
- * ∞: the bore is held) or a torque. bare: the boundary acts on the bores, without the ports' chains. keep: start from the
- * present angles instead of from the unloaded mesh. */
+/* Equilibrium under the given boundary: for each port a spring of stiffness k at angle phi, a held angle
+ * (PORT_FIXED, k = ∞: the bore is held) or a torque. bare: the boundary acts on the bores, without the ports'
+ * chains. keep: start from the present angles instead of from the unloaded mesh. */
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                            const gk_boundary *boundary, int bare, int keep)
 {
@@ -656,10 +657,10 @@ static gk_boundary further(const gk_model *model, int p)
     return held ? (gk_boundary){PORT_SPRING, 0.0, 0.0, model->port[p].k} : (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
 }
 
-/* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out, other
- * ports free; what chains the ports have is left out. out: te (m) of engagement e, angle (rad) of the first port's bore,
- * then for every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 2 + MAX_PAIRS·(2 + MAX_SLICES)
- * numbers. `keep` continues from the last call. */
+/* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out,
+ * other ports free; what chains the ports have is left out. out: te (m) of engagement e, angle (rad) of the first
+ * port's bore, then for every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 2 +
+ * MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                  double torque, int e, int keep, double *out, int *places)
 {

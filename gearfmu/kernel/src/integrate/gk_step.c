@@ -1,6 +1,6 @@
-/* One internal step of dg4 (docs/theory.md, 3). It reads like its description: predict, find, form, recall, solve, and
- * only if all is finite: correct and remember. Until `correct` nothing of gk_data changes but its expression for another
- * h, so a step that fails can be repeated with another h or scheme. */
+/* One internal step of dg4 (docs/theory.md, 3). It reads like its description: predict, find, form, recall, solve,
+ * and only if all is finite: correct and remember. Until `correct` nothing of gk_data changes but its expression for
+ * another h, so a step that fails can be repeated with another h or scheme. */
 #include "integrate/gk_integrate.h"
 
 static const double PAYABLE =
@@ -12,7 +12,7 @@ static const double FARTHEST = 0.25 * 2.0 * GK_PI;            /* a quarter of a 
 /* a speed of the scheme is ẋ + lead·ḟ/m (docs/theory, 3.8) */
 static double speed_lead(double h, double gamma) { return h * h * (2.0 * gk_correction(gamma) - 1.0) / 12.0; }
 
-/* ---- state --------------------------------------------------------------------------------------------------------- */
+/* ---- state ------------------------------------------------------------------------------------------------------- */
 /* Σ (½ v² + ½ ω² q²)/s² of a gear group, summed in double in fixed lanes */
 static double modal_energy(const gk_setup *setup, const gk_data *data, const gk_coefficients *k, int g)
 {
@@ -85,7 +85,7 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
     return taken;
 }
 
-/* ---- prediction ------------------------------------------------------------------------------------------------------ */
+/* ---- prediction -------------------------------------------------------------------------------------------------- */
 /* where arrays are whole halves (gk_real) or quads (double): the compiler need not prove that they do not overlap */
 #define HALVES(array) ((gk_half *)(array))
 #define SEEN_HALVES(array) ((const gk_half *)(array))
@@ -190,7 +190,7 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
     return GK_OK;
 }
 
-/* ---- the start of the step -------------------------------------------------------------------------------------------- */
+/* ---- the start of the step --------------------------------------------------------------------------------------- */
 /* λ0 without dashpots: massless deflection and energy at the start; linear: forces of the step are (mix4) */
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
@@ -281,14 +281,14 @@ static int all_finite(const gk_system *s)
     return (fine[0] & fine[1] & fine[2] & fine[3]) != 0;
 }
 
-/* ---- the end of the step ----------------------------------------------------------------------------------------------- */
+/* ---- the end of the step ----------------------------------------------------------------------------------------- */
 const double *gk_step_force(const gk_system *s) { return s->force; }
 const double *gk_step_z(const gk_system *s) { return s->z; }
 /* forces at the end that the next prediction is made with, where forces are linear in the step */
 static const double *force_with_dampers(const gk_system *s) { return s->last; }
 
-/* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of energy, mode
- * by mode */
+/* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of
+ * energy, mode by mode */
 static double correct_damped(const gk_setup *setup, const gk_work *work, const gk_coefficients *k, int g,
                              gk_real *state)
 {
@@ -475,7 +475,7 @@ void gk_step_forget(gk_engaged *engaged)
     engaged->system.n = engaged->system.contacts = engaged->system.stride = engaged->system.clutches = 0;
 }
 
-/* ---- the step ------------------------------------------------------------------------------------------------------------ */
+/* ---- the step ---------------------------------------------------------------------------------------------------- */
 /* problems of all engagements, island by island */
 static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                             const gk_coefficients *k)

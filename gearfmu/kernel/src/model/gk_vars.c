@@ -1,6 +1,6 @@
-/* Variables by value reference: one table (gk_variables.inc) decides names, ranges and which of them exist in a model.
- * A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are added; those of
- * amplitudes, which may be many, begin at 2²⁴. */
+/* Variables by value reference: one table (gk_variables.inc) decides names, ranges and which of them exist in a
+ * model. A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are
+ * added; those of amplitudes, which may be many, begin at 2²⁴. */
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
@@ -98,7 +98,7 @@ static double start_of(const gk_model *model, const gk_row *row, int instance)
     return row->start;
 }
 
-/* ---- names ----------------------------------------------------------------------------------------------------------- */
+/* ---- names ------------------------------------------------------------------------------------------------------- */
 static size_t append(char *out, size_t size, size_t n, const char *text)
 {
     for (; *text && n + 1 < size; text++) out[n++] = *text;
@@ -168,7 +168,7 @@ static void expand(char *out, size_t size, const gk_model *model, const gk_row *
 
 static void copy(char *out, size_t size, const char *text) { out[append(out, size, 0, text)] = 0; }
 
-/* ---- interface ------------------------------------------------------------------------------------------------------- */
+/* ---- interface --------------------------------------------------------------------------------------------------- */
 int gk_variable_count(const gk_model *model)
 {
     int count = 0;

@@ -1,12 +1,12 @@
-/* What the bodies of an engagement do to its rows at once and within the step: compliance between contacts through both
- * gears, from the tables or from the rows, residual at the bores, paths of the contacts' own dampers. D and A are
- * symmetric and filled by block rows of quads: row i of a contact has columns up to the end of its block, that of a joint
- * up to itself; at the end the rest is mirrored. */
+/* What the bodies of an engagement do to its rows at once and within the step: compliance between contacts through
+ * both gears, from the tables or from the rows, residual at the bores, paths of the contacts' own dampers. D and A
+ * are symmetric and filled by block rows of quads: row i of a contact has columns up to the end of its block, that
+ * of a joint up to itself; at the end the rest is mirrored. */
 #include "problem/gk_work.h"
 
 static const double SHARE = 0.95, SHARE_OF_BOTH_FLANKS = 0.75;
 
-/* ---- between contacts ---------------------------------------------------------------------------------------------- */
+/* ---- between contacts -------------------------------------------------------------------------------------------- */
 /* tooth pairs that follow each other: their strips are neighbours in the system and in the tables of both sides */
 typedef struct run {
     int column, count, point[2]; /* columns of the system; where they begin in the tables */
@@ -91,8 +91,8 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
     }
 }
 
-/* compliance between the contacts through both gears, from the tables: of the step, or of what is not dynamic alone; the
- * rest of D and A is cleared */
+/* compliance between the contacts through both gears, from the tables: of the step, or of what is not dynamic alone;
+ * the rest of D and A is cleared */
 static void between_contacts(const gk_setup *setup, const gk_engaged *engaged, int e, int tables)
 {
     const gk_system *s = &engaged->system;
@@ -150,7 +150,7 @@ static void joint_residual(const gk_setup *setup, gk_engaged *engaged, int e)
     }
 }
 
-/* ---- dampers --------------------------------------------------------------------------------------------------------- */
+/* ---- dampers ----------------------------------------------------------------------------------------------------- */
 /* The share of a tooth's own residual that its damper is parallel to. What other contacts have in common with it stays
  * outside, so that Q = C_res − P is positive: little with the neighbours, more with the other flank of the same tooth
  * (docs/theory.md, 2.5). */

@@ -1,7 +1,7 @@
-/* Engagements that share a rotor. Each has a problem of its own, solved with the others' forces as they are; what those do
- * to its gaps goes through the spins and the ground group, gathered and scattered, never through one dense system. Block
- * Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at γ = 1, so that two or three sweeps suffice. The sum
- * of all parts is exact, so is the energy they are balanced with. */
+/* Engagements that share a rotor. Each has a problem of its own, solved with the others' forces as they are; what those
+ * do to its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and scattered, never
+ * through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at γ = 1, so that
+ * three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
 #include "problem/gk_work.h"
 
 enum { SWEEPS = 40 };
@@ -25,7 +25,7 @@ static void forces_of(const gk_system *s, effect of, double *step, double *once)
     }
 }
 
-/* ---- what an engagement gives ---------------------------------------------------------------------------------------- */
+/* ---- what an engagement gives ------------------------------------------------------------------------------------ */
 /* sum += now − before, before = now */
 static void exchange(double *sum, double *before, const double *now, int n)
 {
@@ -111,7 +111,7 @@ static void give_all(const gk_coupled *c, effect of)
     }
 }
 
-/* ---- what it takes -------------------------------------------------------------------------------------------------------- */
+/* ---- what it takes ----------------------------------------------------------------------------------------------- */
 static void take_spins(const gk_coupled *c, int e, double *read)
 {
     const gk_engaged *engaged = &c->work->engaged[e];

@@ -72,7 +72,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
         s->g[i] = s->force0[i] = s->dash0[i] = s->end0[i] = s->damping[i] = s->width[i] = s->per_width[i] = 0.0;
 }
 
-/* ---- gaps ------------------------------------------------------------------------------------------------------------ */
+/* ---- gaps -------------------------------------------------------------------------------------------------------- */
 /* derivatives of a joint's row by the spins of the engagement; its reading of spins x */
 static double joint_reading(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s, int i,
                             const double *x)
@@ -89,8 +89,8 @@ static double joint_reading(const gk_model *model, const gk_setup *setup, const 
     return x[mesh->spin[plus]] - (minus >= 0 ? x[mesh->spin[minus]] : 0.0);
 }
 
-/* Undeformed gap at the predicted poses, which contain what the ground group moves the gears rigidly, minus outward elastic
- * displacement. Springs measure relative to their outer ends; clutches read half a step of slip. */
+/* Undeformed gap at the predicted poses, which contain what the ground group moves the gears rigidly, minus outward
+ * elastic displacement. Springs measure relative to their outer ends; clutches read half a step of slip. */
 static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work *work, int e)
 {
     const gk_mesh *mesh = &setup->mesh[e];

@@ -1,5 +1,5 @@
-/* What the ground group and the spins do to the rows of an engagement within the step: D and −K, from the rows, or motion
- * by motion of both gears from the tables of the step. */
+/* What the ground group and the spins do to the rows of an engagement within the step: D and −K, from the rows, or
+ * motion by motion of both gears from the tables of the step. */
 #include "problem/gk_work.h"
 
 /* D += W mobility Wᵀ, A −= W κ Wᵀ over the dynamic ground oscillators, from the rows: for a step that has no table */
@@ -25,8 +25,8 @@ static void add_ground(const gk_setup *setup, gk_work *work, int e, const gk_coe
     }
 }
 
-/* The same from tables: with W = −u + gΦ (u outward, g gradient, Φ rigid motion) what u alone makes is in the tables of the
- * contacts; the rest is −h gᵀ − g hᵀ, h = uMΦᵀ − ½ gΦMΦᵀ, motion by motion of both gears */
+/* The same from tables: with W = −u + gΦ (u outward, g gradient, Φ rigid motion) what u alone makes is in the tables
+ * of the contacts; the rest is −h gᵀ − g hᵀ, h = uMΦᵀ − ½ gΦMΦᵀ, motion by motion of both gears */
 typedef struct pulled {                                           /* a motion of a gear */
     double g[MAX_STRIDE], moved[MAX_STRIDE], yielded[MAX_STRIDE]; /* h in D, in K */
 } pulled;

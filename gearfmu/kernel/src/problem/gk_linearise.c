@@ -1,6 +1,6 @@
 /* The stage linearised at rest (docs/theory.md, 8): the problem of a step in which no time passes, formed at the
- * equilibrium, as matrices. What a row reads is what its unit force does, so that all rows come from those functions that
- * spread the forces of a step. */
+ * equilibrium, as matrices. What a row reads is what its unit force does, so that all rows come from those functions
+ * that spread the forces of a step. */
 #include "problem/gk_linearise.h"
 #include "integrate/gk_integrate.h"
 
@@ -58,7 +58,7 @@ static void place_ground(const gk_setup *setup, const double *lanes, int first, 
         if (setup->base.which[i] >= 0) out[first++] = lanes[i];
 }
 
-/* ---- the problem at rest ------------------------------------------------------------------------------------------- */
+/* ---- the problem at rest ----------------------------------------------------------------------------------------- */
 static int form(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
     const gk_meshing *meshing = &data->meshing[e];
@@ -103,7 +103,7 @@ static int list_kept(const gk_model *model, const gk_work *work, kept *rows)
     return count;
 }
 
-/* ---- rows ---------------------------------------------------------------------------------------------------------- */
+/* ---- rows -------------------------------------------------------------------------------------------------------- */
 static void describe_row(const gk_setup *setup, const gk_work *work, kept row, int r, gk_linear *out)
 {
     const gk_engaged *engaged = &work->engaged[row.engagement];
@@ -179,7 +179,7 @@ static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
         fill_row(model, setup, work, rows[r], out->W + (size_t)r * (size_t)out->coordinates);
 }
 
-/* ---- supports ------------------------------------------------------------------------------------------------------ */
+/* ---- supports ---------------------------------------------------------------------------------------------------- */
 /* what a unit force of one row does at once to the force on a support: one side's part of a contact */
 static double pressed(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, int support)
 {
@@ -220,7 +220,7 @@ static void fill_supports(const gk_model *model, const gk_setup *setup, const gk
     }
 }
 
-/* ---- all of it ------------------------------------------------------------------------------------------------------- */
+/* ---- all of it --------------------------------------------------------------------------------------------------- */
 gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_linear *out)
 {
     int at[MAX_SPINS];

@@ -1,5 +1,5 @@
-/* The stage linearised at rest under load (docs/theory.md, 8), in the terms of a step: coordinates are spins and dynamic
- * oscillators, rows the unknown forces of a step that are at work.
+/* The stage linearised at rest under load (docs/theory.md, 8), in the terms of a step: coordinates are spins and
+ * dynamic oscillators, rows the unknown forces of a step that are at work.
  *
  *     x = W q,   λ = −(Q + S)⁻¹ x,   M q̈ + diag(ω²) q = Wᵀ λ                                                    (29)
  *

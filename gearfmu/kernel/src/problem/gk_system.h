@@ -2,8 +2,8 @@
  * Closed contact, bilateral row, sticking clutch:
  *     g + D z + Aλ + lag + Pλ + δ(λ) = 0,   z = λ + η_d + α·direction
  * D: what a force in the step does to the gaps; P + δ: compliance parallel to the row's own damper; A = Q − K:
- * everything else that is quasi-static, Q, less the κ part. lag = A f_d: what the dampers' force at the end of the step,
- * f_d = β η_d + tail, deflects. */
+ * everything else that is quasi-static, Q, less the κ part. lag = A f_d: what the dampers' force at the end of the
+ * step, f_d = β η_d + tail, deflects. */
 #ifndef GK_SYSTEM_H
 #define GK_SYSTEM_H
 #include "setup/gk_setup.h"
@@ -94,8 +94,8 @@ void gk_solve_status(gk_system *s);
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
 void gk_solve_path(const gk_system *s, const double *x, double *y);
 double gk_solve_stored(const gk_system *s);
-/* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the distance
- * that is left */
+/* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the
+ * distance that is left */
 static inline double gk_solve_end_gap(const gk_system *s, int i)
 {
     return s->g[i] + s->Dz[i] + s->lag[i] + s->outer[i];

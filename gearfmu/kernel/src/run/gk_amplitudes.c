@@ -1,7 +1,7 @@
-/* Motion of the gears that the model observes, in their own axes, as outputs: rigid motion and amplitudes of all stored
- * modes of the free body, so that its displacement is their sum over the mode shapes. Patterns of nodal diameter 0 and 1
- * are those of the ground oscillators, turned into the gear's axes; modes of the gear group are its own. What is not
- * dynamic follows the forces at once, −N λ/ω². Left out: the residual beyond all stored modes. */
+/* Motion of the gears that the model observes, in their own axes, as outputs: rigid motion and amplitudes of all
+ * stored modes of the free body, so that its displacement is their sum over the mode shapes. Patterns of nodal
+ * diameter 0 and 1 are those of the ground oscillators, turned into the gear's axes; modes of the gear group are its
+ * own. What is not dynamic follows the forces at once, −N λ/ω². Left out: the residual beyond all stored modes. */
 #include "run/gk_run.h"
 
 /* forces on the strips of a tooth of one gear of an engagement: contacts press, so outward they pull */

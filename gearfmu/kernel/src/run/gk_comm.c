@@ -14,8 +14,8 @@ static gk_motion motion_in(const gk_data *data, int p)
     return (gk_motion){v[V_PHI_IN] - data->hold[p], v[V_W_IN], v[V_A_IN]};
 }
 
-/* outer end of a port at τ after the start of the communication step: φ + wτ + ½aτ² plus the jump of the inputs, faded out
- * over H with continuous angle and speed */
+/* outer end of a port at τ after the start of the communication step: φ + wτ + ½aτ² plus the jump of the inputs,
+ * faded out over H with continuous angle and speed */
 static gk_motion carried(gk_motion m, gk_motion jump, double tau, double H)
 {
     const double x = tau / H, r = 1.0 - x;
@@ -34,7 +34,7 @@ int gk_profile(const gk_work *work, int phase, const char **name, uint64_t *cycl
     return 1;
 }
 
-/* ---- start ------------------------------------------------------------------------------------------------------------ */
+/* ---- start ------------------------------------------------------------------------------------------------------- */
 static double start_speed(const gk_model *model, const gk_data *data, int p)
 {
     const double *v = data->shaft[p];
@@ -94,7 +94,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *
     return GK_OK;
 }
 
-/* ---- guarded internal step ---------------------------------------------------------------------------------------------- */
+/* ---- guarded internal step --------------------------------------------------------------------------------------- */
 typedef struct span {
     double start, H;
     gk_motion jump[MAX_PORTS];
@@ -136,7 +136,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_work 
     return outcome;
 }
 
-/* ---- communication step -------------------------------------------------------------------------------------------------- */
+/* ---- communication step ------------------------------------------------------------------------------------------ */
 /* the step as it is counted: a later H that differs by rounding only is the last H again */
 static gk_outcome accept_step(gk_data *data, double time, double H)
 {
@@ -210,7 +210,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     return GK_ENERGY;
 }
 
-/* ---- states from outside -------------------------------------------------------------------------------------------------- */
+/* ---- states from outside ----------------------------------------------------------------------------------------- */
 static int all_small(const double *v, size_t count)
 {
     for (size_t i = 0; i < count; i++)
@@ -249,8 +249,8 @@ static int good_head(const gk_data *d)
     return good;
 }
 
-/* size, kind, counters and numbers of a state that comes from outside; that it belongs to this model the bearer must know
- * (the FMI face keeps the hash). Bytes are aligned to 8. */
+/* size, kind, counters and numbers of a state that comes from outside; that it belongs to this model the bearer must
+ * know (the FMI face keeps the hash). Bytes are aligned to 8. */
 gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const void *bytes, size_t size)
 {
     if (setup->magic != GK_SETUP_MAGIC || size != setup->state_size || size > gk_data_size(model) ||

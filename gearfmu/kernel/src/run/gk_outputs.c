@@ -3,7 +3,7 @@
 
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
 
-/* ---- forces ----------------------------------------------------------------------------------------------------------- */
+/* ---- forces ------------------------------------------------------------------------------------------------------ */
 static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
 {
     const gk_system *s = &engaged->system;
@@ -125,7 +125,8 @@ static void support_forces(const gk_model *model, const gk_setup *setup, const g
     add_direct_forces(model, setup, work, data, out);
 }
 
-/* forces on the ground that are kept in the axes of a carrier, turned into those of the ground (sense 1), or back (−1) */
+/* forces on the ground that are kept in the axes of a carrier, turned into those of the ground (sense 1), or back
+ * (−1) */
 static void turn_supports(const gk_model *model, const gk_data *data, double sense, double *force)
 {
     for (int s = 0; model->support_turn && s < model->supports; s++) {
@@ -146,7 +147,7 @@ static void support_outputs(const gk_model *model, const gk_setup *setup, gk_dat
     }
 }
 
-/* ---- motion ------------------------------------------------------------------------------------------------------------- */
+/* ---- motion ------------------------------------------------------------------------------------------------------ */
 /* speed of the bore's node: spin and dynamic oscillators */
 static double bore_speed(const gk_model *model, const gk_setup *setup, const gk_data *data, int p)
 {
@@ -217,7 +218,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     v[V_NDYN] = dynamic;
 }
 
-/* ---- energy ---------------------------------------------------------------------------------------------------------------- */
+/* ---- energy ------------------------------------------------------------------------------------------------------ */
 static double stored(const gk_model *model, const gk_work *work)
 {
     double sum = 0.0;
@@ -225,7 +226,8 @@ static double stored(const gk_model *model, const gk_work *work)
     return sum;
 }
 
-/* stored energy and what the balance does not close, from the first step on; 0 when that is more than the model can mean */
+/* stored energy and what the balance does not close, from the first step on; 0 when that is more than the model can
+ * mean */
 int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h, int first)
 {
     double *v = data->stage;
@@ -244,7 +246,7 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
     return gk_finite(energy) && !(fabs(v[V_RESIDUAL]) > BROKEN * there + 1e-6);
 }
 
-/* ---- over a communication step -------------------------------------------------------------------------------------------- */
+/* ---- over a communication step ----------------------------------------------------------------------------------- */
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     outputs(model, setup, work, data, 0.0);

@@ -12,7 +12,8 @@ typedef struct gk_tally { /* integrals over a communication step */
     double last_moved[MAX_GROUND + 4 * MAX_ROTORS], last_speed[MAX_GROUND + 4 * MAX_ROTORS];
 } gk_tally;
 
-/* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never pulls. */
+/* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never
+ * pulls. */
 static inline double gk_reported(const gk_system *s, int i) { return s->force[i] + s->end[i]; }
 
 /* gk_amplitudes.c */

@@ -1,11 +1,10 @@
-/* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory.md, 3.1 and eq. 9).
- *
- *   exponential where ωh < 1.2: exact flow; trapezoidal above, with a step stretched for the mesh mode. Force constant in
- * the step, ½(f_n + f_{n+1}) with equal coefficients bq, bv at both ends. With p = min(1, 2γ), σ = (sin(ωh)/(ωh))^p,
- * s² = 1/σ, κ = (1/σ − 1)/ω² (rigid: s = 1, κ = ph²/6): the sampled system then has the exact pole, residue and static
- * value, and with ζσ for ζ the loss. The scaled row sW of the derivation is carried by bq, bv and κ (each times s²):
- * state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. A lower γ first takes the stiffest modes out
- * of the exponential ones, ωh < 1.2γ, and only below ½ weakens the correction. */
+/* Coefficients of the modal oscillators q̈ + 2ζω q̇ + ω² q = f for one internal step h (docs/theory.md, 3.1, eq. 9):
+ * exponential where ωh < 1.2, which is the exact flow; trapezoidal above, with a step stretched for the mesh mode.
+ * Force constant in the step, ½(f_n + f_{n+1}) with equal coefficients bq, bv at both ends. With p = min(1, 2γ),
+ * σ = (sin(ωh)/(ωh))^p, s² = 1/σ, κ = (1/σ − 1)/ω² (rigid: s = 1, κ = ph²/6): the sampled system then has the exact
+ * pole, residue and static value, and with ζσ for ζ the loss. The scaled row sW of the derivation is carried by bq,
+ * bv and κ (each times s²): state and rows stay physical. inverse_s2 = 1/s² weighs the modal energy. A lower γ first
+ * takes the stiffest modes out of the exponential ones, ωh < 1.2γ, and only below ½ weakens the correction. */
 #include "problem/gk_work.h"
 
 static const double EXPONENTIAL_BELOW = 1.2;

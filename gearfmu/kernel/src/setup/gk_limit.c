@@ -1,8 +1,8 @@
-/* Which internal step: μ′ = largest eigenvalue of C⁻¹K over the roll positions (docs/theory.md, 3.5), C the compliance
- * that a force of alternating sign meets: outside the paths of the dashpots all of it, in them what the dashpots let
- * move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m). A closed contact is stable up to μ′ = 1. Modes above ωh = 1.2 have no κ, so μ′
- * goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and 1/40 of the mesh period at
- * speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
+/* Which internal step: μ′ = largest eigenvalue of C⁻¹K over the roll positions (docs/theory.md, 3.5), C the
+ * compliance that a force of alternating sign meets: outside the paths of the dashpots all of it, in them what the
+ * dashpots let move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m). A closed contact is stable up to μ′ = 1. Modes above ωh = 1.2
+ * have no κ, so μ′ goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and
+ * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "integrate/gk_integrate.h"
 

@@ -1,6 +1,6 @@
-/* What a step makes of the rows in the tables of a side: D and A = C − K between all points, C what is not dynamic. A row between two nodes is linear, so
- * both are quadratic there: tabulated as squares of nodes and products of neighbours, they are exactly the bilinear form
- * of the interpolated rows. */
+/* What a step makes of the rows in the tables of a side: D and A = C − K between all points, C what is not dynamic.
+ * A row between two nodes is linear, so both are quadratic there: tabulated as squares of nodes and products of
+ * neighbours, they are exactly the bilinear form of the interpolated rows. */
 #include "problem/gk_work.h"
 
 /* Σ a b over modes between all points: rows of one node, and mixed with those of the next (NULL: none) */
@@ -33,8 +33,8 @@ static double weighed(const double *a, const double *b, const double *by, int n)
     return sum;
 }
 
-/* what gaps and bores read of the gear, per oscillator of its part: rigid motion as in a pose, then the angle of its bore;
- * returns how many */
+/* what gaps and bores read of the gear, per oscillator of its part: rigid motion as in a pose, then the angle of its
+ * bore; returns how many */
 static int common_rows(const gk_model *model, const gk_setup *setup, const gk_side *side, const double *rows[COMMON])
 {
     static const double nothing[MAX_GROUND + 4 * MAX_ROTORS];

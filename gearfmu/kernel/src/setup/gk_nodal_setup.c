@@ -88,7 +88,7 @@ static double line_compliance(const gk_model *model, const gk_mesh *mesh, double
     return depth / (1.5 * load);
 }
 
-/* ---- rows at points -------------------- */
+/* ---- rows at points ---------------------------------------------------------------------------------------------- */
 /* Weights of the model's rolls for the displacement at a point of the flank, at the arc length p from its form circle.
  * Rows are means over the load strip, p ± w, clipped at the ends of the flank: the value at a point is that of the
  * strip whose middle it is; within w/2 of an end, where there is none, it goes on straight. */
@@ -148,7 +148,7 @@ void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g)
     }
 }
 
-/* ---- an engagement -------------------- */
+/* ---- an engagement ----------------------------------------------------------------------------------------------- */
 void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh)
 {
     const gk_engagement *e = &model->engagement[mesh->index];

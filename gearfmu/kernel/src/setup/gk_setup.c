@@ -66,7 +66,7 @@ static void count_engagements(const gk_model *model, gk_setup *setup)
         for (int w = 0; w < 2; w++) setup->engagements_of[model->engagement[e].gear[w]]++;
 }
 
-/* ---- layout ------------------------------------------------------------------------------------------------------- */
+/* ---- layout ------------------------------------------------------------------------------------------------------ */
 static void lay_out_modal(bump *b, const gk_gear *gear, gk_modal *m, int modes)
 {
     m->count = modes;
@@ -275,7 +275,7 @@ size_t gk_data_size(const gk_model *model)
 
 size_t gk_state_size(const gk_setup *setup) { return setup->state_size; }
 
-/* ---- which oscillators are dynamic --------------------------------------------------------------------------------- */
+/* ---- which oscillators are dynamic ------------------------------------------------------------------------------- */
 /* number of modes below the wished cut, moved to the widest relative gap within 15 %: never inside a cluster, never
  * inside a pair */
 static int modes_below(const gk_gear *gear, double cut_hz)
@@ -308,8 +308,8 @@ static int modes_at_level(const gk_model *model, const gk_setup *setup, int g)
     }
 }
 
-/* what moves rigidly is dynamic at every level; of the rest what lies below the cut. Rigid gears whose bores are held do
- * not move. */
+/* what moves rigidly is dynamic at every level; of the rest what lies below the cut. Rigid gears whose bores are
+ * held do not move. */
 static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
 {
     const gk_ground *ground = &model->ground[setup->base.set];
@@ -341,7 +341,7 @@ static int list_ground(const gk_model *model, const gk_setup *setup, int32_t *wh
     return n;
 }
 
-/* ---- filling ---------------------------------------------------------------------------------------------------------- */
+/* ---- filling ----------------------------------------------------------------------------------------------------- */
 static void fill_modal(const gk_gear *gear, gk_modal *m)
 {
     const int P = m->pairs, n = m->n;
@@ -614,7 +614,7 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
     memset(work->ground_zero, 0, ground);
 }
 
-/* ---- level and integrator ---------------------------------------------------------------------------------------------- */
+/* ---- level and integrator ---------------------------------------------------------------------------------------- */
 static int has_nodes(const gk_model *model, const gk_data *data)
 {
     int all = model->engagements > 0;
@@ -654,8 +654,8 @@ static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_
     return GK_OK;
 }
 
-/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal contact,
- * rk45 (dg4 and lines of contact where a clutch hangs on a port) */
+/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal
+ * contact, rk45 (dg4 and lines of contact where a clutch hangs on a port) */
 static gk_outcome choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
 {
     double damping = 0.0;

@@ -1,5 +1,5 @@
-/* What is fixed once level, effects and step are chosen: dynamic oscillators, tables of rows and of compliance along the
- * path of contact, coefficients of the joints. */
+/* What is fixed once level, effects and step are chosen: dynamic oscillators, tables of rows and of compliance along
+ * the path of contact, coefficients of the joints. */
 #ifndef GK_SETUP_H
 #define GK_SETUP_H
 #include "base/gk_math.h"
@@ -100,7 +100,7 @@ typedef struct gk_side {
                                rigid motion, at the nominal place of contact */
     gk_real
         *residual; /* (nodes + 1, points, 2, columns): C of what is not dynamic at the node, and mixed with the next, so
-                          that the whole of C is a parabola between nodes at every level; points: strips of the candidates */
+                          that all of C is a parabola between nodes at every level; points: strips of the candidates */
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     int port_of;   /* the port that the gear feels, −1: none */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
@@ -180,10 +180,10 @@ struct gk_setup {
     gk_integrator integrator;
     gk_effects on;
     int slices;
-    int nodal; /* contact by nodes and penalty, else by lines */
-    int spatial; /* axial motion and tilt count, every strip has a gap of its own; else the strips of a tooth pair share it */
+    int nodal;   /* contact by nodes and penalty, else by lines */
+    int spatial; /* axial motion and tilt count, every strip has its own gap; else those of a tooth pair share one */
     int engagements_of[MAX_GEARS];
-    int strips; /* contact rows of a tooth pair: slices, or half of them where both halves of the face width do the same */
+    int strips; /* contact rows of a tooth pair: slices, or half of them where both halves of the width do the same */
     int spins;
     double h, gamma_at[GAMMAS];
     double inverse_inertia[MAX_SPINS];

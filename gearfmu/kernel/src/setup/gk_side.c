@@ -13,7 +13,7 @@ static double tan_of(double angle)
     return sine / cosine;
 }
 
-/* ---- which teeth ----------------------------------------------------------------------------------------------- */
+/* ---- which teeth ------------------------------------------------------------------------------------------------- */
 /* lengths of roll of this side between which the other side has a flank, corners included */
 static void span(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int which, double ends[2])
 {
@@ -369,8 +369,8 @@ static void tabulate(const node *n, const place *p, const place *q, double *cell
         }
 }
 
-/* the same between two candidates, (strips, strips); 0 when they are too far apart for the table: what stored modes carry
- * is all there is then */
+/* the same between two candidates, (strips, strips); 0 when they are too far apart for the table: what stored modes
+ * carry is all there is then */
 static int tabulated(const node *n, int first, int second, double *out)
 {
     const int A = n->model->functions, strips = n->setup->strips;
@@ -425,8 +425,8 @@ static double carried_halfway(const node *n, int at, int i, int j)
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 
-/* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its damper
- * is parallel to. Halfway to the next node: what makes the parabola there right. */
+/* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its
+ * damper is parallel to. Halfway to the next node: what makes the parabola there right. */
 static void store_block(const node *n, int at, int halfway, const double *still, int p, int q)
 {
     const gk_side *side = n->side;
@@ -514,7 +514,7 @@ static void store_ground(const node *n, int at)
     }
 }
 
-/* ---- all of them -------------------------------------------------------------------------------------------------- */
+/* ---- all of them ------------------------------------------------------------------------------------------------- */
 static node begin_node(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
 {
     node n = {

@@ -54,9 +54,9 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engag
         row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
 }
 
-/* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks and
- * past their ends by no more than `past`; of a strip that has left them the end next to them. A roll at z is s + sg z tan
- * β_b, β_b of its own gear. */
+/* The part of a strip that carries, where the rolls of both flanks at mid-width are `roll`: what lies on both flanks
+ * and past their ends by no more than `past`; of a strip that has left them the end next to them. A roll at z is s +
+ * sg z tan β_b, β_b of its own gear. */
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
                        const double roll[2], int strip)
 {
@@ -79,9 +79,10 @@ gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_me
     };
 }
 
-/* The tip edge carries a line of contact on past the end of its flank: by the half-width of the load strip, over which the
- * contact patch leaves the flank; farther where a slice spans less roll than that, without end for spur teeth, whose strips
- * leave the flank as a whole. Longer parts of coarse slices would carry at the gap of their middle alone. */
+/* The tip edge carries a line of contact on past the end of its flank: by the half-width of the load strip, over
+ * which the contact patch leaves the flank; farther where a slice spans less roll than that, without end for spur
+ * teeth, whose strips leave the flank as a whole. Longer parts of coarse slices would carry at the gap of their
+ * middle alone. */
 static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_gear *gear, double helix)
 {
     if (!GK_ON(setup, tip_contact) || e->kind == MESH_FLAT) return 0.0;
