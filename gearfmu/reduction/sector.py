@@ -8,10 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Harmonic, Sector, SectorSpace, sector_spaces
+from gearfmu.fem.spinning import centrifugal_load, stress_stiffness
 from gearfmu.reduction.flank import Points, ToothFlank, flank_loads
 
 
@@ -62,7 +64,7 @@ class SectorBody:
             mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
             bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
         )  # fmt: skip
-        self.spaces = sector_spaces(sector)
+        self.material, self.spaces = material, sector_spaces(sector)
         self._inputs = [self._space_inputs(space) for space in self.spaces]
 
     @cached_property
@@ -119,6 +121,20 @@ class SectorBody:
         """Mass matrix of the whole rigid body about the origin, (6, 6): kg, kg·m, kg·m²."""
         fields = rigid_modes(self.mesh.nodes)
         return turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
+
+    @cached_property
+    def growth(self) -> np.ndarray:
+        """Displacement (3N,) of the sector under centrifugal load per square of the speed, m·s²."""
+        load = centrifugal_load(self.mesh.nodes, self.mass_matrix)
+        space = self.spaces[0]  # symmetric about mid-width, or all fields
+        harmonic = space.harmonic(0)
+        grown = harmonic.flexibility(harmonic.reduce((space.from_nodes @ load)[:, None]))
+        return (space.to_nodes @ harmonic.expand(grown))[:, 0]
+
+    @cached_property
+    def stress_stiffness(self) -> sp.csr_array:
+        """K_σ (N, N) of the stresses of that load, kg, the same for each component."""
+        return stress_stiffness(self.mesh.nodes, self.mesh.elements, self.material, self.growth)
 
     def rigid_rows(self) -> np.ndarray:
         """Flank rows of the six rigid motions: (2·R·A, 6)."""
