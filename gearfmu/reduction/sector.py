@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Harmonic, Sector, SectorSpace, sector_spaces
-from gearfmu.fem.spinning import centrifugal_load, stress_stiffness
+from gearfmu.fem.spinning import growth, stress_stiffness
 from gearfmu.reduction.flank import Points, ToothFlank, flank_loads
 
 
@@ -125,11 +125,7 @@ class SectorBody:
     @cached_property
     def growth(self) -> np.ndarray:
         """Displacement (3N,) of the sector under centrifugal load per square of the speed, m·s²."""
-        load = centrifugal_load(self.mesh.nodes, self.mass_matrix)
-        space = self.spaces[0]  # symmetric about mid-width, or all fields
-        harmonic = space.harmonic(0)
-        grown = harmonic.flexibility(harmonic.reduce((space.from_nodes @ load)[:, None]))
-        return (space.to_nodes @ harmonic.expand(grown))[:, 0]
+        return growth(self.spaces[0], self.mesh.nodes, self.mass_matrix)
 
     @cached_property
     def stress_stiffness(self) -> sp.csr_array:

@@ -27,6 +27,7 @@ from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.nodal import nodal_sections
 from gearfmu.stage.observed import observed_number, observed_sections
+from gearfmu.stage.spinning import turn_rates
 from gearfmu.stage.tables import ROLLS
 from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
 
@@ -173,8 +174,10 @@ def _gear_sections(
     name, chosen = stage.gears[index].name, flank.chosen
     meshes = sum(name in mesh.gears for mesh in stage.engagements)
     tables = flank_sections(index, groups, nodes)
+    rates = turn_rates(body, chosen)
+    turning = {} if rates is None else {f"turn_rate{index}": rates}
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
-    return tables | {
+    return tables | turning | {
         f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
         f"omega{index}": 2 * np.pi * body.frequency[chosen],
         f"zeta{index}": body.damping_ratio[chosen],
@@ -212,7 +215,9 @@ def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[in
 def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
     carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
-    return carried | {
+    rotors, whirls = group.whirl_rows()
+    whirling = {"whirl": rotors.astype(np.int32), f"whirl_rows{number}": whirls} if rotors.size else {}
+    return carried | whirling | {
         f"omega_ground{number}": group.omega,
         f"zeta_ground{number}": group.zeta,
         f"rigid_share{number}": group.rigid_share,
