@@ -208,7 +208,11 @@ def _spin_entries() -> tuple[Entry, ...]:
             "flank rows of tooth 0 under centrifugal load per square of the speed",
         ),
         Entry(
-            "spin/inertia", "spin.inertia", (), "kg.m2.s2", "what that adds to the polar inertia per square of the speed"
+            "spin/inertia",
+            "spin.inertia",
+            (),
+            "kg.m2.s2",
+            "what that adds to the polar inertia per square of the speed",
         ),
     )
 
@@ -226,8 +230,8 @@ GROUPS = {
 
 def entries_of(groups: Iterable[str]) -> tuple[Entry, ...]:
     """The datasets of a body: those of every gear, and of the `groups` that it has besides: "rim" (an internal gear),
-    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface in all modes), "spin" (what
-    modes feel when the body turns)."""
+    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface in all modes),
+    "spin" (what modes feel when the body turns)."""
     return (*ENTRIES, *(entry for name in GROUPS if name in groups for entry in GROUPS[name]))
 
 

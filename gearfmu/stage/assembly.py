@@ -60,10 +60,7 @@ def general_sections(
     observe: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
-    stage, carriers = as_general(spec), {}
-    if isinstance(spec, PlanetarySpec):
-        *bodies, carrier = set_gears(spec, bodies)
-        carriers = {stage.carriers[0].name: carrier}
+    stage, bodies, carriers = _parted(spec, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
@@ -96,6 +93,23 @@ def general_sections(
     for name in observe:
         sections |= observed_sections(observed_number(stage, name), bodies, groups)
     return sections
+
+
+def stage_group(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]) -> Group:
+    """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    stage, bodies, carriers = _parted(spec, bodies)
+    return mount(stage_layout(stage, bodies, carriers=carriers))
+
+
+def _parted(
+    spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]
+) -> tuple[GeneralStage, Sequence[Any], dict[str, InterfaceBody]]:
+    """The stage in general terms, the bodies of its gears, and its carriers' by name."""
+    stage = as_general(spec)
+    if not isinstance(spec, PlanetarySpec):
+        return stage, bodies, {}
+    *gears, carrier = set_gears(spec, bodies)
+    return stage, gears, {stage.carriers[0].name: carrier}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:
@@ -177,13 +191,17 @@ def _gear_sections(
     rates = turn_rates(body, chosen)
     turning = {} if rates is None else {f"turn_rate{index}": rates}
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
-    return tables | turning | {
-        f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
-        f"omega{index}": 2 * np.pi * body.frequency[chosen],
-        f"zeta{index}": body.damping_ratio[chosen],
-        f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
-        f"member{index}": body.part[chosen].astype(np.int32),
-    }
+    return (
+        tables
+        | turning
+        | {
+            f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
+            f"omega{index}": 2 * np.pi * body.frequency[chosen],
+            f"zeta{index}": body.damping_ratio[chosen],
+            f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
+            f"member{index}": body.part[chosen].astype(np.int32),
+        }
+    )
 
 
 def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
@@ -217,19 +235,23 @@ def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) ->
     carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
     rotors, whirls = group.whirl_rows()
     whirling = {"whirl": rotors.astype(np.int32), f"whirl_rows{number}": whirls} if rotors.size else {}
-    return carried | whirling | {
-        f"omega_ground{number}": group.omega,
-        f"zeta_ground{number}": group.zeta,
-        f"rigid_share{number}": group.rigid_share,
-        f"damper_rows{number}": group.damper_rows,
-        f"damper{number}": group.damper,
-        f"support_rows{number}": group.support_rows,
-        f"support_compliance{number}": np.diag(group.support_compliance),
-        f"kappa{number}": group.kappa,
-        f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
-            len(nodes), group.omega.size
-        ),
-    }
+    return (
+        carried
+        | whirling
+        | {
+            f"omega_ground{number}": group.omega,
+            f"zeta_ground{number}": group.zeta,
+            f"rigid_share{number}": group.rigid_share,
+            f"damper_rows{number}": group.damper_rows,
+            f"damper{number}": group.damper,
+            f"support_rows{number}": group.support_rows,
+            f"support_compliance{number}": np.diag(group.support_compliance),
+            f"kappa{number}": group.kappa,
+            f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
+                len(nodes), group.omega.size
+            ),
+        }
+    )
 
 
 def port_nodes(

@@ -116,9 +116,7 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
 def free_shaft(name: str, beam: BeamBody, damping_ratio: float) -> FreeBody:
     """The FreeBody of a shaft, its origin the centre of mass; all its modes with one damping ratio."""
     zeta, spinning = np.full(beam.omega.size, damping_ratio), shaft_spinning(beam)
-    return FreeBody(
-        name, beam.mass, beam.omega, zeta, beam.place, beam.rows, beam.residual, spinning=spinning
-    )
+    return FreeBody(name, beam.mass, beam.omega, zeta, beam.place, beam.rows, beam.residual, spinning=spinning)
 
 
 def free_carrier(body: InterfaceBody) -> FreeBody:

@@ -170,8 +170,8 @@ class Group:
         return rows
 
     def whirl_rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rotors (p,) and rows x, y (p, 2, n) of gyroscopic forces, those of the bodies' own rotors and of the axes that
-        they stand in (`spinning`): speeds change by −2Ω (y x·v − x y·v)."""
+        """Rotors (p,) and rows x, y (p, 2, n) of gyroscopic forces, those of the bodies' own rotors and of the axes
+        that they stand in (`spinning`): speeds change by −2Ω (y x·v − x y·v)."""
         rotors, rows = [], []
         for r, rotor in enumerate(self.layout.rotors):
             for body in rotor if r not in self.layout.stands else ():

@@ -1,4 +1,4 @@
-"""What finite elements feel when they turn, against the thin rotating ring (Bryan 1890) and the whole of a small gear."""
+"""What finite elements feel when they turn, against the thin rotating ring (Bryan 1890) and a small gear as a whole."""
 
 from __future__ import annotations
 
@@ -30,9 +30,7 @@ def ring() -> SimpleNamespace:
     """A thin ring as `family_spin` takes a body, and the space of its motion in the plane."""
     mesh = ring_sector((1, 2, 2), RADIUS - THICKNESS / 2, RADIUS + THICKNESS / 2, HEIGHT, SECTORS)
     stiffness, mass = hex20.assemble(mesh.nodes, mesh.elements, STEEL)
-    space = sector_spaces(
-        Sector(mesh.nodes, mesh.elements, stiffness, mass, SECTORS, mesh.cut_minus, mesh.cut_plus)
-    )[0]
+    space = sector_spaces(Sector(mesh.nodes, mesh.elements, stiffness, mass, SECTORS, mesh.cut_minus, mesh.cut_plus))[0]
     grown = growth(space, mesh.nodes, mass)
     stress = stress_stiffness(mesh.nodes, mesh.elements, STEEL, grown)
     return SimpleNamespace(

@@ -1,5 +1,5 @@
-"""Gyroscopic and Coriolis forces in the kernel: free flight of the small pair after a kick against the exponential of its
-linear system, order of the step, energy, and the explicit peers."""
+"""Gyroscopic and Coriolis forces in the kernel: free flight of the small pair after a kick against the exponential of
+its linear system, order of the step, energy, and the explicit peers."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ VIBRATING = 1e-3  # m/s·√kg: some tenths of a micrometre
 
 @cache
 def spinning_blob(known: bool = True) -> bytes:
-    """The small pair without dashpots at its bearings; with all ground patterns of the pinion in two pairs, those of the
-    gear group turning forth and back."""
+    """The small pair without dashpots at its bearings; with all ground patterns of the pinion in two pairs, those of
+    the gear group turning forth and back."""
     sections: dict[str, Any] = dict(read_blob(pair_blob(("torque", "torque"))))
     rng = np.random.default_rng(5)
     for s in (0, 1):

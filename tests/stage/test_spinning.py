@@ -75,7 +75,7 @@ TILTS = np.array([3e8, 3e8, 1e8, 6e4, 6e4])
 
 
 def test_what_a_carrier_carries_tilts_by_both_speeds() -> None:
-    """In axes that turn at Ω_f a disc of speed Ω has 2 (Ω_f J_t − ½ Ω J_p) between its tilts, the carrier with Ω = Ω_f."""
+    """In axes that turn at Ω_f a disc of speed Ω has 2 (Ω_f J_t − ½ Ω J_p) between its tilts, the carrier Ω = Ω_f."""
     bodies = [disc("planet", 0.5, 2e-4, 3.5e-4), disc("carrier", 2.0, 3e-3, 5e-3)]
     pin = Support("pin", (0, 0), (1, 0), (0, 1, 2, 3, 4), np.diag(1 / TILTS), np.zeros(5))
     layout = Layout(bodies, [(0,), (1,)], [pin, bearing("bearing", (1, 0), TILTS)], False, carried={0: (1, 0.05, 0.0)})

@@ -4,7 +4,18 @@
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
-typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED, SPINNING, OBSERVED } gk_exists;
+typedef enum {
+    ALWAYS,
+    SPRING,
+    TORQUE,
+    FIXED,
+    SPRING_OR_FIXED,
+    CHAIN,
+    SLICES_DIFFER,
+    CARRIED,
+    SPINNING,
+    OBSERVED
+} gk_exists;
 enum {
     STAGE = SCOPE_STAGE,
     SHAFT = SCOPE_SHAFT,
@@ -291,6 +302,7 @@ gk_effects gk_effects_of(const gk_data *data)
     const gk_effects on = {v[V_E_ELASTIC] != 0,     v[V_E_RESIDUAL] != 0, v[V_E_LOCAL] != 0,
                            v[V_E_COAST] != 0,       v[V_E_DAMPING] != 0,  v[V_E_RELIEF] != 0,
                            v[V_E_CORNER] != 0,      v[V_E_BEARING] != 0,  v[V_E_MODAL_DAMPING] != 0,
-                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0, v[V_E_GYROSCOPIC] != 0};
+                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0,
+                           v[V_E_GYROSCOPIC] != 0};
     return on;
 }
