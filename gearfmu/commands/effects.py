@@ -141,21 +141,20 @@ def _whirling(model: Any) -> str:
     """What turning does to the frequencies of the ground oscillators, at speed_max."""
     from gearfmu.body import load_bodies
     from gearfmu.stage.assembly import stage_group
-    from gearfmu.stage.inertia import largest_speeds, rotor_speeds, whirl_shift
+    from gearfmu.stage.inertia import whirl_shift
 
-    speeds = rotor_speeds(model.stage, largest_speeds(model.stage))
-    shift = whirl_shift(stage_group(model.spec, load_bodies(model.spec)), speeds, WHIRL_BAND)
+    shift = whirl_shift(model.stage, stage_group(model.spec, load_bodies(model.spec)), WHIRL_BAND)
     return f"at speed_max frequencies below {WHIRL_BAND / 1e3:g} kHz move by up to {shift:.2%}" + _idle(shift == 0.0)
 
 
 def _left_out(stage: str) -> Iterable[str]:
     """Sizes of what is left out, a line for every gear whose file tells."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.spec.expand import as_general
+    from gearfmu.stage.assembly import gear_bodies
     from gearfmu.stage.inertia import inertia_terms
 
-    spec, bodies = bodies_of(stage)
-    for gear in inertia_terms(as_general(spec), bodies):
+    general, bodies, _ = gear_bodies(*bodies_of(stage))
+    for gear in inertia_terms(general, bodies):
         yield (
             f"{gear.name} at {gear.speed:.0f} rad/s: stiffening {gear.stiffening:.1e} (Coriolis forces of the same "
             f"modes {gear.whirl:.1e}), stretch {1e6 * gear.growth:.2f} µm (the tooth yields "

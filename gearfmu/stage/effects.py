@@ -263,11 +263,11 @@ EFFECTS: tuple[Effect, ...] = (
         "gyroscopic",
         title="gyroscopic and Coriolis forces on tilting and elastic bodies",
         formula="v̇ = −2 (Ω H + Ω_f Q) v; of tilts H = −½ J_p J: moment J_p Ω θ̇",
-        equation="3.11 (eqs. 17h, 17i)",
+        equation="3.11 (eqs. 17i to 17k)",
         matters=(
             "where something that tilts or bends turns fast: Δω/ω of the size of Ω J_p/(2 J_t ω). Helical pairs and "
-            "trains with their shafts: at speed_max frequencies below 15 kHz move by 3 % (helical_demo) and 18 % "
-            "(two_stage), those of planetary54 by 0.3 %; elastic patterns alone by 2Ωg/ω, g up to 0.8"
+            "trains with their shafts, planets on their pins: at speed_max frequencies below 15 kHz move by 2 % "
+            "(helical_demo), 5 % (two_stage), 4 % (planetary54); elastic patterns alone by Ωg/ω, 0.4 % on fzg_c"
         ),
         off="bodies tilt and vibrate as at rest",
         code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",

@@ -7,7 +7,7 @@ A gear's numbers need its file's group "spin" (`ReducedBody.spin`); what has non
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.shapes import gear_shape
+from gearfmu.spec.turning import turns
 from gearfmu.stage.groups import Group
 from gearfmu.stage.spinning import turn_rates
 
@@ -68,15 +69,15 @@ class GearInertia:
 
 
 def largest_speeds(stage: GeneralStage) -> dict[str, float]:
-    """rad/s, of every gear: from speed_max of its engagements."""
-    speeds: dict[str, float] = {}
-    gears = {gear.name: gear for gear in stage.gears}
+    """rad/s, of every rotor that is geared to the first port: the stage turns so fast that one engagement has its
+    speed_max, in the axes in which it stands."""
+    per = {name: float(speed) for name, speed in turns(stage, next(iter(stage.ports))).items()}
+    units = []
     for mesh in stage.engagements:
-        first, second = (gears[name] for name in mesh.gears)
-        other = mesh.speed_max * first.teeth / second.teeth
-        for name, speed in zip(mesh.gears, (mesh.speed_max, other), strict=True):
-            speeds[name] = max(speed, speeds.get(name, 0.0))
-    return speeds
+        rotor = stage.rotor_of(mesh.gears[0])
+        relative = per.get(rotor, 0.0) - per.get(stage.rotors[rotor].carried_by or "", 0.0)
+        units += [mesh.speed_max / abs(relative)] if relative else []
+    return {name: speed * min(units, default=0.0) for name, speed in per.items()}
 
 
 def gear_inertia(name: str, body: Any, speed: float, force: float, cut: float) -> GearInertia | None:
@@ -100,11 +101,13 @@ def gear_inertia(name: str, body: Any, speed: float, force: float, cut: float) -
 
 
 def inertia_terms(stage: GeneralStage, bodies: Sequence[Any]) -> list[GearInertia]:
-    """Of the gears of a stage whose files tell. bodies: those of its gears, in their order, others behind them."""
+    """Of the gears of a stage whose files tell; bodies: those of its gears, in their order."""
     speeds, force = largest_speeds(stage), largest_forces(stage)
     found = [
-        gear_inertia(gear.name, body, speeds[gear.name], force[gear.name], stage.levels.fast_cut)
-        for gear, body in zip(stage.gears, bodies, strict=False)
+        gear_inertia(
+            gear.name, body, abs(speeds.get(stage.rotor_of(gear.name), 0.0)), force[gear.name], stage.levels.fast_cut
+        )
+        for gear, body in zip(stage.gears, bodies, strict=True)
     ]
     return [gear for gear in found if gear is not None]
 
@@ -120,8 +123,10 @@ def largest_forces(stage: GeneralStage) -> dict[str, float]:
     return forces
 
 
-def whirl_shift(group: Group, speeds: Sequence[float], cut: float) -> float:
-    """Largest |Δω/ω| of the ground oscillators up to `cut` (Hz), their rotors at these speeds (rad/s)."""
+def whirl_shift(stage: GeneralStage, group: Group, cut: float) -> float:
+    """Largest |Δω/ω| of the ground oscillators up to `cut` (Hz) by gyroscopic forces, at the largest speeds."""
+    known = largest_speeds(stage)
+    speeds = [known.get(name, 0.0) for name in stage.rotors]
     low = group.omega < 2 * math.pi * cut
     omega, coupling = group.omega[low], np.zeros(2 * (int(low.sum()),))
     for rotor, (x, y) in zip(*group.whirl_rows(), strict=True):
@@ -129,8 +134,3 @@ def whirl_shift(group: Group, speeds: Sequence[float], cut: float) -> float:
     matrix = np.block([[np.zeros_like(coupling), np.diag(omega)], [-np.diag(omega), -2 * coupling]])
     whirling = np.sort(np.abs(np.linalg.eigvals(matrix).imag))[::2]
     return float(np.abs(whirling / omega - 1).max(initial=0.0))
-
-
-def rotor_speeds(stage: GeneralStage, speeds: Mapping[str, float]) -> list[float]:
-    """rad/s, of every rotor: that of its fastest gear, 0 where it has none."""
-    return [max((speeds.get(name, 0.0) for name in rotor.bodies), default=0.0) for rotor in stage.rotors.values()]

@@ -1,6 +1,6 @@
 /* What turning does to masses beside the conservative step (docs/theory.md, 3.10), half a step each beside the dashpots
  * of the supports. Coriolis forces on what a carrier carries (17f) and gyroscopic forces of tilting and elastic bodies
- * (17h): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation by Cayley's form,
+ * (17k): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation by Cayley's form,
  * without energy; one after the other, and in the other half step in the other order. Centrifugal load m Ω² a (17g). */
 #include "integrate/gk_integrate.h"
 
