@@ -7,7 +7,7 @@ whirls for 1 ms. Exudyn gets the whole finite-element mesh, its M and K, and the
 of an ObjectFFRFreducedOrder: Coriolis, centrifugal and Euler terms are its own, quadratic in the deformation. Here the
 same modes are those of one sector, their coupling, load and gyroscopic moment as a stage takes them (gearfmu/stage/
 spinning.py), patterns of ν ≤ 1 in axes that do not turn, the others in the gear's own; the linear system is solved
-exactly, which is what the kernel does to 4e-6 in steps of 2 µs (tests/kernel/test_spinning.py).
+exactly, which is what the kernel does to 4e-6 in steps of 2 µs (tests/kernel/test_gyroscopic.py).
 
 Prints and writes exudyn_rotor.csv: speed, step of Exudyn (0: extrapolated from its two finest runs), differences
 (largest over largest) of the bore's motion, of the modes of ν ≥ 2, and of the mean growth of the fan mode of ν = 0;

@@ -150,11 +150,12 @@ def _whirling(model: Any) -> str:
 def _left_out(stage: str) -> Iterable[str]:
     """Sizes of what is left out, a line for every gear whose file tells."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.stage.assembly import gear_bodies
+    from gearfmu.spec.expand import as_general
     from gearfmu.stage.inertia import inertia_terms
+    from gearfmu.stage.observed import gear_bodies
 
-    general, bodies, _ = gear_bodies(*bodies_of(stage))
-    for gear in inertia_terms(general, bodies):
+    spec, bodies = bodies_of(stage)
+    for gear in inertia_terms(as_general(spec), gear_bodies(spec, bodies)):
         yield (
             f"{gear.name} at {gear.speed:.0f} rad/s: stiffening {gear.stiffening:.1e} (Coriolis forces of the same "
             f"modes {gear.whirl:.1e}), stretch {1e6 * gear.growth:.2f} µm (the tooth yields "

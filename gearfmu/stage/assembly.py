@@ -60,7 +60,7 @@ def general_sections(
     observe: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
-    stage, bodies, carriers = gear_bodies(spec, bodies)
+    stage, bodies, carriers = _parted(spec, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
@@ -97,11 +97,11 @@ def general_sections(
 
 def stage_group(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
-    stage, bodies, carriers = gear_bodies(spec, bodies)
+    stage, bodies, carriers = _parted(spec, bodies)
     return mount(stage_layout(stage, bodies, carriers=carriers))
 
 
-def gear_bodies(
+def _parted(
     spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]
 ) -> tuple[GeneralStage, Sequence[Any], dict[str, InterfaceBody]]:
     """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""

@@ -271,7 +271,7 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         off="bodies tilt and vibrate as at rest",
         code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",
-        test="tests/kernel/test_spinning.py::test_a_kicked_pair_whirls_as_its_linear_system",
+        test="tests/kernel/test_gyroscopic.py::test_a_kicked_pair_whirls_as_its_linear_system",
         carried=True,
     ),
 )

@@ -7,7 +7,7 @@ A gear's numbers need its file's group "spin" (`ReducedBody.spin`); what has non
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,14 +100,13 @@ def gear_inertia(name: str, body: Any, speed: float, force: float, cut: float) -
     )
 
 
-def inertia_terms(stage: GeneralStage, bodies: Sequence[Any]) -> list[GearInertia]:
-    """Of the gears of a stage whose files tell; bodies: those of its gears, in their order."""
+def inertia_terms(stage: GeneralStage, bodies: Mapping[str, Any]) -> list[GearInertia]:
+    """Of the gears of a stage whose files tell; bodies: by name (`observed.gear_bodies`)."""
     speeds, force = largest_speeds(stage), largest_forces(stage)
     found = [
-        gear_inertia(
-            gear.name, body, abs(speeds.get(stage.rotor_of(gear.name), 0.0)), force[gear.name], stage.levels.fast_cut
-        )
-        for gear, body in zip(stage.gears, bodies, strict=True)
+        gear_inertia(name, body, abs(speeds.get(stage.rotor_of(name), 0.0)), force[name], stage.levels.fast_cut)
+        for name, body in bodies.items()
+        if name in force
     ]
     return [gear for gear in found if gear is not None]
 

@@ -39,11 +39,14 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
  * Ωh times its rate, with the cosine and sine of Cayley's form. angle: Ωh. */
 void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to)
 {
+    const int halves = 2 * m->pairs / LANES;
     const gk_real half = (gk_real)(0.5 * angle);
-    for (int i = 0; i < m->pairs; i++) {
-        const gk_real t = half * m->turn_rate[i], s = 2 * t / (1 + t * t), v = from[i], w = from[m->pairs + i];
-        to[i] = v + s * (w - t * v);
-        to[m->pairs + i] = w - s * (v + t * w);
+    const gk_half *rate = (const gk_half *)m->turn_rate, *v = (const gk_half *)from, *w = v + halves;
+    gk_half *first = (gk_half *)to, *second = first + halves;
+    for (int i = 0; i < halves; i++) {
+        const gk_half t = half * rate[i], s = (t + t) / (1 + t * t), a = v[i], b = w[i];
+        first[i] = a + s * (b - t * a);
+        second[i] = b - s * (a + t * b);
     }
 }
 
