@@ -40,6 +40,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.stage.free import FreeBody
 from gearfmu.stage.groups import Layout, Support, mount
 from gearfmu.stage.spinning import gear_spinning, turn_rates
+from gearfmu.stage.whirls import whirl_rows
 
 COARSE = MeshSpec(flank=2, thickness=1, root=2, rim=1, width=2)
 MODES, SPEEDS, STEPS = 18, (300.0, 600.0, 1200.0), (1e-6, 5e-7, 2.5e-7)
@@ -107,7 +108,7 @@ def our_motion(rotor: Rotor, speed: float, times: np.ndarray, known: bool = True
     springs = [Support(f"end{i}", (0, i), None, (0, 1, 2), spring, np.zeros(3)) for i in (0, 1)]
     group = mount(Layout([free], [(0,)], springs, planar=False))
     coupling = sum(
-        (np.outer(y, x) - np.outer(x, y) for _, (x, y) in zip(*group.whirl_rows(), strict=True)),
+        (np.outer(y, x) - np.outer(x, y) for _, (x, y) in zip(*whirl_rows(group), strict=True)),
         np.zeros(2 * group.omega.shape),
     )
     raw = np.zeros(group.at[0].stop)  # x, y, z, rx, ry, patterns

@@ -30,6 +30,7 @@ from gearfmu.stage.observed import observed_number, observed_sections
 from gearfmu.stage.spinning import turn_rates
 from gearfmu.stage.tables import ROLLS
 from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
+from gearfmu.stage.whirls import whirl_rows
 
 MODEL_VERSION = 2
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
@@ -233,7 +234,7 @@ def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[in
 def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
     carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
-    rotors, whirls = group.whirl_rows()
+    rotors, whirls = whirl_rows(group)
     whirling = {"whirl": rotors.astype(np.int32), f"whirl_rows{number}": whirls} if rotors.size else {}
     return (
         carried

@@ -31,7 +31,6 @@ from scipy.sparse.csgraph import connected_components
 
 from gearfmu.errors import ModelError
 from gearfmu.stage.free import FreeBody
-from gearfmu.stage.spinning import rigid_spinning, skew_pairs
 
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -168,26 +167,6 @@ class Group:
             mass = self.layout.bodies[body].mass
             rows[i] = mass[:2] @ self.rigid(body) / math.sqrt(mass[0, 0])
         return rows
-
-    def whirl_rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rotors (p,) and rows x, y (p, 2, n) of gyroscopic forces, those of the bodies' own rotors and of the axes
-        that they stand in (`spinning`): speeds change by −2Ω (y x·v − x y·v)."""
-        rotors, rows = [], []
-        for r, rotor in enumerate(self.layout.rotors):
-            for body in rotor if r not in self.layout.stands else ():
-                free, frame = self.layout.bodies[body], self.layout.frame_of(body)
-                own = free.spinning or rigid_spinning(free.mass, free.omega.size)
-                for turns, matrix in ((r, own.gyroscopic), (frame, own.coriolis)):
-                    if turns >= 0:
-                        found = skew_pairs(matrix[np.ix_(*2 * [self._unknowns(body)])]) @ self.shapes[self.at[body]]
-                        rotors += len(found) * [turns]
-                        rows += list(found)
-        return np.array(rotors, int), np.array(rows).reshape(-1, 2, self.omega.size)
-
-    def _unknowns(self, body: int) -> np.ndarray:
-        """Which of the rigid motions and patterns of a body are unknowns."""
-        freedoms = list(self.layout.freedoms(body))
-        return np.array(freedoms + list(range(6, 6 + self.layout.bodies[body].omega.size)), int)
 
     def rigid(self, body: int) -> np.ndarray:
         """(6, n): rigid motion of a body about its origin."""

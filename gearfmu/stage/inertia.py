@@ -18,6 +18,7 @@ from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.turning import turns
 from gearfmu.stage.groups import Group
 from gearfmu.stage.spinning import turn_rates
+from gearfmu.stage.whirls import whirl_rows
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,7 @@ def whirl_shift(stage: GeneralStage, group: Group, cut: float) -> float:
     speeds = [known.get(name, 0.0) for name in stage.rotors]
     low = group.omega < 2 * math.pi * cut
     omega, coupling = group.omega[low], np.zeros(2 * (int(low.sum()),))
-    for rotor, (x, y) in zip(*group.whirl_rows(), strict=True):
+    for rotor, (x, y) in zip(*whirl_rows(group), strict=True):
         coupling += speeds[rotor] * (np.outer(y[low], x[low]) - np.outer(x[low], y[low]))
     matrix = np.block([[np.zeros_like(coupling), np.diag(omega)], [-np.diag(omega), -2 * coupling]])
     whirling = np.sort(np.abs(np.linalg.eigvals(matrix).imag))[::2]

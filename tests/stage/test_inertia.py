@@ -23,7 +23,9 @@ def test_speeds_are_those_of_the_fastest_the_stage_may_turn() -> None:
     pair = largest_speeds(as_general(load_stage("fzg_c")))
     assert pair["wheel"] / pair["pinion"] == pytest.approx(-16 / 24)
     of_set = largest_speeds(as_general(load_stage("planetary54")))
-    assert [of_set[name] for name in ("carrier", "sun", "planet1", "ring")] == pytest.approx([300.0, 1200.0, -600.0, 0.0])
+    assert [of_set[name] for name in ("carrier", "sun", "planet1", "ring")] == pytest.approx(
+        [300.0, 1200.0, -600.0, 0.0]
+    )
 
 
 def test_sizes_of_a_small_gear() -> None:

@@ -13,6 +13,7 @@ from gearfmu.body.beam import Section, Shaft, reduce_shaft
 from gearfmu.stage.free import free_shaft
 from gearfmu.stage.groups import Group, Layout, Support, mount
 from gearfmu.stage.spinning import skew_pairs
+from gearfmu.stage.whirls import whirl_rows
 
 LENGTH, SECTION = 0.3, Section(0.3, 0.04, 0.01)
 
@@ -20,7 +21,7 @@ LENGTH, SECTION = 0.3, Section(0.3, 0.04, 0.01)
 def coupling(group: Group, speeds: dict[int, float]) -> np.ndarray:
     """(n, n), rad/s: Σ Ω (y xᵀ − x yᵀ) of the rotors that turn."""
     total = np.zeros(2 * group.omega.shape)
-    for rotor, (x, y) in zip(*group.whirl_rows(), strict=True):
+    for rotor, (x, y) in zip(*whirl_rows(group), strict=True):
         total += speeds.get(int(rotor), 0.0) * (np.outer(y, x) - np.outer(x, y))
     return total
 

@@ -1,7 +1,8 @@
-/* What turning does to masses beside the conservative step (docs/theory.md, 3.10), half a step each beside the dashpots
- * of the supports. Coriolis forces on what a carrier carries (17f) and gyroscopic forces of tilting and elastic bodies
- * (17k): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation by Cayley's form,
- * without energy; one after the other, and in the other half step in the other order. Centrifugal load m Ω² a (17g). */
+/* What turning does to masses beside the conservative step (docs/theory.md, 3.10, 3.11), half a step each beside the
+ * dashpots of the supports. Coriolis forces on what a carrier carries (17f) and gyroscopic forces of tilting and
+ * elastic bodies (17k): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation
+ * by Cayley's form, without energy; one after the other, in the other half step in the other order. Centrifugal load
+ * m Ω² a (17g). */
 #include "integrate/gk_integrate.h"
 
 static int carries(const gk_model *model, int rotor)
@@ -17,8 +18,8 @@ static void turn_pair(const gk_setup *setup, const gk_ground_flow *f, double hal
     const int n = setup->base.n;
     const double *x = f->turns + 2 * i * n, *y = x + n, *to_x = f->turned + 2 * i * n, *to_y = to_x + n;
     const gk_span span = setup->base.turn_span[i];
-    const double a = half * gk_dot_span(span, x, to_x), b = half * gk_dot_span(span, y, to_y);
-    const double c = half * gk_dot_span(span, x, to_y), p = gk_dot_span(span, x, v), q = gk_dot_span(span, y, v);
+    const double a = half * f->products[3 * i], b = half * f->products[3 * i + 1], c = half * f->products[3 * i + 2];
+    const double p = gk_dot_span(span, x, v), q = gk_dot_span(span, y, v);
     const double scale = 2.0 * half / (1.0 + a * b - c * c);
     gk_axpy_span(span, -scale * ((1.0 - c) * p + a * q), to_y, v);
     gk_axpy_span(span, scale * ((1.0 + c) * q - b * p), to_x, v);

@@ -293,8 +293,8 @@ const double *gk_step_z(const gk_system *s) { return s->z; }
 /* forces at the end that the next prediction is made with, where forces are linear in the step */
 static const double *force_with_dampers(const gk_system *s) { return s->last; }
 
-/* Where Coriolis forces turn the speeds of a gear group: predicted speeds to the end of the step, turned by half a step.
- * Returns what the force of this step has still to do to them. */
+/* Where Coriolis forces turn the speeds of a gear group: predicted speeds to the end of the step, turned by half a
+ * step. Returns what the force of this step has still to do to them. */
 static const gk_real *finish_speeds(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                                     const gk_coefficients *k, int g)
 {

@@ -195,6 +195,12 @@ static void fill_turns(const gk_setup *setup, gk_coefficients *k)
             f->turns[r * base->n + i] = row * s;
             f->turned[r * base->n + i] = row / s;
         }
+    for (int i = 0; i < base->turns; i++) {
+        const double *x = f->turns + 2 * i * base->n, *to_x = f->turned + 2 * i * base->n, *to_y = to_x + base->n;
+        f->products[3 * i] = gk_dot_quads(x, to_x, base->n / 4);
+        f->products[3 * i + 1] = gk_dot_quads(x + base->n, to_y, base->n / 4);
+        f->products[3 * i + 2] = gk_dot_quads(x, to_y, base->n / 4);
+    }
 }
 
 static void fill_ground(const gk_model *model, const gk_setup *setup, gk_coefficients *k)

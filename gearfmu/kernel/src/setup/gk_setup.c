@@ -172,6 +172,7 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
     const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
     f->turns = doubles(b, turning);
     f->turned = doubles(b, turning);
+    f->products = doubles(b, 3 * (size_t)(model->carried + model->whirls));
 }
 
 static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged, int e)

@@ -161,6 +161,7 @@ typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
     double *pulls;          /* (dampers, n) s²e/n of a dashpot */
     double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
+    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
     double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
 } gk_ground_flow;
 
