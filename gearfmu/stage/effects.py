@@ -23,7 +23,7 @@ class Effect:
     matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
     turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
     the stage decide; build: name in -DGK_WITHOUT of a kernel that has no code for it, "" where there is none; test: the
-    test by hand calculation; carried: only stages with a planet carrier have it.
+    test by hand calculation; carried: a planetary set has it, a spur pair does not.
     """
 
     name: str
