@@ -99,7 +99,8 @@ class Shaft:
 class BeamBody:
     """A free shaft, reduced. centre: z of its centre of mass, the origin of mass and place; mass (6, 6) of the rigid
     motion; omega (n,) rad/s, ascending; place (K,) m; rows (K, 6, n), kg^-½ and kg^-½/m, of the interfaces in the
-    modes; residual (6K, 6K): C_static beyond them, mean-axis gauge."""
+    modes; residual (6K, 6K): C_static beyond them, mean-axis gauge; gyroscopic (6 + n, 6 + n), kg·m² …, skew: ∫ρI of
+    (θ_a × θ_b)_z, θ the tilts of sections in unit rigid motion and unit modes."""
 
     centre: float
     mass: np.ndarray
@@ -107,6 +108,7 @@ class BeamBody:
     place: np.ndarray
     rows: np.ndarray
     residual: np.ndarray
+    gyroscopic: np.ndarray
 
 
 def reduce_shaft(shaft: Shaft, cut: float, longest: float | None = None) -> BeamBody:
@@ -121,17 +123,26 @@ def reduce_shaft(shaft: Shaft, cut: float, longest: float | None = None) -> Beam
         (extension, {ALONG: (0, 1.0)}),
     ]
     omega, rows, residual = [], [], np.zeros((6 * len(at), 6 * len(at)))
+    tilts = [np.zeros((2, bending[1].shape[0] // 2, 6))]  # about x and y, of all nodes
+    tilts[0][[0, 1], :, [3, 4]] = 1.0
     for (frequency, shapes), directions in motions:
         own = np.zeros((len(at), 6, frequency.size))
         for direction, (unknown, sign) in directions.items():
             own[:, direction] = sign * shapes[len(directions) * at + unknown]
         stored = frequency < 2 * math.pi * cut
+        tilt = np.zeros((2, tilts[0].shape[1], stored.sum()))
+        for direction, (unknown, sign) in directions.items():
+            if direction in (3, 4):
+                tilt[direction - 3] = sign * shapes[unknown :: len(directions), stored]
+        tilts.append(tilt)
         rest = (own[..., ~stored] / frequency[~stored]).reshape(6 * len(at), -1)
         residual += rest @ rest.T
         omega.append(frequency[stored])
         rows.append(own[..., stored])
     order = np.argsort(np.concatenate(omega), kind="stable")
     centre, mass = rigid_mass(shaft)
+    about_x, about_y = np.concatenate([tilts[0], np.concatenate(tilts[1:], axis=2)[..., order]], axis=2)
+    turning = about_x.T @ rotary_matrix(shaft, ends) @ about_y
     return BeamBody(
         centre=centre,
         mass=mass,
@@ -139,6 +150,7 @@ def reduce_shaft(shaft: Shaft, cut: float, longest: float | None = None) -> Beam
         place=np.asarray(shaft.places) - centre,
         rows=np.concatenate(rows, axis=2)[..., order],
         residual=residual,
+        gyroscopic=turning - turning.T,
     )
 
 
@@ -160,6 +172,11 @@ def rigid_mass(shaft: Shaft) -> tuple[float, np.ndarray]:
 def bending_matrices(shaft: Shaft, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """K, M of one plane: unknowns w, θ at every node, θ = w′ without shear."""
     return _assemble(shaft, ends, _bending_element, 2)
+
+
+def rotary_matrix(shaft: Shaft, ends: np.ndarray) -> np.ndarray:
+    """∫ ρI θ_i θ_j of the rotations of the nodes, kg·m²."""
+    return bending_matrices(shaft, ends)[1][1::2, 1::2]
 
 
 def rod_matrices(shaft: Shaft, ends: np.ndarray, turning: bool) -> tuple[np.ndarray, np.ndarray]:

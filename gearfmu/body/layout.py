@@ -190,14 +190,48 @@ def _shape_entries() -> tuple[Entry, ...]:
     )
 
 
+def _spin_entries() -> tuple[Entry, ...]:
+    return (
+        Entry(
+            "spin/coupling", "spin.coupling", ("n", "n"), "", "integral of density times mode k . (e_z x mode l), skew"
+        ),
+        Entry(
+            "spin/tilt", "spin.tilt", (2, "n"), "kg1/2.m", "the same with rigid tilt about x and y: of z u_x and z u_y"
+        ),
+        Entry("spin/load", "spin.load", ("n",), "kg1/2.m", "centrifugal load per square of the speed"),
+        Entry("spin/stiffening", "spin.stiffening", ("n",), "", "B in ω² = ω₀² + B Ω²: stresses less softening"),
+        Entry(
+            "spin/growth",
+            "spin.growth",
+            (2, "R", "A"),
+            "m.s2",
+            "flank rows of tooth 0 under centrifugal load per square of the speed",
+        ),
+        Entry(
+            "spin/inertia",
+            "spin.inertia",
+            (),
+            "kg.m2.s2",
+            "what that adds to the polar inertia per square of the speed",
+        ),
+    )
+
+
 ENTRIES = _entries()
 RIM_ENTRIES = _rim_entries()
-GROUPS = {"rim": RIM_ENTRIES, "helix": _helix_entries(), "tangent": _tangent_entries(), "shapes": _shape_entries()}
+GROUPS = {
+    "rim": RIM_ENTRIES,
+    "helix": _helix_entries(),
+    "tangent": _tangent_entries(),
+    "shapes": _shape_entries(),
+    "spin": _spin_entries(),
+}
 
 
 def entries_of(groups: Iterable[str]) -> tuple[Entry, ...]:
     """The datasets of a body: those of every gear, and of the `groups` that it has besides: "rim" (an internal gear),
-    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface in all modes)."""
+    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface in all modes),
+    "spin" (what modes feel when the body turns)."""
     return (*ENTRIES, *(entry for name in GROUPS if name in groups for entry in GROUPS[name]))
 
 

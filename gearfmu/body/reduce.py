@@ -167,6 +167,7 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         rim=made.rim,
         tangent=tangent_of(modes, statics, points),
         shapes=made.shapes,
+        spin=modes.spin,
         base_helix_angle=geometry.beta_b,
     )
 

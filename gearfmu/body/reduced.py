@@ -11,6 +11,7 @@ from gearfmu.body.layout import ALGORITHM_VERSION, FORMAT_VERSION, Entry, entrie
 from gearfmu.errors import BodyError
 from gearfmu.reduction.display import Display, Shapes
 from gearfmu.reduction.frf import FrfError
+from gearfmu.reduction.spin import Spin
 
 _KINDS = {"f8": "floating-point", "f4": "floating-point", "i8": "integer"}
 
@@ -58,7 +59,8 @@ class ReducedBody:
     input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of a ring, whose
     rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one. tangent: rows along
     the profile, None where none were made. shapes: surface of a sector and how it moves in every mode, None where none
-    was made. base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
+    was made. spin: what the modes feel when the body turns, None of an imported one and of one that was stored before
+    there was such a group. base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
     Raises BodyError naming every field that cannot be.
     """
 
@@ -91,6 +93,7 @@ class ReducedBody:
     rim: Rim | None = None
     tangent: Tangent | None = None
     shapes: Shapes | None = None
+    spin: Spin | None = None
     base_helix_angle: float = 0.0
     format_version: int = FORMAT_VERSION
     algorithm_version: int = ALGORITHM_VERSION
@@ -117,6 +120,7 @@ class ReducedBody:
             "helix": self.base_helix_angle != 0,
             "tangent": self.tangent is not None,
             "shapes": self.shapes is not None,
+            "spin": self.spin is not None,
         }
         return tuple(name for name, there in has.items() if there)
 

@@ -16,6 +16,7 @@ from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 from gearfmu.reduction.display import Display, Shapes
 from gearfmu.reduction.frf import FrfError
+from gearfmu.reduction.spin import Spin
 
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, "make it again with 'gearfmu reduce STAGE'")
 _PACKED = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "fletcher32": True}
@@ -76,6 +77,7 @@ def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
         ("rim", Rim),
         ("tangent", Tangent),
         ("shapes", Shapes),
+        ("spin", Spin),
     ):
         if any(name.startswith(f"{group}.") for name in values):
             parts[group] = kind(**{f.name: values.pop(f"{group}.{f.name}") for f in fields(kind)})

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+WHIRL_BAND = 15e3  # Hz
 FIELDS = ("formula", "matters", "off", "switch", "code")
 HEAD = """# Effects: what a scene may call for
 
@@ -27,6 +28,7 @@ slices, but: residual at level full with `em` against level paper, bodies and mo
 def effects(stage: str | None) -> None:
     """The effects there are: formula, when each matters, what it costs, how to switch it; with STAGE its numbers."""
     from gearfmu.stage.effects import EFFECTS, costs
+    from gearfmu.stage.inertia import NEGLECTED
 
     found, numbers = costs(), _numbers(stage) if stage else {}
     for effect in EFFECTS:
@@ -36,6 +38,11 @@ def effects(stage: str | None) -> None:
         lines |= {"theory": effect.equation, "cost": _cost(found.get(effect.name))}
         for name, text in lines.items():
             click.echo(f"  {name:<12}  {text}")
+    click.echo("left out:")
+    for term in NEGLECTED:
+        click.echo(f"  {term.name}: {term.formula}; {term.why}")
+    for line in _left_out(stage) if stage else ():
+        click.echo(f"  in the stage  {line}")
 
 
 def effects_page() -> str:
@@ -53,7 +60,18 @@ def effects_page() -> str:
         f"{HEAD}\n| effect | formula | [theory](theory.md) | matters | cost | off |\n|---|---|---|---|---|---|\n"
         + "".join(what)
         + "\n## Off: what it means, how to switch, where it enters\n\n| effect | off means | switch | code | test |\n"
-        "|---|---|---|---|---|\n" + "".join(how)
+        "|---|---|---|---|---|\n" + "".join(how) + _left_out_page()
+    )
+
+
+def _left_out_page() -> str:
+    from gearfmu.stage.inertia import NEGLECTED
+
+    rows = [f"| {term.name} | {_cell(term.formula)} | {term.why} |\n" for term in NEGLECTED]
+    return (
+        "\n## Left out: terms of the floating frame that never matter within the limits of a stage\n\n"
+        "`gearfmu effects STAGE` prints their size at speed_max and torque_max.\n\n"
+        "| term | size | why |\n|---|---|---|\n" + "".join(rows)
     )
 
 
@@ -115,7 +133,34 @@ def _numbers(stage: str) -> dict[str, str]:
         "pitch_errors": "up to " + _listed(f"{a:g} µm" for a in misplaced) + _idle(not any(misplaced)),
         "coriolis": turning,
         "centrifugal": turning,
+        "gyroscopic": _whirling(model),
     }
+
+
+def _whirling(model: Any) -> str:
+    """What turning does to the frequencies of the ground oscillators, at speed_max."""
+    from gearfmu.body import load_bodies
+    from gearfmu.stage.assembly import stage_group
+    from gearfmu.stage.inertia import whirl_shift
+
+    shift = whirl_shift(model.stage, stage_group(model.spec, load_bodies(model.spec)), WHIRL_BAND)
+    return f"at speed_max frequencies below {WHIRL_BAND / 1e3:g} kHz move by up to {shift:.2%}" + _idle(shift == 0.0)
+
+
+def _left_out(stage: str) -> Iterable[str]:
+    """Sizes of what is left out, a line for every gear whose file tells."""
+    from gearfmu.commands.models import bodies_of
+    from gearfmu.spec.expand import as_general
+    from gearfmu.stage.inertia import inertia_terms
+    from gearfmu.stage.observed import gear_bodies
+
+    spec, bodies = bodies_of(stage)
+    for gear in inertia_terms(as_general(spec), gear_bodies(spec, bodies)):
+        yield (
+            f"{gear.name} at {gear.speed:.0f} rad/s: stiffening {gear.stiffening:.1e} (Coriolis forces of the same "
+            f"modes {gear.whirl:.1e}), stretch {1e6 * gear.growth:.2f} µm (the tooth yields "
+            f"{1e6 * gear.deflection:.2f} µm), inertia {gear.by_load:.1e} by load, {gear.by_speed:.1e} by speed"
+        )
 
 
 def _listed(texts: Iterable[str]) -> str:

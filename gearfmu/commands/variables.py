@@ -24,6 +24,7 @@ WHEN = {
     "SPRING_OR_FIXED": "port `spring` or `fixed`",
     "SLICES_DIFFER": "helical or tilting gears, slices of the stage file",
     "CARRIED": "a carrier that carries other rotors",
+    "SPINNING": "bodies that tilt or bend when they turn",
     "OBSERVED": "a gear that is observed",
 }
 FIELDS = re.compile(r'\s*("(?:[^"\\]|\\.)*"|[^,]+?)\s*(?:,|$)')

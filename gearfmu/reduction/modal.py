@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.sector import SectorBody
+from gearfmu.reduction.spin import FamilySpin, Spin, family_spin, join_spin
 
 _SHAPES = 4  # lowest shapes of each family kept for pictures
 COLUMNS = ("frequency", "diameter", "part", "parity", "flank", "bore", "surface")
@@ -30,7 +31,8 @@ class Modes:
     and kg^-½/m; patch_rows (3, n) of a ring, (0, n) of a gear, kg^-½; tangent_rows (2·R·A, n) or (0, n) where there are
     none, kg^-½: like flank_rows, along the profile. shapes : index of a mode → (3N,) sector
     displacement in kg^-½, complex for a pair's first mode. surface (n, P, 3) or None, kg^-½: displacement of chosen
-    points of sector 0 in every mode, the second of a pair its imaginary part.
+    points of sector 0 in every mode, the second of a pair its imaginary part. spin : what they feel when the body
+    turns; None where that was not made.
     """
 
     frequency: np.ndarray
@@ -43,12 +45,14 @@ class Modes:
     shapes: dict[int, np.ndarray]
     tangent_rows: np.ndarray | None = None
     surface: np.ndarray | None = None
+    spin: Spin | None = None
 
 
 @dataclass(frozen=True)
 class _FamilyModes:
     """Sector modes of one family: ω² (k,), rows of all loads of a tooth (m, k), bore rows (6, k), lowest shapes (3N, k
-    at most) for pictures, displacement (k, P, 3) of the chosen points, complex for weight 2."""
+    at most) for pictures, displacement (k, P, 3) of the chosen points, complex for weight 2; what they feel when the
+    body turns."""
 
     weight: int
     complete: bool
@@ -57,6 +61,7 @@ class _FamilyModes:
     bore_rows: np.ndarray
     shapes: np.ndarray
     surface: np.ndarray
+    spin: FamilySpin
 
 
 def elastic_modes(
@@ -111,11 +116,13 @@ def _solve(body: SectorBody, key: tuple[int, int], count: int, sample: sp.csr_ar
     shapes, flank = shapes * gauge, flank * gauge
     bore = body.teeth * (family.bore.conj().T @ shapes)
     space = body.spaces[key[0]]
-    pictures = space.to_nodes @ harmonic.expand(shapes[:, :_SHAPES])
+    fields = space.to_nodes @ harmonic.expand(shapes)
     surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
     for k in range(len(squared) if sample.shape[0] else 0):
-        surface[k] = sample @ (space.to_nodes @ harmonic.expand(shapes[:, [k]])).reshape(-1, 3)
-    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface)
+        surface[k] = sample @ fields[:, k].reshape(-1, 3)
+    spin = family_spin(body, key[1], family.weight, fields)
+    pictures = fields[:, :_SHAPES].copy()
+    return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
 
 
 def _gauge(rows: np.ndarray) -> np.ndarray:
@@ -134,6 +141,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
     entries = [(m.squared[k], key, k) for key, m in found.items() for k in range(len(m.squared))]
     entries.sort(key=lambda entry: entry[0])
     columns: dict[str, list] = {name: [] for name in COLUMNS}
+    spins: list[tuple[FamilySpin, int, int]] = []
     shapes: dict[int, np.ndarray] = {}
     for squared, key, k in entries:
         modes = found[key]
@@ -146,6 +154,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
             columns["frequency"].append(np.sqrt(squared) / (2 * np.pi))
             columns["diameter"].append(key[1])
             columns["part"].append(part)
+            spins.append((modes.spin, k, part))
             columns["parity"].append(body.spaces[key[0]].parity)
             columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
             columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
@@ -163,4 +172,5 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
         shapes,
         tangent,
         np.array(columns["surface"]),
+        join_spin(body, spins),
     )

@@ -8,10 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
 from gearfmu.fem.cyclic import Harmonic, Sector, SectorSpace, sector_spaces
+from gearfmu.fem.spinning import growth, stress_stiffness
 from gearfmu.reduction.flank import Points, ToothFlank, flank_loads
 
 
@@ -62,7 +64,7 @@ class SectorBody:
             mesh.nodes, mesh.elements, stiffness, self.mass_matrix, mesh.teeth, mesh.cut_minus, mesh.cut_plus,
             bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
         )  # fmt: skip
-        self.spaces = sector_spaces(sector)
+        self.material, self.spaces = material, sector_spaces(sector)
         self._inputs = [self._space_inputs(space) for space in self.spaces]
 
     @cached_property
@@ -119,6 +121,16 @@ class SectorBody:
         """Mass matrix of the whole rigid body about the origin, (6, 6): kg, kg·m, kg·m²."""
         fields = rigid_modes(self.mesh.nodes)
         return turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
+
+    @cached_property
+    def growth(self) -> np.ndarray:
+        """Displacement (3N,) of the sector under centrifugal load per square of the speed, m·s²."""
+        return growth(self.spaces[0], self.mesh.nodes, self.mass_matrix)
+
+    @cached_property
+    def stress_stiffness(self) -> sp.csr_array:
+        """K_σ (N, N) of the stresses of that load, kg, the same for each component."""
+        return stress_stiffness(self.mesh.nodes, self.mesh.elements, self.material, self.growth)
 
     def rigid_rows(self) -> np.ndarray:
         """Flank rows of the six rigid motions: (2·R·A, 6)."""

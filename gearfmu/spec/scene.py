@@ -40,6 +40,7 @@ class Effects(Spec):
     roll_motion: Switch = True
     coriolis: Switch = True
     centrifugal: Switch = True
+    gyroscopic: Switch = True
 
     @property
     def off(self) -> tuple[str, ...]:

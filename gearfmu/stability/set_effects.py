@@ -37,6 +37,7 @@ EFFECTS = (
     "roll_motion",
     "coriolis",
     "centrifugal",
+    "gyroscopic",
 )
 COAST = "coast_flank"  # without it one of the two flanks between sun and ring cannot push: run without a load
 FROZEN = "roll_motion"  # without it a turning mesh jams along the slope of its relief: run at rest

@@ -27,8 +27,10 @@ from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.nodal import nodal_sections
 from gearfmu.stage.observed import observed_number, observed_sections
+from gearfmu.stage.spinning import turn_rates
 from gearfmu.stage.tables import ROLLS
 from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
+from gearfmu.stage.whirls import whirl_rows
 
 MODEL_VERSION = 2
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
@@ -59,10 +61,7 @@ def general_sections(
     observe: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Every section of the blob of `assemble`, by name."""
-    stage, carriers = as_general(spec), {}
-    if isinstance(spec, PlanetarySpec):
-        *bodies, carrier = set_gears(spec, bodies)
-        carriers = {stage.carriers[0].name: carrier}
+    stage, bodies, carriers = _parted(spec, bodies)
     shapes = [gear_shape(gear) for gear in stage.gears]
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
@@ -95,6 +94,23 @@ def general_sections(
     for name in observe:
         sections |= observed_sections(observed_number(stage, name), bodies, groups)
     return sections
+
+
+def stage_group(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]) -> Group:
+    """The ground oscillators of a stage as supported; bodies as of `assemble`."""
+    stage, bodies, carriers = _parted(spec, bodies)
+    return mount(stage_layout(stage, bodies, carriers=carriers))
+
+
+def _parted(
+    spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]
+) -> tuple[GeneralStage, Sequence[Any], dict[str, InterfaceBody]]:
+    """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""
+    stage = as_general(spec)
+    if not isinstance(spec, PlanetarySpec):
+        return stage, bodies, {}
+    *gears, carrier = set_gears(spec, bodies)
+    return stage, gears, {stage.carriers[0].name: carrier}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:
@@ -173,14 +189,20 @@ def _gear_sections(
     name, chosen = stage.gears[index].name, flank.chosen
     meshes = sum(name in mesh.gears for mesh in stage.engagements)
     tables = flank_sections(index, groups, nodes)
+    rates = turn_rates(body, chosen)
+    turning = {} if rates is None else {f"turn_rate{index}": rates}
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
-    return tables | {
-        f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
-        f"omega{index}": 2 * np.pi * body.frequency[chosen],
-        f"zeta{index}": body.damping_ratio[chosen],
-        f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
-        f"member{index}": body.part[chosen].astype(np.int32),
-    }
+    return (
+        tables
+        | turning
+        | {
+            f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
+            f"omega{index}": 2 * np.pi * body.frequency[chosen],
+            f"zeta{index}": body.damping_ratio[chosen],
+            f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
+            f"member{index}": body.part[chosen].astype(np.int32),
+        }
+    )
 
 
 def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
@@ -212,19 +234,25 @@ def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[in
 def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
     """Sections of one set of ground oscillators. nodes: (body, node) of every port."""
     carried = {f"carried_rows{number}": group.carried_rows()} if group.layout.in_turning_axes else {}
-    return carried | {
-        f"omega_ground{number}": group.omega,
-        f"zeta_ground{number}": group.zeta,
-        f"rigid_share{number}": group.rigid_share,
-        f"damper_rows{number}": group.damper_rows,
-        f"damper{number}": group.damper,
-        f"support_rows{number}": group.support_rows,
-        f"support_compliance{number}": np.diag(group.support_compliance),
-        f"kappa{number}": group.kappa,
-        f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
-            len(nodes), group.omega.size
-        ),
-    }
+    rotors, whirls = whirl_rows(group)
+    whirling = {"whirl": rotors.astype(np.int32), f"whirl_rows{number}": whirls} if rotors.size else {}
+    return (
+        carried
+        | whirling
+        | {
+            f"omega_ground{number}": group.omega,
+            f"zeta_ground{number}": group.zeta,
+            f"rigid_share{number}": group.rigid_share,
+            f"damper_rows{number}": group.damper_rows,
+            f"damper{number}": group.damper,
+            f"support_rows{number}": group.support_rows,
+            f"support_compliance{number}": np.diag(group.support_compliance),
+            f"kappa{number}": group.kappa,
+            f"port_rows{number}": np.array([group.node_rows(*node, SPIN) for node in nodes]).reshape(
+                len(nodes), group.omega.size
+            ),
+        }
+    )
 
 
 def port_nodes(

@@ -23,7 +23,7 @@ class Effect:
     matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
     turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
     the stage decide; build: name in -DGK_WITHOUT of a kernel that has no code for it, "" where there is none; test: the
-    test by hand calculation; carried: only stages with a planet carrier have it.
+    test by hand calculation; carried: a planetary set has it, a spur pair does not.
     """
 
     name: str
@@ -257,6 +257,21 @@ EFFECTS: tuple[Effect, ...] = (
         off="pins carry mesh forces alone",
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
         test="tests/stage/test_planetary_motion.py::test_pins_hold_the_planets_against_their_centrifugal_load",
+        carried=True,
+    ),
+    _switched(
+        "gyroscopic",
+        title="gyroscopic and Coriolis forces on tilting and elastic bodies",
+        formula="v̇ = −2 (Ω H + Ω_f Q) v; of tilts H = −½ J_p J: moment J_p Ω θ̇",
+        equation="3.11 (eqs. 17i to 17k)",
+        matters=(
+            "where something that tilts or bends turns fast: Δω/ω of the size of Ω J_p/(2 J_t ω). Helical pairs and "
+            "trains with their shafts, planets on their pins: at speed_max frequencies below 15 kHz move by 2 % "
+            "(helical_demo), 5 % (two_stage), 4 % (planetary54); elastic patterns alone by Ωg/ω, 0.4 % on fzg_c"
+        ),
+        off="bodies tilt and vibrate as at rest",
+        code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",
+        test="tests/kernel/test_gyroscopic.py::test_a_kicked_pair_whirls_as_its_linear_system",
         carried=True,
     ),
 )

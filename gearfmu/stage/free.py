@@ -21,6 +21,7 @@ import numpy as np
 from gearfmu.body.beam import BeamBody
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
+from gearfmu.stage.spinning import Spinning, gear_spinning, shaft_spinning
 from gearfmu.stage.tables import OFFSETS, blend
 
 NODE_MEMBERS = np.array([1, 2, 0, 1, 2, 0])  # x, y and rx, ry are pairs, z and rz single
@@ -52,7 +53,7 @@ class FreeBody:
     """A free body on its axis. mass (6, 6) of the rigid motion x, y, z, rx, ry, rz about its origin on the axis (kg,
     kg·m, kg·m²); omega (n,) rad/s and zeta (n,) of its elastic modes; place (K,) m: interface nodes along the axis,
     from the origin, across (K, 2) m: beside it; rows (K, 6, n), kg^-½ and kg^-½/m: nodes in the modes; residual (6K,
-    6K), m/N …: nodes beyond the modes."""
+    6K), m/N …: nodes beyond the modes; spinning: what it feels when it turns, None: as a rigid body."""
 
     name: str
     mass: np.ndarray
@@ -63,6 +64,7 @@ class FreeBody:
     residual: np.ndarray
     flank: Flank | None = None
     across: np.ndarray | None = None
+    spinning: Spinning | None = None
 
     def rigid_rows(self, node: int) -> np.ndarray:
         """(6, 6): rigid motion of the body → motion of a node."""
@@ -107,13 +109,14 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
             node=node,
             residual=_flank_residual(body, degrees, to_grid, patterns, omega),
         ),
+        spinning=gear_spinning(body, mass, low),
     )
 
 
 def free_shaft(name: str, beam: BeamBody, damping_ratio: float) -> FreeBody:
     """The FreeBody of a shaft, its origin the centre of mass; all its modes with one damping ratio."""
-    zeta = np.full(beam.omega.size, damping_ratio)
-    return FreeBody(name, beam.mass, beam.omega, zeta, beam.place, beam.rows, beam.residual)
+    zeta, spinning = np.full(beam.omega.size, damping_ratio), shaft_spinning(beam)
+    return FreeBody(name, beam.mass, beam.omega, zeta, beam.place, beam.rows, beam.residual, spinning=spinning)
 
 
 def free_carrier(body: InterfaceBody) -> FreeBody:

@@ -1,10 +1,9 @@
-/* What the axes of a turning carrier do to the masses in them (docs/theory.md, 3.10), half a step each beside the
- * dashpots of the supports. Coriolis force −2Ω m J times the speed, J a quarter turn, on P v, P = √m Φ_xy of every
- * carried body (17f): turned exactly by Cayley's form of the low-rank rotation, without energy. Centrifugal load m
- * Ω² a (17g). */
+/* What turning does to masses beside the conservative step (docs/theory.md, 3.10, 3.11), half a step each beside the
+ * dashpots of the supports. Coriolis forces on what a carrier carries (17f) and gyroscopic forces of tilting and
+ * elastic bodies (17k): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation
+ * by Cayley's form, without energy; one after the other, in the other half step in the other order. Centrifugal load
+ * m Ω² a (17g). */
 #include "integrate/gk_integrate.h"
-
-enum { ROUNDS = 5 }; /* Ωh is some 1e-3: every round three digits */
 
 static int carries(const gk_model *model, int rotor)
 {
@@ -13,27 +12,53 @@ static int carries(const gk_model *model, int rotor)
     return 0;
 }
 
-/* half a step of Coriolis forces on the speeds of the ground group */
-void gk_frame_turn(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
-                   double *v)
+/* half a step of one pair: v changes by −½θ (y (x·v + x·v′) − x (y·v + y·v′)), θ = Ωh */
+static void turn_pair(const gk_setup *setup, const gk_ground_flow *f, double half, int i, double *v)
 {
-    const int rows = 2 * model->carried, n = setup->base.n;
-    const gk_ground_flow *f = &k->ground;
-    double before[2 * MAX_CARRIED], after[2 * MAX_CARRIED], force[2 * MAX_CARRIED];
-    if (!GK_ON(setup, coriolis) || !rows) return;
-    for (int r = 0; r < rows; r++) before[r] = after[r] = gk_dot_quads(f->turns + r * n, v, n / 4);
-    for (int round = 0; round < ROUNDS; round++) {
-        for (int b = 0; b < model->carried; b++) {
-            const double angle = 0.5 * k->h * data->v[model->carried_frame[b]];
-            force[2 * b] = -angle * (before[2 * b + 1] + after[2 * b + 1]);
-            force[2 * b + 1] = angle * (before[2 * b] + after[2 * b]);
-        }
-        for (int r = 0; r < rows; r++) {
-            after[r] = before[r];
-            for (int c = 0; c < rows; c++) after[r] -= f->coupling[r * rows + c] * force[c];
-        }
+    const int n = setup->base.n;
+    const double *x = f->turns + 2 * i * n, *y = x + n, *to_x = f->turned + 2 * i * n, *to_y = to_x + n;
+    const gk_span span = setup->base.turn_span[i];
+    const double a = half * f->products[3 * i], b = half * f->products[3 * i + 1], c = half * f->products[3 * i + 2];
+    const double p = gk_dot_span(span, x, v), q = gk_dot_span(span, y, v);
+    const double scale = 2.0 * half / (1.0 + a * b - c * c);
+    gk_axpy_span(span, -scale * ((1.0 - c) * p + a * q), to_y, v);
+    gk_axpy_span(span, scale * ((1.0 + c) * q - b * p), to_x, v);
+}
+
+/* half a step of all pairs on the speeds of the ground group; back: in the other order */
+void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v)
+{
+    const gk_base *base = &setup->base;
+    for (int j = 0; j < base->turns; j++) {
+        const int i = back ? base->turns - 1 - j : j;
+        const double speed = data->v[base->turn_rotor[i]];
+        if (speed != 0.0) turn_pair(setup, &k->ground, 0.5 * k->h * speed, i, v);
     }
-    for (int r = 0; r < rows; r++) gk_axpy(-force[r], f->turned + r * n, v, 0, n / 4);
+}
+
+/* Speeds of a gear group turned by half a step of Coriolis forces, member into member of every pair (17i): by the angle
+ * Ωh times its rate, with the cosine and sine of Cayley's form. angle: Ωh. */
+void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to)
+{
+    const int halves = 2 * m->pairs / LANES;
+    const gk_real half = (gk_real)(0.5 * angle);
+    const gk_half *rate = (const gk_half *)m->turn_rate, *v = (const gk_half *)from, *w = v + halves;
+    gk_half *first = (gk_half *)to, *second = first + halves;
+    for (int i = 0; i < halves; i++) {
+        const gk_half t = half * rate[i], s = (t + t) / (1 + t * t), a = v[i], b = w[i];
+        first[i] = a + s * (b - t * a);
+        second[i] = b - s * (a + t * b);
+    }
+}
+
+/* adds the same as accelerations, for explicit integrators */
+void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a)
+{
+    for (int i = 0; i < m->pairs; i++) {
+        const gk_real twice = (gk_real)(2.0 * speed) * m->turn_rate[i];
+        a[i] += twice * v[m->pairs + i];
+        a[m->pairs + i] -= twice * v[i];
+    }
 }
 
 /* Half a step of centrifugal loads: the kick that at rest gives the displacement F/ω² at the ends of steps. Returns its
@@ -69,11 +94,12 @@ void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *
 {
     const gk_base *base = &setup->base;
     const int n = base->n;
-    for (int b = 0; b < model->carried && GK_ON(setup, coriolis); b++) {
-        const double *x = base->carried_rows + 2 * b * n, *y = x + n, twice = 2.0 * spin[model->carried_frame[b]];
-        const double along = gk_dot_quads(x, v, n / 4), across = gk_dot_quads(y, v, n / 4);
-        gk_axpy(twice * across, x, a, 0, n / 4);
-        gk_axpy(-twice * along, y, a, 0, n / 4);
+    for (int i = 0; i < base->turns; i++) {
+        const double *x = base->turn_rows + 2 * i * n, *y = x + n, twice = 2.0 * spin[base->turn_rotor[i]];
+        const gk_span span = base->turn_span[i];
+        const double along = gk_dot_span(span, x, v), across = gk_dot_span(span, y, v);
+        gk_axpy_span(span, twice * across, x, a);
+        gk_axpy_span(span, -twice * along, y, a);
     }
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
         if (carries(model, r)) gk_axpy(spin[r] * spin[r], base->outward + r * n, a, 0, n / 4);

@@ -24,8 +24,9 @@ double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_dat
 const double *gk_step_force(const gk_system *s);
 const double *gk_step_z(const gk_system *s);
 /* gk_frame.c */
-void gk_frame_turn(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
-                   double *v);
+void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
+void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
+void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a);
 double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
                       double *v);
 void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v, double *a);

@@ -152,6 +152,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work
             v[j] = speed[g][j];
             a[j] = work->force[g][j] - damping * speed[g][j] - m->omega2[j] * work->trial[g][j];
         }
+        if (GK_HAS(gyroscopic) && m->turns) gk_frame_gear_rates(m, work->speed[model->gear[g].rotor], speed[g], a);
     }
     for (int d = 0; d < setup->spins; d++) check += (work->stage_spin[i][d] + work->stage_spin[i][MAX_SPINS + d]) * 0.0;
     return check == 0.0;

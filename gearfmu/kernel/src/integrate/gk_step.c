@@ -92,10 +92,16 @@ static double damp_supports(const gk_model *model, const gk_setup *setup, const 
 #define QUADS(array) ((gk_quad *)(array))
 #define SEEN_QUADS(array) ((const gk_quad *)(array))
 
-static void predict_gear(const gk_setup *setup, gk_work *work, const gk_data *data, const gk_coefficients *k, int g)
+static void predict_gear(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                         const gk_coefficients *k, int g)
 {
     const int n = GK_LANES(setup, g), halves = 2 * n / LANES;
     const gk_half *q = SEEN_HALVES(gk_modal_seen(setup, data, g)), *v = q + halves, *f = v + halves;
+    if (GK_HAS(gyroscopic) && setup->modal[g].turns) {
+        gk_frame_turn_gear(&setup->modal[g], k->h * data->v[model->gear[g].rotor], (const gk_real *)v,
+                           work->turned_speed[g]);
+        v = SEEN_HALVES(work->turned_speed[g]);
+    }
     const gk_flow *w = &k->flow[g];
     const gk_half *d11 = SEEN_HALVES(w->d11), *a12 = SEEN_HALVES(w->a12), *b0q = SEEN_HALVES(w->b0q);
     const gk_half *a21 = SEEN_HALVES(w->a21), *d22 = SEEN_HALVES(w->d22), *b0v = SEEN_HALVES(w->b0v);
@@ -120,7 +126,7 @@ static double predict_ground(const gk_model *model, const gk_setup *setup, gk_wo
     double *v = work->ground_start;
     memcpy(v, x + n, (size_t)n * sizeof *v);
     const double taken = damp_supports(model, setup, k, v);
-    gk_frame_turn(model, setup, k, data, v);
+    gk_frame_turn(setup, k, data, 0, v);
     work->pressed = gk_frame_press(model, setup, k, data, v);
     const gk_quad *x4 = SEEN_QUADS(x), *v4 = SEEN_QUADS(v), *f4 = SEEN_QUADS(f);
     const gk_quad *d11 = SEEN_QUADS(w->d11), *a12 = SEEN_QUADS(w->a12), *b0q = SEEN_QUADS(w->b0q);
@@ -141,7 +147,7 @@ static double predict_ground(const gk_model *model, const gk_setup *setup, gk_wo
 static double predict(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                       const gk_coefficients *k)
 {
-    for (int g = 0; g < model->gears; g++) predict_gear(setup, work, data, k, g);
+    for (int g = 0; g < model->gears; g++) predict_gear(model, setup, work, data, k, g);
     for (int d = 0; d < setup->spins; d++) {
         const double acceleration = data->f[d] * setup->inverse_inertia[d];
         work->spin[d] = data->x[d] + k->h * data->v[d] + k->rigid_b0 * acceleration;
@@ -287,16 +293,29 @@ const double *gk_step_z(const gk_system *s) { return s->z; }
 /* forces at the end that the next prediction is made with, where forces are linear in the step */
 static const double *force_with_dampers(const gk_system *s) { return s->last; }
 
+/* Where Coriolis forces turn the speeds of a gear group: predicted speeds to the end of the step, turned by half a
+ * step. Returns what the force of this step has still to do to them. */
+static const gk_real *finish_speeds(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                                    const gk_coefficients *k, int g)
+{
+    const gk_modal *m = &setup->modal[g];
+    if (!GK_HAS(gyroscopic) || !m->turns) return k->flow[g].bv;
+    gk_real *v = work->vp[g];
+    for (int i = 0; i < m->n; i++) v[i] += k->flow[g].bv[i] * work->force[g][i];
+    gk_frame_turn_gear(m, k->h * data->v[model->gear[g].rotor], v, v);
+    return work->zero;
+}
+
 /* modal state to the end of the step; returns what modal damping took: work of the mean force minus change of
  * energy, mode by mode */
 static double correct_damped(const gk_setup *setup, const gk_work *work, const gk_coefficients *k, int g,
-                             gk_real *state)
+                             const gk_real *bv_left, gk_real *state)
 {
     const int halves = 2 * GK_LANES(setup, g) / LANES;
     gk_half *q = HALVES(state), *v = q + halves, sum = {0};
     const gk_half *f = v + halves, *z = SEEN_HALVES(work->force[g]), *qp = SEEN_HALVES(work->qp[g]);
     const gk_half *vp = SEEN_HALVES(work->vp[g]), *omega2 = SEEN_HALVES(setup->modal[g].omega2);
-    const gk_half *bq = SEEN_HALVES(k->flow[g].bq), *bv = SEEN_HALVES(k->flow[g].bv);
+    const gk_half *bq = SEEN_HALVES(k->flow[g].bq), *bv = SEEN_HALVES(bv_left);
     const gk_half *weight = SEEN_HALVES(k->flow[g].inverse_s2);
     for (int i = 0; i < halves; i++) {
         const gk_half q1 = qp[i] + bq[i] * z[i], v1 = vp[i] + bv[i] * z[i], moved = q1 - q[i];
@@ -309,7 +328,8 @@ static double correct_damped(const gk_setup *setup, const gk_work *work, const g
 }
 
 /* the same without damping: nothing but rounding, so it takes more digits to see */
-static double correct_undamped(const gk_setup *setup, const gk_work *work, const gk_coefficients *k, int g, gk_real *q)
+static double correct_undamped(const gk_setup *setup, const gk_work *work, const gk_coefficients *k, int g,
+                               const gk_real *bv_left, gk_real *q)
 {
     const int n = GK_LANES(setup, g);
     const gk_flow *w = &k->flow[g];
@@ -317,7 +337,7 @@ static double correct_undamped(const gk_setup *setup, const gk_work *work, const
     const gk_real *f = v + n;
     double sum = 0.0;
     for (int j = 0; j < n; j++) {
-        const gk_real z = work->force[g][j], q1 = work->qp[g][j] + w->bq[j] * z, v1 = work->vp[g][j] + w->bv[j] * z;
+        const gk_real z = work->force[g][j], q1 = work->qp[g][j] + w->bq[j] * z, v1 = work->vp[g][j] + bv_left[j] * z;
         const double dq = (double)q1 - q[j], dv = (double)v1 - v[j], omega = setup->modal[g].omega[j];
         sum += 0.5 * (((double)f[j] + z) * dq -
                       w->inverse_s2[j] * (dv * ((double)v1 + v[j]) + omega * omega * dq * ((double)q1 + q[j])));
@@ -359,7 +379,7 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
     }
     const double taken = damped ? 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3])) : 0.0;
     data->ledger.work += work->pressed + gk_frame_press(model, setup, k, data, v);
-    gk_frame_turn(model, setup, k, data, v);
+    gk_frame_turn(setup, k, data, 1, v);
     return taken + damp_supports(model, setup, k, v);
 }
 
@@ -402,10 +422,11 @@ static void correct(const gk_model *model, const gk_setup *setup, gk_work *work,
         const int n = GK_LANES(setup, g), e = engagement_of(model, g);
         gk_real *q = gk_modal_of(setup, data, g);
         if (!n || e < 0) continue;
+        const gk_real *bv_left = finish_speeds(model, setup, work, data, k, g);
         if (GK_ON(setup, modal_damping))
-            data->ledger.dissipated += correct_damped(setup, work, k, g, q);
-        else
-            work->engaged[e].system.owed -= correct_undamped(setup, work, k, g, q); /* what rounding gave or took */
+            data->ledger.dissipated += correct_damped(setup, work, k, g, bv_left, q);
+        else /* what rounding gave or took */
+            work->engaged[e].system.owed -= correct_undamped(setup, work, k, g, bv_left, q);
         memcpy(q + 2 * n, work->next[g], (size_t)n * sizeof *q);
     }
     data->ledger.dissipated += correct_ground(model, setup, work, data, k);

@@ -73,6 +73,12 @@
 #define gk_step_energy gk_step_energy_avx2
 #define gk_step_force gk_step_force_avx2
 #define gk_step_z gk_step_z_avx2
+#define gk_frame_turn gk_frame_turn_avx2
+#define gk_frame_turn_gear gk_frame_turn_gear_avx2
+#define gk_frame_gear_rates gk_frame_gear_rates_avx2
+#define gk_frame_press gk_frame_press_avx2
+#define gk_frame_load gk_frame_load_avx2
+#define gk_frame_rates gk_frame_rates_avx2
 #define gk_rk45_evaluate gk_rk45_evaluate_avx2
 #define gk_rk45_resist gk_rk45_resist_avx2
 #define gk_rk45_angles gk_rk45_angles_avx2
@@ -92,6 +98,7 @@
 #include "problem/gk_balance.c"
 #include "problem/gk_couple.c"
 #include "force/gk_nodal.c"
+#include "integrate/gk_frame.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"

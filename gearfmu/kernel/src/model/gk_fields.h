@@ -25,6 +25,7 @@ typedef enum gk_symbol {
     SYMBOL_reads,
     SYMBOL_ground,
     SYMBOL_carried,
+    SYMBOL_whirls,
     SYMBOL_own,
     SYMBOLS
 } gk_symbol;

@@ -116,6 +116,12 @@ static void read_frames(reader *r, gk_model *m)
     if (m->carried && !m->carried_place) refuse(r, "places of carried bodies", "are missing");
     for (int i = 0; i < m->carried && !r->outcome; i++)
         demand(r, counted(m->carried_frame + i, 0, m->rotors - 1), "carried bodies");
+    m->whirls = (int)length_of(r, F_MODEL_whirl);
+    demand(r, m->whirls <= MAX_WHIRLS, "gyroscopic pairs");
+    r->shape.size[SYMBOL_whirls] = (uint64_t)m->whirls;
+    m->whirl = take(r, F_MODEL_whirl);
+    for (int i = 0; i < m->whirls && !r->outcome; i++)
+        demand(r, counted(m->whirl + i, 0, m->rotors - 1), "gyroscopic pairs");
     for (int i = 0; i < m->rotors; i++)
         if (m->frame[i] >= 0) demand(r, m->frame[m->frame[i]] < 0 && m->inertia[m->frame[i]] > 0.0, "frames");
 }
@@ -325,6 +331,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     read_numbers(r, g);
     g->omega = take(r, F_GEAR_omega), g->zeta = take(r, F_GEAR_zeta);
     g->diameter = take(r, F_GEAR_diameter), g->member = take(r, F_GEAR_member);
+    g->turn_rate = bounded(r, F_GEAR_turn_rate, 1.001);
     g->rows = bounded(r, F_GEAR_rows, 1e6);
     g->residual = bounded(r, F_GEAR_residual, 1e3);
     g->support_residual = bounded(r, F_GEAR_support_residual, 1e3);
@@ -354,6 +361,8 @@ static void read_ground(reader *r, gk_model *m, int set)
     g->port_rows = bounded(r, F_SET_port_rows, 1e6);
     g->carried_rows = bounded(r, F_SET_carried_rows, 1e6);
     if (m->carried && !g->carried_rows) refuse(r, "motion of carried bodies", "is missing");
+    g->whirl_rows = bounded(r, F_SET_whirl_rows, 1e6);
+    if (m->whirls && !g->whirl_rows) refuse(r, "rows of gyroscopic pairs", "are missing");
     for (int k = 0; k < g->n && !r->outcome; k++) {
         demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "ground oscillators");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "ground oscillators", "are not sorted");
@@ -432,6 +441,8 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     if (!r.outcome) read_engagements(&r, model);
     if (!r.outcome) read_nodal(&r, model);
     if (!r.outcome) model->spatial = is_spatial(model);
+    model->spinning = model->whirls > 0;
+    for (int g = 0; g < model->gears; g++) model->spinning |= model->gear[g].turn_rate != NULL;
     return r.outcome;
 }
 

@@ -14,6 +14,7 @@ enum {
     MAX_FUNCTIONS = 8,
     LEADS = 33,       /* places across the face width where a lead is given */
     MAX_CARRIED = 32, /* bodies in the axes of turning rotors */
+    MAX_WHIRLS = 1000,
     MAX_MODES = 6000,
     MAX_TEETH = 1000,
     MAX_GROUND = 2000,
@@ -43,6 +44,7 @@ typedef struct gk_gear {
     int rotor, z, modes;
     int nodes[2]; /* of a flank for nodal contact: along, across; 0: none */
     const double *omega, *zeta, *rows, *residual, *support_residual, *port_residual;
+    const double *turn_rate; /* (modes) Coriolis coupling of a pair; NULL: unknown */
     const int32_t *diameter, *member;
     const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
@@ -82,7 +84,7 @@ typedef struct gk_port {
 typedef struct gk_ground {
     int n;
     const double *omega, *zeta, *rigid_share, *damper_rows, *damper, *support_rows, *support_compliance, *kappa,
-        *port_rows, *carried_rows;
+        *port_rows, *carried_rows, *whirl_rows;
 } gk_ground;
 
 struct gk_model {
@@ -101,6 +103,9 @@ struct gk_model {
     int carried;       /* bodies that stand in the axes of a turning rotor */
     const int32_t *carried_frame; /* (carried) that rotor */
     const double *carried_place;  /* (carried, 2) place of their axes there times √m */
+    int spinning;                 /* gyroscopic forces are known */
+    int whirls;                   /* pairs of rows of gyroscopic forces */
+    const int32_t *whirl;         /* (whirls) rotor whose speed turns them */
     int frame[MAX_ROTORS];        /* rotor in whose axes this one stands and its supports rest, −1: the ground */
     gk_gear gear[MAX_GEARS];
     gk_engagement engagement[MAX_ENGAGEMENTS];

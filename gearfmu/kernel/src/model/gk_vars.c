@@ -4,7 +4,18 @@
 #include "model/gk_data.h"
 #include "setup/gk_setup.h"
 
-typedef enum { ALWAYS, SPRING, TORQUE, FIXED, SPRING_OR_FIXED, CHAIN, SLICES_DIFFER, CARRIED, OBSERVED } gk_exists;
+typedef enum {
+    ALWAYS,
+    SPRING,
+    TORQUE,
+    FIXED,
+    SPRING_OR_FIXED,
+    CHAIN,
+    SLICES_DIFFER,
+    CARRIED,
+    SPINNING,
+    OBSERVED
+} gk_exists;
 enum {
     STAGE = SCOPE_STAGE,
     SHAFT = SCOPE_SHAFT,
@@ -59,6 +70,7 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     case CHAIN: return port->chain > 0;
     case SLICES_DIFFER: return model->spatial && row->place - V_SLICE_1 < model->slices; /* those of the stage file */
     case CARRIED: return model->carried > 0;
+    case SPINNING: return model->spinning;
     }
     return 0;
 }
@@ -72,8 +84,9 @@ static const gk_row *row_of(const gk_model *model, uint32_t reference, int *inst
         return *instance < model->amplitudes ? &TABLE[ROWS - 1] : NULL; /* the last of the table */
     }
     *instance = (int)(reference % INSTANCES);
-    if (number < 1 || number >= ROWS) return NULL; /* the table is in the order of its numbers */
-    return exists(model, &TABLE[number - 1], *instance) ? &TABLE[number - 1] : NULL;
+    for (int i = 0; i < ROWS - 1; i++)
+        if (TABLE[i].number == (int)number) return exists(model, &TABLE[i], *instance) ? &TABLE[i] : NULL;
+    return NULL;
 }
 
 static double *value_of(gk_data *data, const gk_row *row, int instance)
@@ -289,6 +302,7 @@ gk_effects gk_effects_of(const gk_data *data)
     const gk_effects on = {v[V_E_ELASTIC] != 0,     v[V_E_RESIDUAL] != 0, v[V_E_LOCAL] != 0,
                            v[V_E_COAST] != 0,       v[V_E_DAMPING] != 0,  v[V_E_RELIEF] != 0,
                            v[V_E_CORNER] != 0,      v[V_E_BEARING] != 0,  v[V_E_MODAL_DAMPING] != 0,
-                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0};
+                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0,
+                           v[V_E_GYROSCOPIC] != 0};
     return on;
 }

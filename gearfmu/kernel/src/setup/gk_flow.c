@@ -184,21 +184,23 @@ static void fill_dampers(const gk_model *model, const gk_setup *setup, gk_coeffi
     }
 }
 
-/* what carried masses are on the invariant's speeds y = v/s (gk_frame.c) */
-static void fill_carried(const gk_model *model, const gk_setup *setup, gk_coefficients *k)
+/* rows that turn into each other, on the invariant's speeds y = v/s (gk_frame.c) */
+static void fill_turns(const gk_setup *setup, gk_coefficients *k)
 {
     const gk_base *base = &setup->base;
-    const int rows = 2 * model->carried, n = base->n;
     gk_ground_flow *f = &k->ground;
-    for (int r = 0; r < rows; r++)
-        for (int i = 0; i < n; i++) {
-            const double row = base->omega[i] > 0.0 ? base->carried_rows[r * n + i] : 0.0, s = sqrt(f->inverse_s2[i]);
-            f->turns[r * n + i] = row * s;
-            f->turned[r * n + i] = row / s;
+    for (int r = 0; r < 2 * base->turns; r++)
+        for (int i = 0; i < base->n; i++) {
+            const double row = base->turn_rows[r * base->n + i], s = sqrt(f->inverse_s2[i]);
+            f->turns[r * base->n + i] = row * s;
+            f->turned[r * base->n + i] = row / s;
         }
-    for (int r = 0; r < rows; r++)
-        for (int c = 0; c < rows; c++)
-            f->coupling[r * rows + c] = gk_dot_quads(f->turns + r * n, f->turned + c * n, n / 4);
+    for (int i = 0; i < base->turns; i++) {
+        const double *x = f->turns + 2 * i * base->n, *to_x = f->turned + 2 * i * base->n, *to_y = to_x + base->n;
+        f->products[3 * i] = gk_dot_quads(x, to_x, base->n / 4);
+        f->products[3 * i + 1] = gk_dot_quads(x + base->n, to_y, base->n / 4);
+        f->products[3 * i + 2] = gk_dot_quads(x, to_y, base->n / 4);
+    }
 }
 
 static void fill_ground(const gk_model *model, const gk_setup *setup, gk_coefficients *k)
@@ -215,7 +217,7 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, gk_coeffic
         f->kappa[i] = o.kappa, f->inverse_s2[i] = there ? o.inverse_s2 : 1.0;
     }
     fill_dampers(model, setup, k);
-    fill_carried(model, setup, k);
+    fill_turns(setup, k);
 }
 
 /* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */

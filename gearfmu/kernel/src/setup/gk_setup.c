@@ -79,6 +79,7 @@ static void lay_out_modal(bump *b, const gk_gear *gear, gk_modal *m, int modes)
     m->lane = take(b, (size_t)modes * sizeof *m->lane);
     m->cosine = reals(b, turns);
     m->sine = reals(b, turns);
+    m->turn_rate = reals(b, (size_t)m->pairs);
 }
 
 static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int count)
@@ -94,6 +95,10 @@ static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int coun
     base->support_rows = doubles(b, n * (size_t)model->supports);
     base->port_rows = doubles(b, n * (size_t)model->ports);
     base->carried_rows = doubles(b, 2 * n * (size_t)model->carried);
+    const size_t pairs = (size_t)(model->carried + model->whirls);
+    base->turn_rotor = take(b, pairs * sizeof *base->turn_rotor);
+    base->turn_rows = doubles(b, 2 * n * pairs);
+    base->turn_span = take(b, pairs * sizeof *base->turn_span);
     base->outward = doubles(b, model->carried ? n * (size_t)model->rotors : 0);
     base->outward_support = doubles(b, (size_t)(model->carried ? model->rotors * model->supports : 0));
     for (int g = 0; g < model->gears; g++) base->centre[g] = doubles(b, 6 * n);
@@ -164,9 +169,10 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
                         &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
     f->pulls = doubles(b, (size_t)model->dampers * (size_t)setup->base.n);
-    f->turns = doubles(b, 2 * (size_t)model->carried * (size_t)setup->base.n);
-    f->turned = doubles(b, 2 * (size_t)model->carried * (size_t)setup->base.n);
-    f->coupling = doubles(b, 4 * (size_t)(model->carried * model->carried));
+    const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
+    f->turns = doubles(b, turning);
+    f->turned = doubles(b, turning);
+    f->products = doubles(b, 3 * (size_t)(model->carried + model->whirls));
 }
 
 static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged, int e)
@@ -194,7 +200,8 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     const size_t ground = (size_t)setup->base.n;
     for (int g = 0; g < model->gears; g++) {
         const size_t n = (size_t)setup->modal[g].n;
-        gk_real **array[] = {&work->qp[g], &work->vp[g], &work->force[g], &work->next[g], &work->reading[g]};
+        gk_real **array[] = {&work->qp[g],   &work->vp[g],      &work->force[g],
+                             &work->next[g], &work->reading[g], &work->turned_speed[g]};
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(&b, n);
         for (int i = 0; i < 7; i++) work->stage[g][i] = reals(&b, 2 * n);
         work->trial[g] = reals(&b, 2 * n);
@@ -351,6 +358,7 @@ static void fill_modal(const gk_gear *gear, gk_modal *m)
     memset(m->omega2, 0, (size_t)n * sizeof(gk_real));
     memset(m->cosine, 0, (size_t)gear->z * (size_t)P * sizeof(gk_real));
     memset(m->sine, 0, (size_t)gear->z * (size_t)P * sizeof(gk_real));
+    memset(m->turn_rate, 0, (size_t)P * sizeof(gk_real));
     for (int k = 0; k < m->count; k++) {
         if (gear->member[k] != 2) lane++;
         const int to = gear->member[k] == 2 ? P + lane : lane;
@@ -358,6 +366,7 @@ static void fill_modal(const gk_gear *gear, gk_modal *m)
         m->omega[to] = gear->omega[k];
         m->omega2[to] = (gk_real)(gear->omega[k] * gear->omega[k]);
         m->zeta[to] = gear->zeta[k];
+        if (gear->member[k] == 1) m->turn_rate[lane] = (gk_real)(gear->turn_rate ? gear->turn_rate[k] : 0.0);
         for (int j = 0; j < gear->z && gear->member[k] != 2; j++) {
             double sine, cosine;
             gk_sincos(2.0 * GK_PI * (double)((int64_t)gear->diameter[k] * j % gear->z) / gear->z, &sine, &cosine);
@@ -408,7 +417,43 @@ static gk_span span_of(const double *row, int n)
     return from < to ? (gk_span){from / 4 * 4, (to + 3) / 4 * 4 - from / 4 * 4} : (gk_span){0, 0};
 }
 
-/* what turns with rotors: rows of the masses, and the load outward */
+static gk_span hull(gk_span a, gk_span b)
+{
+    if (!a.width || !b.width) return a.width ? a : b;
+    const int from = a.from < b.from ? a.from : b.from;
+    const int to = a.from + a.width > b.from + b.width ? a.from + a.width : b.from + b.width;
+    return (gk_span){from, to - from};
+}
+
+/* of a pair of rows that turn into each other: below it speeds whirl by less than that part of the rotor's speed */
+static const double IDLE_TURN = 1e-4;
+
+/* adds a pair of rows that turn into each other with the speed of a rotor, unless they hardly move what is dynamic */
+static void add_turn(gk_base *base, const double *rows, int all, int rotor)
+{
+    double *to = base->turn_rows + 2 * base->turns * base->n, size[2] = {0.0, 0.0};
+    select_rows(base, rows, 2, all, to);
+    for (int k = 0; k < base->n; k++) {
+        if (!(base->omega[k] > 0.0)) to[k] = to[base->n + k] = 0.0;
+        for (int i = 0; i < 2; i++) size[i] += to[i * base->n + k] * to[i * base->n + k];
+    }
+    if (size[0] * size[1] < IDLE_TURN * IDLE_TURN) return;
+    base->turn_rotor[base->turns] = rotor;
+    base->turn_span[base->turns++] = hull(span_of(to, base->n), span_of(to + base->n, base->n));
+}
+
+/* what turns with rotors: Coriolis forces on carried bodies, gyroscopic forces */
+static void fill_turns(const gk_model *model, const gk_setup *setup, gk_base *base)
+{
+    const gk_ground *ground = &model->ground[base->set];
+    base->turns = 0;
+    for (int i = 0; i < model->carried && GK_ON(setup, coriolis); i++)
+        add_turn(base, ground->carried_rows + 2 * i * ground->n, ground->n, model->carried_frame[i]);
+    for (int i = 0; i < model->whirls && GK_ON(setup, gyroscopic); i++)
+        add_turn(base, ground->whirl_rows + 2 * i * ground->n, ground->n, model->whirl[i]);
+}
+
+/* the load outward on what rotors carry */
 static void fill_carried(const gk_model *model, gk_base *base)
 {
     const gk_ground *ground = &model->ground[base->set];
@@ -445,6 +490,7 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
     select_rows(base, ground->damper_rows, model->dampers, ground->n, base->damper_rows);
     select_rows(base, ground->port_rows, model->ports, ground->n, base->port_rows);
     fill_carried(model, base);
+    fill_turns(model, setup, base);
     for (int s = 0; s < model->supports; s++) /* the force there: κ times the displacement */
         for (int k = 0; k < base->n; k++) {
             double sum = 0.0;
@@ -457,14 +503,6 @@ static void fill_base(const gk_model *model, gk_setup *setup, const int32_t *whi
         base->support_span[s] = span_of(base->support_rows + s * base->n, base->n);
     for (int p = 0; p < model->ports; p++) base->port_span[p] = span_of(base->port_rows + p * base->n, base->n);
     for (int g = 0; g < model->gears; g++) fill_centre(model, base, gk_directions(setup), g);
-}
-
-static gk_span hull(gk_span a, gk_span b)
-{
-    if (!a.width || !b.width) return a.width ? a : b;
-    const int from = a.from < b.from ? a.from : b.from;
-    const int to = a.from + a.width > b.from + b.width ? a.from + a.width : b.from + b.width;
-    return (gk_span){from, to - from};
 }
 
 static int meet(gk_span a, gk_span b)
@@ -720,7 +758,10 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(work, 0, sizeof *work);
     lay_out_work(model, setup, work, behind(work, sizeof *work));
     setup->step = gk_wide_step(1, setup->integrator);
-    for (int g = 0; g < model->gears; g++) fill_modal(&model->gear[g], &setup->modal[g]);
+    for (int g = 0; g < model->gears; g++) {
+        fill_modal(&model->gear[g], &setup->modal[g]);
+        setup->modal[g].turns = GK_ON(setup, gyroscopic) && model->gear[g].turn_rate;
+    }
     fill_base(model, setup, which);
     fill_ports(model, setup);
     for (int e = 0; e < model->engagements; e++) fill_mesh(model, setup, data, e);

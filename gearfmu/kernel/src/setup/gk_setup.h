@@ -17,7 +17,7 @@ enum {
 
 typedef struct gk_effects {
     int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping,
-        roll_motion, coriolis, centrifugal;
+        roll_motion, coriolis, centrifugal, gyroscopic;
 } gk_effects;
 
 /* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
@@ -41,7 +41,8 @@ enum {
     EFFECT_roll_motion,
     EFFECT_pitch_errors,
     EFFECT_coriolis,
-    EFFECT_centrifugal
+    EFFECT_centrifugal,
+    EFFECT_gyroscopic
 };
 #define GK_EFFECT(name) EFFECT_##name
 #define GK_EFFECT_OF(name) GK_EFFECT(name)
@@ -57,6 +58,8 @@ typedef struct gk_modal { /* dynamic modes of a gear group: n lanes, [first memb
     gk_real *omega2;
     int32_t *lane;          /* (count) lane of every dynamic mode */
     gk_real *cosine, *sine; /* (z, pairs) */
+    int turns;              /* Coriolis forces couple the members of pairs: the effect is on and known */
+    gk_real *turn_rate;     /* (pairs) */
 } gk_modal;
 
 /* of a pose among the rows of a gear's rigid motion */
@@ -75,6 +78,10 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     double *support_rows;          /* (supports, n): force on the support, kappa included */
     double *port_rows;             /* (ports, n) */
     double *carried_rows;          /* (2 carried, n) √m x, √m y of carried bodies */
+    int turns;                     /* pairs of rows x, y that turn into each other: carried bodies, gyroscopic forces */
+    int32_t *turn_rotor;           /* (turns) with whose speed */
+    double *turn_rows;             /* (2 turns, n) */
+    gk_span *turn_span;            /* (turns) the part of both that is not zero */
     double *outward;               /* (rotors, n) centrifugal force on what a rotor carries per square of its speed */
     double *outward_support;       /* (rotors, supports) what it does at once to the forces on supports */
     double *centre[MAX_GEARS];     /* (6, n): rigid motion of every gear at its mid-width */
@@ -153,8 +160,8 @@ typedef struct gk_flow { /* coefficients of a gear group for one (h, γ) */
 typedef struct gk_ground_flow { /* the same of the ground group */
     double *d11, *a12, *a21, *d22, *b0q, *b0v, *bq, *bv, *mobility, *read_q, *read_v, *kappa, *inverse_s2;
     double *pulls;          /* (dampers, n) s²e/n of a dashpot */
-    double *turns, *turned; /* (2 carried, n) carried_rows on the invariant's speeds, and what these do to speeds */
-    double *coupling;       /* (2 carried, 2 carried) their products */
+    double *turns, *turned; /* (2 turns, n) turn_rows on the invariant's speeds, and what these do to speeds */
+    double *products;       /* (turns, 3) of the rows of a pair: x·x, y·y, x·y */
     double decay[MAX_SUPPORTS], loss[MAX_SUPPORTS]; /* 1 − e^(−dh/2); what that takes per (e·v)², n = Σ s²e² */
 } gk_ground_flow;
 

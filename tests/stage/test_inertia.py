@@ -1,0 +1,52 @@
+"""Sizes of the terms of turning axes in a stage."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gearfmu.reduction.modal import elastic_modes
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.inertia import gear_inertia, largest_speeds
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
+
+import small_gear  # noqa: E402  (found through the line above)
+
+
+def test_speeds_are_those_of_the_fastest_the_stage_may_turn() -> None:
+    pair = largest_speeds(as_general(load_stage("fzg_c")))
+    assert pair["wheel"] / pair["pinion"] == pytest.approx(-16 / 24)
+    of_set = largest_speeds(as_general(load_stage("planetary54")))
+    assert [of_set[name] for name in ("carrier", "sun", "planet1", "ring")] == pytest.approx(
+        [300.0, 1200.0, -600.0, 0.0]
+    )
+
+
+def test_sizes_of_a_small_gear() -> None:
+    """Of first and second order in the speed; ΔJ/J by a force is by reciprocity what its place moves outward."""
+    body, force = small_gear.coarse(), 1e4
+    modes = elastic_modes(body, 16)
+    shown = SimpleNamespace(
+        spin=modes.spin,
+        part=modes.part,
+        frequency=modes.frequency,
+        modes=modes.frequency.size,
+        roll=np.zeros(4),
+        inertia=body.inertia[3:, 3:],
+        static_ff=np.full((2, 2, 12, 4, 4, 3, 3), 1e-9),
+    )
+    slow, fast = (gear_inertia("gear", shown, speed, force, 1e6) for speed in (500.0, 1000.0))
+    assert slow is not None and fast is not None
+    assert fast.whirl / slow.whirl == pytest.approx(2.0) and fast.stiffening / slow.stiffening == pytest.approx(4.0)
+    assert fast.growth / slow.growth == pytest.approx(4.0) and fast.by_load == slow.by_load
+    assert slow.deflection == pytest.approx(1e-5)
+    polar = body.inertia[5, 5]
+    assert fast.by_load == pytest.approx(2 * fast.growth / 1000.0**2 * force / polar)
+    assert 1e-9 < fast.by_speed < 1e-3
+    assert gear_inertia("gear", SimpleNamespace(spin=None, modes=0), 1.0, 1.0, 1.0) is None
