@@ -159,7 +159,7 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
         strip_half_width=gear.body.strip_half_width,
-        static_ff=kept_offsets(statics.static_ff, whole=getattr(gear, "mounts", None) is not None and not geometry.beta),
+        static_ff=kept_offsets(statics.static_ff, whole=bool(getattr(gear, "mounts", None)) and not geometry.beta),
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=made.frf,
