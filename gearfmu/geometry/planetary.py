@@ -59,6 +59,11 @@ class RingMesh:
         return {"A": self.ring.s_tip - self.length, "C": pitch, "E": self.planet.s_tip}
 
     @property
+    def planet_pitch_radius(self) -> float:
+        """Working pitch radius (m) of the planet."""
+        return self.a * self.planet.z / (self.ring.z - self.planet.z)
+
+    @property
     def contact_ratio(self) -> float:
         """Transverse contact ratio of the usable flanks."""
         return (self.path["E"] - self.path["A"]) / self.base_pitch
