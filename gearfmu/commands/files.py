@@ -228,16 +228,12 @@ def _derived_set_helix(spec: Any, g: Any) -> dict[str, Any]:
     """What a helical set has besides: angle and overlap, and what torque_max presses along the axis in the mean."""
     import math
 
-    sun, planet = g.sun_mesh.gears
-    width = min(gear.face_width for gear in spec.gears)
+    sun = g.sun_mesh.gears[0]
     axial = spec.torque_max / g.ratio / spec.set.planets / sun.r * math.tan(abs(sun.beta))
     apart = g.sun_mesh.r_w[1] + g.ring_mesh.planet_pitch_radius
     return {
         "base_helix_angle_deg": math.degrees(sun.beta_b),
-        "overlap_ratio": {
-            "sun_planet": g.sun_mesh.overlap_ratio(width),
-            "planet_ring": g.ring_mesh.overlap_ratio(width),
-        },
+        "overlap_ratio": sun.overlap_ratio(min(gear.face_width for gear in spec.gears)),
         "axial_force_of_a_mesh": axial,
         "tilting_moment_on_a_pin": axial * apart,
     }

@@ -73,10 +73,6 @@ class RingMesh:
         """Transverse base pitch p_bt = p_et = π m_t cos α_t, m."""
         return math.pi * self.planet.m_t * math.cos(self.planet.alpha_t)
 
-    def overlap_ratio(self, face_width: float) -> float:
-        """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
-        return face_width * math.sin(abs(self.planet.beta)) / (math.pi * self.planet.m)
-
     def outer_single_contact(self, gear: int) -> float:
         """Roll (m) of the point of single contact that is nearer to the tip of the planet (0) or of the ring (1)."""
         return (self.path["A"] + self.base_pitch, self.path["E"] - self.base_pitch + self.length)[gear]

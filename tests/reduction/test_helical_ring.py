@@ -44,7 +44,8 @@ def test_twisted_sectors_are_sound(degrees: float) -> None:
 
 @pytest.mark.parametrize("beta", [BETA, -BETA])
 def test_a_unit_load_pushes_along_the_axis_by_sin_beta_b(beta: float) -> None:
-    """1 N along n = −(cos β_b n_t − sg sin β_b e_z): axial force sg sin β_b, moment −sg r_b cos β_b; F_t tan β = F_a."""
+    """1 N along n = −(cos β_b n_t − sg sin β_b e_z): axial force sg sin β_b, moment −sg r_b cos β_b, and so
+    F_t tan β = F_a."""
     shape, made = geometry(beta), coarse(beta)
     resultant = made.rigid_rows().reshape(2, 4, 3, 6)[:, :, 0]
     for side, sg in ((0, 1), (1, -1)):
