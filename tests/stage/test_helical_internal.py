@@ -96,7 +96,7 @@ def test_a_vanishing_helix_is_the_spur_pair() -> None:
 
 @pytest.mark.full
 def test_transmission_error_of_an_overlap_ratio_of_one_is_smooth() -> None:
-    """Against the spur pair of the same section, whole and from one position to the next; what is left are ten slices."""
+    """Against the spur pair of the same section, over a pitch and from one position to the next; ten slices remain."""
     positions = 24
     helical, spur = (loaded_te(model_at(beta), [TORQUE], positions, rigid_bearings=True).te[0] for beta in (WHOLE, 0.0))
     steps = [np.abs(np.diff(te)).max() for te in (helical, spur)]
