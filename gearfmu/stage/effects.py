@@ -152,11 +152,12 @@ EFFECTS: tuple[Effect, ...] = (
     _switched(
         "coast_flank",
         title="coast flank",
-        formula="g of the other side, sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt",
+        formula="g of the other side, sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt; of a mesh through "
+        "which a torque in +z on the first port drives with sg = −1, that of sg = +1",
         equation="2.1 (eq. 4)",
         matters="rattle, load reversal, engagement and every start; not where the drive flanks stay closed",
         off="teeth pass through the backlash",
-        code="gk_flank.c (gk_flank_find)",
+        code="gk_flank.c (gk_flank_find), gk_kinematics.c (gk_kinematics_carrying)",
     ),
     _switched(
         "contact_damping",
