@@ -77,7 +77,15 @@ void gk_kinematics_find(const gk_model *model, gk_motions *motions)
 }
 
 /* ---- flanks that carry ------------------------------------------------------------------------------------------- */
-/* torque on every rotor per unit force on the drive flanks of an engagement */
+/* does nothing hold a rotor but the teeth? */
+static int is_free(const gk_model *model, int rotor)
+{
+    for (int p = 1; p < model->ports; p++)
+        if (model->port[p].rotor == rotor) return 0;
+    return model->inertia[rotor] > 0.0;
+}
+
+/* torque on every free rotor per unit force on the drive flanks of an engagement */
 static void find_arms(const gk_model *model, const gk_engagement *e, double arms[MAX_ROTORS])
 {
     const double r_a = model->gear[e->gear[0]].r_b, r_b = e->kind * model->gear[e->gear[1]].r_b;
@@ -86,14 +94,8 @@ static void find_arms(const gk_model *model, const gk_engagement *e, double arms
     memset(arms, 0, MAX_ROTORS * sizeof *arms);
     arms[rotor[0]] -= r_a, arms[rotor[1]] -= r_b;
     if (rotor[2] >= 0) arms[rotor[2]] += r_a + r_b;
-}
-
-/* does nothing hold a rotor but the teeth? */
-static int is_free(const gk_model *model, int rotor)
-{
-    for (int p = 1; p < model->ports; p++)
-        if (model->port[p].rotor == rotor) return 0;
-    return model->inertia[rotor] > 0.0;
+    for (int r = 0; r < model->rotors; r++)
+        if (!is_free(model, r)) arms[r] = 0.0;
 }
 
 /* The forces of least squares that balance the torque on every free rotor: where planets or shafts share the load,
@@ -110,10 +112,9 @@ void gk_kinematics_carrying(const gk_model *model, int coasts[MAX_ENGAGEMENTS])
         find_arms(model, &model->engagement[i], arms[i]);
     }
     if (model->ports < 2) return;
-    for (int a = 0; a < n; a++)
-        for (int b = 0; b < n; b++)
-            for (int i = 0; i < model->engagements && is_free(model, a) && is_free(model, b); i++)
-                product[a * n + b] += arms[i][a] * arms[i][b];
+    for (int i = 0; i < model->engagements; i++)
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++) product[a * n + b] += arms[i][a] * arms[i][b];
     for (int a = 0; a < n; a++) trace += product[a * n + a];
     for (int a = 0; a < n; a++) product[a * n + a] += SMALL * trace;
     y[model->port[0].rotor] = 1.0;
@@ -121,7 +122,7 @@ void gk_kinematics_carrying(const gk_model *model, int coasts[MAX_ENGAGEMENTS])
     gk_limit_solve(product, y, n);
     for (int i = 0; i < model->engagements; i++) {
         force[i] = 0.0;
-        for (int a = 0; a < n; a++) force[i] -= is_free(model, a) ? arms[i][a] * y[a] : 0.0;
+        for (int a = 0; a < n; a++) force[i] -= arms[i][a] * y[a];
         most = gk_max(most, fabs(force[i]));
     }
     for (int i = 0; i < model->engagements; i++) coasts[i] = force[i] < -SMALL * most;
