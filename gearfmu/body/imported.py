@@ -23,6 +23,7 @@ from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -94,11 +95,6 @@ def imported_set_sector(spec: Any, name: str) -> FeMesh:
         f"{part.imported.file}: an imported carrier is taken as a whole and has no sector: use the pictures of your "
         "own finite-element program"
     )
-
-
-def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:
-    """The geometry of sun, planet or ring of a PlanetarySpec."""
-    return (InternalGearGeometry if name == "ring" else GearGeometry).of(getattr(spec, name), spec.set)
 
 
 def pair_geometry(spec: Any, name: str) -> GearGeometry:

@@ -42,7 +42,6 @@ def inspect_file(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _facts(body: ReducedBody) -> dict[str, Any]:
     middle, offsets = len(body.roll) // 2, body.static_ff.shape[2]
-    all_offsets = offsets == body.teeth
     return {
         "teeth": body.teeth,
         "mass_kg": body.mass,
@@ -57,7 +56,7 @@ def _facts(body: ReducedBody) -> dict[str, Any]:
         "frequency_range_Hz": [float(body.frequency[0]), float(body.frequency[-1])],
         "roll_points": len(body.roll),
         "width_functions": body.width_functions,
-        "tooth_offsets": f"all {body.teeth}" if all_offsets else f"−{offsets // 2} to {offsets // 2}",
+        "tooth_offsets": f"all {body.teeth}" if body.all_offsets else f"−{offsets // 2} to {offsets // 2}",
         "rows_along_profile": body.tangent is not None,
         "tooth_compliance_mid_flank_m_per_N": float(body.static_ff[0, 0, 0, middle, middle, 0, 0]),
         **_mounts(body),
@@ -79,7 +78,7 @@ def _mounts(body: ReducedBody) -> dict[str, Any]:
         "spread_of_residual_between_teeth": {
             f"{n} modes": ring.residual_spread(0.5 * float(ring.frequency[n - 1] + ring.frequency[n]))
             for n in (36, 128)
-            if n < len(ring.frequency)
+            if n < len(ring.frequency) and body.all_offsets
         },
     }
 

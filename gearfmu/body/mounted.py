@@ -187,7 +187,9 @@ def _residual_mm(body: ReducedBody) -> np.ndarray:
 
 
 def _cyclic_flank(body: ReducedBody) -> np.ndarray:
-    """C_ff of the free ring by tooth offset, (z, 2·R·A, 2·R·A)."""
+    """C_ff of the free ring by tooth offset, (z, 2·R·A, 2·R·A). BodyError where the file does not hold all of them."""
+    if not body.all_offsets:
+        raise BodyError(f"body '{body.name}' keeps a few tooth offsets only, as helical ones do: no mean tooth table")
     size = body.flank_rows[..., 0].size
     return body.static_ff.transpose(2, 0, 3, 5, 1, 4, 6).reshape(body.teeth, size, size)
 

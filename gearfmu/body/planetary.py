@@ -21,9 +21,8 @@ from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report
 from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
@@ -101,8 +100,7 @@ def reduce_set_body(spec: PlanetarySpec, name: str, progress: Progress | None = 
         if name == "carrier":
             return _carrier(spec, progress)
         gear = spec.gears[SET_BODIES.index(name)]
-        kind = InternalGearGeometry if name == "ring" else GearGeometry
-        return reduced_gear(gear, kind.of(gear, spec.set), set_hash(spec, name), progress)
+        return reduced_gear(gear, set_geometry(spec, name), set_hash(spec, name), progress)
     except MeshError as error:
         raise MeshError(f"{spec.source}: {name}: {error}") from error
 

@@ -114,7 +114,7 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
     gear = spec.gears[gear_index]
     geometry: Geometry
     if isinstance(gear, RingSpec):
-        geometry = InternalGearGeometry.of(gear, spec.pair)
+        geometry = InternalGearGeometry.of(gear, spec.pair, hand=1)
     else:
         geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
     try:
@@ -159,7 +159,7 @@ def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progr
         roll_range=np.array(flank.roll_range),
         roll=points.rolls,
         strip_half_width=gear.body.strip_half_width,
-        static_ff=kept_offsets(statics.static_ff, whole=getattr(gear, "mounts", None) is not None),
+        static_ff=kept_offsets(statics.static_ff, whole=bool(getattr(gear, "mounts", None)) and not geometry.beta),
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         frf=made.frf,

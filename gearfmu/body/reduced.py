@@ -125,6 +125,11 @@ class ReducedBody:
         return tuple(name for name, there in has.items() if there)
 
     @property
+    def all_offsets(self) -> bool:
+        """Whether `static_ff` holds all tooth offsets."""
+        return self.static_ff.shape[2] == self.teeth
+
+    @property
     def width_functions(self) -> int:
         """Number A of Legendre functions across the face width."""
         return self.flank_rows.shape[2]

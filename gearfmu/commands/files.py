@@ -220,7 +220,23 @@ def _derived_set(spec: Any) -> dict[str, Any]:
         "largest_hertz_half_width_planet_ring": ring_half_width(spec, g.ring_mesh),
         "carrier_mass": carrier.volume * spec.carrier.material.density,
         **{name: {"r_b": s.r_b, "r_f": s.r_f, "r_a": s.r_a} for name, s in shapes.items()},
+        **(_derived_set_helix(spec, g) if spec.set.helix_angle else {}),
     }  # fmt: skip
+
+
+def _derived_set_helix(spec: Any, g: Any) -> dict[str, Any]:
+    """What a helical set has besides: angle and overlap, and what torque_max presses along the axis in the mean."""
+    import math
+
+    sun = g.sun_mesh.gears[0]
+    axial = spec.torque_max / g.ratio / spec.set.planets / sun.r * math.tan(abs(sun.beta))
+    apart = g.sun_mesh.r_w[1] + g.ring_mesh.planet_pitch_radius
+    return {
+        "base_helix_angle_deg": math.degrees(sun.beta_b),
+        "overlap_ratio": sun.overlap_ratio(min(gear.face_width for gear in spec.gears)),
+        "axial_force_of_a_mesh": axial,
+        "tilting_moment_on_a_pin": axial * apart,
+    }
 
 
 def _fmu(path: Path) -> dict[str, Any]:

@@ -110,7 +110,8 @@ def _keep_scale(part: Any, name: str, scale: float | None) -> None:
 
 def _imported(spec: Any, gear: Any) -> FullOrder:
     """The FullOrder of a gear from finite elements made elsewhere."""
-    from gearfmu.body.imported import imported_full_order, pair_geometry, set_geometry
+    from gearfmu.body.imported import imported_full_order, pair_geometry
+    from gearfmu.geometry.planetary import set_geometry
 
     geometry_of = set_geometry if spec.kind == "planetary_set" else pair_geometry
     return imported_full_order(gear, geometry_of(spec, gear.name))

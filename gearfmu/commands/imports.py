@@ -45,7 +45,8 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 
 def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
-    from gearfmu.body.imported import check_gear, pair_geometry, set_geometry
+    from gearfmu.body.imported import check_gear, pair_geometry
+    from gearfmu.geometry.planetary import set_geometry
     from gearfmu.reduction.imported_carrier import imported_carrier
     from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 

@@ -111,10 +111,11 @@ def _body(spec: Any, name: str) -> Any:
 
 def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
     """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
-    from gearfmu.body.imported import imported_sector_mesh, imported_set_sector, pair_geometry, set_geometry
+    from gearfmu.body.imported import imported_sector_mesh, imported_set_sector, pair_geometry
     from gearfmu.femesh import sector_mesh
     from gearfmu.femesh.carrier import carrier_sector
     from gearfmu.geometry.carrier import CarrierGeometry
+    from gearfmu.geometry.planetary import set_geometry
     from gearfmu.spec.shapes import gear_shape
 
     body = _body(spec, name)

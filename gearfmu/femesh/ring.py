@@ -22,12 +22,13 @@ from gearfmu.spec.gear import MeshSpec
 
 
 def ring_sector(geometry: InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:
-    """One sector of an internal spur gear, `face_width` b (m) about z = 0; sets: "rim", its share of the outer surface.
+    """One sector of an internal gear, `face_width` b (m) about z = 0; sets: "rim", its share of the outer surface.
 
-    Flank nodes, mid nodes included, lie on the involute; the tip edge is meshed sharp. flank[0] is that of space 0 at
-    its larger angle. MeshError when the geometry leaves no valid element.
+    Flank nodes, mid nodes included, lie on the involute of their section; the tip edge is meshed sharp. flank[0] is
+    that of space 0 at its larger angle. MeshError when the geometry leaves no valid element.
     """
-    return sector_of(build_ring_section(geometry, mesh), geometry.z, face_width, mesh.scaled(mesh.width), "rim")
+    section, elements = build_ring_section(geometry, mesh), mesh.scaled(mesh.width)
+    return sector_of(section, geometry.z, face_width, elements, "rim", geometry.twist)
 
 
 def sector_mesh(geometry: GearGeometry | InternalGearGeometry, face_width: float, mesh: MeshSpec) -> FeMesh:

@@ -1,10 +1,11 @@
-"""One internal spur gear: reference data, flank, root and cross-section.
+"""One internal gear, spur or helical: reference data, and flank, root and cross-section of its transverse section.
 
 A ring's tooth space is bounded by the same involutes as the tooth of the external gear that would fill it, so space 0
 is centred on +x, ψ_b is the half angle of the *space* at the base circle, and flank sg = +1 is that at its larger
 angle. Roll s and radius mean what they mean outside; along a flank both grow from the tip to the root, and the normal
 out of the material points into the space: −sg e_t(t). ISO 21771 gives diameters of internal gears a minus sign; here
-all are positive.
+all are positive. The hand of a helical ring is that of the gear that would fill its spaces, and of the planet in mesh
+with it: both are turned by z·twist in one direction.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ _GAUSS = np.polynomial.legendre.leggauss(40)
 
 @dataclass(frozen=True)
 class InternalGearGeometry(ReferenceGear):
-    """An internal spur gear in its body frame: tooth space 0 centred on +x (lengths m, angles rad).
+    """An internal gear in its body frame: tooth space 0 centred on +x at z = 0 (lengths m, angles rad).
 
-    z, m, alpha, x: teeth, module, pressure angle, profile-shift coefficient (positive outwards). r_a: tip radius, the
-    smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of the tip edge rounding. fillet: radius of the
-    root fillet, an arc tangent to flank and root circle (as a shaping cutter with that tip rounding leaves it, up to
-    its motion along the trochoid).
+    z, m, alpha, x, beta: teeth, normal module, normal pressure angle, profile-shift coefficient (positive outwards),
+    helix angle. r_a: tip radius, the smallest; r_f: root radius; r_rim: outer radius. tip_edge: radius of the tip edge
+    rounding. fillet: radius of the root fillet, an arc tangent to flank and root circle (as a shaping cutter with that
+    tip rounding leaves it, up to its motion along the trochoid). Both radii are those of the transverse section.
     """
 
     r_a: float
@@ -39,13 +40,15 @@ class InternalGearGeometry(ReferenceGear):
     fillet: float
 
     @classmethod
-    def of(cls, ring: Any, gear_set: Any) -> InternalGearGeometry:
-        """The geometry of the RingSpec of a SetSpec."""
-        m = gear_set.normal_module
+    def of(cls, ring: Any, gear_set: Any, hand: int = 0) -> InternalGearGeometry:
+        """The geometry of the RingSpec of a SetSpec. hand: of a helical one, the sign of its helix angle over that of
+        `gear_set`."""
+        assert hand or not gear_set.helix_angle, "of which hand is the ring?"
+        m, beta = gear_set.normal_module, hand * gear_set.helix_angle + 0.0
         return cls(
             z=ring.teeth, m=m, alpha=gear_set.pressure_angle, x=ring.profile_shift, r_a=ring.tip_diameter / 2,
-            r_f=m * (ring.teeth / 2 + ring.profile_shift + ring.dedendum), r_rim=ring.rim_diameter / 2,
-            tip_edge=ring.tip_edge_radius, fillet=ring.fillet_radius * m,
+            r_f=m * (ring.teeth / 2 / math.cos(beta) + ring.profile_shift + ring.dedendum), r_rim=ring.rim_diameter / 2,
+            tip_edge=ring.tip_edge_radius, fillet=ring.fillet_radius * m, beta=beta,
         )  # fmt: skip
 
     @property

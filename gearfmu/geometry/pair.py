@@ -58,7 +58,7 @@ class PairGeometry:
 
     def overlap_ratio(self, face_width: float) -> float:
         """ε_β = b sin |β| / (π m_n) of the common face width b (m)."""
-        return face_width * math.sin(abs(self.gears[0].beta)) / (math.pi * self.gears[0].m)
+        return self.gears[0].overlap_ratio(face_width)
 
     def opposite(self, roll: float) -> float:
         """Roll (m) on the other gear at the contact point that has `roll` (m) on this one."""

@@ -1,4 +1,6 @@
-"""A planetary set: two meshes with one centre distance, places of the planets, phases of assembly."""
+"""A planetary set, spur or helical: two meshes with one centre distance, places of the planets, phases of assembly.
+
+Sun and planets have opposite hands, planets and ring the same: the helix angle of the set is that of the sun."""
 
 from __future__ import annotations
 
@@ -14,6 +16,7 @@ from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.pair import PairGeometry
 
 SAME_ANGLE = 1e-9  # rad
+HANDS = {"sun": 1, "planet": -1, "ring": -1}  # sign of the helix angle over that of the set
 
 
 @dataclass(frozen=True)
@@ -56,14 +59,19 @@ class RingMesh:
         return {"A": self.ring.s_tip - self.length, "C": pitch, "E": self.planet.s_tip}
 
     @property
+    def planet_pitch_radius(self) -> float:
+        """Working pitch radius (m) of the planet."""
+        return self.a * self.planet.z / (self.ring.z - self.planet.z)
+
+    @property
     def contact_ratio(self) -> float:
         """Transverse contact ratio of the usable flanks."""
         return (self.path["E"] - self.path["A"]) / self.base_pitch
 
     @property
     def base_pitch(self) -> float:
-        """Base pitch p_b = π m cos α, m."""
-        return math.pi * self.planet.m * math.cos(self.planet.alpha)
+        """Transverse base pitch p_bt = p_et = π m_t cos α_t, m."""
+        return math.pi * self.planet.m_t * math.cos(self.planet.alpha_t)
 
     def outer_single_contact(self, gear: int) -> float:
         """Roll (m) of the point of single contact that is nearer to the tip of the planet (0) or of the ring (1)."""
@@ -71,8 +79,8 @@ class RingMesh:
 
     @property
     def normal_backlash(self) -> float:
-        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_wt cos α_wt."""
-        return self.backlash * math.cos(self.alpha_wt)
+        """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""
+        return self.backlash * math.cos(self.alpha_wt) * math.cos(self.planet.beta_b)
 
     def ring_phase(self, planet_angle: float, direction: float) -> float:
         """Angle (rad) of the ring's space 0 at which its drive flank touches that of the planet's tooth 0 at the angle
@@ -138,8 +146,7 @@ class PlanetaryGeometry:
     @classmethod
     def of(cls, spec: Any) -> PlanetaryGeometry:
         """The geometry of a PlanetarySpec."""
-        sun, planet = (GearGeometry.of(gear, spec.set) for gear in (spec.sun, spec.planet))
-        ring = InternalGearGeometry.of(spec.ring, spec.set)
+        sun, planet, ring = set_geometries(spec)
         a, backlash = spec.set.center_distance, spec.set.backlash
         return cls(PairGeometry((sun, planet), a, backlash), RingMesh(planet, ring, a, backlash), planet_angles(spec))
 
@@ -180,6 +187,20 @@ class PlanetaryGeometry:
         """Whether the planets fit: their angles are multiples of 2π/(z_s + z_r)."""
         teeth = self.sun_mesh.gears[0].z + self.ring_mesh.ring.z
         return all(abs(math.remainder(angle, 2 * math.pi / teeth)) < SAME_ANGLE for angle in self.angles)
+
+
+def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:
+    """The geometry of sun, planet or ring of a PlanetarySpec."""
+    kind = InternalGearGeometry if name == "ring" else GearGeometry
+    return kind.of(getattr(spec, name), spec.set, HANDS[name])
+
+
+def set_geometries(spec: Any) -> tuple[GearGeometry, GearGeometry, InternalGearGeometry]:
+    """Sun, planet and ring of a PlanetarySpec."""
+    sun, planet, ring = (set_geometry(spec, name) for name in HANDS)
+    assert isinstance(sun, GearGeometry) and isinstance(planet, GearGeometry)
+    assert isinstance(ring, InternalGearGeometry)
+    return sun, planet, ring
 
 
 def planet_angles(spec: Any) -> tuple[float, ...]:

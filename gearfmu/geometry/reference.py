@@ -45,6 +45,10 @@ class ReferenceGear:
         """Angle by which the transverse section turns about +z per metre of face width, tan β / r, rad/m."""
         return math.tan(self.beta) / self.r
 
+    def overlap_ratio(self, face_width: float) -> float:
+        """ε_β = b sin |β| / (π m_n) of a face width b (m)."""
+        return face_width * math.sin(abs(self.beta)) / (math.pi * self.m)
+
     @property
     def z_virtual(self) -> float:
         """Virtual number of teeth z_n = z / (cos² β_b cos β) of the spur gear that the normal section resembles."""

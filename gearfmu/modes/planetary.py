@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.imported import imported_full_order, imported_set_sector, set_geometry
+from gearfmu.body.imported import imported_full_order, imported_set_sector
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.femesh.ring import sector_mesh
 from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes

@@ -5,7 +5,8 @@ involute's arc length σ = s²/(2 r_b), over the strip |σ − σ(s)| ≤ w clip
 is left). It acts along the outward normal of the analytic flank, or along the profile. A helical flank is the same
 involute in every transverse section, turned by z·twist: roll, strip and profile direction are those of the section at
 z, and the normal has an axial component,
-    n = cos β_b n_t(s, z) − sg sin β_b e_z,     e_p = e_r(t) turned by z·twist    (β_b > 0: right-handed).
+    n = cos β_b n_t(s, z) − sg sin β_b e_z,     e_p = e_r(t) turned by z·twist    (β_b > 0: right-handed),
+and the opposite one on the flanks of a ring.
 e_p points to growing roll, lies in the transverse plane and in the flank, square to n: the direction in which flanks of
 gears on parallel axes slide on each other. Integration runs over the quadratic surface
 elements, split exactly where the strip begins and ends, so that the rows are smooth in s, and over the roll (dσ = s
@@ -57,12 +58,12 @@ class ToothFlank:
     def normal(self, roll: np.ndarray, side: int, z: np.ndarray | float = 0.0) -> np.ndarray:
         """Unit normals (…, 3) out of the material of flank index `side` (0 ↔ sg = +1) at roll (…) and face-width
         coordinate z (m, to be broadcast with the roll; of no influence on a spur gear)."""
-        plane = involute.flank_normal(roll, self.r_b, self.psi_b, 1 - 2 * side)
-        plane = -plane if self.internal else plane
+        sg, outwards = 1 - 2 * side, -1 if self.internal else 1
+        plane = outwards * involute.flank_normal(roll, self.r_b, self.psi_b, sg)
         if not self.base_helix_angle:
             return np.concatenate([plane, np.zeros((*plane.shape[:-1], 1))], axis=-1)
         turned = self._turned(np.cos(self.base_helix_angle) * plane, z)
-        turned[..., 2] = -(1 - 2 * side) * np.sin(self.base_helix_angle)
+        turned[..., 2] = -outwards * sg * np.sin(self.base_helix_angle)
         return turned
 
     def tangent(self, roll: np.ndarray, side: int, z: np.ndarray | float = 0.0) -> np.ndarray:

@@ -14,8 +14,8 @@ from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.planetary import set_geometries
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
 
@@ -29,7 +29,7 @@ def ring_full_order(spec: Any, scale: float = RING_SCALE, mounted: bool = True) 
     mounted : its springs are in the stiffness, and nothing else holds it. Otherwise the body is free, and the mounts
     (averaging nodes mount0 …) are interfaces and the ground when it is judged.
     """
-    geometry = InternalGearGeometry.of(spec.ring, spec.set)
+    *_, geometry = set_geometries(spec)
     counts = spec.ring.body.mesh
     sector = ring_sector(geometry, spec.ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, spec.ring.material)
@@ -46,7 +46,7 @@ def gear_full_order(spec: Any, name: str, scale: float = GEAR_SCALE) -> FullOrde
     of its bore (averaging, or rigid where the gear says so), which is the ground when it is judged."""
     if spec.kind == "planetary_set":
         gears = (spec.sun, spec.planet)
-        shapes = tuple(GearGeometry.of(gear, spec.set) for gear in gears)
+        shapes = set_geometries(spec)[:2]
     else:
         gears, shapes = spec.gears, PairGeometry.of(spec).gears
     gear, geometry = next((gear, shape) for gear, shape in zip(gears, shapes, strict=True) if gear.name == name)

@@ -55,6 +55,8 @@ def gear_table(spec: Any, name: str) -> str:
 def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:
     """`body_inputs` of the ring of a general stage."""
     inputs = {"kind": "ring"} | ring.model_dump(exclude={"name", "kind", "mounts", "imported", "rim_coupling"})
+    if not inputs["helix_angle"]:
+        inputs.pop("helix_angle")  # files of spur rings are older than helical ones
     if getattr(ring, "rigid_bore", False):  # a ring of a general stage
         inputs["rim_coupling"] = "rigid"
     if ring.imported is not None:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.hertz import contact_modulus, half_width, largest_relative_radius
+from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.spec.gear import GearSpec, PairSpec
 
 STRIP_PER_HERTZ = 1.5  # the local law needs w > 1.12 b; at 1.5 b its tangent still has a margin
@@ -58,7 +60,7 @@ def gear_problems(gear: GearSpec, shape: GearGeometry) -> Found:
     yield from rack
     yield from _rim_problems(gear, shape)
     yield from _index_problems(gear, shape)
-    yield from _import_problems(gear, shape)
+    yield from import_problems(gear, shape)
     if not rack:
         yield from _tip_problems(gear, shape)
 
@@ -99,10 +101,11 @@ def _rim_problems(gear: GearSpec, shape: GearGeometry) -> Found:
         )
 
 
-def _import_problems(gear: GearSpec, shape: GearGeometry) -> Found:
+def import_problems(gear: Any, shape: ReferenceGear) -> Found:
+    """Finite elements made elsewhere, of a gear or a ring."""
     if gear.imported is not None and shape.beta:
         remedy = (
-            "finite elements made elsewhere are read for spur gears only: set pair.helix_angle to 0 deg or leave the "
+            "finite elements made elsewhere are read for spur gears only: set the helix angle to 0 deg or leave the "
         )
         yield "import", gear.imported.file, remedy + "table away and let the gear be meshed here"
 

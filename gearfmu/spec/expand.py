@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.planetary import planet_angles
+from gearfmu.geometry.planetary import HANDS, planet_angles
 from gearfmu.spec.gear import Bearing, GearSpec
 from gearfmu.spec.general import (
     CarrierBody,
@@ -90,11 +90,10 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
         raise SpecError(problems)
     assert spec.contact is not None
     planets = [f"planet{k + 1}" for k in range(spec.set.planets)]
-    angles: dict[str, Any] = {"normal_module": spec.set.normal_module, "pressure_angle": spec.set.pressure_angle}
-    bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, "sun", angles)}
-    bodies |= {name: _set_gear(spec.planet, name, angles) for name in planets}
+    bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, "sun", _rack(spec, "sun"))}
+    bodies |= {name: _set_gear(spec.planet, name, _rack(spec, "planet")) for name in planets}
     ring = {name: getattr(spec.ring, name) for name in RingSpec.model_fields} | {"mounts": None}
-    bodies["ring"] = RingBody(**ring, kind="ring", **angles)
+    bodies["ring"] = RingBody(**ring, kind="ring", **_rack(spec, "ring"))
     carrier = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
     bodies["carrier"] = CarrierBody(**carrier, name="carrier", kind="carrier")
     stage = GeneralStage(
@@ -147,6 +146,15 @@ def motion_problems(spec: PlanetarySpec) -> list[Problem]:
         )
         found.append(Problem(str(spec.source), "ports", ", ".join(spec.ports) or "missing", f'{remedy} = "torque"'))
     return found
+
+
+def _rack(spec: PlanetarySpec, name: str) -> dict[str, Any]:
+    """Module and angles of sun, planet or ring."""
+    s = spec.set
+    return {
+        "normal_module": s.normal_module, "pressure_angle": s.pressure_angle,
+        "helix_angle": HANDS[name] * s.helix_angle + 0.0,
+    }  # fmt: skip
 
 
 def _set_gear(gear: SetGearSpec, name: str, angles: dict[str, Any]) -> GearBody:

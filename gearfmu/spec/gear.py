@@ -29,7 +29,7 @@ def _in_range(angle: float) -> float:
     if abs(degrees) > LARGEST_HELIX_ANGLE * (1 + 1e-12):
         raise refuse(
             f"{degrees:g} degrees is out of range: write the helix angle at the reference circle, from -35 deg to "
-            "35 deg, positive for a right-handed pinion (the wheel then is left-handed), 0 deg for spur gears"
+            "35 deg, positive for a right-handed pinion or sun (its mate then is left-handed), 0 deg for spur gears"
         )
     return angle
 

@@ -46,7 +46,7 @@ class GearBody(GearSpec):
 
 
 class RingBody(RingSpec):
-    """An internal gear: a RingSpec with its basic rack's module and pressure angle, spur. Its one node is the mean
+    """An internal gear: a RingSpec with its basic rack's module and angles. Its one node is the mean
     motion of its rim; what holds it stands in `supports`, and a port holds its spin."""
 
     name: Name
@@ -54,6 +54,11 @@ class RingBody(RingSpec):
     normal_module: Length = Field(description="normal module m_n")
     pressure_angle: Annotated[float, Quantity("rad", above=0.17, below=0.62)] = Field(
         description="normal pressure angle of the basic rack"
+    )
+    helix_angle: HelixAngle = Field(
+        default=0.0,
+        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed ring, whose "
+        "mate is right-handed too",
     )
     mounts: MountsSpec | None = Field(default=None, description="not here: write [[supports]]")
     rim_coupling: SurfaceCoupling = Field(
@@ -78,11 +83,6 @@ class RingBody(RingSpec):
         if value is not None:
             raise refuse("a ring of a general stage has no mounts of its own: write it under [[supports]]")
         return value
-
-    @property
-    def helix_angle(self) -> float:
-        """Rings are spur."""
-        return 0.0
 
     @property
     def tip_relief(self) -> None:

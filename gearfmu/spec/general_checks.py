@@ -152,11 +152,10 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
     if differ:
         remedy = f"{a.name} and {b.name} differ in it: gears in mesh share the basic rack"
         return [Problem(file, f"bodies.{b.name}.{key}", f"{getattr(b, key):g}", remedy) for key in differ]
-    if isinstance(b, RingBody) and a.helix_angle != 0:
-        remedy = f"{b.name} is a ring, and rings are spur: write 0 deg"
-        return [Problem(file, f"bodies.{a.name}.helix_angle", f"{math.degrees(a.helix_angle):g} deg", remedy)]
-    if not math.isclose(a.helix_angle, -b.helix_angle, abs_tol=1e-12):
-        remedy = f"gears in mesh have opposite hands: write {math.degrees(-a.helix_angle):g} deg, as {a.name} asks"
+    hands, same = ("one hand", 1) if isinstance(b, RingBody) else ("opposite hands", -1)
+    if not math.isclose(a.helix_angle, same * b.helix_angle, abs_tol=1e-12):
+        what = "a ring and a gear in it have" if isinstance(b, RingBody) else "gears in mesh have"
+        remedy = f"{what} {hands}: write {math.degrees(same * a.helix_angle):g} deg, as {a.name} asks"
         return [Problem(file, f"bodies.{b.name}.helix_angle", f"{math.degrees(b.helix_angle):g} deg", remedy)]
     places = [stage.place(gear.name, None) for gear in (a, b)]
     found = []

@@ -6,21 +6,15 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
-from gearfmu.spec.gear import Bearing, BodySpec, Factor, Length, Material, RackSpec, Ratio, Size, TipRelief
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
+from gearfmu.spec.gear import Bearing, BodySpec, Factor, HelixAngle, Length, Material, RackSpec, Ratio, Size, TipRelief
 from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
 
 Deviation = Annotated[float, Quantity("m", at_least=-1e-3, at_most=1e-3)]
 CouplingKind = Literal["rigid", "averaging"]
-
-
-def _spur(angle: float) -> float:
-    if angle != 0.0:
-        raise refuse("planetary sets are spur so far: leave it out (pairs and trains of kind general may be helical)")
-    return angle
 
 
 class SetSpec(Spec):
@@ -39,8 +33,10 @@ class SetSpec(Spec):
     pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
         description="normal pressure angle"
     )
-    helix_angle: Annotated[float, Quantity("rad"), AfterValidator(_spur)] = Field(
-        default=0.0, description="helix angle; only spur gears so far"
+    helix_angle: HelixAngle = Field(
+        default=0.0,
+        description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the sun is right-handed, "
+        "planets and ring are left-handed",
     )
     backlash: Size = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")
     load_sharing: Annotated[float, Quantity(at_least=1, at_most=4)] = Field(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.imported import import_inputs
 from gearfmu.spec.planetary import PlanetarySpec
 
@@ -16,9 +17,13 @@ def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
 
     An imported body depends on the contents of its files, not on our element counts; SpecError when a file is missing.
     """
-    s = spec.set
+    s, hand = spec.set, HANDS.get(name, 1)
     common = {"kind": spec.kind, "body": name}
-    tooth = {"normal_module": s.normal_module, "pressure_angle": s.pressure_angle, "helix_angle": s.helix_angle}
+    tooth = {
+        "normal_module": s.normal_module,
+        "pressure_angle": s.pressure_angle,
+        "helix_angle": hand * s.helix_angle,
+    }
     if name == "carrier":
         place: dict[str, Any] = {
             "planets": s.planets,

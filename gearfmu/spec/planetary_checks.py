@@ -17,12 +17,13 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles
+from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles, set_geometries, set_geometry
 from gearfmu.spec.checks import (
     STRIP_PER_HERTZ,
     Found,
     gear_problems,
     geometry_problems,
+    import_problems,
     millimetres,
     rounded_down,
     rounded_up,
@@ -38,7 +39,7 @@ _DIAMETERS = ("tip_diameter", "bore_diameter", "rim_diameter")
 
 def set_problems(file: str, spec: PlanetarySpec) -> list[Problem]:
     """Everything that is wrong with a set whose single fields can be read."""
-    planet, ring = GearGeometry.of(spec.planet, spec.set), InternalGearGeometry.of(spec.ring, spec.set)
+    _, planet, ring = set_geometries(spec)
     problems = _sun_mesh(file, spec)
     alone = list(_ring(spec, ring))
     found = [*alone, *_assembly(spec, planet), *_carrier(spec), *_mounts(spec)]
@@ -65,7 +66,7 @@ class RingPair:
 
 def ring_pair_problems(file: str, pair: RingPair) -> list[Problem]:
     """Everything that is wrong with a pinion in a ring, fields "gears.<name>.…" and "pair.…" as in a pair."""
-    pinion, ring = GearGeometry.of(pair.planet, pair.set), InternalGearGeometry.of(pair.ring, pair.set)
+    pinion, ring = GearGeometry.of(pair.planet, pair.set, 1), InternalGearGeometry.of(pair.ring, pair.set, 1)
     names = {"planet": f"gears.{pair.planet.name}", "ring": f"gears.{pair.ring.name}", "set": "pair"}
     found = [(f"planet.{field}", value, remedy) for field, value, remedy in gear_problems(pair.planet, pinion)]
     found += _ring(pair, ring)
@@ -96,7 +97,7 @@ def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
     s = spec.set
     pair = PairSpec(
         center_distance=s.center_distance, normal_module=s.normal_module, pressure_angle=s.pressure_angle,
-        backlash=s.backlash,
+        helix_angle=s.helix_angle, backlash=s.backlash,
     )  # fmt: skip
     gears: tuple[Any, Any] = (spec.sun, spec.planet)  # they have the fields of a GearSpec that are checked
     found = geometry_problems(file, pair, gears, mesh_torque(spec))
@@ -110,6 +111,8 @@ def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
 
 def _ring(spec: PlanetarySpec | RingPair, shape: InternalGearGeometry) -> Found:
     """The ring by itself, from the root inwards."""
+    for field, value, remedy in import_problems(spec.ring, shape):
+        yield f"ring.{field}", value, remedy
     fillet, tip = "ring.fillet_radius", "ring.tip_diameter"
     if shape.fillet_centre[1] <= 0:
         yield fillet, f"{spec.ring.fillet_radius:g}", "the two fillets of a space overlap: make it smaller"
@@ -177,19 +180,20 @@ def _ring_strips(spec: PlanetarySpec | RingPair, mesh: RingMesh, half_width: flo
 
 def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
     """Largest Hertz half-width b (m) of planet and ring, one tooth pair carrying the most loaded planet's force."""
-    sun_base = spec.sun.teeth * spec.set.normal_module / 2 * math.cos(spec.set.pressure_angle)
-    return internal_half_width((spec.planet, spec.ring), mesh, mesh_torque(spec) / sun_base)
+    force = mesh_torque(spec) / set_geometry(spec, "sun").r_b
+    return internal_half_width((spec.planet, spec.ring), mesh, force)
 
 
 def internal_half_width(gears: tuple[Any, Any], mesh: RingMesh, force: float) -> float:
-    """Largest Hertz half-width b (m) of a pinion in a ring, one tooth pair carrying `force` (N)."""
+    """Largest Hertz half-width b (m) of a pinion in a ring, one tooth pair carrying `force` (N, transverse;
+    `largest_half_width` for helical flanks)."""
     load = force / min(gear.face_width for gear in gears)
     materials = [gear.material for gear in gears]
     e_star = contact_modulus(
         (materials[0].youngs_modulus, materials[1].youngs_modulus),
         (materials[0].poisson_ratio, materials[1].poisson_ratio),
     )
-    return half_width(load, mesh.largest_relative_radius(), e_star)
+    return half_width(load, mesh.largest_relative_radius() / math.cos(mesh.planet.beta_b), e_star)
 
 
 def _assembly(spec: PlanetarySpec, planet: GearGeometry) -> Found:

@@ -15,7 +15,7 @@ MeshShape = PairGeometry | RingMesh
 
 def gear_shape(gear: ToothedBody) -> GearShape:
     """The geometry of a toothed body in its own frame."""
-    return InternalGearGeometry.of(gear, gear) if isinstance(gear, RingBody) else GearGeometry.of(gear, gear, 1)
+    return InternalGearGeometry.of(gear, gear, 1) if isinstance(gear, RingBody) else GearGeometry.of(gear, gear, 1)
 
 
 def mesh_shape(stage: GeneralStage, mesh: EngagementSpec) -> MeshShape:

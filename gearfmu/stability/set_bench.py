@@ -13,8 +13,7 @@ import numpy as np
 
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.reduce import reduced_gear
-from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.planetary import PlanetarySpec, RingSpec
@@ -89,7 +88,7 @@ def thin_ring() -> tuple[RingSpec, ReducedBody]:
     mesh = MeshSpec(flank=6, thickness=2, root=3, rim=1, width=2)
     body = spec.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
     ring = spec.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
-    return ring, reduced_gear(ring, InternalGearGeometry.of(ring, spec.set), "0" * 64)
+    return ring, reduced_gear(ring, set_geometry(spec.model_copy(update={"ring": ring}), "ring"), "0" * 64)
 
 
 @lru_cache(maxsize=2)
@@ -131,7 +130,7 @@ def base_radius() -> float:
     """Base radius of the sun, m."""
     spec = load_stage(SET)
     assert isinstance(spec, PlanetarySpec)
-    return float(GearGeometry.of(spec.sun, spec.set).r_b)
+    return set_geometry(spec, "sun").r_b
 
 
 @dataclass(frozen=True)

@@ -152,11 +152,12 @@ EFFECTS: tuple[Effect, ...] = (
     _switched(
         "coast_flank",
         title="coast flank",
-        formula="g of the other side, sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt",
+        formula="g of the other side, sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt; of a mesh through "
+        "which a torque in +z on the first port drives with sg = −1, that of sg = +1",
         equation="2.1 (eq. 4)",
         matters="rattle, load reversal, engagement and every start; not where the drive flanks stay closed",
         off="teeth pass through the backlash",
-        code="gk_flank.c (gk_flank_find)",
+        code="gk_flank.c (gk_flank_find), gk_kinematics.c (gk_kinematics_carrying)",
     ),
     _switched(
         "contact_damping",
@@ -263,7 +264,7 @@ EFFECTS: tuple[Effect, ...] = (
         "gyroscopic",
         title="gyroscopic and Coriolis forces on tilting and elastic bodies",
         formula="v̇ = −2 (Ω H + Ω_f Q) v; of tilts H = −½ J_p J: moment J_p Ω θ̇",
-        equation="3.11 (eqs. 17i to 17k)",
+        equation="3.11 (eqs. 17j to 17l)",
         matters=(
             "where something that tilts or bends turns fast: Δω/ω of the size of Ω J_p/(2 J_t ω). Helical pairs and "
             "trains with their shafts, planets on their pins: at speed_max frequencies below 15 kHz move by 2 % "

@@ -1,4 +1,4 @@
-"""Gyroscopic forces of a ground group: pairs of rows that turn into each other (docs/theory.md eq. 17k)."""
+"""Gyroscopic forces of a ground group: pairs of rows that turn into each other (docs/theory.md eq. 17l)."""
 
 from __future__ import annotations
 

@@ -8,12 +8,12 @@ the reference's moving average over 10 ms, whole window.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from gearfmu.cosim.accuracy import alternating, rms
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.stage.trace import Channel, Trace
 
@@ -64,7 +64,7 @@ def set_signals(trace: Trace, spec: PlanetarySpec, settle: float) -> Signals:
     and on all pins."""
     part = trace.window(settle * (1.0 - 1e-12))
     planets, ratio = range(1, spec.set.planets + 1), 1 + spec.ring.teeth / spec.sun.teeth
-    r_b = 0.5 * spec.sun.teeth * spec.set.normal_module * math.cos(spec.set.pressure_angle)
+    r_b = set_geometry(spec, "sun").r_b
     te = r_b * (part["sun.gear.phi"] - ratio * part["carrier.gear.phi"])
     force = [part[f"{gear}_planet{k}.force_mean"] for gear in ("sun", "ring") for k in planets]
     pins = [part[f"pin.planet{k}.{axis}_mean"] for k in planets for axis in ("fx", "fy")]

@@ -56,6 +56,19 @@ def test_shipped_bodies_are_current_small_and_trusted_over_the_band(shipped):
     assert shipped["carrier"].max_error < 1e-6
 
 
+def test_shipped_bodies_of_the_helical_set_are_current_small_and_of_their_hands():
+    spec = load_stage("helical_set")
+    *gears, carrier = load_set_bodies(spec)
+    assert [np.sign(gear.base_helix_angle) for gear in gears] == [1, -1, -1]
+    for gear in gears:
+        assert set_body_path(spec, gear.name).stat().st_size <= 8e6
+        assert gear.frf.max_error < 0.01
+    assert carrier.max_error < 1e-6
+    with pytest.raises(BodyError, match="keeps a few tooth offsets"):
+        mounted(gears[2]).mean_residual(120e3)
+    assert "mounted_frequencies_Hz" in inspect_file(set_body_path(spec, "ring"))["facts"]
+
+
 def test_masses_and_inertias_are_the_analytic_ones(shipped):
     ring, carrier = InternalGearGeometry.of(SPEC.ring, SPEC.set), CarrierGeometry.of(SPEC)
     volume = ring.z * ring.sector_area * SPEC.ring.face_width

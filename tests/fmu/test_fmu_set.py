@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 from small_stage import unpack
@@ -73,6 +74,28 @@ def test_the_fmu_of_a_set_is_its_kernel_bit_for_bit(
     values = np.array(expected)
     assert np.abs(values[:, names.index("ring_planet3.force")]).min() > 1000, "the run loads the teeth"
     assert values.tobytes() == np.array(found).tobytes()
+
+
+def test_a_helical_set_runs_through_fmpy(tmp_path: Path) -> None:
+    """An importer of its own, from start to end: kernel's numbers, axial forces of sun and ring among them."""
+    spec = load_stage("helical_set")
+    helical = assemble(spec, load_bodies(spec))
+    file = export(helical, tmp_path / "helical_set.fmu")
+    ratio = 90 / 26
+    start = {"carrier.tau": 400.0, "sun.tau": -400 / ratio, "carrier.w_start": 85.0, "sun.w_start": 85 * ratio}
+    names = ["sun_planet1.force_mean", "bearing.sun.fz_mean", "bearing.ring.fz_mean", "pin.planet2.mx_mean"]
+    found = fmpy.simulate_fmu(
+        str(file), start_values=start | {"level": RIGID}, output=names,
+        stop_time=STEPS * H, step_size=H, output_interval=H,
+    )  # fmt: skip
+    kernel = helical.kernel(level=float(RIGID))
+    for name, value in start.items():
+        kernel.set(name, value)
+    kernel.initialize(0.0)
+    for step in range(STEPS):
+        kernel.step(step * H, H)
+        assert [found[name][step + 1] for name in names] == [kernel.get(name) for name in names]
+    assert found["bearing.sun.fz_mean"][1:].mean() == pytest.approx(-3 * 579.1, rel=0.02)
 
 
 def test_a_saved_state_of_a_set_goes_on_with_the_same_bits(subject: tuple[Subject, dict[str, int]]) -> None:

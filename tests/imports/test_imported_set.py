@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from decks import write_deck
 
 from gearfmu import cli
-from gearfmu.body.imported import imported_full_order, set_geometry
+from gearfmu.body.imported import imported_full_order
 from gearfmu.body.mounted import mounted
 from gearfmu.body.planetary import reduce_set_body, set_hash
 from gearfmu.errors import MeshError, SpecError
@@ -22,6 +22,7 @@ from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.modes.planetary import mounted_ring_modes, set_sector
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported_carrier import circle_centre

@@ -1,7 +1,9 @@
-"""A small ring (z = 24, m = 2.5 mm, six mounts) on a coarse mesh: by one sector, and as one whole model."""
+"""A small ring (z = 24, m_n = 2.5 mm, six mounts), spur or helical, on a coarse mesh: by one sector, and as one whole
+model."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 
@@ -44,9 +46,17 @@ GEOMETRY = InternalGearGeometry.of(ring_spec(), load_stage("planetary54").set)
 STEEL = ring_spec().material
 
 
-@lru_cache(maxsize=1)
-def coarse() -> SectorBody:
-    return SectorBody(ring_sector(GEOMETRY, 8e-3, COARSE), STEEL, *tooth_flank(GEOMETRY, ring_spec(), internal=True))
+def geometry(beta: float) -> InternalGearGeometry:
+    """The ring with another helix angle (rad): what stands off its reference circle goes with it."""
+    own = replace(GEOMETRY, beta=beta)
+    grown = own.r - GEOMETRY.r
+    return replace(own, r_a=own.r_a + grown, r_f=own.r_f + grown, r_rim=own.r_rim + grown)
+
+
+@lru_cache(maxsize=4)
+def coarse(beta: float = 0.0) -> SectorBody:
+    own = geometry(beta)
+    return SectorBody(ring_sector(own, 8e-3, COARSE), STEEL, *tooth_flank(own, ring_spec(), internal=True))
 
 
 @lru_cache(maxsize=2)
@@ -54,15 +64,16 @@ def reduced(modes: int = 81) -> ReducedBody:
     return reduced_gear(ring_spec(modes), GEOMETRY, "0" * 64)
 
 
-@lru_cache(maxsize=1)
-def whole() -> SimpleNamespace:
+@lru_cache(maxsize=2)
+def whole(beta: float = 0.0) -> SimpleNamespace:
     """Without symmetry: free body, flank rows (2·R·A, 3N) of every space, mounts and their springs."""
-    sector, full = coarse().mesh, coarse().mesh.full()
+    made = coarse(beta)
+    sector, full = made.mesh, made.mesh.full()
     free = FreeBody(*hex20.assemble(full.nodes, full.elements, STEEL), full.nodes, full.elements)
-    rows = [whole_rows(coarse().flank_rows, tooth) for tooth in range(GEOMETRY.z)]
+    rows = [whole_rows(made.flank_rows, tooth) for tooth in range(GEOMETRY.z)]
     elements = Elements(full.nodes, full.elements, free.stiffness, free.mass_matrix)
     mounts = ring_mounts(sector, elements, MOUNTS)
-    own = [flank_loads(full.nodes, full.flank[s].quads, coarse().flank, s, coarse().points) for s in (0, 1)]
+    own = [flank_loads(full.nodes, full.flank[s].quads, made.flank, s, made.points) for s in (0, 1)]
     return SimpleNamespace(
         free=free, flank_rows=np.array(rows), springs=mount_springs(elements, mounts, MOUNTS.stiffness),
         elements=elements, mounts=mounts, space_0=np.concatenate(own).reshape(len(rows[0]), -1),

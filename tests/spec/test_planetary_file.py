@@ -58,7 +58,7 @@ def test_the_shipped_set_is_read():
         (("planets = 4", "planets = 4\npositions = [0, 18, 54, 36]"), "set.positions", "ascending from 0 and below"),
         (("planets = 4", "planets = 4\npositions = [0, 18, 36, 72]"), "set.positions", "z_sun + z_ring = 72"),
         (("planets = 4", "planets = 4\npositions = [0, 10, 36, 54]"), "set.planets", "neighbouring planets touch"),
-        (("planets = 4", 'planets = 4\nhelix_angle = "15 deg"'), "set.helix_angle", "sets are spur so far"),
+        (("planets = 4", 'planets = 4\nhelix_angle = "36 deg"'), "set.helix_angle", "from -35 deg to 35 deg"),
         (("planets = 4", "planets = 6"), "set.planets", "fewer or smaller planets"),
         (('center_distance = "45 mm"', 'center_distance = "42 mm"'), "set.center_distance", "base radii"),
         (('center_distance = "45 mm"', 'center_distance = "44.6 mm"'), "ring.profile_shift", "j_wt"),

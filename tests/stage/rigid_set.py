@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.interface_body import InterfaceBody
-from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.planetary import set_geometries
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
@@ -71,6 +70,16 @@ class RigidSet:
     damping_ratio: float = 0.0
     contact_damping: float = 0.0
     ports: Mapping[str, PortSpec] = field(default_factory=dict)
+    helix_angle: float = 0.0
+    width: float = WIDTH
+    slices: int = 1
+    functions: int = 1
+
+    @property
+    def transverse(self) -> tuple[float, float]:
+        """Module (m) and pressure angle (rad) of the transverse section; `module` and `pressure_angle` are normal."""
+        cosine = math.cos(self.helix_angle)
+        return self.module / cosine, math.atan(math.tan(self.pressure_angle) / cosine)
 
     @property
     def ring_teeth(self) -> int:
@@ -78,7 +87,7 @@ class RigidSet:
 
     @property
     def distance(self) -> float:
-        return self.module * sum(self.teeth) / 2
+        return self.transverse[0] * sum(self.teeth) / 2
 
     @property
     def ratio(self) -> float:
@@ -90,7 +99,8 @@ class RigidSet:
         if name == "carrier":
             return self.distance
         teeth = {"sun": self.teeth[0], "planet": self.teeth[1], "ring": self.ring_teeth}[name]
-        return self.module * teeth / 2 * math.cos(self.pressure_angle)
+        module, angle = self.transverse
+        return module * teeth / 2 * math.cos(angle)
 
     def angles(self) -> np.ndarray:
         """(N,) rad: places of the planets."""
@@ -109,6 +119,7 @@ class RigidSet:
             "backlash": 60e-6,
             "pin_errors": self.pins,
             "load_sharing": 4.0,
+            "helix_angle": self.helix_angle,
         }
         if self.positions is not None:
             update["positions"] = self.positions
@@ -132,7 +143,9 @@ class RigidSet:
                 "ring": shipped.ring.model_copy(update=ring),
                 "carrier": shipped.carrier.model_copy(update={"bearing": self._bearing(self.carrier)}),
                 "ports": {"carrier": TORQUE, "sun": TORQUE} | dict(self.ports),
-                "contact": shipped.contact.model_copy(update={"slices": 1, "damping": self.contact_damping / WIDTH}),
+                "contact": shipped.contact.model_copy(
+                    update={"slices": self.slices, "damping": self.contact_damping / self.width}
+                ),
             }
         )
 
@@ -140,14 +153,15 @@ class RigidSet:
         """Hard material, no relief, sharp tips that give the contact ratio."""
         material = gear.material.model_copy(update={"youngs_modulus": HARD})
         found: dict[str, Any] = {"material": material, "tip_edge_radius": EDGE, "tip_diameter": self._tip(gear.name)}
-        found["face_width"] = WIDTH
+        found["face_width"] = self.width
         return found | ({} if gear.name == "ring" else {"tip_relief": None})
 
     def _tip(self, name: str) -> float:
         """Tip diameter (m): the flank ends half the length of contact beyond the pitch point."""
-        half = self.contact_ratio / 2 * math.pi * self.module * math.cos(self.pressure_angle)
+        module, angle = self.transverse
+        half = self.contact_ratio / 2 * math.pi * module * math.cos(angle)
         r_b = self.base(name)
-        roll = r_b * math.tan(self.pressure_angle) + (-half if name == "ring" else half)
+        roll = r_b * math.tan(angle) + (-half if name == "ring" else half)
         return 2 * (math.hypot(roll + EDGE, r_b) + (-EDGE if name == "ring" else EDGE))
 
     def _bearing(self, body: Rigid) -> Any:
@@ -162,9 +176,7 @@ class RigidSet:
     def bodies(self) -> list[Any]:
         """Sun, planet, ring and carrier as `assemble` reads them."""
         spec = self.spec()
-        shapes: list[Any] = [GearGeometry.of(gear, spec.set) for gear in (spec.sun, spec.planet)]
-        shapes.append(InternalGearGeometry.of(spec.ring, spec.set))
-        gears = [_gear(self, gear, shape) for gear, shape in zip(spec.gears, shapes, strict=True)]
+        gears = [_gear(self, gear, shape) for gear, shape in zip(spec.gears, set_geometries(spec), strict=True)]
         return [*gears, _carrier(self)]
 
     def model(self) -> StageModel:
@@ -181,11 +193,12 @@ def kernel_of(model: StageModel, library: Path | None = None, **parameters: floa
 def _gear(rigid: RigidSet, gear: Any, shape: Any) -> SimpleNamespace:
     """One invented mode far above everything, so weak that its products underflow: tables are not empty."""
     body: Rigid = getattr(rigid, gear.name)
-    rolls, z = 4, gear.teeth
+    rolls, z, a = 4, gear.teeth, rigid.functions
     middle, half = (shape.s_form + shape.s_tip) / 2, abs(shape.s_tip - shape.s_form) / 2
-    static = np.zeros((2, 2, z, rolls, rolls, 1, 1))
+    static = np.zeros((2, 2, z, rolls, rolls, a, a))
     for flank in (0, 1):
-        static[flank, flank, 0] = 0.5 / rigid.mesh
+        for degree in range(a):  # a foundation: every place across the width yields by itself
+            static[flank, flank, 0, ..., degree, degree] = 0.5 / rigid.mesh / (2 * degree + 1)
     polar = body.inertia * shape.r_b**2
     return SimpleNamespace(
         name=gear.name,
@@ -194,7 +207,7 @@ def _gear(rigid: RigidSet, gear: Any, shape: Any) -> SimpleNamespace:
         r_b=shape.r_b,
         face_width=gear.face_width,
         strip_half_width=gear.body.strip_half_width,
-        width_functions=1,
+        width_functions=a,
         roll=middle + half * np.cos((2 * np.arange(rolls) + 1) * np.pi / (2 * rolls)),
         mass=body.mass,
         inertia=np.diag([polar / 2, polar / 2, polar]),
@@ -203,10 +216,10 @@ def _gear(rigid: RigidSet, gear: Any, shape: Any) -> SimpleNamespace:
         nodal_diameter=np.zeros(1, int),
         part=np.zeros(1, int),
         parity=np.zeros(1, int),
-        flank_rows=np.full((2, rolls, 1, 1), WEAK),
+        flank_rows=np.full((2, rolls, a, 1), WEAK),
         bore_rows=np.full((6, 1), WEAK),
         static_ff=static,
-        static_fb=np.zeros((2, rolls, 1, 6)),
+        static_fb=np.zeros((2, rolls, a, 6)),
         static_bb=np.zeros((6, 6)),
     )
 

@@ -13,6 +13,7 @@ import pytest
 
 from gearfmu import cli
 from gearfmu.body import load_bodies
+from gearfmu.commands.models import of_other_kinds
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN
@@ -67,6 +68,29 @@ def at_rest(model: StageModel) -> Kernel:
     kernel.set("sun.tau", -TORQUE / 4)
     kernel.initialize()
     return kernel
+
+
+@pytest.mark.parametrize("name", ["planetary54", pytest.param("two_stage", marks=pytest.mark.full)])
+def test_without_coast_flanks_the_set_is_driven_through_those_that_carry(name: str) -> None:
+    """A planet presses the ring with one flank and is pressed by the sun on the other, a train's intermediate shaft
+    turns the other way: which flanks are left out is decided mesh by mesh. Against that load teeth pass through."""
+    stage = load_stage(name)
+    first, second = list(stage.ports)[:2]
+    driven = assemble(of_other_kinds(stage, {first: "torque", second: "torque"}), load_bodies(stage))
+    ratio = driven.shafts.ratio
+    found = []
+    for torque, coast in ((TORQUE / 10, 1.0), (TORQUE / 10, 0.0), (-TORQUE / 10, 0.0)):
+        kernel = driven.kernel(**{"level": 0.0, "effect.coast_flank": coast})
+        kernel.set(f"{first}.tau", torque)
+        kernel.set(f"{second}.tau", -torque * ratio)
+        if torque < 0:
+            with pytest.raises(SimulationError, match="no static equilibrium"):
+                kernel.initialize()
+            continue
+        kernel.initialize()
+        found.append([kernel.get(f"{mesh.name}.force") for mesh in driven.stage.engagements])
+    assert min(found[0]) < -50 and max(found[0]) > 50
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
 def force(kernel: Kernel, name: str) -> np.ndarray:

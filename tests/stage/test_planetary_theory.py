@@ -170,6 +170,17 @@ def test_shares_with_pin_errors_are_those_of_the_paper_model(
     assert np.ptp(paper) > 0.02 and np.allclose(kernel, paper, atol=1e-4)
 
 
+@pytest.mark.parametrize("stiffness", [1e3, 1.0])
+def test_a_set_with_pin_errors_rests_without_load_however_softly_its_sun_floats(stiffness: float) -> None:
+    """Flanks that overlapped push the sun aside, planets turn loosely in their backlash: what is left is the weight of
+    the sun's bearing on the teeth, less than stiffness times backlash."""
+    rigid = RigidSet(4, pins={1: (5e-6, 12e-6)}, sun=Rigid(0.4, 0.39, stiffness))
+    model = rigid.model()
+    state = kernel_of(model).transmission(-ALONE * place_of(model, "sun_planet1").pitch, 0.0)
+    assert abs(state.te) < 1e-7
+    assert max(abs(force) for slices in state.forces.values() for force in slices) < stiffness * 60e-6
+
+
 def test_four_planets_share_in_pairs() -> None:
     """A floating sun carries one state of stress of its own: two planets opposite each other against the other two."""
     kernel, _ = shares(RigidSet(4, pins={1: (0.5e-6, 1.2e-6)}, sun=FLOATING), 300.0)

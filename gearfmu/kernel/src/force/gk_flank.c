@@ -439,7 +439,8 @@ static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *d
 }
 
 /* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their
- * tables; −1 when the poses are meaningless. The spins of a flat engagement are translations. */
+ * tables; −1 when the poses are meaningless. Without coast flanks those that carry when the first port drives the
+ * stage. The spins of a flat engagement are translations. */
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
                   gk_position position[2], gk_place *place)
 {
@@ -452,8 +453,9 @@ int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *m
     if (!(a2 > 1.0001 * R * R) || !(a2 < 1e4) || !(fabs(pose[PHIA]) < 1e9) || !(fabs(pose[PHIB]) < 1e9)) return -1;
     const flank_side drive = side_of(&q, 0);
     place_sides(&q, mesh, &drive, position);
-    const int found = find_side(&q, mesh, &drive, reach, position, place, MAX_PAIRS);
-    if (found < 0 || !GK_ON(setup, coast_flank)) return found;
+    const int both = GK_ON(setup, coast_flank);
+    const int found = both || !mesh->coasts ? find_side(&q, mesh, &drive, reach, position, place, MAX_PAIRS) : 0;
+    if (found < 0 || !(both || mesh->coasts)) return found;
     if (coast_is_open(&q, mesh, &drive, sqrt(a2), reach)) return found;
     const flank_side coast = side_of(&q, 1);
     const int back = find_side(&q, mesh, &coast, reach, position, place + found, MAX_PAIRS - found);

@@ -1,6 +1,6 @@
 /* What turning does to masses beside the conservative step (docs/theory.md, 3.10, 3.11), half a step each beside the
  * dashpots of the supports. Coriolis forces on what a carrier carries (17f) and gyroscopic forces of tilting and
- * elastic bodies (17k): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation
+ * elastic bodies (17l): pairs of rows x, y that turn into each other, v̇ = −2Ω (y x·v − x y·v), each an exact rotation
  * by Cayley's form, without energy; one after the other, in the other half step in the other order. Centrifugal load
  * m Ω² a (17g). */
 #include "integrate/gk_integrate.h"
@@ -36,7 +36,7 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
     }
 }
 
-/* Speeds of a gear group turned by half a step of Coriolis forces, member into member of every pair (17i): by the angle
+/* Speeds of a gear group turned by half a step of Coriolis forces, member into member of every pair (17j): by the angle
  * Ωh times its rate, with the cosine and sine of Cayley's form. angle: Ωh. */
 void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to)
 {

@@ -9,8 +9,11 @@
 
 static const double MOBILITY = 1e-11; /* s²: divided by the inertia of a spin, rad/(N m): what a spin yields within an
                                          engagement's problem, so that no row of it is without compliance */
-static const double LOOSE = 1e-4;     /* s²: the same of a motion that nothing holds, in the tangent */
-static const double FLOATS = 1e-11;   /* s²: of a motion that must not be moved */
+static const double LOOSE = 1e-4;     /* s²: the same of a motion that nothing holds, in the tangent. It is a stiffness
+                                         there: beside a softer bearing it shortens every move … */
+static const double MOST_LOOSE = 10.0; /* … and grows weaker then, up to here */
+static const double SLOW = 0.5;        /* of the last move: a longer one than that has been shortened */
+static const double FLOATS = 1e-11;    /* s²: of a motion that must not be moved */
 static const double TRUST = 2e-4; /* m: a move is not longer, twice that after every one that need not turn round … */
 static const double MOST_TRUST = 3e-3; /* … up to here */
 static const double OVERSHOT = 0.1;    /* of the force along a move: what may be left where it has turned round */
@@ -18,7 +21,8 @@ static const double SEE = 3e-3;        /* m: look this far for flanks */
 static const double AT_REST = 1e-15, EXACT = 1e-11; /* m; of the deepest deflection: a move that is none */
 static const double ENOUGH = 1e-11,
                     ROUNDING = 2e-7; /* the same where single precision of the rows leaves it undecided */
-enum { REST_ITERATIONS = 100, BACK = 60, STATIC_SWEEPS = 400 };
+static const double NOTHING = 1e-18; /* J: a move that gains less; ENOUGH on a contact gains 1e-14 */
+enum { REST_ITERATIONS = 100, ORDINARY = 20, BACK = 60, STATIC_SWEEPS = 400 };
 
 typedef struct rest { /* a search for rest */
     const gk_model *model;
@@ -38,6 +42,8 @@ typedef struct rest { /* a search for rest */
     double *force, *move; /* of them */
     double *tangent;      /* (unknowns, unknowns) */
     double trust;         /* m: how far the next move may go */
+    double loose;         /* s²: LOOSE … MOST_LOOSE */
+    double gain;          /* J: force along the whole of the last move */
 } rest;
 
 static int searched(const rest *r, int e) { return r->setup.mesh[e].island == r->island; }
@@ -353,7 +359,7 @@ static void find_tangent(rest *r)
     memset(r->tangent, 0, (size_t)(n * n) * sizeof *r->tangent);
     for (int d = 0; d < spins; d++) {
         const double inverse = r->setup.inverse_inertia[d];
-        r->tangent[(size_t)d * n + d] = moves(r, d) && inverse > 0.0 ? 1.0 / (LOOSE * inverse) : 1.0;
+        r->tangent[(size_t)d * n + d] = moves(r, d) && inverse > 0.0 ? 1.0 / (r->loose * inverse) : 1.0;
     }
     for (int i = 0; i < r->setup.base.n; i++)
         r->tangent[(size_t)(spins + i) * n + spins + i] = r->setup.base.omega2[i] > 0.0 ? r->setup.base.omega2[i] : 1.0;
@@ -444,6 +450,7 @@ static int go_along(rest *r)
         at = next;
     }
     r->trust = back ? gk_max(0.5 * r->trust, TRUST) : gk_min(2.0 * r->trust, MOST_TRUST);
+    if (back) r->loose = gk_max(0.1 * r->loose, LOOSE);
     return 1;
 }
 
@@ -458,6 +465,7 @@ static double relax(rest *r)
     gk_limit_solve(r->tangent, r->move, r->unknowns);
     const double length = length_of(r, r->move), least = gk_min(1.0, r->trust / gk_max(length, 1e-300));
     if (!gk_finite(length)) return NAN;
+    r->gain = along(r);
     for (int i = 0; i < r->unknowns; i++) r->move[i] *= least;
     if (!go_along(r)) return NAN;
     unroll(r);
@@ -574,12 +582,15 @@ static void set_joints(rest *r)
 /* do any engagements share rotors? */
 static int shares(const rest *r) { return r->setup.islands < r->model->engagements; }
 
-static int close_to_rest(const rest *r, double length) { return length <= ENOUGH + ROUNDING * deepest_of(r); }
+static int close_to_rest(const rest *r, double length)
+{
+    return length <= ENOUGH + ROUNDING * deepest_of(r) || r->gain < NOTHING;
+}
 
 static int search(rest *r)
 {
     double length = INFINITY;
-    r->trust = TRUST;
+    r->trust = TRUST, r->loose = LOOSE;
     balance_rotation(r, 0);
     if (!press(r)) return 0;
     for (int i = 0; i < REST_ITERATIONS; i++) {
@@ -588,6 +599,7 @@ static int search(rest *r)
         length = relax(r);
         if (!gk_finite(length)) return 0;
         if (length <= AT_REST + EXACT * deepest_of(r)) break;
+        if (i >= ORDINARY && length > SLOW * last) r->loose = gk_min(10.0 * r->loose, MOST_LOOSE);
         if (shares(r) && close_to_rest(r, length) && length > 0.5 * last) break; /* rounding of the rows is left */
     }
     for (int e = 0; e < r->model->engagements; e++)

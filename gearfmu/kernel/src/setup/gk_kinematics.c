@@ -1,6 +1,7 @@
 /* Speeds of rotors through the engagements: seen from the axes that its gears stand in, an engagement rolls like one on
  * fixed axes (Willis):  r_bA (ω_A − ω_f) + kind r_bB (ω_B − ω_f) = 0. */
 #include "setup/gk_kinematics.h"
+#include "integrate/gk_integrate.h"
 
 /* rotors of an engagement: gear A's, gear B's, the frame's (−1: the ground) */
 static void rotors_of(const gk_model *model, const gk_engagement *e, int rotor[3])
@@ -73,4 +74,56 @@ void gk_kinematics_find(const gk_model *model, gk_motions *motions)
             gk_kinematics_follow(model, known, motions->turn[m]);
         }
     }
+}
+
+/* ---- flanks that carry ------------------------------------------------------------------------------------------- */
+/* does nothing hold a rotor but the teeth? */
+static int is_free(const gk_model *model, int rotor)
+{
+    for (int p = 1; p < model->ports; p++)
+        if (model->port[p].rotor == rotor) return 0;
+    return model->inertia[rotor] > 0.0;
+}
+
+/* torque on every free rotor per unit force on the drive flanks of an engagement */
+static void find_arms(const gk_model *model, const gk_engagement *e, double arms[MAX_ROTORS])
+{
+    const double r_a = model->gear[e->gear[0]].r_b, r_b = e->kind * model->gear[e->gear[1]].r_b;
+    int rotor[3];
+    rotors_of(model, e, rotor);
+    memset(arms, 0, MAX_ROTORS * sizeof *arms);
+    arms[rotor[0]] -= r_a, arms[rotor[1]] -= r_b;
+    if (rotor[2] >= 0) arms[rotor[2]] += r_a + r_b;
+    for (int r = 0; r < model->rotors; r++)
+        if (!is_free(model, r)) arms[r] = 0.0;
+}
+
+/* The forces of least squares that balance the torque on every free rotor: where planets or shafts share the load,
+ * alike. λ = −Tᵀ y, (T Tᵀ) y = τ. */
+void gk_kinematics_carrying(const gk_model *model, int coasts[MAX_ENGAGEMENTS])
+{
+    static const double SMALL = 1e-9; /* of the diagonal, for what no tooth turns; of the largest force, for none */
+    double arms[MAX_ENGAGEMENTS][MAX_ROTORS], force[MAX_ENGAGEMENTS], most = 0.0, trace = 0.0;
+    double product[MAX_ROTORS * MAX_ROTORS] = {0}, y[MAX_ROTORS] = {0};
+    const int n = model->rotors;
+    memset(coasts, 0, MAX_ENGAGEMENTS * sizeof *coasts);
+    for (int i = 0; i < model->engagements; i++) {
+        if (model->engagement[i].kind == MESH_FLAT) return;
+        find_arms(model, &model->engagement[i], arms[i]);
+    }
+    if (model->ports < 2) return;
+    for (int i = 0; i < model->engagements; i++)
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++) product[a * n + b] += arms[i][a] * arms[i][b];
+    for (int a = 0; a < n; a++) trace += product[a * n + a];
+    for (int a = 0; a < n; a++) product[a * n + a] += SMALL * trace;
+    y[model->port[0].rotor] = 1.0;
+    if (!gk_limit_cholesky(product, n)) return;
+    gk_limit_solve(product, y, n);
+    for (int i = 0; i < model->engagements; i++) {
+        force[i] = 0.0;
+        for (int a = 0; a < n; a++) force[i] -= arms[i][a] * y[a];
+        most = gk_max(most, fabs(force[i]));
+    }
+    for (int i = 0; i < model->engagements; i++) coasts[i] = force[i] < -SMALL * most;
 }

@@ -10,5 +10,7 @@ typedef struct gk_motions {
 } gk_motions;
 
 void gk_kinematics_find(const gk_model *model, gk_motions *motions);
+/* 1 where an engagement drives through the flanks sg = −1 when the other ports hold a torque in +z on the first */
+void gk_kinematics_carrying(const gk_model *model, int coasts[MAX_ENGAGEMENTS]);
 void gk_kinematics_follow(const gk_model *model, int known[MAX_ROTORS], double *speed);
 #endif

@@ -1,6 +1,7 @@
 /* Level, effects, slices and step → gk_setup: which oscillators are dynamic, and their tables. */
 #include "problem/gk_work.h"
 #include "integrate/gk_integrate.h"
+#include "setup/gk_kinematics.h"
 #include <stdio.h>
 
 /* memory is handed out twice with the same code: first counting (base NULL), then for real */
@@ -737,7 +738,7 @@ static char *behind(void *block, size_t size) { return (char *)(((uintptr_t)bloc
 gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
                       char message[GK_MESSAGE])
 {
-    int modes[MAX_GEARS];
+    int modes[MAX_GEARS], coasts[MAX_ENGAGEMENTS];
     int32_t which[MAX_GROUND + 4 * MAX_ROTORS];
     message[0] = 0;
     if (data->magic != GK_DATA_MAGIC) {
@@ -764,7 +765,11 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     }
     fill_base(model, setup, which);
     fill_ports(model, setup);
-    for (int e = 0; e < model->engagements; e++) fill_mesh(model, setup, data, e);
+    gk_kinematics_carrying(model, coasts);
+    for (int e = 0; e < model->engagements; e++) {
+        fill_mesh(model, setup, data, e);
+        setup->mesh[e].coasts = coasts[e];
+    }
     for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);

@@ -132,6 +132,7 @@ typedef struct gk_mesh { /* an engagement */
     int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
     double action[2];     /* t of the line of action of both flanks at the nominal axes (gk_flank.c) */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
+    int coasts;                                  /* its flanks sg = −1 are those that carry (gk_kinematics_carrying) */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
     double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
