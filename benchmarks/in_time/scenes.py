@@ -55,6 +55,7 @@ class Scene:
     solids: dict[str, Solid]
     assembly: Assembly
     kinds: np.ndarray
+    material: hex20.Material
     points: Points | None = None
 
 
@@ -76,7 +77,7 @@ def carrier_planet(meshes: Meshes) -> Scene:
     patterns = (load, np.zeros(solids["planet"].full.rows().shape[0]))
     members = tuple(Member.whole(solid.full) for solid in solids.values())
     at_rest = (np.zeros(6), np.zeros(6))
-    return Scene("carrier_planet", solids, Assembly(members, joints, patterns, _ramp, at_rest), kinds)
+    return Scene("carrier_planet", solids, Assembly(members, joints, patterns, _ramp, at_rest), kinds, _steel(spec))
 
 
 def hammering(meshes: Meshes) -> Scene:
@@ -97,7 +98,13 @@ def hammering(meshes: Meshes) -> Scene:
     start = (turning, turning + SPEED * a * np.eye(6)[1], np.zeros(6))
     members = tuple(Member.whole(solid.full) for solid in solids.values())
     patterns = tuple(np.zeros(solid.full.rows().shape[0]) for solid in solids.values())
-    return Scene("hammering", solids, Assembly(members, joints, patterns, lambda t: 0.0, start), kinds, points)
+    return Scene("hammering", solids, Assembly(members, joints, patterns, lambda t: 0.0, start), kinds, _steel(spec), points)
+
+
+def _steel(spec: Any) -> hex20.Material:
+    """The one material of all bodies."""
+    assert spec.carrier.material == spec.planet.material == spec.sun.material
+    return spec.carrier.material
 
 
 def _ramp(time: float) -> float:

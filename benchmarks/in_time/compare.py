@@ -1,0 +1,194 @@
+"""The paper's reductions in the time domain against the unreduced finite elements (its Figs. 3 and 4).
+
+    python benchmarks/in_time/compare.py [carrier_planet] [hammering] [--chart]
+
+carrier_planet : carrier + one planet (scenes.py), 1 ms; the carrier reduced by each method, the planet never.
+hammering      : carrier + planet + sun through their backlash, 0.5 ms; the carrier by each method, gears by eigenmodes.
+
+Everything is integrated by the same scheme (HHT-α, α = −0.05) with the same step and contact points, so that the
+reduction alone makes a difference; one line tells what half the step does to the finite elements themselves.
+Writes errors.csv (rms of the difference over rms of the reference, whole run and its last fifth) and curves_<scene>.csv
+beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. About a quarter of an hour.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import numpy as np
+from channels import channels, errors
+from chart import draw
+from scenes import Meshes, Scene, carrier_planet, hammering
+
+from gearfmu.files import written_whole
+from gearfmu.reduction.basis import Size
+from gearfmu.reduction.methods import METHODS
+from gearfmu.reduction.oscillators import oscillators
+from gearfmu.reduction.transient import Assembly, Member, Scheme, integrate
+
+HERE = Path(__file__).parent
+TABLE = HERE / "errors.csv"
+FOUR = ("modal", "craig_bampton", "rubin", "krylov")
+EVERY = 2  # steps of a curve's points
+
+
+@dataclass(frozen=True)
+class Run:
+    """One line of a table: how each kind of body is reduced, "whole" or method and number; see `reduced`."""
+
+    carrier: str = "whole"
+    gears: str = "whole"
+    half_step: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"{self.carrier} | {self.gears}" + (" | half the step" if self.half_step else "")
+
+
+@dataclass(frozen=True)
+class Study:
+    """A scene, its scheme, and its runs; the first is the reference."""
+
+    make: Callable[[Meshes], Scene]
+    meshes: Meshes
+    scheme: Scheme
+    runs: tuple[Run, ...]
+
+
+SMALL, PAPER, LARGE = 60, 120, 240
+STUDIES = {
+    "carrier_planet": Study(
+        carrier_planet,
+        Meshes(carrier=0.5, gear=0.17),
+        Scheme(1e-6, 1e-3),
+        (
+            Run(),
+            Run(half_step=True),
+            *(Run(carrier=f"{method} {n}") for n in (SMALL, PAPER, LARGE) for method in FOUR),
+            *(Run(carrier=f"modal {n} + residual") for n in (SMALL, PAPER, LARGE)),
+        ),
+    ),
+    "hammering": Study(
+        hammering,
+        Meshes(carrier=0.5, gear=0.25),
+        Scheme(1e-6, 0.5e-3),
+        (
+            Run(),
+            Run(half_step=True),
+            *(Run(carrier=f"{method} {PAPER}") for method in FOUR),
+            *(Run(gears=f"modal {n}") for n in (100, 200, 400)),
+            *(Run(gears=f"modal {n} + residual") for n in (100, 200, 400)),
+            Run(gears="rubin 400"),
+            Run(f"krylov {PAPER}", "modal 400"),
+            Run(f"krylov {PAPER}", "modal 400 + residual"),
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A channel of a run. error, late: parts of the reference's rms, whole run and its last fifth; seconds: wall time
+    of the integration, with whatever else the machine does."""
+
+    scene: str
+    carrier: str
+    gears: str
+    half_step: bool
+    channel: str
+    error: float
+    late: float
+    seconds: float
+
+
+def measure(name: str, study: Study) -> Iterator[Line]:
+    """All lines of a study; its curves are written when it ends."""
+    scene = study.make(study.meshes)
+    made: dict[tuple[str, str], Member] = {}
+    curves: dict[str, dict[str, np.ndarray]] = {}
+    for run in study.runs:
+        scheme = replace(study.scheme, step=study.scheme.step / (2 if run.half_step else 1))
+        assembly = reduced(scene, run, made)
+        started = time.perf_counter()
+        found = channels(scene, integrate(assembly, scheme))
+        seconds = time.perf_counter() - started
+        curves[run.name] = {key: values[:: 2 if run.half_step else 1] for key, values in found.items()}
+        reference = curves[study.runs[0].name]
+        for channel, values in curves[run.name].items():
+            error, late = errors(reference[channel], values)
+            yield Line(name, run.carrier, run.gears, run.half_step, channel, error, late, seconds)
+    write_curves(name, study.scheme, curves)
+
+
+def reduced(scene: Scene, run: Run, made: dict[tuple[str, str], Member]) -> Assembly:
+    """The scene's assembly with its bodies reduced as the run says; `made` keeps what was reduced before."""
+    others = []
+    for name, solid in scene.solids.items():
+        text = run.carrier if name == "carrier" else run.gears
+        if text == "whole":
+            continue
+        if (name, text) not in made:
+            method, number, *extra = text.split(" ", 2)
+            basis = METHODS[method](solid.full, Size(int(number)))
+            model = oscillators(solid.full, basis, damping_ratio=0.0)
+            made[name, text] = Member.reduced(model, residual=bool(extra))
+        others.append(made[name, text])
+    return scene.assembly.with_members(*others)
+
+
+def write_curves(name: str, scheme: Scheme, curves: dict[str, dict[str, np.ndarray]]) -> None:
+    """curves_<name>.csv: time and every channel of every run but that of half the step."""
+    columns = {"time_s": np.arange(scheme.steps + 1) * scheme.step}
+    for run, found in curves.items():
+        if "half" not in run:
+            columns |= {f"{channel} | {run}": values for channel, values in found.items()}
+    rows = np.column_stack(list(columns.values()))[::EVERY]
+    with written_whole(HERE / f"curves_{name}.csv") as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([[f"{value:.5g}" for value in row] for row in rows])
+
+
+def read() -> list[dict[str, str]]:
+    if not TABLE.exists():
+        return []
+    with TABLE.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def write(rows: list[dict[str, str]]) -> None:
+    with written_whole(TABLE) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Line)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(STUDIES))
+    parser.add_argument("--chart", action="store_true", help="draw from the tables that are there")
+    chosen = parser.parse_args()
+    if unknown := [name for name in chosen.scenes if name not in STUDIES]:
+        parser.error(f"no scene {', '.join(unknown)}; there are {', '.join(STUDIES)}")
+    for name in chosen.scenes or STUDIES:
+        if not chosen.chart:
+            found = []
+            for line in measure(name, STUDIES[name]):
+                text = {key: f"{v:.4g}" if isinstance(v, float) else str(v) for key, v in asdict(line).items()}
+                found.append(text)
+                print("  ".join(text.values()), flush=True)
+            write([*(row for row in read() if row["scene"] != name), *found])
+        draw(name)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""A window of both scenes in CalculiX's direct time integration (*DYNAMIC, DIRECT), the same meshes, against ours.
+
+    python benchmarks/in_time/window.py [carrier_planet] [hammering] [--work DIR] [--compare]
+
+Both programs take HHT-α with the same α and step over 0.2 ms; the finite elements are not reduced. The mesh is coarser
+than that of compare.py, because CalculiX factorises twice a step or more. Writes window_<scene>.csv (time and every
+channel of both) and window.csv (largest and rms difference over the rms of CalculiX) beside this file; --compare
+integrates ours again and leaves CalculiX's columns as they are. Needs ccx (Debian: calculix-ccx); 10 to 30 minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import sys
+from pathlib import Path
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import numpy as np
+from channels import channels
+from deck import Deck
+from scenes import Meshes, Scene, carrier_planet, hammering
+
+from gearfmu.files import written_whole
+from gearfmu.reduction.transient import Motion, Scheme, integrate
+
+HERE = Path(__file__).parent
+sys.path.append(str(HERE.parent / "calculix"))
+from ccx import require_ccx, run  # noqa: E402
+
+SCENES = {"carrier_planet": carrier_planet, "hammering": hammering}
+MESHES = Meshes(carrier=0.35, gear=0.17)
+SCHEME = Scheme(step=2.5e-6, end=0.2e-3)
+
+
+def calculix(scene: Scene, work: Path) -> dict[str, np.ndarray]:
+    """The channels of CalculiX's run."""
+    work.mkdir(parents=True, exist_ok=True)
+    deck, path = Deck(scene, SCHEME), work / f"{scene.name}.inp"
+    deck.write(path)
+    print(f"{scene.name}: ccx took {run(path):.0f} s", file=sys.stderr, flush=True)
+    return channels(scene, motion_of(scene, deck.read(path.with_suffix(".dat"))))
+
+
+def motion_of(scene: Scene, read: dict[str, np.ndarray]) -> Motion:
+    """What CalculiX printed as a Motion; the tension of contacts follows from their gaps, springs have none."""
+    steps = len(read["contact"])
+    assert steps == SCHEME.steps + 1, f"{steps - 1} of {SCHEME.steps} increments in the file"
+    joints, touching = scene.assembly.joints, scene.kinds == "contact"
+    tension = np.zeros((steps, joints.count))
+    tension[:, touching] = np.minimum(read["contact"] + joints.gap[touching], 0.0) * joints.stiffness[touching]
+    interfaces = {name: read[name] for name in scene.solids}
+    return Motion(np.arange(steps) * SCHEME.step, interfaces, tension, np.zeros(steps), 0)
+
+
+def write(path: Path, rows: list[dict[str, str]]) -> None:
+    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a table of numbers."""
+    with path.open(encoding="utf-8") as file:
+        head = next(csv.reader(file))
+        return dict(zip(head, np.loadtxt(file, delimiter=",").T, strict=True))
+
+
+def differences(name: str, ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> list[dict[str, str]]:
+    """A row a channel that is not nothing."""
+    rows = []
+    for channel, values in theirs.items():
+        size, off = np.sqrt(np.mean(values**2)), ours[channel] - values
+        if size > 0:
+            rms, most = np.sqrt(np.mean(off**2)) / size, np.abs(off).max() / size
+            rows.append({"scene": name, "channel": channel, "rms": f"{rms:.2e}", "largest": f"{most:.2e}"})
+    return rows
+
+
+def compared(name: str, work: Path, again: bool) -> list[dict[str, str]]:
+    """Both runs of a scene, their curves written; rows of their differences. again : CalculiX's curves are there."""
+    scene, path = SCENES[name](MESHES), HERE / f"window_{name}.csv"
+    mark = " | CalculiX"
+    theirs = (
+        {key.removesuffix(mark): values for key, values in columns(path).items() if key.endswith(mark)}
+        if again
+        else calculix(scene, work)
+    )
+    ours = channels(scene, integrate(scene.assembly, SCHEME))
+    table = {"time_s": np.arange(SCHEME.steps + 1) * SCHEME.step}
+    table |= {f"{key}{mark}": values for key, values in theirs.items()}
+    table |= {f"{key} | ours": values for key, values in ours.items()}
+    lines = np.column_stack(list(table.values()))
+    write(path, [dict(zip(table, (f"{value:.9g}" for value in line), strict=True)) for line in lines])
+    return differences(name, ours, theirs)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(SCENES))
+    parser.add_argument("--work", type=Path, default=Path("out/in_time"), help="decks, logs and results of ccx")
+    parser.add_argument("--compare", action="store_true")
+    chosen = parser.parse_args()
+    if unknown := [name for name in chosen.scenes if name not in SCENES]:
+        parser.error(f"no scene {', '.join(unknown)}; there are {', '.join(SCENES)}")
+    if not chosen.compare:
+        require_ccx()
+    path = HERE / "window.csv"
+    for name in chosen.scenes or SCENES:
+        found = compared(name, chosen.work, chosen.compare)
+        for row in found:
+            print("  ".join(row.values()), flush=True)
+        with path.open(encoding="utf-8") if path.exists() else open(os.devnull, encoding="utf-8") as file:
+            kept = [row for row in csv.DictReader(file) if row["scene"] != name]
+        write(path, [*kept, *found])
+
+
+if __name__ == "__main__":
+    main()
