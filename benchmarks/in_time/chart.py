@@ -15,10 +15,10 @@ HERE = Path(__file__).parent
 PICTURES = HERE.parents[1] / "docs" / "pictures"
 RUNS = {
     "carrier_planet": {
-        "modal 120 | whole": "modal truncation",
-        "craig_bampton 120 | whole": "Craig–Bampton",
-        "rubin 120 | whole": "Rubin / MacNeal",
-        "krylov 120 | whole": "block Krylov",
+        "modal 120 | rubin 60": "modal truncation",
+        "craig_bampton 120 | rubin 60": "Craig–Bampton",
+        "rubin 120 | rubin 60": "Rubin / MacNeal",
+        "krylov 120 | rubin 60": "block Krylov",
     },
     "hammering": {
         "krylov 120 | modal 400": "carrier Krylov 120, gears 400 eigenmodes (paper)",

@@ -1,14 +1,17 @@
 """The paper's reductions in the time domain against the unreduced finite elements (its Figs. 3 and 4).
 
-    python benchmarks/in_time/compare.py [carrier_planet] [hammering] [--chart]
+    python benchmarks/in_time/compare.py [carrier_planet] [hammering] [--work DIR] [--chart]
 
-carrier_planet : carrier + one planet (scenes.py), 1 ms; the carrier reduced by each method, the planet never.
+carrier_planet : carrier + one planet (scenes.py), 1 ms; the carrier reduced by each method and to several sizes.
 hammering      : carrier + planet + sun through their backlash, 0.5 ms; the carrier by each method, gears by eigenmodes.
 
+A line that reduces one kind of body has the others unreduced, or reduced so that a line of their own shows them to be
+without influence (planet: Rubin 60; carrier: Krylov 120).
 Everything is integrated by the same scheme (HHT-α, α = −0.05) with the same step and contact points, so that the
 reduction alone makes a difference; one line tells what half the step does to the finite elements themselves.
 Writes errors.csv (rms of the difference over rms of the reference, whole run and its last fifth) and curves_<scene>.csv
-beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. About a quarter of an hour.
+beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. Runs are kept in DIR and not made
+again. Ten minutes of one core.
 """
 
 from __future__ import annotations
@@ -64,17 +67,20 @@ class Study:
     runs: tuple[Run, ...]
 
 
-SMALL, PAPER, LARGE = 60, 120, 240
+SIZES, PAPER = (60, 120, 240), 120
+PLANET = "rubin 60"
+CARRIER = f"krylov {PAPER}"
 STUDIES = {
     "carrier_planet": Study(
         carrier_planet,
         Meshes(carrier=0.5, gear=0.17),
-        Scheme(1e-6, 1e-3),
+        Scheme(2e-6, 1e-3),
         (
             Run(),
-            Run(half_step=True),
-            *(Run(carrier=f"{method} {n}") for n in (SMALL, PAPER, LARGE) for method in FOUR),
-            *(Run(carrier=f"modal {n} + residual") for n in (SMALL, PAPER, LARGE)),
+            Run(gears=PLANET),
+            Run(gears=PLANET, half_step=True),
+            *(Run(f"{method} {n}", PLANET) for n in SIZES for method in FOUR),
+            *(Run(f"modal {n} + residual", PLANET) for n in SIZES),
         ),
     ),
     "hammering": Study(
@@ -83,13 +89,11 @@ STUDIES = {
         Scheme(1e-6, 0.5e-3),
         (
             Run(),
-            Run(half_step=True),
-            *(Run(carrier=f"{method} {PAPER}") for method in FOUR),
-            *(Run(gears=f"modal {n}") for n in (100, 200, 400)),
-            *(Run(gears=f"modal {n} + residual") for n in (100, 200, 400)),
-            Run(gears="rubin 400"),
-            Run(f"krylov {PAPER}", "modal 400"),
-            Run(f"krylov {PAPER}", "modal 400 + residual"),
+            Run(CARRIER),
+            Run(CARRIER, half_step=True),
+            *(Run(CARRIER, f"modal {n}{rest}") for n in (400, 200, 100) for rest in ("", " + residual")),
+            Run(CARRIER, "rubin 400"),
+            *(Run(f"{method} {PAPER}", "modal 400 + residual") for method in FOUR if method != "krylov"),
         ),
     ),
 }
@@ -97,8 +101,8 @@ STUDIES = {
 
 @dataclass(frozen=True)
 class Line:
-    """A channel of a run. error, late: parts of the reference's rms, whole run and its last fifth; seconds: wall time
-    of the integration, with whatever else the machine does."""
+    """A channel of a run. error, late: parts of the reference's rms, whole run and its last fifth; seconds: processor time
+    of the integration."""
 
     scene: str
     carrier: str
@@ -110,23 +114,36 @@ class Line:
     seconds: float
 
 
-def measure(name: str, study: Study) -> Iterator[Line]:
+def measure(name: str, study: Study, work: Path) -> Iterator[Line]:
     """All lines of a study; its curves are written when it ends."""
     scene = study.make(study.meshes)
     made: dict[tuple[str, str], Member] = {}
     curves: dict[str, dict[str, np.ndarray]] = {}
     for run in study.runs:
-        scheme = replace(study.scheme, step=study.scheme.step / (2 if run.half_step else 1))
-        assembly = reduced(scene, run, made)
-        started = time.perf_counter()
-        found = channels(scene, integrate(assembly, scheme))
-        seconds = time.perf_counter() - started
+        kept = work / name / f"{run.name.replace(' ', '_').replace('|', '-')}.npz"
+        if not kept.exists():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with written_whole(kept) as temporary, temporary.open("wb") as file:
+                np.savez(file, **integrated(scene, study.scheme, run, made))
+        with np.load(kept) as file:
+            found = dict(file)
+        seconds = float(found.pop("seconds"))
         curves[run.name] = {key: values[:: 2 if run.half_step else 1] for key, values in found.items()}
         reference = curves[study.runs[0].name]
         for channel, values in curves[run.name].items():
             error, late = errors(reference[channel], values)
             yield Line(name, run.carrier, run.gears, run.half_step, channel, error, late, seconds)
     write_curves(name, study.scheme, curves)
+
+
+def integrated(
+    scene: Scene, scheme: Scheme, run: Run, made: dict[tuple[str, str], Member]
+) -> dict[str, np.ndarray]:
+    """Channels of a run, and its "seconds"."""
+    assembly = reduced(scene, run, made)
+    started = time.process_time()
+    motion = integrate(assembly, replace(scheme, step=scheme.step / (2 if run.half_step else 1)))
+    return channels(scene, motion) | {"seconds": np.array(time.process_time() - started)}
 
 
 def reduced(scene: Scene, run: Run, made: dict[tuple[str, str], Member]) -> Assembly:
@@ -175,6 +192,7 @@ def write(rows: list[dict[str, str]]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(STUDIES))
+    parser.add_argument("--work", type=Path, default=Path("out/in_time"), help="where runs are kept")
     parser.add_argument("--chart", action="store_true", help="draw from the tables that are there")
     chosen = parser.parse_args()
     if unknown := [name for name in chosen.scenes if name not in STUDIES]:
@@ -182,7 +200,7 @@ def main() -> None:
     for name in chosen.scenes or STUDIES:
         if not chosen.chart:
             found = []
-            for line in measure(name, STUDIES[name]):
+            for line in measure(name, STUDIES[name], chosen.work):
                 text = {key: f"{v:.4g}" if isinstance(v, float) else str(v) for key, v in asdict(line).items()}
                 found.append(text)
                 print("  ".join(text.values()), flush=True)

@@ -52,8 +52,8 @@ class Points:
     rows: tuple[sp.csr_array, sp.csr_array]
 
 
-def contact_points(a: Placed, b: Placed, grid: Grid, allowance: float) -> Points:
-    """Points of gear A's flanks within reach of gear B's. allowance : m, added to the gap of every flank."""
+def contact_points(a: Placed, b: Placed, grid: Grid, allowance: dict[int, float]) -> Points:
+    """Points of gear A's flanks within reach of gear B's. allowance : m, added to the gaps of side +1 and −1."""
     found = [
         _between(a, b, (i, j), side, grid)
         for side in (1, -1)
@@ -66,7 +66,7 @@ def contact_points(a: Placed, b: Placed, grid: Grid, allowance: float) -> Points
         sp.csr_array(sp.vstack([_row(k, n, 3 * len(gear.sector.full().nodes)) for k, n in part]))
         for gear, part in ((a, first), (b, second))
     )
-    return Points(gap + allowance, area, side, rows)
+    return Points(gap + np.where(side > 0, allowance[1], allowance[-1]), area, side, rows)
 
 
 def _face_each_other(a: Placed, b: Placed, i: int, j: int) -> bool:

@@ -71,7 +71,7 @@ class Meshes:
 def carrier_planet(meshes: Meshes) -> Scene:
     """Fig. 3: the carrier is driven, the planet hangs on its pin."""
     spec = load_stage("planetary54")
-    solids = {"carrier": _carrier(spec, meshes), "planet": _gear(spec, _planet(spec, meshes), "planet")}
+    solids = {"carrier": _carrier(spec, meshes), "planet": gear("planet", _planet(spec, meshes), spec.planet.material)}
     joints, kinds = _supports(spec, solids)
     load = np.zeros(solids["carrier"].full.rows().shape[0])
     load[solids["carrier"].index("bore", "rz")] = TORQUE
@@ -87,14 +87,15 @@ def hammering(meshes: Meshes) -> Scene:
     geometry = PlanetaryGeometry.of(spec)
     planet, sun = _planet(spec, meshes), _sun(spec, meshes, geometry)
     mesh = geometry.sun_mesh
-    points = contact_points(planet, sun, GRID, (mesh.normal_backlash - _nominal(mesh)) / 2)
+    play = (mesh.normal_backlash - nominal_play(mesh)) / 2
+    points = contact_points(planet, sun, GRID, {1: play, -1: play})
     solids = {
         "carrier": _carrier(spec, meshes),
-        "planet": _gear(spec, planet, "planet", points.rows[0]),
-        "sun": _gear(spec, sun, "sun", points.rows[1]),
+        "planet": gear("planet", planet, spec.planet.material, points.rows[0]),
+        "sun": gear("sun", sun, spec.sun.material, points.rows[1]),
     }
     joints, kinds = _supports(spec, solids)
-    joints, kinds = _touching(joints, kinds, solids, points, _penalty(spec, mesh))
+    joints, kinds = touching(joints, kinds, solids, points, _penalty(spec, mesh))
     turning, a = SPEED * np.eye(6)[5], spec.set.center_distance
     start = (turning, turning + SPEED * a * np.eye(6)[1], np.zeros(6))
     members = tuple(Member.whole(solid.full) for solid in solids.values())
@@ -122,24 +123,24 @@ def _carrier(spec: Any, meshes: Meshes) -> Solid:
 def _planet(spec: Any, meshes: Meshes) -> Placed:
     """The planet of bolt 0, tooth 0 on +x."""
     geometry = PlanetaryGeometry.of(spec)
-    return _placed(spec.planet, geometry.sun_mesh.gears[1], geometry.planet_centre(0), 0.0, meshes)
+    return placed_gear(spec.planet, geometry.sun_mesh.gears[1], geometry.planet_centre(0), 0.0, meshes.gear)
 
 
 def _sun(spec: Any, meshes: Meshes, geometry: PlanetaryGeometry) -> Placed:
-    return _placed(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), geometry.sun_phase(), meshes)
+    return placed_gear(spec.sun, geometry.sun_mesh.gears[0], np.zeros(2), geometry.sun_phase(), meshes.gear)
 
 
-def _placed(gear: Any, geometry: Any, centre: np.ndarray, angle: float, meshes: Meshes) -> Placed:
+def placed_gear(gear: Any, geometry: Any, centre: np.ndarray, angle: float, scale: float) -> Placed:
+    """A gear of a stage file where it stands; scale : factor on its element counts."""
     counts = gear.body.mesh
-    sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * meshes.gear}))
+    sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     return Placed(sector, geometry, centre, angle)
 
 
-def _gear(spec: Any, placed: Placed, name: str, flank: sp.csr_array | None = None) -> Solid:
+def gear(name: str, placed: Placed, material: hex20.Material, flank: sp.csr_array | None = None) -> Solid:
     """A gear with its bore as averaging node and, where it touches another, rows of its contact points."""
     mesh = placed.sector.full()
     nodes = rotated(mesh.nodes, placed.angle)
-    material = getattr(spec, name).material
     elements = Elements(nodes, mesh.elements, *hex20.assemble(nodes, mesh.elements, material))
     bore = Coupling("bore", "averaging", mesh.sets["bore"], np.zeros(3))
     full = full_order(name, elements, [bore], Judgement(("bore",), placed.geometry.r))
@@ -165,7 +166,7 @@ def _supports(spec: Any, solids: dict[str, Solid]) -> tuple[Joints, np.ndarray]:
             stiffness.append(k)
             kinds.append(kind)
     count = len(kinds)
-    joints = Joints(_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
+    joints = Joints(joint_rows(solids, entries, count), np.array(stiffness), np.zeros(count), np.zeros(count, bool))
     return joints, np.array(kinds)
 
 
@@ -173,7 +174,10 @@ def _five(bearing: Any) -> tuple[float, ...]:
     return (bearing.stiffness, bearing.stiffness, bearing.axial, bearing.tilt, bearing.tilt)
 
 
-def _rows(solids: dict[str, Solid], entries: list[tuple[int, str, int, float]], count: int) -> tuple[sp.csr_array, ...]:
+def joint_rows(
+    solids: dict[str, Solid], entries: list[tuple[int, str, int, float]], count: int
+) -> tuple[sp.csr_array, ...]:
+    """Joint rows of every solid: entries are (joint, solid, row of its interfaces, sign)."""
     result = []
     for name, solid in solids.items():
         own = np.array([(joint, row, sign) for joint, owner, row, sign in entries if owner == name]).reshape(-1, 3)
@@ -182,14 +186,15 @@ def _rows(solids: dict[str, Solid], entries: list[tuple[int, str, int, float]], 
     return tuple(result)
 
 
-def _touching(
+def touching(
     joints: Joints, kinds: np.ndarray, solids: dict[str, Solid], points: Points, penalty: float
 ) -> tuple[Joints, np.ndarray]:
     """The joints and, after them, a contact at every point, penalty (N/m³) times its area stiff."""
     count = len(points.gap)
-    at = {name: solid.index("flank", "n0") for name, solid in solids.items() if name != "carrier"}
+    touching_ones = [(name, solid) for name, solid in solids.items() if solid.full.interfaces[-1].name == "flank"]
+    at = {name: solid.index("flank", "n0") for name, solid in touching_ones}
     entries = [(k, name, first + k, 1.0) for name, first in at.items() for k in range(count)]
-    contacts = _rows(solids, entries, count)
+    contacts = joint_rows(solids, entries, count)
     rows = tuple(sp.csr_array(sp.vstack(both)) for both in zip(joints.rows, contacts, strict=True))
     return (
         Joints(
@@ -202,7 +207,8 @@ def _touching(
     )
 
 
-def _nominal(mesh: Any) -> float:
+def nominal_play(mesh: Any) -> float:
+    """Gap (m) along the normal of one flank of the nominal teeth while the other one touches."""
     return mesh.nominal_backlash * np.cos(mesh.alpha_wt)
 
 
