@@ -28,11 +28,9 @@ def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
     }
     if "sun" not in scene.solids:
         return found | {"planet speed, m/s": speed("planet", "uy"), "carrier speed, rad/s": speed("carrier", "rz")}
-    touching, side = scene.kinds == "contact", scene.points.side
-    force = -motion.tension[:, touching]
+    force = -motion.tension[:, scene.kinds == "contact"]
     return {
-        "drive flank force, N": force[:, side > 0].sum(axis=1),
-        "coast flank force, N": force[:, side < 0].sum(axis=1),
+        "mesh force, N": force.sum(axis=1),
         "planet speed, rad/s": speed("planet", "rz"),
         "sun speed, rad/s": speed("sun", "rz"),
         **found,
@@ -40,9 +38,9 @@ def channels(scene: Scene, motion: Motion) -> dict[str, np.ndarray]:
 
 
 def errors(reference: np.ndarray, other: np.ndarray) -> tuple[float, float]:
-    """rms of the difference over rms of the reference: of the whole run, and of its last part."""
-    last = slice(-round(LATE * len(reference)), None)
-    return tuple(float(_rms(other[at] - reference[at]) / _rms(reference[at])) for at in (slice(None), last))
+    """rms of the difference, of the whole run and of its last part, over the rms of the whole reference."""
+    off, last = other - reference, slice(-round(LATE * len(reference)), None)
+    return _rms(off) / _rms(reference), _rms(off[last]) / _rms(reference)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.ticker import FuncFormatter
 
 from gearfmu.files import written_whole
 from gearfmu.report.style import INK, panels, styled
@@ -27,8 +28,9 @@ RUNS = {
 }
 SHOWN = {
     "carrier_planet": ("bolt deflection, µm", "bolt tilt, mrad", "pin elongation, µm"),
-    "hammering": ("drive flank force, N", "coast flank force, N", "planet speed, rad/s", "sun speed, rad/s"),
+    "hammering": ("mesh force, N", "planet speed, rad/s", "sun speed, rad/s"),
 }
+FLOOR = 1e-8  # of the differences shown
 DIFFERENCE = {"carrier_planet": "bolt deflection, µm", "hammering": "planet speed, rad/s"}
 
 
@@ -45,10 +47,10 @@ def draw(name: str) -> None:
             panel.set_ylabel(channel)
         channel = DIFFERENCE[name]
         whole = columns[f"{channel} | whole | whole"]
-        axes[-1].plot([], [])
         for index, (run, label) in enumerate(RUNS[name].items()):
             off = np.abs(columns[f"{channel} | {run}"] - whole) / np.sqrt(np.mean(whole**2))
-            axes[-1].semilogy(at[1:], np.maximum(off[1:], 1e-7), color=f"C{index}", label=label)
+            axes[-1].semilogy(at[1:], np.maximum(off[1:], FLOOR), color=f"C{index}", label=label)
+        axes[-1].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes[-1].set(xlabel="time, ms", ylabel=f"difference in {channel.split(',')[0]}\nover its rms")
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         with written_whole(PICTURES / f"in_time_{name}.svg") as temporary:

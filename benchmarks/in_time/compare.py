@@ -9,7 +9,7 @@ A line that reduces one kind of body has the others unreduced, or reduced so tha
 without influence (planet: Rubin 60; carrier: Krylov 120).
 Everything is integrated by the same scheme (HHT-α, α = −0.05) with the same step and contact points, so that the
 reduction alone makes a difference; one line tells what half the step does to the finite elements themselves.
-Writes errors.csv (rms of the difference over rms of the reference, whole run and its last fifth) and curves_<scene>.csv
+Writes errors.csv (rms of the difference, in the whole run and in its last fifth, over that of the reference) and curves_<scene>.csv
 beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. Runs are kept in DIR and not made
 again. Ten minutes of one core.
 """
@@ -29,7 +29,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 from channels import channels, errors
-from chart import draw
+from chart import RUNS, draw
 from scenes import Meshes, Scene, carrier_planet, hammering
 
 from gearfmu.files import written_whole
@@ -101,7 +101,8 @@ STUDIES = {
 
 @dataclass(frozen=True)
 class Line:
-    """A channel of a run. error, late: parts of the reference's rms, whole run and its last fifth; seconds: processor time
+    """A channel of a run. error, late: over the reference's rms, of the whole run and of its last
+    fifth; seconds: processor time
     of the integration."""
 
     scene: str
@@ -163,16 +164,16 @@ def reduced(scene: Scene, run: Run, made: dict[tuple[str, str], Member]) -> Asse
 
 
 def write_curves(name: str, scheme: Scheme, curves: dict[str, dict[str, np.ndarray]]) -> None:
-    """curves_<name>.csv: time and every channel of every run but that of half the step."""
+    """curves_<name>.csv: time and every channel of the reference and of what the picture shows."""
     columns = {"time_s": np.arange(scheme.steps + 1) * scheme.step}
     for run, found in curves.items():
-        if "half" not in run:
+        if run in (STUDIES[name].runs[0].name, *RUNS[name]):
             columns |= {f"{channel} | {run}": values for channel, values in found.items()}
     rows = np.column_stack(list(columns.values()))[::EVERY]
     with written_whole(HERE / f"curves_{name}.csv") as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([[f"{value:.5g}" for value in row] for row in rows])
+        writer.writerows([[f"{value:.9g}" for value in row] for row in rows])
 
 
 def read() -> list[dict[str, str]]:

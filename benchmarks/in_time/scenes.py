@@ -2,8 +2,8 @@
 
 Bodies, pin, bearings and backlash are those of the shipped planetary54; the planet of bolt 0 alone is there. Nothing is
 damped. `carrier_planet`: a quarter of the paper's 600 N·m acts on the carrier's bore, growing within 0.1 ms.
-`hammering`: carrier and planet turn at 25 rad/s about the axis, the sun is at rest, the teeth are in the middle of
-their backlash, and nothing drives them.
+`hammering`: carrier and planet turn at 25 rad/s about the axis besides, the sun is at rest, and the teeth are in the
+middle of their backlash: they meet, let go and meet again.
 """
 
 from __future__ import annotations
@@ -73,12 +73,8 @@ def carrier_planet(meshes: Meshes) -> Scene:
     spec = load_stage("planetary54")
     solids = {"carrier": _carrier(spec, meshes), "planet": gear("planet", _planet(spec, meshes), spec.planet.material)}
     joints, kinds = _supports(spec, solids)
-    load = np.zeros(solids["carrier"].full.rows().shape[0])
-    load[solids["carrier"].index("bore", "rz")] = TORQUE
-    patterns = (load, np.zeros(solids["planet"].full.rows().shape[0]))
-    members = tuple(Member.whole(solid.full) for solid in solids.values())
     at_rest = (np.zeros(6), np.zeros(6))
-    return Scene("carrier_planet", solids, Assembly(members, joints, patterns, _ramp, at_rest), kinds, _steel(spec))
+    return Scene("carrier_planet", solids, _driven(solids, joints, at_rest), kinds, _steel(spec))
 
 
 def hammering(meshes: Meshes) -> Scene:
@@ -98,9 +94,15 @@ def hammering(meshes: Meshes) -> Scene:
     joints, kinds = touching(joints, kinds, solids, points, _penalty(spec, mesh))
     turning, a = SPEED * np.eye(6)[5], spec.set.center_distance
     start = (turning, turning + SPEED * a * np.eye(6)[1], np.zeros(6))
+    return Scene("hammering", solids, _driven(solids, joints, start), kinds, _steel(spec), points)
+
+
+def _driven(solids: dict[str, Solid], joints: Joints, start: tuple[np.ndarray, ...]) -> Assembly:
+    """All bodies unreduced, TORQUE on the carrier's bore."""
+    patterns = {name: np.zeros(solid.full.rows().shape[0]) for name, solid in solids.items()}
+    patterns["carrier"][solids["carrier"].index("bore", "rz")] = TORQUE
     members = tuple(Member.whole(solid.full) for solid in solids.values())
-    patterns = tuple(np.zeros(solid.full.rows().shape[0]) for solid in solids.values())
-    return Scene("hammering", solids, Assembly(members, joints, patterns, lambda t: 0.0, start), kinds, _steel(spec), points)
+    return Assembly(members, joints, tuple(patterns.values()), _ramp, start)
 
 
 def _steel(spec: Any) -> hex20.Material:

@@ -2,7 +2,7 @@
 
     python benchmarks/in_time/window.py [carrier_planet] [hammering] [--work DIR] [--compare]
 
-Both programs take HHT-α with the same α and step over 0.2 ms; the finite elements are not reduced. The mesh is coarser
+Both programs take HHT-α with the same α and step over 0.2 ms (2.5 and 4 µs); the finite elements are not reduced. The mesh is coarser
 than that of compare.py, because CalculiX factorises twice a step or more. Writes window_<scene>.csv (time and every
 channel of both) and window.csv (largest and rms difference over the rms of CalculiX) beside this file; --compare
 integrates ours again and leaves CalculiX's columns as they are. Needs ccx (Debian: calculix-ccx); 10 to 30 minutes.
@@ -21,8 +21,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 from channels import channels
-from deck import Deck
 from scenes import Meshes, Scene, carrier_planet, hammering
+from transient_deck import Deck
 
 from gearfmu.files import written_whole
 from gearfmu.reduction.transient import Motion, Scheme, integrate
@@ -33,13 +33,13 @@ from ccx import require_ccx, run  # noqa: E402
 
 SCENES = {"carrier_planet": carrier_planet, "hammering": hammering}
 MESHES = Meshes(carrier=0.35, gear=0.17)
-SCHEME = Scheme(step=2.5e-6, end=0.2e-3)
+SCHEMES = {"carrier_planet": Scheme(2.5e-6, 0.2e-3), "hammering": Scheme(4e-6, 0.2e-3)}
 
 
 def calculix(scene: Scene, work: Path) -> dict[str, np.ndarray]:
     """The channels of CalculiX's run."""
     work.mkdir(parents=True, exist_ok=True)
-    deck, path = Deck(scene, SCHEME), work / f"{scene.name}.inp"
+    deck, path = Deck(scene, SCHEMES[scene.name]), work / f"{scene.name}.inp"
     deck.write(path)
     print(f"{scene.name}: ccx took {run(path):.0f} s", file=sys.stderr, flush=True)
     return channels(scene, motion_of(scene, deck.read(path.with_suffix(".dat"))))
@@ -47,13 +47,13 @@ def calculix(scene: Scene, work: Path) -> dict[str, np.ndarray]:
 
 def motion_of(scene: Scene, read: dict[str, np.ndarray]) -> Motion:
     """What CalculiX printed as a Motion; the tension of contacts follows from their gaps, springs have none."""
-    steps = len(read["contact"])
-    assert steps == SCHEME.steps + 1, f"{steps - 1} of {SCHEME.steps} increments in the file"
+    steps, scheme = len(read["contact"]), SCHEMES[scene.name]
+    assert steps == scheme.steps + 1, f"{steps - 1} of {scheme.steps} increments in the file"
     joints, touching = scene.assembly.joints, scene.kinds == "contact"
     tension = np.zeros((steps, joints.count))
     tension[:, touching] = np.minimum(read["contact"] + joints.gap[touching], 0.0) * joints.stiffness[touching]
     interfaces = {name: read[name] for name in scene.solids}
-    return Motion(np.arange(steps) * SCHEME.step, interfaces, tension, np.zeros(steps), 0)
+    return Motion(np.arange(steps) * scheme.step, interfaces, tension, np.zeros(steps), 0)
 
 
 def write(path: Path, rows: list[dict[str, str]]) -> None:
@@ -83,15 +83,15 @@ def differences(name: str, ours: dict[str, np.ndarray], theirs: dict[str, np.nda
 
 def compared(name: str, work: Path, again: bool) -> list[dict[str, str]]:
     """Both runs of a scene, their curves written; rows of their differences. again : CalculiX's curves are there."""
-    scene, path = SCENES[name](MESHES), HERE / f"window_{name}.csv"
+    scene, scheme, path = SCENES[name](MESHES), SCHEMES[name], HERE / f"window_{name}.csv"
     mark = " | CalculiX"
     theirs = (
         {key.removesuffix(mark): values for key, values in columns(path).items() if key.endswith(mark)}
         if again
         else calculix(scene, work)
     )
-    ours = channels(scene, integrate(scene.assembly, SCHEME))
-    table = {"time_s": np.arange(SCHEME.steps + 1) * SCHEME.step}
+    ours = channels(scene, integrate(scene.assembly, scheme))
+    table = {"time_s": np.arange(scheme.steps + 1) * scheme.step}
     table |= {f"{key}{mark}": values for key, values in theirs.items()}
     table |= {f"{key} | ours": values for key, values in ours.items()}
     lines = np.column_stack(list(table.values()))
