@@ -9,23 +9,19 @@ A line that reduces one kind of body has the others unreduced, or reduced so tha
 without influence (planet: Rubin 60; carrier: Krylov 120).
 Everything is integrated by the same scheme (HHT-α, α = −0.05) with the same step and contact points, so that the
 reduction alone makes a difference; one line tells what half the step does to the finite elements themselves.
-Writes errors.csv (rms of the difference, in the whole run and in its last fifth, over that of the reference) and curves_<scene>.csv
-beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. Runs are kept in DIR and not made
-again. Ten minutes of one core.
+Writes errors.csv (rms of the difference, in the whole run and in its last fifth, over that of the reference) and
+curves_<scene>.csv beside this file, and draws docs/pictures/in_time_<scene>.svg; --chart only draws. Runs are kept in
+DIR and not made again. Ten minutes of one core, a third of it the modes of the gears.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[_name] = "1"
 
 import numpy as np
 from channels import channels, errors
@@ -137,9 +133,7 @@ def measure(name: str, study: Study, work: Path) -> Iterator[Line]:
     write_curves(name, study.scheme, curves)
 
 
-def integrated(
-    scene: Scene, scheme: Scheme, run: Run, made: dict[tuple[str, str], Member]
-) -> dict[str, np.ndarray]:
+def integrated(scene: Scene, scheme: Scheme, run: Run, made: dict[tuple[str, str], Member]) -> dict[str, np.ndarray]:
     """Channels of a run, and its "seconds"."""
     assembly = reduced(scene, run, made)
     started = time.process_time()

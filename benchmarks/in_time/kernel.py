@@ -13,12 +13,8 @@ contact and its begin, and writes kernel.csv and curves_kernel.csv beside this f
 from __future__ import annotations
 
 import csv
-import os
 import sys
 from pathlib import Path
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[_name] = "1"
 
 import numpy as np
 from channels import errors

@@ -50,7 +50,7 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """solids by name in the order of the assembly's members; joints are told apart by `kinds`: pin, bearing, contact."""
+    """solids by name in the order of the assembly's members; kinds (j,) tells pin, bearings and contacts apart."""
 
     name: str
     solids: dict[str, Solid]

@@ -93,11 +93,11 @@ class Deck:
                 assert rows.shape[1] == 3 * len(solid.elements.nodes), "averaging beside rigid couplings"
                 for k in range(6):
                     unit = 1.0 if k < 3 else 1 / MM
-                    yield from _equation([(master + k // 3, k % 3 + 1, -1.0), *_terms(rows[[k]], self.first[name], unit)])
+                    yield from _equation(
+                        [(master + k // 3, k % 3 + 1, -1.0), *_terms(rows[[k]], self.first[name], unit)]
+                    )
 
-    def _rigid(
-        self, name: str, solid: Solid, nodes: np.ndarray, master: int, point: np.ndarray
-    ) -> Iterator[str]:
+    def _rigid(self, name: str, solid: Solid, nodes: np.ndarray, master: int, point: np.ndarray) -> Iterator[str]:
         for node in nodes:
             fields = rigid_fields(MM * (solid.elements.nodes[node] - point))
             for axis in range(3):
@@ -115,8 +115,8 @@ class Deck:
         yield from ("*BOUNDARY", *(f"{node}, 2, 3" for node in range(self.contact, self.last)))
 
     def _springs(self) -> Iterator[str]:
-        """Joints in their order: springs between interfaces or to the ground, then contacts. CalculiX takes whole numbers
-        for directions here: all others have a decimal point."""
+        """Joints in their order: springs between interfaces or to the ground, then contacts. CalculiX takes whole
+        numbers for directions here: all others have a decimal point."""
         joints, element = self.scene.assembly.joints, 1_000_000
         before = int((self.scene.kinds != "contact").sum())
         for j, (kind, stiffness) in enumerate(zip(self.scene.kinds, joints.stiffness, strict=True)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def ramp(time: float) -> float:
     return 0.5 * (1 - np.cos(np.pi * min(time / 0.1e-3, 1.0)))
 
 
-@lru_cache(maxsize=None)
+@cache
 def reduced(method: str, count: int, residual: bool = False) -> Member:
     body = tiny()
     return Member.reduced(oscillators(body, METHODS[method](body, Size(count)), 0.0), residual)
