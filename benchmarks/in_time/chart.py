@@ -22,8 +22,8 @@ RUNS = {
         "krylov 120 | rubin 60": "block Krylov",
     },
     "hammering": {
-        "krylov 120 | modal 400": "carrier Krylov 120, gears 400 eigenmodes (paper)",
-        "krylov 120 | modal 400 + residual": "the same with static residual",
+        "krylov 120 | modal 400": "reduced as in the paper",
+        "krylov 120 | modal 400 + residual": "with static residual",
     },
 }
 SHOWN = {
