@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.ticker import FuncFormatter
+from tables import read_columns
 
 from gearfmu.files import written_whole
 from gearfmu.report.style import INK, panels, styled
@@ -36,7 +36,7 @@ DIFFERENCE = {"carrier_planet": "bolt deflection, µm", "hammering": "planet spe
 
 def draw(name: str) -> None:
     """docs/pictures/in_time_<name>.svg: curves of the unreduced bodies and of the reduced ones, and the difference."""
-    columns = _columns(HERE / f"curves_{name}.csv")
+    columns = read_columns(HERE / f"curves_{name}.csv")
     at = 1e3 * columns["time_s"]
     with styled(), rc_context({"svg.hashsalt": name}):
         figure, axes = panels((1.7,) * len(SHOWN[name]) + (2.0,))
@@ -55,10 +55,3 @@ def draw(name: str) -> None:
         axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         with written_whole(PICTURES / f"in_time_{name}.svg") as temporary:
             figure.savefig(temporary, format="svg", metadata={"Date": None})
-
-
-def _columns(path: Path) -> dict[str, np.ndarray]:
-    with path.open(encoding="utf-8") as file:
-        head = next(csv.reader(file))
-        values = np.loadtxt(file, delimiter=",")
-    return dict(zip(head, values.T, strict=True))

@@ -17,16 +17,16 @@ DIR and not made again. Ten minutes of one core, a third of it the modes of the 
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from channels import channels, errors
 from chart import RUNS, draw
 from scenes import Meshes, Scene, carrier_planet, hammering
+from tables import read_rows, write_columns, write_rows
 
 from gearfmu.files import written_whole
 from gearfmu.reduction.basis import Size
@@ -163,25 +163,7 @@ def write_curves(name: str, scheme: Scheme, curves: dict[str, dict[str, np.ndarr
     for run, found in curves.items():
         if run in (STUDIES[name].runs[0].name, *RUNS[name]):
             columns |= {f"{channel} | {run}": values for channel, values in found.items()}
-    rows = np.column_stack(list(columns.values()))[::EVERY]
-    with written_whole(HERE / f"curves_{name}.csv") as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([[f"{value:.9g}" for value in row] for row in rows])
-
-
-def read() -> list[dict[str, str]]:
-    if not TABLE.exists():
-        return []
-    with TABLE.open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def write(rows: list[dict[str, str]]) -> None:
-    with written_whole(TABLE) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Line)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write_columns(HERE / f"curves_{name}.csv", {key: values[::EVERY] for key, values in columns.items()})
 
 
 def main() -> None:
@@ -196,10 +178,9 @@ def main() -> None:
         if not chosen.chart:
             found = []
             for line in measure(name, STUDIES[name], chosen.work):
-                text = {key: f"{v:.4g}" if isinstance(v, float) else str(v) for key, v in asdict(line).items()}
-                found.append(text)
-                print("  ".join(text.values()), flush=True)
-            write([*(row for row in read() if row["scene"] != name), *found])
+                found.append(asdict(line))
+                print("  ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in found[-1].values()), flush=True)
+            write_rows(TABLE, [*(row for row in read_rows(TABLE) if row["scene"] != name), *found])
         draw(name)
 
 

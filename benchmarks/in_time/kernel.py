@@ -12,17 +12,15 @@ contact and its begin, and writes kernel.csv and curves_kernel.csv beside this f
 
 from __future__ import annotations
 
-import csv
-import sys
 from pathlib import Path
 
 import numpy as np
 from channels import errors
 from contact_points import contact_points
 from scenes import GRID, Solid, gear, joint_rows, nominal_play, placed_gear, touching
+from tables import write_columns, write_rows
 
 from gearfmu.body import reduce_stage
-from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
@@ -105,24 +103,22 @@ def runs() -> dict[str, np.ndarray]:
 def main() -> None:
     found = runs()
     reference = next(iter(found.values()))
-    rows = []
-    for name, force in found.items():
-        error, _ = errors(reference, force)
-        impulse = force[force > 0].sum() * SAMPLE
-        closed = SAMPLE * np.count_nonzero(force > 0)
-        rows.append([name, force.max(), 1e3 * impulse, 1e6 * closed, 1e6 * SAMPLE * np.flatnonzero(force)[0], error])
-        print(f"{name}: " + "  ".join(f"{value:.4g}" for value in rows[-1][1:]), file=sys.stderr, flush=True)
-    table(HERE / "kernel.csv", ["model", "peak_N", "impulse_mNs", "closed_us", "first_us", "error"], rows)
-    time = np.arange(len(reference)) * SAMPLE
-    curves = np.column_stack([time, *found.values()]).tolist()
-    table(HERE / "curves_kernel.csv", ["time_s", *found], curves)
+    rows = [{"model": name} | facts(reference, force) for name, force in found.items()]
+    for row in rows:
+        print("  ".join(f"{v:.4g}" if isinstance(v, float) else str(v) for v in row.values()), flush=True)
+    write_rows(HERE / "kernel.csv", rows)
+    write_columns(HERE / "curves_kernel.csv", {"time_s": np.arange(len(reference)) * SAMPLE} | found)
 
 
-def table(path: Path, head: list[str], rows: list[list]) -> None:
-    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(head)
-        writer.writerows([[v if isinstance(v, str) else f"{v:.5g}" for v in row] for row in rows])
+def facts(reference: np.ndarray, force: np.ndarray) -> dict[str, float]:
+    """Of a force over time: peak, impulse and time of the drive flanks, first contact, error."""
+    return {
+        "peak_N": float(force.max()),
+        "impulse_mNs": float(1e3 * force[force > 0].sum() * SAMPLE),
+        "closed_us": float(1e6 * SAMPLE * np.count_nonzero(force > 0)),
+        "first_us": float(1e6 * SAMPLE * np.flatnonzero(force)[0]),
+        "error": errors(reference, force)[0],
+    }
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ from gearfmu.fem.coupling import rigid_fields
 from gearfmu.reduction.transient import Scheme
 
 MM = 1e3
-OPENING, CLOSING = 1e3, 1.0  # mm, ends of a contact's table
+ARM, OPENING, CLOSING = 10.0, 1e3, 5.0  # mm: length of a contact's spring, ends of its table
+SPRINGS = 1_000_000  # first number of their elements
 _TERMS = 4  # terms of an equation in a line
 
 
@@ -41,7 +42,7 @@ class Deck:
 
     def write(self, path: Path) -> None:
         """The deck."""
-        lines = [*self._meshes(), *self._couplings(), *self._contacts(), *self._springs(), *self._step()]
+        lines = [*self._meshes(), *self._couplings(), *self._contacts(), *self._springs(), *self._contact_springs(), *self._step()]
         path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
     def read(self, path: Path) -> dict[str, np.ndarray]:
@@ -115,25 +116,33 @@ class Deck:
         yield from ("*BOUNDARY", *(f"{node}, 2, 3" for node in range(self.contact, self.last)))
 
     def _springs(self) -> Iterator[str]:
-        """Joints in their order: springs between interfaces or to the ground, then contacts. CalculiX takes whole
-        numbers for directions here: all others have a decimal point."""
-        joints, element = self.scene.assembly.joints, 1_000_000
-        before = int((self.scene.kinds != "contact").sum())
-        for j, (kind, stiffness) in enumerate(zip(self.scene.kinds, joints.stiffness, strict=True)):
-            ends = [(self.contact + j - before, 1, False)] if kind == "contact" else self._ends(j)
+        """Springs between interfaces or to the ground. CalculiX takes whole numbers for directions here: stiffness has a
+        decimal point."""
+        stiffness = self.scene.assembly.joints.stiffness
+        for j in np.flatnonzero(self.scene.kinds != "contact"):
+            ends = self._ends(j)
             unit = MM if ends[0][2] else 1 / MM  # N·m/rad → N·mm/rad, N/m → N/mm
-            nodes = ", ".join(str(end[0]) for end in ends)
-            yield f"*ELEMENT, TYPE=SPRING{'A12'[len(ends)]}, ELSET=S{j}"
-            yield f"{element + j}, {nodes}"
-            yield f"*SPRING, ELSET=S{j}" + (", NONLINEAR" if kind == "contact" else "")
+            yield f"*ELEMENT, TYPE=SPRING{len(ends)}, ELSET=S{j}"
+            yield f"{SPRINGS + j}, " + ", ".join(str(end[0]) for end in ends)
+            yield f"*SPRING, ELSET=S{j}"
             yield ", ".join(str(end[1]) for end in ends)
-            if kind == "contact":
-                gap = MM * joints.gap[j]
-                yield f"{-CLOSING * stiffness * unit:.13e}, {-gap - CLOSING:.13e}"
-                yield f"0.0, {-gap:.13e}"
-                yield f"0.0, {OPENING:.13e}"
-            else:
-                yield f"{stiffness * unit:.13e}"
+            yield f"{stiffness[j] * unit:.13e}"
+
+    def _contact_springs(self) -> Iterator[str]:
+        """From the node of every gap along x to one that is held. (SPRING1 with a table, which would need none, has a
+        tangent in CalculiX 2.20 with which Newton's method goes round in circles.)"""
+        joints, touching = self.scene.assembly.joints, np.flatnonzero(self.scene.kinds == "contact")
+        if not len(touching):
+            return
+        yield from ("*NODE, NSET=HELD", f"{self.last}, {-ARM}, 0, 0", "*BOUNDARY", "HELD, 1, 3")
+        for k, j in enumerate(touching):
+            gap = MM * joints.gap[j]
+            yield f"*ELEMENT, TYPE=SPRINGA, ELSET=S{j}"
+            yield f"{SPRINGS + j}, {self.last}, {self.contact + k}"
+            yield f"*SPRING, ELSET=S{j}, NONLINEAR"
+            yield f"{-CLOSING * joints.stiffness[j] / MM:.13e}, {-gap - CLOSING:.13e}"
+            yield f"0.0, {-gap:.13e}"
+            yield f"0.0, {OPENING:.13e}"
 
     def _ends(self, joint: int) -> list[tuple[int, int, bool]]:
         """(node, direction, whether a rotation) of the interfaces that a spring joins."""

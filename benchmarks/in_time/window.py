@@ -2,7 +2,7 @@
 
     python benchmarks/in_time/window.py [carrier_planet] [hammering] [--work DIR] [--compare]
 
-Both programs take HHT-α with the same α and step over 0.2 ms (4 and 5 µs); the finite elements are not reduced. The
+Both programs take HHT-α with the same α and step over 0.2 ms (4 and 10 µs); the finite elements are not reduced. The
 mesh is coarser than that of compare.py, because CalculiX factorises twice a step or more. Writes window_<scene>.csv
 (time and every channel of both) and window.csv (largest and rms difference over the rms of CalculiX) beside this file;
 --compare integrates ours again and leaves CalculiX's columns as they are. Needs ccx (Debian: calculix-ccx); ten minutes
@@ -12,17 +12,16 @@ of one core.
 from __future__ import annotations
 
 import argparse
-import csv
-import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from channels import channels
 from scenes import Meshes, Scene, carrier_planet, hammering
+from tables import read_columns, read_rows, write_columns, write_rows
 from transient_deck import Deck
 
-from gearfmu.files import written_whole
 from gearfmu.reduction.transient import Motion, Scheme, integrate
 
 HERE = Path(__file__).parent
@@ -31,7 +30,7 @@ from ccx import require_ccx, run  # noqa: E402
 
 SCENES = {"carrier_planet": carrier_planet, "hammering": hammering}
 MESHES = Meshes(carrier=0.35, gear=0.17)
-SCHEMES = {"carrier_planet": Scheme(4e-6, 0.2e-3), "hammering": Scheme(5e-6, 0.2e-3)}
+SCHEMES = {"carrier_planet": Scheme(4e-6, 0.2e-3), "hammering": Scheme(10e-6, 0.2e-3)}
 
 
 def calculix(scene: Scene, work: Path) -> dict[str, np.ndarray]:
@@ -54,37 +53,23 @@ def motion_of(scene: Scene, read: dict[str, np.ndarray]) -> Motion:
     return Motion(np.arange(steps) * scheme.step, interfaces, tension, np.zeros(steps), 0)
 
 
-def write(path: Path, rows: list[dict[str, str]]) -> None:
-    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def columns(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a table of numbers."""
-    with path.open(encoding="utf-8") as file:
-        head = next(csv.reader(file))
-        return dict(zip(head, np.loadtxt(file, delimiter=",").T, strict=True))
-
-
-def differences(name: str, ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> list[dict[str, str]]:
+def differences(name: str, ours: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> list[dict[str, Any]]:
     """A row a channel that is not nothing."""
     rows = []
     for channel, values in theirs.items():
         size, off = np.sqrt(np.mean(values**2)), ours[channel] - values
         if size > 0:
             rms, most = np.sqrt(np.mean(off**2)) / size, np.abs(off).max() / size
-            rows.append({"scene": name, "channel": channel, "rms": f"{rms:.2e}", "largest": f"{most:.2e}"})
+            rows.append({"scene": name, "channel": channel, "rms": float(rms), "largest": float(most)})
     return rows
 
 
-def compared(name: str, work: Path, again: bool) -> list[dict[str, str]]:
+def compared(name: str, work: Path, again: bool) -> list[dict[str, Any]]:
     """Both runs of a scene, their curves written; rows of their differences. again : CalculiX's curves are there."""
     scene, scheme, path = SCENES[name](MESHES), SCHEMES[name], HERE / f"window_{name}.csv"
     mark = " | CalculiX"
     theirs = (
-        {key.removesuffix(mark): values for key, values in columns(path).items() if key.endswith(mark)}
+        {key.removesuffix(mark): values for key, values in read_columns(path).items() if key.endswith(mark)}
         if again
         else calculix(scene, work)
     )
@@ -92,8 +77,7 @@ def compared(name: str, work: Path, again: bool) -> list[dict[str, str]]:
     table = {"time_s": np.arange(scheme.steps + 1) * scheme.step}
     table |= {f"{key}{mark}": values for key, values in theirs.items()}
     table |= {f"{key} | ours": values for key, values in ours.items()}
-    lines = np.column_stack(list(table.values()))
-    write(path, [dict(zip(table, (f"{value:.9g}" for value in line), strict=True)) for line in lines])
+    write_columns(path, table)
     return differences(name, ours, theirs)
 
 
@@ -111,10 +95,8 @@ def main() -> None:
     for name in chosen.scenes or SCENES:
         found = compared(name, chosen.work, chosen.compare)
         for row in found:
-            print("  ".join(row.values()), flush=True)
-        with path.open(encoding="utf-8") if path.exists() else open(os.devnull, encoding="utf-8") as file:
-            kept = [row for row in csv.DictReader(file) if row["scene"] != name]
-        write(path, [*kept, *found])
+            print(f"{row['scene']}  {row['channel']}  {row['rms']:.1e}  {row['largest']:.1e}", flush=True)
+        write_rows(path, [*(row for row in read_rows(path) if row["scene"] != name), *found])
 
 
 if __name__ == "__main__":
