@@ -42,7 +42,14 @@ class Deck:
 
     def write(self, path: Path) -> None:
         """The deck."""
-        lines = [*self._meshes(), *self._couplings(), *self._contacts(), *self._springs(), *self._contact_springs(), *self._step()]
+        lines = [
+            *self._meshes(),
+            *self._couplings(),
+            *self._contacts(),
+            *self._springs(),
+            *self._contact_springs(),
+            *self._step(),
+        ]
         path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
     def read(self, path: Path) -> dict[str, np.ndarray]:
@@ -116,8 +123,8 @@ class Deck:
         yield from ("*BOUNDARY", *(f"{node}, 2, 3" for node in range(self.contact, self.last)))
 
     def _springs(self) -> Iterator[str]:
-        """Springs between interfaces or to the ground. CalculiX takes whole numbers for directions here: stiffness has a
-        decimal point."""
+        """Springs between interfaces or to the ground. CalculiX takes whole numbers for directions here: a stiffness
+        has a decimal point."""
         stiffness = self.scene.assembly.joints.stiffness
         for j in np.flatnonzero(self.scene.kinds != "contact"):
             ends = self._ends(j)

@@ -90,6 +90,13 @@ def test_tables_say_what_the_paper_says() -> None:
     assert error("hammering", "krylov 120", "modal 400 + residual", "mesh force") < 0.1 * paper["mesh force"]
 
 
+def test_calculix_goes_the_same_way() -> None:
+    """Both windows in CalculiX: every channel within 1e-4 of its rms (measured: its printed digits)."""
+    found = rows("window.csv")
+    assert {row["scene"] for row in found} == {"carrier_planet", "hammering"} and len(found) == 11
+    assert all(float(row["largest"]) < 1e-4 for row in found), found
+
+
 def test_kernel_carries_the_impact_of_the_finite_elements() -> None:
     """Level full: peak within 5 %, impulse within 1 % of the unreduced gears."""
     found = {row["model"]: (float(row["peak_N"]), float(row["impulse_mNs"])) for row in rows("kernel.csv")}
