@@ -21,6 +21,12 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
     if spec.carrier.imported is not None:
         return imported_carrier(spec).full
     geometry = CarrierGeometry.of(spec)
+    return full_order("carrier", *carrier_elements(spec, scale), Judgement(("bore",), geometry.a))
+
+
+def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:
+    """Finite elements of the carrier as the file describes it, and the couplings of its bolts and bore."""
+    geometry = CarrierGeometry.of(spec)
     counts = spec.carrier.mesh
     sector = carrier_sector(geometry, counts.model_copy(update={"scale": counts.scale * scale}))
     whole = whole_carrier(geometry, sector)
@@ -35,4 +41,4 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
         for k in range(geometry.planets)
     ]
     couplings.append(Coupling("bore", spec.carrier.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
-    return full_order("carrier", body, couplings, Judgement(("bore",), geometry.a))
+    return body, couplings
