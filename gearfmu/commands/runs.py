@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -118,8 +119,14 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
     source = path / "trace.h5" if path.is_dir() else path
     trace = Trace.load(source)
-    named = stage or trace.meta.get("stage_path") or trace.meta.get("stage")
-    click.echo(write_report(trace, out or source.parent, named, source.parent))
+    click.echo(write_report(trace, out or source.parent, stage or stage_of(trace.meta), source.parent))
+
+
+def stage_of(meta: Mapping[str, Any]) -> str | None:
+    """STAGE of a run by its trace's meta: its file where that is still there, else its name; None where neither is
+    told."""
+    path = meta.get("stage_path")
+    return path if path and Path(path).is_file() else meta.get("stage")
 
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:

@@ -59,7 +59,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
         + (
             f"Dotted: {of_mesh(trace, ' and '.join(marked), 'mesh orders')}."
             if marked
-            else "Mesh orders are not marked: the speed is not known or not steady."
+            else "Mesh orders are not marked: the speed is not known or not steady, or they lie above the spectrum."
         )
     )
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
@@ -75,6 +75,7 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
         return None
     file = "orders" if not others else f"orders_{mesh}"
     cuts = {name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS) for name in names}
+    _require_order(next(iter(cuts.values())), mesh, metrics.sample_step(trace.time))
     with styled():
         figure, axes = panels((1.6,) * len(cuts))
         for axis, (name, cut) in zip(axes, cuts.items(), strict=True):
@@ -182,30 +183,42 @@ def sampling_warning(trace: Trace) -> str | None:
     )
 
 
+def _require_order(cuts: metrics.OrderCuts, mesh: str, step: float) -> None:
+    """MetricsError where not even the first order lies below the sampling limit anywhere in the run."""
+    if not np.any(np.isfinite(cuts.amplitude)):
+        lowest = float(cuts.mesh_frequency.min())
+        raise metrics.MetricsError(
+            f"Mesh orders of {mesh}: its mesh frequency, {lowest:.0f} Hz and more, lies above 0.45 of the sampling "
+            f"rate, {0.45 / step:.0f} Hz. Run again with a communication step of {0.45e6 / lowest / 5:.2g} µs for the "
+            "first five orders."
+        )
+
+
 def level_axis(axis: Axes, label: str, end: float | None = None) -> None:
     """Limit the level axis to RANGE_DB below the highest line, so that a silent line does not squeeze the rest."""
-    tops = [np.nanmax(line.get_ydata()) for line in axis.lines]
-    lows = [np.nanmin(line.get_ydata()) for line in axis.lines]
-    top = np.ceil((max(tops) + 3) / 10) * 10
-    axis.set_ylim(max(np.floor((min(lows) - 3) / 10) * 10, top - RANGE_DB), top)
+    shown = [line.get_ydata() for line in axis.lines if np.any(np.isfinite(line.get_ydata()))]
+    if shown:
+        top = np.ceil((max(map(np.nanmax, shown)) + 3) / 10) * 10
+        axis.set_ylim(max(np.floor((min(map(np.nanmin, shown)) - 3) / 10) * 10, top - RANGE_DB), top)
     axis.set_ylabel(label)
     axis.margins(x=0)
     if end is not None:
         axis.set_xlim(0, end)
-    elif len(axis.lines) > 1 or axis.lines[0].get_label():
+    elif axis.lines:
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
 
 
 def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray]) -> bool:
     """Mark the orders of an engagement (name, mesh angle) at the median speed, if nine tenths of the window stay within
-    10 %; whether it did."""
+    10 %; whether there was one to mark."""
     name, angle = mesh
     frequency = np.interp(time, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
     low, middle, high = np.percentile(frequency, [5, 50, 95])
     if middle <= 0 or high - low > 0.1 * middle:
         return False
     several = len(meshes(trace)) > 1
-    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 3 if several else 24) + 1):
+    highest = min(int(axis.get_xlim()[1] * 1e3 / middle), 3 if several else 24)
+    for order in range(1, highest + 1):
         axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
         axis.annotate(
             f"{name} {order}" if several else str(order),
@@ -216,7 +229,7 @@ def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh: tuple[str, np
             fontsize=8,
             color=MUTED,
         )
-    return True
+    return highest > 0
 
 
 def _overlay_orders(axis: Axes, trace: Trace, mesh: tuple[np.ndarray, Any], limit: float) -> None:

@@ -6,6 +6,7 @@ import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -96,11 +97,18 @@ def simulate(
     except SimulationError as error:
         outcome = error.outcome
     cpu = clock.process_time() - started
-    return Trace(
-        np.arange(done + 1) * step,
-        _channels(kernel, names, samples[: done + 1]),
-        _meta(model, kernel, outcome, cpu, done * step),
-    )
+    channels = _channels(kernel, names, samples[: done + 1])
+    price = {"cpu_s": cpu, "realtime_factor": cpu / (done * step) if done else None}
+    run = {"outcome": outcome, "simulated_s": done * step, "H": step, "energy_residual": relative_residual(channels)}
+    return Trace(np.arange(done + 1) * step, channels, _meta(model, kernel) | run | price)
+
+
+def relative_residual(channels: Mapping[str, Channel]) -> float | None:
+    """energy.residual at the end over the energy that the stage exchanged: the largest work of its ports and the
+    largest stored energy. None where nothing was exchanged."""
+    work, stored, residual = (channels[f"energy.{name}"].values for name in ("work", "stored", "residual"))
+    exchanged = float(np.abs(work).max() + stored.max())
+    return float(residual[-1]) / exchanged if exchanged else None
 
 
 def _set(kernel: Kernel, values: Mapping[str, float]) -> None:
@@ -117,16 +125,13 @@ def _channels(kernel: Kernel, names: Sequence[str], samples: np.ndarray) -> dict
     return found
 
 
-def _meta(model: StageModel, kernel: Kernel, outcome: str, cpu: float, simulated: float) -> dict:
+def _meta(model: StageModel, kernel: Kernel) -> dict[str, Any]:
     level = kernel.variables["level"].items[int(kernel.get("level"))]
     return {
         "stage": model.name,
-        "outcome": outcome,
-        "simulated_s": simulated,
-        "cpu_s": cpu,
-        "realtime_factor": cpu / simulated if simulated else None,
+        "stage_path": str(model.spec.source),
+        "meshes": {mesh: known.plain for mesh, known in meshings(model.stage).items()},
         "coupling_error": None,
-        "energy_residual": kernel.get("energy.residual"),
         "level": level,
         "n_dyn": int(kernel.get("solver.n_dyn")),
         "slices": int(kernel.get("slices")),

@@ -107,6 +107,7 @@ def test_a_stage_is_found_by_path_folder_and_name(write: Write, monkeypatch: pyt
     assert {find_stage(path), find_stage(str(path)), find_stage(path.parent)} == {path}
     assert {"fzg_c", "fzg_c/stage_relief"} <= set(shipped_stages())
     assert find_stage("fzg_c/stage_relief").name == find_stage("fzg_c/stage_relief.toml").name == "stage_relief.toml"
+    assert find_stage("fzg_c_relief") == find_stage("fzg_c/stage_relief"), "what the file calls itself"
     with pytest.raises(SpecError, match='did you mean "fzg_c"'):
         load_stage("fzg_b")
     monkeypatch.chdir(path.parent)
