@@ -1,8 +1,8 @@
 """Finite-element meshes made elsewhere: nodes in metres, quadratic solids, node sets.
 
-.inp is read by `abaqus`, .msh of format 4.1 by `gmsh`; .bdf, older .msh and .vtu by meshio, whose traps are turned into clear errors here. Elements:
-hex8, hex20, tet10, also mixed. A hex8 is made a hex20 by mid nodes on its straight edges: a fully integrated hex8 is
-4–13 % too stiff in bending (docs/decisions.md); the price is four times the unknowns.
+.inp is read by `abaqus`, .msh of format 4.1 by `gmsh`; .bdf, older .msh and .vtu by meshio, whose traps are turned
+into clear errors here. Elements: hex8, hex20, tet10, also mixed. A hex8 is made a hex20 by mid nodes on its straight
+edges: a fully integrated hex8 is 4–13 % too stiff in bending (docs/decisions.md); the price is four times the unknowns.
 """
 
 from __future__ import annotations
