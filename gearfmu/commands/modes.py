@@ -11,6 +11,7 @@ import click
 
 from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
 from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
     from gearfmu.modes.shapes import BodyModes
@@ -53,12 +54,15 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     spec, bodies = bodies_for_motion(stage)
     if torque == 0:
         raise click.BadParameter("must not be 0: flanks have to carry load", param_hint="--torque")
-    from gearfmu.modes.linear import engagements_per_turn, largest_speed, largest_torque, stage_modes
+    from gearfmu.modes.linear import stage_modes
     from gearfmu.report.campbell import campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
+    from gearfmu.stage.limits import engagements_per_turn, largest_speed, largest_torque
     from gearfmu.stage.trace import write_columns
 
     model = assemble(spec, bodies)
+    if torque is not None:
+        warn_of_limits(model, (torque,))
     found = stage_modes(model, bodies, largest_torque(model) if torque is None else torque, count)
     for line in stage_table(found):
         click.echo(line)

@@ -157,6 +157,8 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
         f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
         f"({meta['realtime_factor']:.3g} per simulated second)"
     )
+    for text in meta.get("warnings") or ():
+        click.echo(f"warning: {text}", err=True)
     click.echo(page)
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 

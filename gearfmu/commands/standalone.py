@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from gearfmu.stage.trace import Trace
 
 
-def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
-    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for a name or value the model does
-    not know."""
+def parameters(model: Any, settings: tuple[str, ...], option: str = "--set") -> dict[str, float]:
+    """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for a name or value
+    the model does not know."""
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     found = {}
     for text in settings:
         name, _, value = text.partition("=")
         if name not in known:
-            raise click.BadParameter(f"'{name}' is no parameter; there are {', '.join(known)}", param_hint="--set")
-        found[name] = _number(known[name], value)
+            raise click.BadParameter(f"'{name}' is no parameter; there are {', '.join(known)}", param_hint=option)
+        found[name] = _number(known[name], value, option)
     return found
 
 
@@ -33,6 +33,7 @@ def steady_run(
     """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
     from gearfmu.spec.turning import require_driven
     from gearfmu.stage import Steady, simulate
+    from gearfmu.stage.limits import beyond_limits, limit_named
 
     two = (model.shafts.input, model.shafts.output)
     require_driven(model.stage, two, "simulate")
@@ -44,7 +45,10 @@ def steady_run(
             "use 'run' with a scene"
         )
     inputs = Steady(model, drive["speed"], drive["torque"])
-    trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
+    with limit_named(model, drive["torque"]):
+        trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
+    beyond = beyond_limits(model, drive["torque"], drive["speed"])
+    trace.meta["warnings"] = [*beyond, *trace.meta["warnings"]]
     trace.meta.update(
         settle=drive["settle"],
         scene="constant speed and load",
@@ -54,7 +58,7 @@ def steady_run(
     return trace
 
 
-def _number(variable: Any, text: str) -> float:
+def _number(variable: Any, text: str, option: str) -> float:
     """Value of an enumeration by its item, of a boolean by true or false, else a number in SI."""
     words = (
         {"true": 1.0, "false": 0.0}
@@ -67,4 +71,4 @@ def _number(variable: Any, text: str) -> float:
         return float(text)
     except ValueError:
         expected = " | ".join(words) or f"a number in {variable.unit or 'plain form'}"
-        raise click.BadParameter(f"{variable.name}={text}: expected {expected}", param_hint="--set") from None
+        raise click.BadParameter(f"{variable.name}={text}: expected {expected}", param_hint=option) from None

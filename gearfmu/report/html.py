@@ -192,6 +192,7 @@ def _document(
     body = [
         page.head(title, str(summary.get("outcome", "outcome not given")), f"{stage}{' · ' + about if about else ''}"),
         page.facts(_facts(summary)),
+        *[page.warning(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("warnings") or ()],
         *(_planets(trace, spec) or [page.section("Results", _results(trace))]),
         *[page.figure(plot) for plot in made if not plot.name.startswith(NVH)],
         *_warned(trace),
@@ -201,7 +202,10 @@ def _document(
         page.details("Where it comes from", page.pairs_table(_provenance(summary)), _channels(trace)),
     ]
     if missing:
-        body.insert(3, page.section("Not shown", *[page.note(reason) for reason in missing]))
+        body.insert(
+            3 + len(summary.get("warnings") or ()),
+            page.section("Not shown", *[page.note(reason) for reason in missing]),
+        )
     return page.page(f"{title} – {stage}", body)
 
 

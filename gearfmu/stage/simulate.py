@@ -12,6 +12,7 @@ import numpy as np
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
+from gearfmu.kernel.binding import status_words
 from gearfmu.spec.turning import meshings, turns
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.te import statics_of
@@ -137,5 +138,5 @@ def _meta(model: StageModel, kernel: Kernel) -> dict[str, Any]:
         "slices": int(kernel.get("slices")),
         "h": kernel.get("solver.h"),
         "hashes": {"model": model.hash, "bodies": list(model.body_hashes)},
-        "warning": kernel.warning,
+        "warnings": [*filter(None, [kernel.warning]), *status_words(int(kernel.get("solver.status")))],
     }
