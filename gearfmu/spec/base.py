@@ -149,6 +149,22 @@ def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     return path
 
 
+def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
+    """Keys and positions in `raw` that lead to a place of the model."""
+    path: list[Any] = []
+    for part in loc:
+        if isinstance(raw, dict):
+            if part not in raw and part in _KINDS_OF_BODY:
+                continue
+            key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
+            raw = raw.get(key)
+        else:
+            key = part
+            raw = raw[part] if isinstance(raw, list) and isinstance(part, int) and part < len(raw) else None
+        path.append(key)
+    return path
+
+
 def _step(raw: Any, part: str | int) -> tuple[Any, str]:
     if isinstance(raw, dict):
         key = part if part in raw or isinstance(part, str) else list(raw)[part] if part < len(raw) else str(part)
@@ -168,11 +184,11 @@ def _problem(kind: type[Spec], raw: Any, file: str, entry: Any) -> Problem:
 def _remedy(kind: type[Spec], entry: Any) -> str:
     loc = entry["loc"]
     if entry["type"] == "missing":
-        field = _fields_at(kind, loc[:-1]).get(loc[-1])
+        field = fields_at(kind, loc[:-1]).get(loc[-1])
         meaning = f" ({field.description})" if field is not None and field.description else ""
         return f"this field is missing{meaning}: add it"
     if entry["type"] == "extra_forbidden":
-        return _unknown_key(str(loc[-1]), list(_fields_at(kind, loc[:-1])))
+        return _unknown_key(str(loc[-1]), list(fields_at(kind, loc[:-1])))
     if entry["type"] == "string_pattern_mismatch":
         return "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
     return entry["msg"][:1].lower() + entry["msg"][1:]
@@ -183,7 +199,7 @@ def _unknown_key(key: str, known: list[str]) -> str:
     return f'unknown key: did you mean "{near[0]}"?' if near else f"unknown key: known are {', '.join(sorted(known))}"
 
 
-def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
+def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
     """The fields of the model that stands at `loc` inside a `kind`."""
     choices = [kind]
     for part in loc:
