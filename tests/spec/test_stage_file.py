@@ -384,10 +384,10 @@ def test_no_layer_of_problems_hides_the_next(write: Write) -> None:
                 "gears.pinion.bore_diameter": "60 mm",
                 "gears.wheel.index_deviation": {"30": "1 um"},
                 "gears.pinion.bearing.axial": "1e8 N/m",
-                "pair.center_distance": "93 mm",
+                "gears.wheel.tip_relief": {"amount": "15 mm"},
             }
         )
     )
     read = {"torque_max", "speed_maximum", "speed_max", "contact.slices"}
-    judged = {"gears.pinion.bore_diameter", "gears.wheel.index_deviation.30", "pair.center_distance"}
+    judged = {"gears.pinion.bore_diameter", "gears.wheel.index_deviation.30", "gears.wheel.tip_relief.amount"}
     assert read | judged | {"gears.pinion.bearing.tilt", "gears.wheel.bearing.axial"} <= set(found)
