@@ -9,11 +9,13 @@ from __future__ import annotations
 import difflib
 import math
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from gearfmu.errors import Problem, SpecError, UnitError
@@ -221,6 +223,13 @@ def _kinds(kind: type[BaseModel]) -> tuple[Any, ...]:
 def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
     """The fields by their keys in a file."""
     return {field.alias or name: field for name, field in kind.model_fields.items()}
+
+
+def metadata_of(field: FieldInfo) -> Iterator[Any]:
+    """Annotations of a field, also those inside `Annotated[…] | None`."""
+    yield from field.metadata
+    for part in get_args(field.annotation):
+        yield from getattr(part, "__metadata__", ())
 
 
 def inner_model(annotation: Any) -> type[BaseModel] | None:

@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 
 from gearfmu.errors import Problem
-from gearfmu.spec.base import FROM_FILE, Quantity, SpecType, fields_at, raw_path, validate
+from gearfmu.spec.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path, validate
 
 _ROUNDS = 4  # a key put right may bring further ones to light
 _MISSING = object()
@@ -79,7 +79,7 @@ def _put_right(kind: type[SpecType], tables: dict[str, Any], entry: Any) -> bool
     inside, field = _at(tables, way), fields_at(kind, loc[:-1]).get(loc[-1])
     if not isinstance(inside, dict) or key not in inside or field is None:
         return False
-    quantity = next((part for part in field.metadata if isinstance(part, Quantity)), None)
+    quantity = next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
     value = inside[key]
     if quantity is not None and quantity.unit and isinstance(value, (int, float)) and not isinstance(value, bool):
         inside[key] = f"{value!r} {quantity.unit}"
