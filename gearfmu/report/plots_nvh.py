@@ -19,6 +19,7 @@ RANGE_DB = 90
 ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
 DASHES = ((0, (4, 4)), (0, (1, 3)))  # of the orders of one mesh and the next
+MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 
@@ -31,6 +32,17 @@ def force_channels(trace: Trace) -> list[str]:
     return [name for name in best if name is not None]
 
 
+def averaging(trace: Trace, name: str) -> float:
+    """Time (s) over which a sample of the channel is a mean: the communication step of "…_mean", else 0."""
+    return metrics.sample_step(trace.time) if name.endswith("_mean") else 0.0
+
+
+def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spectrum:
+    """Spectrum of a channel over the whole of `part`; of a mean over the step as it is without the averaging."""
+    step = metrics.sample_step(part.time)
+    return metrics.amplitude_spectrum(part[name], step, size, averaging(part, name))
+
+
 def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray]) -> Plot | None:
     """Level of every bearing and mesh force over frequency, mesh orders marked; None without forces. angles: mesh angle
     (n,) rad by engagement."""
@@ -39,7 +51,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
         return None
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
-    spectra = {name: metrics.amplitude_spectrum(part[name], step, segment(part.time.size)) for name in names}
+    spectra = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
     groups = _by_part(names)
     with styled():
         figure, axes = panels((1.7,) * len(groups) if len(groups) > 1 else (2.6,))
@@ -56,6 +68,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
         f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). "
+        f"{MEANS if any(name.endswith('_mean') for name in names) else ''}"
         + (
             f"Dotted: {of_mesh(trace, ' and '.join(marked), 'mesh orders')}."
             if marked
@@ -74,7 +87,10 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
     if not names:
         return None
     file = "orders" if not others else f"orders_{mesh}"
-    cuts = {name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS) for name in names}
+    cuts = {
+        name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS, averaged=averaging(trace, name))
+        for name in names
+    }
     _require_order(next(iter(cuts.values())), mesh, metrics.sample_step(trace.time))
     with styled():
         figure, axes = panels((1.6,) * len(cuts))
@@ -109,7 +125,8 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     name = next((n for n in names if preferred in n), names[0])
     step = metrics.sample_step(trace.time)
     window_size = segment(trace.time.size, windows=14)
-    picture_data = metrics.spectrogram(trace[name], step, window_size, max(window_size // 16, 1))
+    hop = max(window_size // 16, 1)
+    picture_data = metrics.spectrogram(trace[name], step, window_size, hop, averaging(trace, name))
     if picture_data.time.size < 4:
         raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
     values = metrics.level(picture_data.amplitude)
@@ -146,8 +163,7 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
 def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
     """Octave-band levels in dB re 1 N by channel over `window`, from one full-length Hann window."""
     part = trace.window(window.start, window.end)
-    step = metrics.sample_step(part.time)
-    return {name: metrics.octave_levels(metrics.amplitude_spectrum(part[name], step)) for name in force_channels(trace)}
+    return {name: metrics.octave_levels(spectrum_of(part, name)) for name in force_channels(trace)}
 
 
 def _by_part(names: list[str]) -> list[list[str]]:

@@ -38,6 +38,7 @@ class Signal:
     unit: str
     reference: float
     sides: Mapping[int, tuple[float, ...]]
+    averaged: float = 0.0  # s, over which every sample is a mean
 
     def level(self, amplitude: np.ndarray) -> np.ndarray:
         """Level in dB."""
@@ -64,7 +65,10 @@ class RunUp:
         angle, time = self.part[f"{self.carrier}{GEAR_PHI}"], self.part.time
         angle = angle if angle[-1] > angle[0] else -angle
         highest = (MESH_ORDERS + 0.3) * self.each
-        return {name: metrics.order_map(time, own.values, angle, highest) for name, own in self.signals.items()}
+        return {
+            name: metrics.order_map(time, own.values, angle, highest, averaged=own.averaged)
+            for name, own in self.signals.items()
+        }
 
 
 def run_up(
@@ -95,10 +99,15 @@ def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:
     """Force of the ring on its mounts, whose direction goes round with the carrier, and a mesh of every central
     gear."""
     around = {k: (k * each - 1.0, k * each + 1.0) for k in range(1, MESH_ORDERS + 1)}
-    found = {name: Signal(values, "N", 1.0, around) for name, values in on_mounts(part).items() if name[-1] == "x"}
+    step = {True: metrics.sample_step(part.time), False: 0.0}
+    found = {
+        name: Signal(values, "N", 1.0, around, step[f"{name}_mean" in part])
+        for name, values in on_mounts(part).items()
+        if name[-1] == "x"
+    }
     meshes = [next(iter(meshes.values())) for meshes in own.meshes.values()]
     forces = {f"{mesh}.force": mean_or_sample(part, f"{mesh}.force") for mesh in meshes if f"{mesh}.force" in part}
-    return found | {name: Signal(values, "N", 1.0, {}) for name, values in forces.items()}
+    return found | {name: Signal(values, "N", 1.0, {}, step[f"{name}_mean" in part]) for name, values in forces.items()}
 
 
 def passing_orders(order: float, planets: int) -> tuple[float, ...]:
@@ -113,7 +122,7 @@ def frequency_maps(run: RunUp) -> Plot:
     step, samples = metrics.sample_step(run.part.time), run.part.time.size
     size = min(samples, 2 ** max(6, round(np.log2(samples / 40))))
     hop = max(1, (samples - size) // BINS)
-    maps = {name: metrics.spectrogram(own.values, step, size, hop) for name, own in run.signals.items()}
+    maps = {name: metrics.spectrogram(own.values, step, size, hop, own.averaged) for name, own in run.signals.items()}
     top = min((MESH_ORDERS + 0.3) * run.each * _fastest(run), 0.5 / step)
     first = next(iter(maps.values()))
     speed, kept = _speed_at(run, first.time) * RPM, first.frequency <= top
