@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import resample_poly
+from scipy.signal import firwin, resample_poly
 
 from gearfmu.errors import GearfmuError
 
 FLOOR = 1e-12
-OVERSAMPLING = 4
+OVERSAMPLING, FILTER_REACH = 4, 32  # FILTER_REACH: samples on either side
 HANN_NOISE_BANDWIDTH = 1.5
 OCTAVES = tuple((c / np.sqrt(2), c, c * np.sqrt(2)) for c in (63, 125, 250, 500, 1000, 2000, 4000, 8000, 16000))
 
@@ -216,7 +216,8 @@ def _oversampled(angle: np.ndarray, values: np.ndarray) -> CubicSpline:
     """The signal over the angle by a spline through OVERSAMPLING times as many points, which a band-limited filter puts
     between the samples: a spline through the samples alone weakens what lies above a fifth of their rate."""
     count = OVERSAMPLING * (angle.size - 1) + 1
-    fine = resample_poly(values, OVERSAMPLING, 1, padtype="line")[:count]
+    between = firwin(2 * FILTER_REACH * OVERSAMPLING + 1, 1 / OVERSAMPLING, window=("kaiser", 8.0))  # ripple 1e-4
+    fine = resample_poly(values, OVERSAMPLING, 1, window=between, padtype="line")[:count]
     places = np.arange(count) / OVERSAMPLING
     return CubicSpline(CubicSpline(np.arange(angle.size), angle)(places), fine)
 
