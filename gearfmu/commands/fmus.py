@@ -50,7 +50,7 @@ PORT_KINDS = ("spring", "torque", "fixed")
     "--terminals/--no-terminals",
     default=True,
     show_default=True,
-    help="The file terminalsAndIcons.xml, which FMI Library 3.0 takes for one of FMI 3 and refuses.",
+    help="The file terminalsAndIcons.xml, which some importers read wrongly: docs/howto-fmu.md.",
 )
 def export(
     stage: str, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], observe: tuple[str, ...], **how: Any
