@@ -126,4 +126,4 @@ def test_means_over_the_step_give_the_amplitudes_of_the_signal(turns: int) -> No
     assert metrics.order_cuts(t, means, angle, 1, 8, step).amplitude == pytest.approx(rms, rel=1e-3)
     shaft = angle / turns
     found = metrics.order_map(t, means, shaft, turns + 2.0, 4, step)
-    assert found.amplitude[:, found.order == turns] == pytest.approx(rms, rel=1e-2)
+    assert found.amplitude[:, found.order == turns] == pytest.approx(rms, rel=1e-3)
