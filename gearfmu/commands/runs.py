@@ -59,6 +59,11 @@ def run(scene: str, out: Path | None, stage: str | None, step: float | None, **h
 @click.argument("stage")
 @click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
 @click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
+@click.option(
+    "--end-speed",
+    type=Quantity("rad/s"),
+    help='A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
+)
 @click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
 @click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
 @click.option(
@@ -76,8 +81,9 @@ def run(scene: str, out: Path | None, stage: str | None, step: float | None, **h
     help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
 )
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
-def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:
-    """Run STAGE alone: the outer ends of input and output turn at constant speed, wound up by the torque."""
+def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: Any) -> int:
+    """Run STAGE alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
+    the torque."""
     from gearfmu.commands.models import model_of
     from gearfmu.commands.standalone import parameters, steady_run
 

@@ -28,9 +28,10 @@ def parameters(model: Any, settings: tuple[str, ...], option: str = "--set") -> 
 
 
 def steady_run(
-    model: StageModel, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None
+    model: StageModel, drive: Mapping[str, Any], settings: Mapping[str, float], progress: Progress | None
 ) -> Trace:
-    """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
+    """Trace of the model under a constant torque: speed rad/s, end_speed rad/s (None: constant speed), torque N·m,
+    duration s, step s, settle s."""
     from gearfmu.spec.turning import require_driven
     from gearfmu.stage import Steady, simulate
     from gearfmu.stage.limits import beyond_limits, limit_named
@@ -44,16 +45,18 @@ def steady_run(
             f"'simulate' turns spring ports without a chain; {', '.join(soft)} of {model.spec.source} is another: "
             "use 'run' with a scene"
         )
-    inputs = Steady(model, drive["speed"], drive["torque"])
+    start, end = drive["speed"], drive.get("end_speed")
+    inputs = Steady(model, start, drive["torque"], 0.0 if end is None else (end - start) / drive["duration"])
     with limit_named(model, drive["torque"]):
         trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
-    beyond = beyond_limits(model, drive["torque"], drive["speed"])
+    beyond = beyond_limits(model, drive["torque"], max(start, start if end is None else end, key=abs))
     trace.meta["warnings"] = [*beyond, *trace.meta["warnings"]]
     trace.meta.update(
         settle=drive["settle"],
-        scene="constant speed and load",
+        scene="constant speed and load" if end is None else "run-up under constant torque",
         torque=drive["torque"],
-        speed=drive["speed"],
+        speed=start,
+        end_speed=end,
     )
     return trace
 

@@ -202,7 +202,8 @@ def order_map(
     even = angle[0] + np.arange(int((angle[-1] - angle[0]) / (2 * np.pi) * each)) * (2 * np.pi / each)
     frames = _frames(_oversampled(angle, values)(even), turns * each, each)
     centres = angle[0] + 2 * np.pi * (np.arange(len(frames)) + 0.5 * turns)
-    speed = np.interp(centres, angle, np.gradient(angle, time))
+    ends = [np.interp(centres + side * np.pi / 2, angle, time) for side in (-1, 1)]
+    speed = np.pi / (ends[1] - ends[0])  # mean over half a revolution: free of the shaft's vibration
     order = np.arange(frames.shape[1] // 2 + 1) / turns
     kept = order <= highest
     amplitude = _amplitudes(frames)[:, kept]

@@ -25,16 +25,18 @@ Inputs = Callable[[float], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Steady:
-    """Inputs of a stage at constant speed and load: the outer ends of its input and output turn at constant speed,
-    wound up so that shafts and meshes carry the torque on average: τ/k on either port and the mean loaded transmission
-    between them.
+    """Inputs of a stage under a constant load: the outer ends of its input and output turn at constant speed, or gather
+    it at a constant rate, wound up so that shafts and meshes carry the torque on average: τ/k on either port and the
+    mean loaded transmission between them.
 
-    speed: of the input, rad/s; torque: on the input, N·m. For spring ports without a chain.
+    speed: of the input at the start, rad/s; torque: on the input, N·m; rate: of the speed, rad/s². For spring ports
+    without a chain.
     """
 
     model: StageModel
     speed: float
     torque: float
+    rate: float = 0.0
 
     @cached_property
     def winding(self) -> float:
@@ -60,8 +62,10 @@ class Steady:
             assert stiffness is not None, "the port is a spring"
             sense = 1.0 if port == shafts.input else -1.0
             wound = sense * self.torque / turn / stiffness + (self.winding if port == shafts.input else 0.0)
-            values[f"{port}.phi"] = wound + self.speed * turn * time
-            values[f"{port}.w"] = self.speed * turn
+            values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * time) * time
+            values[f"{port}.w"] = turn * (self.speed + self.rate * time)
+            if self.rate:
+                values[f"{port}.a"] = turn * self.rate
         return values
 
 
