@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from gearfmu.body.planetary import load_set_bodies, reduce_set
-from gearfmu.body.reduce import Progress, load_stage_bodies, reduce_stage
+from gearfmu.body.planetary import is_current_in_set, load_set_bodies, reduce_set
+from gearfmu.body.reduce import Progress, gears_of, is_current, load_stage_bodies, reduce_stage
 from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.planetary_body import SET_BODIES
 
 
 def reduce_bodies(
@@ -17,6 +18,13 @@ def reduce_bodies(
     if isinstance(spec, PlanetarySpec):
         return list(reduce_set(spec, folder, force, progress))
     return list(reduce_stage(spec, folder, force, progress))
+
+
+def current_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> set[str]:
+    """Names of the bodies that `reduce_bodies` would read and not make."""
+    if isinstance(spec, PlanetarySpec):
+        return {name for name in SET_BODIES if is_current_in_set(spec, name, folder)}
+    return {own.gears[index].name for own, index in gears_of(spec) if is_current(own, index, folder)}
 
 
 def load_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> list[Any]:

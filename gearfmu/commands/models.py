@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -35,8 +36,8 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
     spec = load_stage(stage)
     from gearfmu.body import reduce_bodies
 
-    with progress_bar("reducing") as progress:
-        return spec, reduce_bodies(spec, progress=by_text(progress))
+    with reducing() as progress:
+        return spec, reduce_bodies(spec, progress=progress)
 
 
 def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
@@ -63,11 +64,32 @@ def _with_other_bores(stage: str, coupling: str) -> tuple[Any, list[Any]]:
 
     spec = with_bores(own, coupling)
     folder = None if spec == own else model_folder(own) / f"bores_{coupling}"
-    with progress_bar(f"reducing, bores {coupling}") as progress:
-        bodies = reduce_stage(spec, folder, progress=by_text(progress))
+    with reducing(f"reducing, bores {coupling}") as progress:
+        bodies = reduce_stage(spec, folder, progress=progress)
     if folder is not None:
         click.echo(f"bodies with bores {coupling}: {folder}")
     return spec, bodies
+
+
+@contextmanager
+def reducing(title: str = "reducing") -> Iterator[Callable[[str, float], None]]:
+    """The progress function of reduce_stage: a bar on a terminal, else one line on standard error for every body that
+    is being made, which takes a minute or more."""
+    with progress_bar(title) as bar:
+        yield by_text(bar) or _Told(title)
+
+
+class _Told:
+    """One line for each body."""
+
+    def __init__(self, title: str) -> None:
+        self.title, self._last = title, ""
+
+    def __call__(self, text: str, share: float) -> None:
+        name = text.split(":")[0].removeprefix("reducing ")
+        if name != self._last:
+            click.echo(f"{self.title} {name} …", err=True)
+            self._last = name
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:

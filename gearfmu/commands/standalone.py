@@ -14,25 +14,27 @@ if TYPE_CHECKING:
     from gearfmu.stage.trace import Trace
 
 
-def parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
-    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for a name or value the model does
-    not know."""
+def parameters(model: Any, settings: tuple[str, ...], option: str = "--set") -> dict[str, float]:
+    """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for a name or value
+    the model does not know."""
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     found = {}
     for text in settings:
         name, _, value = text.partition("=")
         if name not in known:
-            raise click.BadParameter(f"'{name}' is no parameter; there are {', '.join(known)}", param_hint="--set")
-        found[name] = _number(known[name], value)
+            raise click.BadParameter(f"'{name}' is no parameter; there are {', '.join(known)}", param_hint=option)
+        found[name] = _number(known[name], value, option)
     return found
 
 
 def steady_run(
-    model: StageModel, drive: Mapping[str, float], settings: Mapping[str, float], progress: Progress | None
+    model: StageModel, drive: Mapping[str, Any], settings: Mapping[str, float], progress: Progress | None
 ) -> Trace:
-    """Trace of the model at constant drive: speed rad/s, torque N·m, duration s, step s, settle s."""
-    from gearfmu.spec.turning import meshings, require_driven
+    """Trace of the model under a constant torque: speed rad/s, end_speed rad/s (None: constant speed), torque N·m,
+    duration s, step s, settle s."""
+    from gearfmu.spec.turning import require_driven
     from gearfmu.stage import Steady, simulate
+    from gearfmu.stage.limits import beyond_limits, limit_named
 
     two = (model.shafts.input, model.shafts.output)
     require_driven(model.stage, two, "simulate")
@@ -43,22 +45,23 @@ def steady_run(
             f"'simulate' turns spring ports without a chain; {', '.join(soft)} of {model.spec.source} is another: "
             "use 'run' with a scene"
         )
-    inputs = Steady(model, drive["speed"], drive["torque"])
-    trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
-    exchanged = abs(trace["energy.work"]).max() + trace["energy.stored"].max()
+    start, end = drive["speed"], drive.get("end_speed")
+    inputs = Steady(model, start, drive["torque"], 0.0 if end is None else (end - start) / drive["duration"])
+    with limit_named(model, drive["torque"]):
+        trace = simulate(model, inputs, drive["duration"], drive["step"], settings, progress)
+    beyond = beyond_limits(model, drive["torque"], max(start, start if end is None else end, key=abs))
+    trace.meta["warnings"] = [*beyond, *trace.meta["warnings"]]
     trace.meta.update(
-        energy_residual=float(trace["energy.residual"][-1] / exchanged),
-        H=drive["step"],
         settle=drive["settle"],
-        scene="constant speed and load",
-        meshes={mesh: known.plain for mesh, known in meshings(model.stage).items()},
+        scene="constant speed and load" if end is None else "run-up under constant torque",
         torque=drive["torque"],
-        speed=drive["speed"],
+        speed=start,
+        end_speed=end,
     )
     return trace
 
 
-def _number(variable: Any, text: str) -> float:
+def _number(variable: Any, text: str, option: str) -> float:
     """Value of an enumeration by its item, of a boolean by true or false, else a number in SI."""
     words = (
         {"true": 1.0, "false": 0.0}
@@ -71,4 +74,4 @@ def _number(variable: Any, text: str) -> float:
         return float(text)
     except ValueError:
         expected = " | ".join(words) or f"a number in {variable.unit or 'plain form'}"
-        raise click.BadParameter(f"{variable.name}={text}: expected {expected}", param_hint="--set") from None
+        raise click.BadParameter(f"{variable.name}={text}: expected {expected}", param_hint=option) from None

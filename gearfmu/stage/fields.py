@@ -99,7 +99,8 @@ def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     """`sections` in the order of the table. AssertionError that lists every section that is missing, unknown, or of
     another type or shape: the writer's mistake, not the user's."""
     sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True))
-    sizes |= {"carried": len(sections.get("carried", ())), "whirls": len(sections.get("whirl", ()))}
+    found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference"}
+    sizes |= {word: len(sections.get(name, ())) for word, name in found.items()}
     ordered, problems = {}, []
     for field, name, known in _instances(sections, sizes):
         if name not in sections:

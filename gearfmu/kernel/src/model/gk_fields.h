@@ -27,6 +27,7 @@ typedef enum gk_symbol {
     SYMBOL_carried,
     SYMBOL_whirls,
     SYMBOL_own,
+    SYMBOL_starts,
     SYMBOLS
 } gk_symbol;
 

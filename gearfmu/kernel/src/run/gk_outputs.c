@@ -1,6 +1,7 @@
 /* Outputs at the end of a communication step: forces, motions, energies, counters. */
 #include "run/gk_run.h"
 
+static const double OVER = 1.01;  /* of torque_max and speed_max: what rounding and ripple may take */
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
@@ -247,6 +248,36 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
 }
 
 /* ---- over a communication step ----------------------------------------------------------------------------------- */
+/* angle of gear A of an engagement in the axes that carry it */
+static double carried_angle(const gk_model *model, const gk_data *data, int e)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    const int f = gk_frame_of(model, engagement);
+    return data->x[model->gear[engagement->gear[0]].rotor] - (f < 0 ? 0.0 : data->x[f]);
+}
+
+static void begin_pitch(const gk_model *model, gk_data *data, int e)
+{
+    data->meshing[e].pitch_angle = carried_angle(model, data, e);
+    data->meshing[e].pitch_time = data->meshing[e].pitch_impulse = 0.0;
+}
+
+/* Over every tooth pitch that passes: is the mean force beyond that of torque_max, the speed beyond speed_max? */
+static void watch_limits(const gk_model *model, gk_data *data, int e, double H, double impulse)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    gk_meshing *meshing = &data->meshing[e];
+    const double turned = fabs(carried_angle(model, data, e) - meshing->pitch_angle),
+                 pitches = turned * model->gear[engagement->gear[0]].z / (2.0 * GK_PI);
+    meshing->pitch_time += H;
+    meshing->pitch_impulse += impulse;
+    if (pitches < 1.0) return;
+    if (fabs(meshing->pitch_impulse) > OVER * engagement->force_max * meshing->pitch_time)
+        data->status |= STATUS_TORQUE;
+    if (meshing->pitch_time * OVER < pitches * model->period_min) data->status |= STATUS_SPEED;
+    begin_pitch(model, data, e);
+}
+
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     outputs(model, setup, work, data, 0.0);
@@ -260,6 +291,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         v[V_MESH_FORCE_MEAN] = v[V_MESH_FORCE];
         v[V_FORCE_MAX] = gk_max(v[V_FORCE_DRIVE], v[V_FORCE_COAST]);
         data->meshing[e].apart = v[V_CONTACT] == 0.0;
+        begin_pitch(model, data, e);
     }
     data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
     for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
@@ -344,6 +376,7 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
     for (int e = 0; e < model->engagements; e++) {
         data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
         data->mesh[e][V_FORCE_MAX] = tally->highest[e];
+        watch_limits(model, data, e, H, tally->mesh[e]);
     }
     outputs(model, setup, work, data, h);
     for (int p = 0; p < model->ports; p++) {
