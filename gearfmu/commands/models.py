@@ -1,4 +1,4 @@
-"""From a stage's name to its bodies and its model: load, reduce what is missing, assemble."""
+"""From a stage's name to its bodies and its model, as `gearfmu.api` makes them, with progress bars."""
 
 from __future__ import annotations
 
@@ -16,27 +16,25 @@ if TYPE_CHECKING:
 def model_of(
     stage: str, port_kinds: Mapping[str, str] | None = None, bores: str | None = None, observe: Sequence[str] = ()
 ) -> StageModel:
-    """The StageModel of STAGE, with other kinds of port where `port_kinds` (port → kind) says so.
+    """`api.assemble` of STAGE, saying where bodies lie that are not the stage's own."""
+    from gearfmu.api.models import assemble, bodies_folder, load
 
-    bores : coupling of every bore, "averaging" or "rigid"; as the stage file says when None. observe : gears whose
-    motion becomes outputs.
-    """
-    spec, bodies = bodies_for_motion(stage) if bores is None else _with_other_bores(stage, bores)
-    from gearfmu.stage import assemble
-
-    return assemble(of_other_kinds(spec, port_kinds or {}), bodies, observe=observe)
+    spec = load(stage)
+    folder = bodies_folder(spec, bores)
+    with progress_bar("reducing" if folder is None else f"reducing, bores {bores}") as progress:
+        model = assemble(spec, port_kinds, bores, observe, folder, progress)
+    if folder is not None:
+        click.echo(f"bodies with bores {bores}: {folder}")
+    return model
 
 
 def bodies_of(stage: str) -> tuple[Any, list[Any]]:
-    """StageSpec or GeneralStage and ReducedBody objects of STAGE; bodies that are missing or stale are reduced first,
-    with a progress bar."""
-    from gearfmu.spec.stage import load_stage
+    """The spec of STAGE and its bodies (`api.reduce`)."""
+    from gearfmu.api.models import load, reduce
 
-    spec = load_stage(stage)
-    from gearfmu.body import reduce_bodies
-
+    spec = load(stage)
     with progress_bar("reducing") as progress:
-        return spec, reduce_bodies(spec, progress=by_text(progress))
+        return spec, reduce(spec, progress=progress)
 
 
 def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
@@ -49,49 +47,6 @@ def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
     return bodies_of(stage)
 
 
-def _with_other_bores(stage: str, coupling: str) -> tuple[Any, list[Any]]:
-    """`bodies_for_motion` with every bore coupled so. Bodies that are not those of the stage file lie in the folder
-    `bores_<coupling>` beside it: the stage's own stay as they are."""
-    from gearfmu.spec.stage import load_stage
-
-    own = load_stage(stage)
-    if own.kind == "planetary_set":
-        raise click.UsageError("--bore: the gears of a planetary set keep averaging bores; leave it away")
-    from gearfmu.body import reduce_stage
-    from gearfmu.spec.bores import with_bores
-    from gearfmu.spec.library import model_folder
-
-    spec = with_bores(own, coupling)
-    folder = None if spec == own else model_folder(own) / f"bores_{coupling}"
-    with progress_bar(f"reducing, bores {coupling}") as progress:
-        bodies = reduce_stage(spec, folder, progress=by_text(progress))
-    if folder is not None:
-        click.echo(f"bodies with bores {coupling}: {folder}")
-    return spec, bodies
-
-
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
     """The progress function of reduce_stage, called with (what is being done, share done)."""
     return None if progress is None else lambda text, share: progress(share, text)
-
-
-def of_other_kinds(spec: Any, kinds: Mapping[str, str]) -> Any:
-    """The stage with the ports' kinds replaced; a usage error for a port it does not have or a spring without k and
-    c."""
-    from gearfmu.spec.turning import with_ports
-
-    unknown = set(kinds) - set(spec.ports)
-    if unknown:
-        raise click.BadParameter(
-            f"no shaft '{min(unknown)}'; the stage has {', '.join(spec.ports)}", param_hint="--port"
-        )
-    changed = {}
-    for name, kind in kinds.items():
-        port = spec.ports[name]
-        if kind == "spring" and port.k is None:
-            raise click.BadParameter(
-                f"{name}=spring needs k and c in [ports.{name}] of {spec.source}", param_hint="--port"
-            )
-        chain = port.chain if kind == "spring" else None
-        changed[name] = port.model_copy(update={"kind": kind, "chain": chain})
-    return with_ports(spec, changed)

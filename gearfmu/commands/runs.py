@@ -49,7 +49,8 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
     spec = load_scene(scene)
     if stage is not None:
         spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
-    return run_scene(spec, out or Path("out") / spec.name, unit=unit, fmu_path=fmu_path, verify=verify)
+    chosen = fmu_path if fmu_path is not None and unit == "fmu" else unit
+    return run_scene(spec, out or Path("out") / spec.name, unit=chosen, verify=verify)
 
 
 @click.command()
@@ -76,11 +77,11 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
 def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:
     """Run STAGE alone: the outer ends of input and output turn at constant speed, wound up by the torque."""
     from gearfmu.commands.models import model_of
-    from gearfmu.commands.standalone import parameters, steady_run
+    from gearfmu.stage.steady import Drive, steady_run
 
     model = model_of(stage)
     with progress_bar(model.name) as progress:
-        trace = steady_run(model, drive, parameters(model, settings), progress)
+        trace = steady_run(model, Drive(**drive), _parameters(model, settings), progress)
     trace.meta["stage"] = stage
     return finish(trace, out or Path("out") / model.name, stage)
 
@@ -124,12 +125,11 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
-    from gearfmu import cosim
-    from gearfmu.commands.models import bodies_for_motion
+    from gearfmu.api.results import recorded_deformation
+    from gearfmu.api.runs import run as run_it
 
-    bodies_for_motion(scene.stage.name)
     with progress_bar(scene.name) as progress:
-        trace = cosim.run(scene, out, progress=progress, **options)
+        trace = run_it(scene, out, progress=progress, **options)
     if scene.deformation is not None and scene.deformation.vtu:
         found = recorded_deformation(trace, out)
         assert found is not None
@@ -154,14 +154,6 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 
 
-def recorded_deformation(trace: Any, home: Path) -> Any:
-    """The Deformation of the run of `trace` in the folder `home`; None where the run recorded none."""
-    from gearfmu.stage.deformation import Deformation
-
-    name = trace.meta.get("deformation")
-    return Deformation.load(home / name) if name else None
-
-
 def write_deformed(deformation: Any, folder: Path, stage: str) -> list[Path]:
     """.vtu files of every gear of a Deformation in `folder`; the paths of their .pvd."""
     from gearfmu.body import load_bodies
@@ -180,19 +172,19 @@ def write_deformed(deformation: Any, folder: Path, stage: str) -> list[Path]:
 
 
 def write_report(trace: Any, out: Path, stage: str | None, home: Path | None = None) -> Path:
-    """The report page of `trace` in `out`; with the deformed gears where the stage and its bodies can be read. home:
-    folder of the run's other files, `out` when None."""
-    from gearfmu import report as room
-    from gearfmu.body import load_bodies
-    from gearfmu.errors import GearfmuError
-    from gearfmu.spec.stage import load_stage
+    """`api.write_report`, its remark on standard error."""
+    from gearfmu.api.results import write_report as write
 
-    if not stage:
-        return room.write(trace, trace.meta, out)
+    return write(trace, out, stage, home, lambda text: click.echo(f"gearfmu: {text}", err=True))
+
+
+def _parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
+    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for what the model does not know."""
+    from gearfmu.errors import ModelError
+    from gearfmu.stage.steady import parameters
+
+    pairs = (text.partition("=") for text in settings)
     try:
-        spec = load_stage(stage)
-        deformation = recorded_deformation(trace, home or out)
-        return room.write(trace, trace.meta, out, spec, load_bodies(spec), deformation)
-    except GearfmuError as error:
-        click.echo(f"gearfmu: the report goes without the deformed pair: {error}", err=True)
-        return room.write(trace, trace.meta, out)
+        return parameters(model, {name: value for name, _, value in pairs})
+    except ModelError as error:
+        raise click.BadParameter(str(error), param_hint="--set") from None
