@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.body.bodies import load_bodies, reduce_bodies
+from gearfmu.body.bodies import body_hashes, load_bodies, reduce_bodies
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
@@ -15,6 +15,7 @@ __all__ = [
     "InterfaceBody",
     "MountedRing",
     "ReducedBody",
+    "body_hashes",
     "body_path",
     "inspect_file",
     "load_bodies",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from gearfmu.body.planetary import load_set_bodies, reduce_set
-from gearfmu.body.reduce import Progress, load_stage_bodies, reduce_stage
+from gearfmu.body.planetary import load_set_bodies, reduce_set, set_hashes
+from gearfmu.body.reduce import Progress, load_stage_bodies, reduce_stage, stage_hashes
 from gearfmu.spec.planetary import PlanetarySpec
 
 
@@ -24,3 +24,8 @@ def load_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> list
     if isinstance(spec, PlanetarySpec):
         return list(load_set_bodies(spec, folder))
     return list(load_stage_bodies(spec, folder))
+
+
+def body_hashes(spec: Any) -> tuple[str, ...]:
+    """Fingerprints that the bodies of a stage must carry, in the order of `load_bodies`."""
+    return set_hashes(spec) if isinstance(spec, PlanetarySpec) else stage_hashes(spec)

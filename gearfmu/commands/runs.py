@@ -141,7 +141,7 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
 def finish(trace: Any, out: Path, stage: str | None) -> int:
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
     else 1."""
-    from gearfmu.report.page import REACHED_THE_END
+    from gearfmu.report.results import REACHED_THE_END
 
     trace.save(out / "trace.h5")
     page = write_report(trace, out, stage)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from gearfmu.report.plots import Plot
+from gearfmu.report.results import REACHED_THE_END
 
 CSS = """
 :root{--ink:#23262b;--muted:#6a7079;--line:#e3e6ea;--accent:#1f5a92}
@@ -42,7 +43,6 @@ details summary{cursor:pointer;font-weight:600}
 """
 
 
-REACHED_THE_END = ("completed", "ok")
 
 
 def page(title: str, body: Sequence[str]) -> str:
