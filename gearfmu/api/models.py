@@ -42,8 +42,8 @@ def load(stage: PathLike, changes: Changes | None = None) -> Stage:
     stage : path of a stage.toml or its folder, or the name of a shipped one ("fzg_c", "fzg_c/stage_relief",
         "two_stage", "planetary54").
     changes : fields that are to be other than in the file, by their dotted keys:
-        {"gears.pinion.tip_relief.amount": "20 um", "contact.slices": 7}. Values as the file would say them, or SI
-        numbers. The file stays as it is.
+        {"gears.pinion.tip_relief.amount": "20 um", "contact.slices": 7}. Values as the file would say them, SI
+        numbers, or None for what is to be left out. The file stays as it is.
 
     Raises SpecError, which lists everything that is wrong.
     """

@@ -1,7 +1,7 @@
 """Single fields of a file, changed before it is checked: `{"test_rig.torque": "200 N*m"}`.
 
 A changed file goes the way of every file: all its problems are found, and named by the field. A value is what the file
-would say, or the SI number of a quantity.
+would say, the SI number of a quantity, or None for a field or table that is to be left out.
 """
 
 from __future__ import annotations

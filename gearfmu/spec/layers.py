@@ -84,9 +84,12 @@ def read_layers(path: Path) -> Layers:
 
 
 def merged_tables(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """The tables `below`, but for what `above` says itself."""
+    """The tables `below`, but for what `above` says itself; None, which no file can say, takes a field away."""
     result = dict(below)
     for key, value in above.items():
+        if value is None:
+            result.pop(key, None)
+            continue
         both = isinstance(value, dict) and isinstance(below.get(key), dict)
         result[key] = merged_tables(below[key], value) if both else value
     return result

@@ -16,6 +16,7 @@ from gearfmu.report.te import write_plot
 from gearfmu.sweeps.table import SweepTable
 
 TORQUE, SPEED = "torque_Nm", "speed_rad_s"
+MOST_CURVES = 8
 RPM = 30 / np.pi
 LABELS = {TORQUE: "torque in N·m", SPEED: "speed in rpm"}
 
@@ -23,12 +24,14 @@ LABELS = {TORQUE: "torque in N·m", SPEED: "speed in rpm"}
 def write_charts(table: SweepTable, out: Path) -> list[Path]:
     """Write what the table allows as .png into `out`; returns the paths.
 
-    harris : transmission error over the mesh cycle, a curve a torque. te_orders : its mesh orders over torque. levels :
+    harris : transmission error over the mesh cycle, a curve a torque, of many at most 8. te_orders : its mesh orders over torque. levels :
     of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two swept keys or curves
     over one. Of further swept keys the first values are taken: `fixed` says which in the title.
     """
     axes = [name for name in table.axes if _numeric(table, name)]
-    found = []
+    found: list[Path] = []
+    if not np.any(table["outcome"] == "ok"):
+        return []
     if TORQUE in axes and table.curves:
         found += [_harris(table, out / "harris.png"), _orders(table, out / "te_orders.png")]
     if axes and any(name.endswith("_rms_ac_N") for name in table.columns):
@@ -37,18 +40,20 @@ def write_charts(table: SweepTable, out: Path) -> list[Path]:
 
 
 def fixed(table: SweepTable, free: Sequence[str]) -> tuple[np.ndarray, str]:
-    """Mask (n,) of the rows in which all swept keys but `free` have their first values and that have results, and what
+    """Mask (n,) of the rows in which all swept keys but `free` have the values of the first point with results, and what
     that fixes, as text."""
     held = [name for name in table.axes if name not in free]
     mask = table["outcome"] == "ok"
+    first = int(np.argmax(mask))
     for name in held:
-        mask = mask & (table[name] == table[name][0])
-    return mask, ", ".join(f"{name} = {table[name][0]}" for name in held)
+        mask = mask & (table[name] == table[name][first])
+    return mask, ", ".join(f"{name} = {table[name][first]}" for name in held)
 
 
 def _harris(table: SweepTable, path: Path) -> Path:
     rows, _ = fixed(table, [TORQUE])
-    chosen = [row for row in np.flatnonzero(rows)]
+    some = np.flatnonzero(rows)[np.argsort(table[TORQUE][rows])]
+    chosen = some[np.unique(np.linspace(0, some.size - 1, min(some.size, MOST_CURVES)).round().astype(int))]
     parts = [_curve(table.curves, row) for row in chosen]
     te, stiffness = (next(n for n in table.curves if n.endswith(end)) for end in ("te_um", "stiffness_N_per_um"))
     result: Any = SimpleNamespace(
