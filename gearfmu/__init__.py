@@ -10,7 +10,7 @@
     gf.export(model, "fzg_c.fmu")                             # FMI 2.0, needs nothing where it is imported
     gf.write_report(trace, "out/steady")
     gf.run("pair_loaded", "out/loaded")                       # a scene: the stage in its drivetrain
-    gf.sweep("fzg_c", {"torque": [100.0, 200.0, 300.0]}, "out/harris", what="te")
+    gf.sweep("fzg_c", {"torque": [100.0, 200.0, 300.0]}, "out/harris")
 
 Numbers are SI; text carries its unit. `docs/howto-python.md` shows more, `gearfmu --help` the same on the command line.
 What is named here is imported when it is used.

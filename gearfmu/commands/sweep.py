@@ -19,7 +19,9 @@ from gearfmu.commands.shared import progress_bar
     help='Values of a key: "torque=100, 200, 300 N*m", "speed=1000:6000:11 rpm" (start:end:count), "stage.level=fast"; '
     "may repeat: all combinations, the last key fastest.",
 )
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder; out/sweep_<name> when not given.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder; out/sweep_<name> when not given."
+)
 @click.option("--jobs", type=click.IntRange(1), help="Processes of this machine; one a core when not given.")
 @click.option("--scheduler", metavar="ADDRESS", help='A dask cluster instead: "tcp://host:8786"; needs gearfmu[dist].')
 @click.option("--traces", is_flag=True, help="Keep the trace of every run, traces/*.h5.")

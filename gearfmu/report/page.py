@@ -43,8 +43,6 @@ details summary{cursor:pointer;font-weight:600}
 """
 
 
-
-
 def page(title: str, body: Sequence[str]) -> str:
     """The whole document around the given parts."""
     meta = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'

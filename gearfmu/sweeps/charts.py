@@ -24,9 +24,9 @@ LABELS = {TORQUE: "torque in N·m", SPEED: "speed in rpm"}
 def write_charts(table: SweepTable, out: Path) -> list[Path]:
     """Write what the table allows as .png into `out`; returns the paths.
 
-    harris : transmission error over the mesh cycle, a curve a torque, of many at most 8. te_orders : its mesh orders over torque. levels :
-    of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two swept keys or curves
-    over one. Of further swept keys the first values are taken: `fixed` says which in the title.
+    harris : transmission error over the mesh cycle, a curve a torque, of many at most 8. te_orders : its mesh orders
+    over torque. levels : of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two
+    swept keys or curves over one. Further swept keys are held at the values of the first point; titles name them.
     """
     axes = [name for name in table.axes if _numeric(table, name)]
     found: list[Path] = []
@@ -40,8 +40,8 @@ def write_charts(table: SweepTable, out: Path) -> list[Path]:
 
 
 def fixed(table: SweepTable, free: Sequence[str]) -> tuple[np.ndarray, str]:
-    """Mask (n,) of the rows in which all swept keys but `free` have the values of the first point with results, and what
-    that fixes, as text."""
+    """Mask (n,) of the rows with results in which all swept keys but `free` have the values of the first such row, and
+    these values as text."""
     held = [name for name in table.axes if name not in free]
     mask = table["outcome"] == "ok"
     first = int(np.argmax(mask))

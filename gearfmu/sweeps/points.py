@@ -39,8 +39,8 @@ class Variant:
 
 @dataclass(frozen=True)
 class Task:
-    """A point for a worker. subject, what, values: of the plan; traces: whether the trace comes back; program: `program()`
-    where the sweep began."""
+    """A point for a worker. subject, what, values: of the plan; traces: whether the trace comes back; program: what
+    `program` says where the sweep began."""
 
     subject: str
     what: str

@@ -27,7 +27,8 @@ POSITIONS = 41
 def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, list[float]]]:
     """Row and curve of a transmission error. te_mean_um, te_pp_um (peak to peak), te_order_1_um … (rms), mean of the
     mesh stiffness; of several meshes with the mesh's name before; of a set K_gamma at sun and ring."""
-    own, settings = _own(TE, values), _settings(TE, model, values)
+    own = _own(TE, values)
+    settings: dict[str, Any] = _settings(TE, model, values)
     torque, positions = own["torque"], int(own.get("positions", POSITIONS))
     if isinstance(model.spec, PlanetarySpec):
         result = set_te(model, [torque], positions, **settings)

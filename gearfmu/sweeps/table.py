@@ -48,7 +48,7 @@ class SweepTable:
     def failures(self) -> list[str]:
         """A sentence for every point that has no results: its values, what went wrong."""
         bad = np.flatnonzero(self["outcome"] != "ok")
-        return [f"{self.values(i)}: {self['outcome'][i]}: {self['message'][i]}" for i in bad]
+        return [f"{self.values(i)}: {self['outcome'][i]}: {self['message'][i]}" for i in bad.tolist()]
 
     def values(self, row: int) -> str:
         """What was swept, as text: "torque_Nm = 100, speed_rad_s = 200"."""
@@ -105,7 +105,7 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
 
 
 def table_suffix() -> str:
-    """".parquet" where pyarrow is installed, else ".csv"."""
+    """ ".parquet" where pyarrow is installed, else ".csv"."""
     return ".parquet" if has("pyarrow") else ".csv"
 
 
@@ -120,7 +120,7 @@ def column(values: Sequence[Any]) -> np.ndarray:
 
 
 def column_name(key: str, unit: str | None) -> str:
-    """"torque_Nm" of torque in N*m, "speed_rad_s"; the key alone without a unit."""
+    """ "torque_Nm" of torque in N*m, "speed_rad_s"; the key alone without a unit."""
     plain = re.sub(r"[*^()]", "", (unit or "").replace("/", "_"))
     return f"{key}_{plain}" if plain else key
 

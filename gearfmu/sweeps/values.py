@@ -18,7 +18,7 @@ def key_and_values(text: str) -> tuple[str, list[Any]]:
     one, or start:end:count, both ends included. SweepError for anything else."""
     key, sign, rest = text.partition("=")
     if not sign or not key.strip() or not rest.strip():
-        raise SweepError(f"'{text}' is not KEY=VALUES: write torque=\"100, 200 N*m\" or speed=\"1000:6000:11 rpm\"")
+        raise SweepError(f'\'{text}\' is not KEY=VALUES: write torque="100, 200 N*m" or speed="1000:6000:11 rpm"')
     found = _RANGE.match(rest)
     return key.strip(), _range(found, text) if found else _list(rest)
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from small_stage import unpack
 
-from gearfmu.body import load_bodies
 from gearfmu.api.models import with_port_kinds
+from gearfmu.body import load_bodies
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.probes import Subject
 from gearfmu.fmu.terminals import shafts

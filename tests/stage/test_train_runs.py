@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_stage_bodies
-from gearfmu.stage.steady import Drive, steady_run
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.base import read_toml
 from gearfmu.spec.expand import expand_pair
@@ -22,6 +21,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.turning import shafts_of, turns
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
 from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.steady import Drive, steady_run
 from gearfmu.stage.te import statics_of
 
 FAST, STEPS, H = 1, 60, 5e-5

@@ -1,4 +1,4 @@
-"""Sweeps: the numbers are those of the functions that compute one point; nothing is computed twice, failures are named."""
+"""Sweeps: the numbers are those of the functions for one point; nothing is computed twice, failures are named."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ def test_a_point_that_fails_is_a_row_with_its_reason(harris: gf.SweepTable) -> N
     assert np.isnan(harris["te_mean_um"][1])
 
 
+@pytest.mark.needs("xarray")
 def test_results_over_the_swept_keys(harris: gf.SweepTable) -> None:
     grid = harris.to_xarray()["te_mean_um"]
     assert grid.dims == ("torque_Nm", f"{RELIEF}_m") and grid.shape == (2, 2)
@@ -92,7 +93,13 @@ def test_a_scene_and_a_stage_alone_by_the_command_line(tmp_path: Path, capsys: p
 
     over = ["--over", "torque=100, 200 N*m", "--over", "stage.level=rigid", "--over", "coupling.step=50 us"]
     assert cli.outcome(["sweep", "pair_loaded", *over, *short]) == 0
-    scene = {"torque": "200 N*m", "stage.level": "rigid", "coupling.step": "50 us", "duration": "40 ms", "settle": "10 ms"}
+    scene = {
+        "torque": "200 N*m",
+        "stage.level": "rigid",
+        "coupling.step": "50 us",
+        "duration": "40 ms",
+        "settle": "10 ms",
+    }
     alone = gf.run(gf.load_scene("pair_loaded", scene), unit="kernel")
     table = gf.sweep("pair_loaded", [scene], tmp_path, on=1)  # known already: nothing is computed
     assert table["mesh_force_mean_N"][0] == pytest.approx(alone.window(0.01)["mesh.force"].mean(), rel=1e-12)
