@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from gearfmu.body import reduce_bodies
+from gearfmu.body import body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.bores import with_bores
 from gearfmu.spec.changes import Changes
@@ -69,14 +70,26 @@ def reduce(
     """The reduced bodies of a stage, in the order of its gears; what is missing or stale is made first (about a minute
     a gear) and stored as .h5.
 
-    folder : of the .h5 files; that of the stage file when None.
+    folder : of the .h5 files; when None that of the stage file, or bodies_<fingerprint> beside it where `changes` ask
+        for other bodies than the file.
     force : make all of them again.
     progress : called with (part of a body that is done, what is being done).
 
     Raises MeshError and BodyError.
     """
     spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
-    return reduce_bodies(spec, folder, force, None if progress is None else lambda text, part: progress(part, text))
+    told = None if progress is None else lambda text, part: progress(part, text)
+    apart = changed_folder(spec) if folder is None else None
+    return reduce_bodies(spec, folder, force, told) if apart is None else reduce_apart(spec, apart, force, told)
+
+
+def changed_folder(spec: Stage) -> Path | None:
+    """Where the bodies of a stage lie that asks for others than its file: bodies_<fingerprint> beside it; None where
+    its own will do."""
+    hashes = body_hashes(spec)
+    if hashes == body_hashes(load(spec.source)):
+        return None
+    return model_folder(spec) / f"bodies_{hashlib.sha256(''.join(hashes).encode()).hexdigest()[:12]}"
 
 
 def assemble(

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
-from gearfmu.body import load_bodies, reduce_bodies
+from gearfmu.body import load_bodies, reduce_apart, reduce_bodies
 from gearfmu.errors import GearfmuError, SimulationError
 from gearfmu.kernel.build import source_hash, sources
-from gearfmu.spec.library import model_folder
 from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Trace, assemble
@@ -83,16 +80,13 @@ def compute(task: Task) -> Outcome:
 
 
 def prepare(variant: Variant) -> str:
-    """Make what is missing of a variant's bodies; "" or what went wrong. Bodies of the stage file that fit are taken
-    over."""
+    """Make what is missing of a variant's bodies; "" or what went wrong."""
     try:
         spec = variant.spec()
-        if variant.folder is not None:
-            Path(variant.folder).mkdir(parents=True, exist_ok=True)
-            for path in model_folder(spec).glob("*.h5"):
-                if not (Path(variant.folder) / path.name).exists():
-                    shutil.copy(path, variant.folder)
-        reduce_bodies(spec, variant.folder)
+        if variant.folder is None:
+            reduce_bodies(spec)
+        else:
+            reduce_apart(spec, variant.folder)
     except GearfmuError as error:
         return str(error)
     except Exception as error:  # as in compute
