@@ -110,11 +110,19 @@ def assemble(
 
     Raises SpecError, MeshError, BodyError, ModelError.
     """
+    spec, bodies = reduced_to_move(stage, bore, folder, progress)
+    return assemble_model(with_port_kinds(spec, ports or {}), bodies, observe=observe)
+
+
+def reduced_to_move(
+    stage: PathLike | Stage, bore: str | None = None, folder: PathLike | None = None, progress: Progress | None = None
+) -> tuple[Stage, list[Any]]:
+    """The stage with these bores, and its bodies: what `assemble` puts together. SpecError, before anything is reduced,
+    for a set that does not say all that it needs to move."""
     spec = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
-    as_general(spec)  # a set that does not say all it needs to move is refused before anything is reduced
+    as_general(spec)
     coupled = spec if bore is None else with_other_bores(spec, bore)
-    bodies = reduce(coupled, folder or bodies_folder(spec, bore), progress=progress)
-    return assemble_model(with_port_kinds(coupled, ports or {}), bodies, observe=observe)
+    return coupled, reduce(coupled, folder or bodies_folder(spec, bore), progress=progress)
 
 
 def model_of(stage: AnyStage) -> StageModel:

@@ -17,15 +17,12 @@ def model_of(
     stage: str, port_kinds: Mapping[str, str] | None = None, bores: str | None = None, observe: Sequence[str] = ()
 ) -> StageModel:
     """`api.assemble` of STAGE, saying where bodies lie that are not the stage's own."""
-    from gearfmu.api.models import assemble, bodies_folder, load
+    from gearfmu.api.models import with_port_kinds
 
-    spec = load(stage)
-    folder = bodies_folder(spec, bores)
-    with progress_bar("reducing" if folder is None else f"reducing, bores {bores}") as progress:
-        model = assemble(spec, port_kinds, bores, observe, folder, progress)
-    if folder is not None:
-        click.echo(f"bodies with bores {bores}: {folder}")
-    return model
+    spec, bodies = bodies_for_motion(stage, bores)
+    from gearfmu.stage import assemble
+
+    return assemble(with_port_kinds(spec, port_kinds or {}), bodies, observe=observe)
 
 
 def bodies_of(stage: str) -> tuple[Any, list[Any]]:
@@ -37,14 +34,18 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
         return spec, reduce(spec, progress=progress)
 
 
-def bodies_for_motion(stage: str) -> tuple[Any, list[Any]]:
-    """`bodies_of` for a verb that needs a model of the stage: a SpecError, before anything is reduced, for a set that
-    does not say all that it needs to move."""
-    from gearfmu.spec.expand import as_general
-    from gearfmu.spec.stage import load_stage
+def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Any, list[Any]]:
+    """`bodies_of` for a verb that needs a model of the stage (`api.reduced_to_move`); says where bodies lie that are not
+    the stage's own."""
+    from gearfmu.api.models import bodies_folder, load, reduced_to_move
 
-    as_general(load_stage(stage))
-    return bodies_of(stage)
+    own = load(stage)
+    folder = bodies_folder(own, bores)
+    with progress_bar("reducing" if folder is None else f"reducing, bores {bores}") as progress:
+        found = reduced_to_move(own, bores, folder, progress)
+    if folder is not None:
+        click.echo(f"bodies with bores {bores}: {folder}")
+    return found
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:

@@ -67,8 +67,8 @@ def _require_springs(model: StageModel) -> None:
     driven = {name: model.stage.ports[name] for name in two}
     soft = [name for name, port in driven.items() if port.kind != "spring" or port.chain is not None]
     if soft:
-        remedy = "'simulate' turns spring ports without a chain: use 'run' with a scene"
-        raise SpecError([Problem(str(model.spec.source), f"ports.{name}", "", remedy) for name in soft])
+        remedy = f"'simulate' turns spring ports without a chain; {', '.join(soft)} is another: use 'run' with a scene"
+        raise SpecError([Problem(str(model.spec.source), "ports", "", remedy)])
 
 
 def _number(variable: Variable, value: Any) -> float:
