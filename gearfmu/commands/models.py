@@ -35,8 +35,8 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
 
 
 def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Any, list[Any]]:
-    """`bodies_of` for a verb that needs a model of the stage (`api.reduced_to_move`); says where bodies lie that are not
-    the stage's own."""
+    """`bodies_of` for a verb that needs a model of the stage (`api.reduced_to_move`); says where bodies lie that are
+    not the stage's own."""
     from gearfmu.api.models import bodies_folder, load, reduced_to_move
 
     own = load(stage)
