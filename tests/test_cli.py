@@ -6,6 +6,7 @@ import importlib
 import importlib.metadata
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -130,8 +131,44 @@ def test_new_stage_can_be_read_and_is_never_overwritten(tmp_path: Path) -> None:
     again = process("new", "my_pair", cwd=tmp_path)
     assert again.returncode == 1 and "exists" in again.stderr
     assert (tmp_path / "my_pair" / "stage.toml").read_bytes() == before
+    assert b"made like fzg_c; say here" in before and b"FZG type C" not in before, "a description of its own"
     shown = process("inspect", "my_pair", "--json", cwd=tmp_path)
     assert json.loads(shown.stdout)["derived"]["contact_ratio"] > 1
+
+
+@pytest.mark.parametrize("verb", ["simulate", "te", "modes", "frf", "import", "run"])
+def test_help_shows_units_as_the_options_take_them(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    from gearfmu.units import to_si
+
+    code, out, _ = call(verb, "--help", capsys=capsys)
+    units = re.findall(r'"<number> ([^"]+)"', out)
+    assert code == 0 and units and [to_si(f"1 {unit}", unit) for unit in units] == [1.0] * len(units)
+
+
+def test_inspect_tells_quantities_with_units_and_json_in_si(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("inspect", "fzg_c/stage_relief", capsys=capsys)
+    told = ("torque_max   600 N*m", "pressure_angle   20 deg", "speed_max    6000 rpm", "tip_diameter     82.46 mm")
+    for line in (*told, "amount      15 µm", "youngs_modulus  2.06e+11 Pa", "r_b  33.8289 mm"):
+        assert line in out
+    plain = json.loads(call("inspect", "fzg_c/stage_relief", "--json", capsys=capsys)[1])
+    assert plain["pair"]["pressure_angle"] == pytest.approx(np.radians(20)) and plain["torque_max"] == 600.0
+    _, scene, _ = call("inspect", "clutch_closure", capsys=capsys)
+    assert "duration     400 ms" in scene or "0.4 s" in scene
+
+
+def test_bodies_that_are_only_read_are_told_so(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call("reduce", "fzg_c", capsys=capsys)
+    assert code == 0 and err == "" and out.count("up to date, only read; it was reduced in ") == 2
+    assert "0 bodies reduced, 2 read" in out
+
+
+def test_bodies_that_are_being_made_are_named_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    from gearfmu.commands.models import reducing
+
+    with reducing() as progress:
+        for text in ("pinion: mesh", "pinion: modes", "wheel: mesh", "reducing ring"):
+            progress(0.5, text)
+    assert capsys.readouterr().err == "reducing pinion …\nreducing wheel …\nreducing ring …\n"
 
 
 def test_mesh_writes_what_meshio_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,7 +187,7 @@ def test_bodies_of_a_planetary_set_mesh_and_tell_their_facts(
     code, out, _ = call("inspect", ROOT / "reduced_models" / "planetary54" / "carrier.h5", capsys=capsys)
     assert code == 0 and "krylov" in out and "trusted_to_Hz" in out and "bolt3" in out
     code, out, _ = call("inspect", "planetary54", capsys=capsys)
-    assert code == 0 and "ring_least_tip_radius" in out and "0.065362" in out
+    assert code == 0 and "ring_least_tip_radius" in out and "65.362 mm" in out
 
 
 @pytest.mark.parametrize("kind", ["stage", "general", "planetary", "scene"])

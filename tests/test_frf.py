@@ -6,6 +6,7 @@ import csv
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gearfmu import cli
@@ -35,7 +36,14 @@ def test_carrier_in_the_order_of_the_paper(tmp_path, capsys) -> None:
     worst = {method: max(values) for method, values in errors(tmp_path / "carrier_frf.csv").items()}
     assert worst["krylov"] < 1e-2 * worst["rubin"] < 1e-4 * worst["craig_bampton"]
     assert worst["craig_bampton"] < 0.1 and worst["modal"] < 0.1
-    assert {p.name for p in tmp_path.iterdir()} == {"carrier_frf.csv", "carrier_frf.svg", "carrier_frf.png"}
+    names = {f"carrier_frf.{suffix}" for suffix in ("csv", "svg", "png")}
+    assert {p.name for p in tmp_path.iterdir()} == names | {"carrier_H.npz"}
+    held = np.load(tmp_path / "carrier_H.npz")
+    assert held["H_reference"].shape == (30, 24, 24) and held["rows"][0] == "bolt0.ux" and held["length_m"] == 0.045
+    off = np.linalg.norm(held["H_rubin_120"] - held["H_reference"], axis=(1, 2))
+    assert off / np.linalg.norm(held["H_reference"], axis=(1, 2)) == pytest.approx(
+        errors(tmp_path / "carrier_frf.csv")["rubin"], rel=1e-3, abs=1e-12
+    )
 
 
 def test_a_method_with_fewer_vectors_than_asked_for_says_so(tmp_path, capsys) -> None:

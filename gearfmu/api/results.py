@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, Stage, load, model_of
@@ -15,10 +16,16 @@ from gearfmu.report import write
 from gearfmu.stage import Trace
 from gearfmu.stage.deformation import Deformation
 from gearfmu.stage.exchange import convert as convert_trace
+from gearfmu.stage.steady import parameters
 
 
 def export(
-    stage: AnyStage, path: PathLike | None = None, runtime: str = "native", platforms: Sequence[str] = ("host",)
+    stage: AnyStage,
+    path: PathLike | None = None,
+    runtime: str = "native",
+    platforms: Sequence[str] = ("host",),
+    terminals: bool = True,
+    **starts: Any,
 ) -> Path:
     """Export a stage as an FMI 2.0 co-simulation FMU; returns its path.
 
@@ -26,11 +33,14 @@ def export(
     path : <stage>.fmu in the working folder when None.
     runtime : "native", which needs nothing where it is imported, or "python" for hosts that are Python.
     platforms : "host", "linux64", "win64"; others than the host's need gearfmu[cross].
+    terminals : with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md).
+    starts : start values of parameters (docs/variables.md): level="fast", slices=10.
 
     Raises FmuError and BuildError.
     """
     model = model_of(stage)
-    return fmu.export(model, Path(path) if path is not None else Path(f"{model.name}.fmu"), runtime, platforms)
+    model = model.with_starts(parameters(model, starts))
+    return fmu.export(model, Path(f"{model.name}.fmu") if path is None else Path(path), runtime, platforms, terminals)
 
 
 def write_report(
@@ -48,7 +58,7 @@ def write_report(
     tell : is called with a sentence where stage or bodies cannot be read and the report goes without that picture.
     """
     trace = trace if isinstance(trace, Trace) else Trace.load(trace)
-    named = stage or trace.meta.get("stage_path") or trace.meta.get("stage")
+    named = stage or stage_of(trace.meta)
     if not named:
         return write(trace, trace.meta, Path(out))
     try:
@@ -58,6 +68,13 @@ def write_report(
     except GearfmuError as error:
         tell(f"the report goes without the deformed pair: {error}")
         return write(trace, trace.meta, Path(out))
+
+
+def stage_of(meta: Mapping[str, Any]) -> str | None:
+    """STAGE of a run by its trace's meta: its file where that is still there, else its name; None where neither is
+    told."""
+    path = meta.get("stage_path")
+    return path if path and Path(path).is_file() else meta.get("stage")
 
 
 def recorded_deformation(trace: Trace, home: Path) -> Deformation | None:

@@ -52,16 +52,17 @@ def te(
 def simulate(
     stage: AnyStage,
     torque: Quantity,
-    speed: Quantity,
+    speed: Quantity | tuple[Quantity, Quantity],
     duration: Quantity = 0.1,
     step: Quantity = 20e-6,
     settle: Quantity = 0.02,
     **settings: Any,
 ) -> Trace:
-    """Run a stage alone: the outer ends of input and output turn at constant speed, wound up by the torque.
+    """Run a stage alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
+    the torque.
 
     stage : as in `te`.
-    torque, speed : of the input: "302 N*m", "2000 rpm", or in N·m and rad/s.
+    torque, speed : of the input: "302 N*m", "2000 rpm", or in N·m and rad/s; ("300 rpm", "6000 rpm") is a run-up.
     duration, step : simulated time, time between samples; "0.1 s", or in s.
     settle : from here on the report takes results and spectra.
     settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
@@ -71,7 +72,8 @@ def simulate(
     """
     model = model_of(stage)
     times = (_si(value, "s") for value in (duration, step, settle))
-    drive = Drive(_si(torque, "N*m"), _si(speed, "rad/s"), *times)
+    start, *end = (_si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,)))
+    drive = Drive(_si(torque, "N*m"), start, *times, *end)
     return steady_run(model, drive, parameters(model, settings))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.body.bodies import body_hashes, load_bodies, reduce_apart, reduce_bodies
+from gearfmu.body.bodies import body_hashes, current_bodies, load_bodies, reduce_apart, reduce_bodies
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
@@ -17,6 +17,7 @@ __all__ = [
     "ReducedBody",
     "body_hashes",
     "body_path",
+    "current_bodies",
     "inspect_file",
     "load_bodies",
     "load_body",

@@ -7,10 +7,11 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from gearfmu.body.planetary import load_set_bodies, reduce_set, set_hashes
-from gearfmu.body.reduce import Progress, load_stage_bodies, reduce_stage, stage_hashes
+from gearfmu.body.planetary import is_current_in_set, load_set_bodies, reduce_set, set_hashes
+from gearfmu.body.reduce import Progress, gears_of, is_current, load_stage_bodies, reduce_stage, stage_hashes
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.planetary_body import SET_BODIES
 
 
 def reduce_bodies(
@@ -32,6 +33,13 @@ def reduce_apart(
         if not (Path(folder) / path.name).exists():
             shutil.copy(path, folder)
     return reduce_bodies(spec, folder, force, progress)
+
+
+def current_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> set[str]:
+    """Names of the bodies that `reduce_bodies` would read and not make."""
+    if isinstance(spec, PlanetarySpec):
+        return {name for name in SET_BODIES if is_current_in_set(spec, name, folder)}
+    return {own.gears[index].name for own, index in gears_of(spec) if is_current(own, index, folder)}
 
 
 def load_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> list[Any]:

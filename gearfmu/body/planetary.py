@@ -83,7 +83,7 @@ def reduce_set(
     Where processes are spawned (Windows, macOS) a script that calls this needs `if __name__ == "__main__":`.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
-    wanted = [name for name in SET_BODIES if force or not _is_current(spec, name, folder)]
+    wanted = [name for name in SET_BODIES if force or not is_current_in_set(spec, name, folder)]
     paths = {name: set_body_path(spec, name, folder) for name in wanted}
     longest_first = sorted(wanted, key=("ring", "sun", "planet", "carrier").index)
     gears = [name for name in longest_first if name != "carrier"]
@@ -124,7 +124,8 @@ def _load(name: str, path: Path) -> Body:
     return load_interface_body(path) if name == "carrier" else load_body(path)
 
 
-def _is_current(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None) -> bool:
+def is_current_in_set(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None = None) -> bool:
+    """Is the stored body sound and made from these numbers?"""
     try:
         return _load(name, set_body_path(spec, name, folder)).input_hash == set_hash(spec, name)
     except BodyError:

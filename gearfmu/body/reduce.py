@@ -57,7 +57,7 @@ def expected_hash(spec: StageSpec, gear_index: int) -> str:
 
 def stage_hashes(spec: Stage) -> tuple[str, ...]:
     """`expected_hash` of every gear of a stage."""
-    return tuple(expected_hash(own, index) for own, index in _gears(spec))
+    return tuple(expected_hash(own, index) for own, index in gears_of(spec))
 
 
 def body_path(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] | None = None) -> Path:
@@ -70,7 +70,7 @@ def load_stage_bodies(spec: Stage, folder: str | os.PathLike[str] | None = None)
     """The stored bodies of a stage, in the order of its gears. Raises BodyError when one is missing, damaged or
     stale."""
     bodies = []
-    for own, index in _gears(spec):
+    for own, index in gears_of(spec):
         path = body_path(own, index, folder)
         body = load_body(path)
         if body.input_hash != expected_hash(own, index):
@@ -95,7 +95,7 @@ def reduce_stage(
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
     bodies = []
-    for own, index in _gears(spec):
+    for own, index in gears_of(spec):
         path = body_path(own, index, out_dir)
         body = None if force else _stored(path, expected_hash(own, index))
         if body is None:
@@ -105,7 +105,7 @@ def reduce_stage(
     return bodies
 
 
-def _gears(spec: Stage) -> list[tuple[Any, int]]:
+def gears_of(spec: Stage) -> list[tuple[Any, int]]:
     """Every gear as (pair it stands in, its number there): of a general stage each for itself, whatever it meshes
     with."""
     if isinstance(spec, GeneralStage):
@@ -192,6 +192,11 @@ def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Poi
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
     shapes = sector_shapes(surface, modes)
     return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim, shapes)
+
+
+def is_current(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] | None = None) -> bool:
+    """Is the stored body sound and made from these numbers?"""
+    return _stored(body_path(spec, gear_index, folder), expected_hash(spec, gear_index)) is not None
 
 
 def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:

@@ -11,17 +11,23 @@ import click
 
 from gearfmu.commands.shared import echo_pairs
 
+UNITS = {
+    "r_b": "m", "r_f": "m", "r_a": "m", "base_pitch": "m", "ring_least_tip_radius": "m", "gap_between_planets": "m",
+    "sun_torque_in_one_mesh": "N*m", "largest_hertz_half_width_planet_ring": "m", "carrier_mass": "kg",
+    "youngs_modulus": "Pa", "density": "kg/m3", "volume": "m3", "flank_element_length": "m",
+}  # fmt: skip
+
 
 @click.command()
 @click.argument("path", type=click.Path(path_type=Path), metavar="FILE")
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
 def inspect(path: Path, as_json: bool) -> None:
-    """Say what FILE holds: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage."""
-    found = facts_of(path)
+    """Say what FILE holds: a body or trace (.h5), a stage or scene (.toml), an FMU, or the folder of a stage. Lengths
+    in mm or µm, angles in degrees, speeds in rpm; with --json all in SI."""
     if as_json:
-        click.echo(json.dumps(found, indent=2, ensure_ascii=False, default=str))
+        click.echo(json.dumps(facts_of(path), indent=2, ensure_ascii=False, default=str))
     else:
-        echo_pairs(found)
+        echo_pairs(in_units(facts_of(path, plain=False)))
 
 
 @click.command()
@@ -60,14 +66,16 @@ def _schema_text(kind: str) -> str:
     return json.dumps(made[kind](), indent=2, ensure_ascii=False) + "\n"
 
 
-def facts_of(path: Path) -> dict[str, Any]:
-    """What the file at `path` holds, by its kind; raises GearfmuError for a file that is none of ours."""
+def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
+    """What the file at `path` holds, by its kind; plain: numbers in SI, else specs with quantities as text. Raises
+    GearfmuError for a file that is none of ours."""
     from gearfmu.errors import GearfmuError
 
     if not path.exists():
         path = _shipped(path)
-    readers = {".h5": _hdf5, ".toml": _toml, ".fmu": _fmu}
-    reader = _toml if path.is_dir() else readers.get(path.suffix.lower())
+    toml = _toml if plain else _toml_with_units
+    readers = {".h5": _hdf5, ".toml": toml, ".fmu": _fmu}
+    reader = toml if path.is_dir() else readers.get(path.suffix.lower())
     if reader is None:
         raise GearfmuError(f"{path}: 'inspect' reads {', '.join(readers)} and the folder of a stage")
     return reader(path)
@@ -150,6 +158,28 @@ def _toml(path: Path) -> dict[str, Any]:
         **spec.model_dump(mode="json", exclude={"kind"}),
         "derived": _derived(spec),
     }
+
+
+def _toml_with_units(path: Path) -> dict[str, Any]:
+    from gearfmu.spec.scene import load_scene
+    from gearfmu.spec.shown import shown
+    from gearfmu.spec.stage import load_stage
+
+    found = _toml(path)
+    spec = load_scene(path) if found["kind"] == "scene" else load_stage(path)
+    own = {key: value for key, value in shown(spec).items() if key != "kind"}
+    derived = {"derived": found["derived"]} if "derived" in found else {}
+    return {"file": found["file"], "kind": found["kind"], **own, **derived}
+
+
+def in_units(found: Any, key: str = "") -> Any:
+    """Numbers whose unit the name does not tell as text with it, here in what follows from a stage and in bodies."""
+    from gearfmu.spec.shown import quantity_text
+
+    if isinstance(found, dict):
+        return {name: in_units(value, key if name in ("sun_planet", "planet_ring") else name)
+                for name, value in found.items()}  # fmt: skip
+    return quantity_text(found, UNITS[key]) if isinstance(found, float) and key in UNITS else found
 
 
 def _derived(spec: Any) -> dict[str, Any]:

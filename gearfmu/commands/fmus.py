@@ -38,21 +38,32 @@ PORT_KINDS = ("spring", "torque", "fixed")
     metavar="GEAR",
     help="Its rigid motion and modal amplitudes become outputs; may repeat.",
 )
+@click.option(
+    "--start",
+    "starts",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Start value of a parameter: level=fast, slices=10; for importers that set none, or no enumeration; may "
+    "repeat.",
+)
+@click.option(
+    "--terminals/--no-terminals",
+    default=True,
+    show_default=True,
+    help="The file terminalsAndIcons.xml, which some importers read wrongly: docs/howto-fmu.md.",
+)
 def export(
-    stage: str,
-    out: Path | None,
-    ports: tuple[str, ...],
-    runtime: str,
-    platforms: tuple[str, ...],
-    observe: tuple[str, ...],
+    stage: str, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], observe: tuple[str, ...], **how: Any
 ) -> None:
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
     from gearfmu.commands.models import model_of
+    from gearfmu.commands.settings import parameters
 
     model = model_of(stage, port_kinds(ports), observe=observe)
-    path = out or Path(f"{model.spec.name}.fmu")
-    fmu.export(model, path, runtime=runtime, platforms=platforms)
+    model = model.with_starts(parameters(model, starts, "--start"))
+    path, runtime = out or Path(f"{model.spec.name}.fmu"), how["runtime"]
+    fmu.export(model, path, **how)
     click.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {runtime}, model {model.hash[:12]}")
 
 

@@ -52,7 +52,8 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
 def frf(stage: str, body: str, **options: Any) -> None:
     """Relative error of the transfer matrix (Frobenius norm) of BODY of STAGE, reduced by several methods.
 
-    Prints a table, writes <body>_frf.csv (method, n, frequency_Hz, error) and a chart.
+    Prints a table, writes <body>_frf.csv (method, n, frequency_Hz, error), a chart, and the transfer matrices
+    themselves: <body>_H.npz for numpy.load.
     """
     entries = _entries(options)
     full = full_order_of(stage, body, options["scale"])
@@ -73,8 +74,9 @@ def frf(stage: str, body: str, **options: Any) -> None:
         click.echo(line)
     click.echo(f"reference: {found.reference.size} vectors, last change {found.reference.change:.1e}, "
                f"{found.reference_seconds:.1f} s; all {found.seconds:.1f} s of processor time")  # fmt: skip
+    path = write_matrices(full, found, contest.judging, options["out"] / f"{body}_H.npz")
     written = write(found, contest, options["out"] / f"{body}_frf", f"{body}, {_ground(full, options)}")
-    click.echo(", ".join(map(str, written)))
+    click.echo(", ".join(map(str, [*written, path])))
 
 
 def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrder:
@@ -154,6 +156,22 @@ def write(found: Any, contest: Any, base: Path, title: str) -> list[Path]:
     path = base.with_suffix(".csv")
     write_text(path, "\n".join(lines) + "\n")
     return [path, *write_error_chart(curves, base, title)]
+
+
+def write_matrices(full: FullOrder, found: Any, judging: Any, path: Path) -> Path:
+    """The transfer matrices as <path>.npz: frequency_Hz (F,), rows (m,) "bolt0.ux", length_m by which rotations are
+    multiplied and moments divided, H_reference (F, m, m) and H_<method>_<n>, all in m/N; complex."""
+    from gearfmu.files import written_whole
+    from gearfmu.reduction.transfer import transfer
+
+    matrices: dict[str, Any] = {
+        f"H_{t.method}_{t.model.size}": transfer(t.model, judging, full.ground) for t in found.trials
+    }
+    rows = np.array([".".join(label) for label in found.reference.labels])
+    with written_whole(path) as temporary:
+        np.savez_compressed(temporary, frequency_Hz=judging.frequency, rows=rows, length_m=full.length,
+                            H_reference=found.reference.matrix, **matrices)  # fmt: skip
+    return path
 
 
 def loaded_rows(labels: Sequence[tuple[str, str]], patterns: str) -> np.ndarray:

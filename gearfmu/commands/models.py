@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -30,7 +31,7 @@ def bodies_of(stage: str) -> tuple[Any, list[Any]]:
     from gearfmu.api.models import load, reduce
 
     spec = load(stage)
-    with progress_bar("reducing") as progress:
+    with reducing() as progress:
         return spec, reduce(spec, progress=progress)
 
 
@@ -41,11 +42,32 @@ def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Any, list[A
 
     own = load(stage)
     folder = bodies_folder(own, bores)
-    with progress_bar("reducing" if folder is None else f"reducing, bores {bores}") as progress:
+    with reducing("reducing" if folder is None else f"reducing, bores {bores}") as progress:
         found = reduced_to_move(own, bores, folder, progress)
     if folder is not None:
         click.echo(f"bodies with bores {bores}: {folder}")
     return found
+
+
+@contextmanager
+def reducing(title: str = "reducing") -> Iterator[Progress]:
+    """A progress function for the reduction of bodies: a bar on a terminal, else one line on standard error for every
+    body that is being made, which takes a minute or more."""
+    with progress_bar(title) as bar:
+        yield bar or _Told(title)
+
+
+class _Told:
+    """One line for each body."""
+
+    def __init__(self, title: str) -> None:
+        self.title, self._last = title, ""
+
+    def __call__(self, fraction: float, text: str = "") -> None:
+        name = text.split(":")[0].removeprefix("reducing ")
+        if name != self._last:
+            click.echo(f"{self.title} {name} …", err=True)
+            self._last = name
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:

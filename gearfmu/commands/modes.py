@@ -11,9 +11,16 @@ import click
 
 from gearfmu.commands.models import bodies_for_motion, bodies_of, by_text
 from gearfmu.commands.shared import Quantity, progress_bar
+from gearfmu.commands.te import warn_of_limits
 
 if TYPE_CHECKING:
     from gearfmu.modes.shapes import BodyModes
+
+
+COUPLED = (
+    "with the couplings of [carrier.coupling]: where they are rigid, bolts and bore stiffen the plate; "
+    "--uncoupled shows it without"
+)
 
 
 @click.command()
@@ -21,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--body", "name", metavar="NAME", help="Modes of this body, with pictures; without: of the whole stage.")
 @click.option("--count", type=click.IntRange(1, 400), default=20, show_default=True, help="Modes; a pair is two.")
 @click.option("--mounted", is_flag=True, help="The ring of a planetary set on its mounts instead of free.")
+@click.option("--uncoupled", is_flag=True, help="The carrier of a set without the couplings of its bolts and bore.")
 @click.option(
     "--torque",
     type=Quantity("N*m"),
@@ -29,7 +37,9 @@ if TYPE_CHECKING:
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
 )
-def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float | None, out: Path) -> None:
+def modes(
+    stage: str, name: str | None, count: int, mounted: bool, uncoupled: bool, torque: float | None, out: Path
+) -> None:
     """Natural frequencies of STAGE.
 
     With --body: elastic modes of one body, with nodal diameters, and per frequency a picture and a .vtu file. Without:
@@ -39,12 +49,16 @@ def modes(stage: str, name: str | None, count: int, mounted: bool, torque: float
     if name is None:
         if mounted:
             raise click.BadParameter("goes with --body ring", param_hint="--mounted")
+        if uncoupled:
+            raise click.BadParameter("goes with --body carrier", param_hint="--uncoupled")
         return _of_stage(stage, torque, count, out)
     if torque is not None:
         raise click.BadParameter("a body's modes know no torque: leave it away", param_hint="--torque")
-    body = _shapes(stage, name, count, mounted)
+    body = _shapes(stage, name, count, (mounted, uncoupled))
     for line in table(body):
         click.echo(line)
+    if body.name == "carrier":
+        click.echo(COUPLED)
     _write(body, out)
     click.echo(f"{out / body.name}_modes.csv, _sheet.png and per frequency _mode_NN.png, .vtu")
 
@@ -53,12 +67,15 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     spec, bodies = bodies_for_motion(stage)
     if torque == 0:
         raise click.BadParameter("must not be 0: flanks have to carry load", param_hint="--torque")
-    from gearfmu.modes.linear import engagements_per_turn, largest_speed, largest_torque, stage_modes
+    from gearfmu.modes.linear import stage_modes
     from gearfmu.report.campbell import campbell_columns, crossings, write_campbell
     from gearfmu.stage import assemble
+    from gearfmu.stage.limits import engagements_per_turn, largest_speed, largest_torque
     from gearfmu.stage.trace import write_columns
 
     model = assemble(spec, bodies)
+    if torque is not None:
+        warn_of_limits(model, (torque,))
     found = stage_modes(model, bodies, largest_torque(model) if torque is None else torque, count)
     for line in stage_table(found):
         click.echo(line)
@@ -115,14 +132,17 @@ def table(body: Any) -> list[str]:
     return lines
 
 
-def _shapes(stage: str, name: str, count: int, mounted: bool) -> BodyModes:
+def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
+    """how: the ring on its mounts, the carrier without couplings."""
     from gearfmu.spec.stage import load_stage
 
-    spec = load_stage(stage)
+    spec, (mounted, uncoupled) = load_stage(stage), how
+    if uncoupled and (spec.kind != "planetary_set" or name != "carrier"):
+        raise click.BadParameter("only the carrier of a planetary set has couplings", param_hint="--uncoupled")
     if mounted and (spec.kind != "planetary_set" or name != "ring"):
         raise click.BadParameter("only the ring of a planetary set has mounts", param_hint="--mounted")
     if spec.kind == "planetary_set":
-        return _of_set(spec, name, count, mounted)
+        return _of_set(spec, name, count, how)
     names = [gear.name for gear in spec.gears]
     _check(name, names)
     _, bodies = bodies_of(stage)
@@ -135,13 +155,16 @@ def _shapes(stage: str, name: str, count: int, mounted: bool) -> BodyModes:
         return gear_modes(*own, bodies[index], count, by_text(progress))
 
 
-def _of_set(spec: Any, name: str, count: int, mounted: bool) -> BodyModes:
-    from gearfmu.modes.planetary import BODIES, mounted_ring_modes, set_body_modes
+def _of_set(spec: Any, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
+    from gearfmu.modes.planetary import BODIES, mounted_ring_modes, set_body_modes, uncoupled_carrier_modes
 
     _check(name, BODIES)
     with progress_bar("shapes") as progress:
+        mounted, uncoupled = how
         if mounted:
             return mounted_ring_modes(spec, count, by_text(progress))
+        if uncoupled:
+            return uncoupled_carrier_modes(spec, count, by_text(progress))
         return set_body_modes(spec, name, count, by_text(progress))
 
 

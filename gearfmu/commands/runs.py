@@ -9,6 +9,7 @@ import click
 
 from gearfmu.commands.shared import Quantity, progress_bar
 
+DEMO_STEP = 20e-6  # s
 OUT = click.Path(path_type=Path, file_okay=False)
 
 
@@ -39,24 +40,31 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
 )
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
 @click.option("--stage", help="Another STAGE than the scene's.")
+@click.option("--step", type=Quantity("s"), help="Another communication step than the scene's: 20 us for spectra.")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
 )
-def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: bool, stage: str | None) -> int:
+def run(scene: str, out: Path | None, stage: str | None, step: float | None, **how: Any) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
     from gearfmu.spec.scene import load_scene
 
     spec = load_scene(scene)
     if stage is not None:
         spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
-    chosen = fmu_path if fmu_path is not None and unit == "fmu" else unit
-    return run_scene(spec, out or Path("out") / spec.name, unit=chosen, verify=verify)
+    unit = how["fmu_path"] if how["fmu_path"] is not None and how["unit"] == "fmu" else how["unit"]
+    spec = spec if step is None else with_step(spec, step)
+    return run_scene(spec, out or Path("out") / spec.name, unit=unit, verify=how["verify"])
 
 
 @click.command()
 @click.argument("stage")
 @click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
 @click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
+@click.option(
+    "--end-speed",
+    type=Quantity("rad/s"),
+    help='A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
+)
 @click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
 @click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
 @click.option(
@@ -74,14 +82,16 @@ def run(scene: str, out: Path | None, unit: str, fmu_path: Path | None, verify: 
     help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
 )
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
-def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: float) -> int:
-    """Run STAGE alone: the outer ends of input and output turn at constant speed, wound up by the torque."""
+def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: Any) -> int:
+    """Run STAGE alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
+    the torque."""
     from gearfmu.commands.models import model_of
+    from gearfmu.commands.settings import parameters
     from gearfmu.stage.steady import Drive, steady_run
 
     model = model_of(stage)
     with progress_bar(model.name) as progress:
-        trace = steady_run(model, Drive(**drive), _parameters(model, settings), progress)
+        trace = steady_run(model, Drive(**drive), parameters(model, settings), progress)
     trace.meta["stage"] = stage
     return finish(trace, out or Path("out") / model.name, stage)
 
@@ -89,10 +99,13 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: f
 @click.command()
 @click.option("--out", type=OUT, default=Path("out/demo"), show_default=True, help="Folder of the results.")
 def demo(out: Path) -> int:
-    """Clutch closure on the shipped stage fzg_c through its exported FMU; ends with a report."""
+    """Clutch closure on the shipped stage fzg_c through its exported FMU; ends with a report.
+
+    It is `gearfmu run clutch_closure --step "20 us"`: so finely sampled its spectra are right up to 16 kHz.
+    """
     from gearfmu.spec.scene import load_scene
 
-    return run_scene(load_scene("clutch_closure"), out, unit="fmu")
+    return run_scene(with_step(load_scene("clutch_closure"), DEMO_STEP), out, unit="fmu")
 
 
 @click.command()
@@ -119,8 +132,14 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
     source = path / "trace.h5" if path.is_dir() else path
     trace = Trace.load(source)
-    named = stage or trace.meta.get("stage_path") or trace.meta.get("stage")
-    click.echo(write_report(trace, out or source.parent, named, source.parent))
+    click.echo(write_report(trace, out or source.parent, stage, source.parent))
+
+
+def with_step(scene: Any, step: float) -> Any:
+    """The SceneSpec with another communication step (s); a usage error for none."""
+    if step <= 0:
+        raise click.BadParameter("must be greater than 0", param_hint="--step")
+    return scene.model_copy(update={"coupling": scene.coupling.model_copy(update={"step": step})})
 
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
@@ -150,6 +169,8 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
         f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
         f"({meta['realtime_factor']:.3g} per simulated second)"
     )
+    for text in meta.get("warnings") or ():
+        click.echo(f"warning: {text}", err=True)
     click.echo(page)
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 
@@ -176,15 +197,3 @@ def write_report(trace: Any, out: Path, stage: str | None, home: Path | None = N
     from gearfmu.api.results import write_report as write
 
     return write(trace, out, stage, home, lambda text: click.echo(f"gearfmu: {text}", err=True))
-
-
-def _parameters(model: Any, settings: tuple[str, ...]) -> dict[str, float]:
-    """Kernel parameters by name from "level=fast" or "slices=10"; a usage error for what the model does not know."""
-    from gearfmu.errors import ModelError
-    from gearfmu.stage.steady import parameters
-
-    pairs = (text.partition("=") for text in settings)
-    try:
-        return parameters(model, {name: value for name, _, value in pairs})
-    except ModelError as error:
-        raise click.BadParameter(str(error), param_hint="--set") from None

@@ -19,6 +19,10 @@ class Quantity(click.ParamType):
         self.unit = unit
         self.name = f'"<number> {unit}"'
 
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """As the option takes it: click would write the unit in capitals."""
+        return self.name
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """SI value of the text; a usage error when number or unit are missing or of another kind."""
         if isinstance(value, float):

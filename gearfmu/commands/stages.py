@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.models import by_text
-from gearfmu.commands.shared import echo_pairs, progress_bar
+from gearfmu.commands.models import by_text, reducing
+from gearfmu.commands.shared import echo_pairs
 
 
 @click.command()
@@ -61,20 +61,21 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
     """Reduce the bodies of STAGE to <body>.h5; a body whose input hash matches is left as it is."""
     import time
 
-    from gearfmu.body import reduce_set, reduce_stage
+    from gearfmu.body import current_bodies, reduce_bodies
     from gearfmu.spec.stage import load_stage
 
     spec, started = load_stage(stage), time.perf_counter()
-    reduce_all: Any = reduce_set if spec.kind == "planetary_set" else reduce_stage
-    with progress_bar("reducing") as progress:
-        bodies = reduce_all(spec, out, force, by_text(progress))
+    kept = set() if force else current_bodies(spec, out)
+    with reducing() as progress:
+        bodies = reduce_bodies(spec, out, force, by_text(progress))
     for body in bodies:
-        click.echo(_told(body))
-    click.echo(f"{len(bodies)} bodies in {time.perf_counter() - started:.1f} s")
+        click.echo(_told(body, body.name in kept))
+    made = len(bodies) - len(kept)
+    click.echo(f"{made} bodies reduced, {len(kept)} read, in {time.perf_counter() - started:.1f} s")
 
 
-def _told(body: Any) -> str:
-    """A body in two lines: what it is and how good, and what it cost."""
+def _told(body: Any, kept: bool) -> str:
+    """A body in two lines: what it is and how good, and what it cost; kept: it was up to date."""
     from gearfmu.body import InterfaceBody
 
     if isinstance(body, InterfaceBody):
@@ -83,17 +84,19 @@ def _told(body: Any) -> str:
         kind, error, top = f"{body.modes} modes", body.frf.max_error, body.frf.band[1]
     return (
         f"{body.name}: {kind} to {body.frequency[-1] / 1e3:.0f} kHz, mass {body.mass:.4g} kg, frequency response "
-        f"within {error:.1e} to {top / 1e3:.0f} kHz, input {body.input_hash[:12]}\n  {_cost(body)}"
+        f"within {error:.1e} to {top / 1e3:.0f} kHz, input {body.input_hash[:12]}\n  {_cost(body, kept)}"
     )
 
 
-def _cost(body: Any) -> str:
+def _cost(body: Any, kept: bool) -> str:
     """Size of the finite elements behind a body, and the processor time and memory its reduction took."""
     mesh, made = body.mesh, body.provenance
     memory, sectors = made["peak_memory_GB"], getattr(body, "teeth", mesh["teeth"])
     return (
-        f"{mesh['dof_body']} DOF, {sectors} sectors of {mesh['dof_sector']}; reduced in {made['cpu_s']:g} s CPU "
-        "time" + ("" if memory is None else f" and {memory:g} GB")
+        f"{mesh['dof_body']} DOF, {sectors} sectors of {mesh['dof_sector']}; "
+        + ("up to date, only read; it was reduced in " if kept else "reduced in ")
+        + f"{made['cpu_s']:g} s CPU time"
+        + ("" if memory is None else f" and {memory:g} GB")
     )
 
 

@@ -53,6 +53,7 @@ def te(
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage, bores=bore)
+    warn_of_limits(model, torques)
     if model.spec.kind == "planetary_set":
         return _of_set(model, list(torques), positions, rigid_bearings, out)
     from gearfmu.report.te import write_plot
@@ -71,6 +72,15 @@ def te(
             click.echo(mesh)
         _tell(result, held)
         click.echo(f"{path}, {picture}")
+
+
+def warn_of_limits(model: Any, torques: tuple[float, ...]) -> None:
+    """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
+    from gearfmu.stage.limits import beyond_limits
+
+    for torque in torques:
+        for text in beyond_limits(model, torque):
+            click.echo(f"warning: {text}", err=True)
 
 
 def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bool, out: Path) -> None:

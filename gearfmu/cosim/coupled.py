@@ -81,6 +81,17 @@ def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
     return Result(trace, outcome, message, cpu, cpu * share, *exchanged, coupled.master.order, facts, coupled.frames)
 
 
+FACTS = (
+    "energy.work",
+    "energy.residual",
+    "solver.n_dyn",
+    "solver.h",
+    "solver.trouble",
+    "solver.steps",
+    "solver.status",
+)
+
+
 class _Timed:
     """A unit whose steps are timed, by the wall clock: asking for CPU time costs as much as a short step."""
 
@@ -104,11 +115,7 @@ class _Run:
         self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, omit)
         self.frames = None if frames is None else FrameRecorder(cut.stage, frames)
         known = cut.stage.outputs()
-        self._fact_names = [
-            name
-            for name in ("energy.work", "energy.residual", "solver.n_dyn", "solver.h", "solver.trouble", "solver.steps")
-            if name in known
-        ]
+        self._fact_names = [name for name in FACTS if name in known]
         self._facts: Any = cut.stage.resolve(self._fact_names)
 
     def go(self) -> None:

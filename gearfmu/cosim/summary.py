@@ -11,6 +11,7 @@ from typing import Any
 from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
+from gearfmu.kernel.binding import status_words
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.turning import meshings
@@ -56,6 +57,7 @@ def _price(result: Result) -> dict[str, Any]:
     return counts | {
         "outcome": result.outcome,
         "message": result.message,
+        "warnings": status_words(int(result.facts.get("solver.status", 0))),
         "simulated_s": end,
         "cpu_s": result.cpu_s,
         "realtime_factor": result.cpu_s / end if end else None,

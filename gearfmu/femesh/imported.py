@@ -1,8 +1,8 @@
 """Finite-element meshes made elsewhere: nodes in metres, quadratic solids, node sets.
 
-.inp is read by `abaqus`; .bdf, .msh and .vtu by meshio, whose traps are turned into clear errors here. Elements:
-hex8, hex20, tet10, also mixed. A hex8 is made a hex20 by mid nodes on its straight edges: a fully integrated hex8 is
-4–13 % too stiff in bending (docs/decisions.md); the price is four times the unknowns.
+.inp is read by `abaqus`, .msh of format 4.1 by `gmsh`; .bdf, older .msh and .vtu by meshio, whose traps are turned
+into clear errors here. Elements: hex8, hex20, tet10, also mixed. A hex8 is made a hex20 by mid nodes on its straight
+edges: a fully integrated hex8 is 4–13 % too stiff in bending (docs/decisions.md); the price is four times the unknowns.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from gearfmu.errors import MeshError
 from gearfmu.femesh.abaqus import Deck, read_deck
+from gearfmu.femesh.gmsh import is_format_4, read_gmsh
 from gearfmu.femesh.nastran import nastran_problems, nastran_sets
 
 _EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
@@ -76,6 +77,8 @@ def read_mesh(path: str | Path, length: float, ignore: tuple[str, ...] = ()) -> 
     suffix = source.suffix.lower()
     if suffix == ".inp":
         nodes, cells, sets, labels = _from_deck(read_deck(source), source)
+    elif suffix == ".msh" and source.is_file() and is_format_4(source):
+        nodes, cells, sets, labels = _from_gmsh(source)
     elif suffix in _FORMATS:
         nodes, cells, sets, labels = _from_meshio(source, _FORMATS[suffix])
     else:
@@ -99,6 +102,21 @@ def _from_deck(deck: Deck, source: Path) -> tuple:
         if not name.startswith("*")
     }
     return nodes, cells, sets, labels
+
+
+def _from_gmsh(source: Path) -> tuple:
+    mesh = read_gmsh(source)
+    order = np.argsort(mesh.labels)
+    labels = mesh.labels[order]
+    cells = {
+        kind: _numbered(np.concatenate(blocks), labels, source, f"elements ({kind})")
+        for kind, blocks in mesh.solids.items()
+    }
+    sets = {
+        name: np.unique(_numbered(np.concatenate(blocks), labels, source, f"physical group {name}"))
+        for name, blocks in mesh.sets.items()
+    }
+    return mesh.nodes[order], cells, sets, labels
 
 
 def _numbered(members: np.ndarray, labels: np.ndarray, source: Path, what: str) -> np.ndarray:

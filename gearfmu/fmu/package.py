@@ -18,6 +18,7 @@ from gearfmu.fmu.terminals import terminals_and_icons
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import host_platform, library_path
 
+TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 MODEL_FILE = "resources/model.gkb"
 RUNTIMES = ("native", "python")
 LONGEST_NAME = 40
@@ -36,11 +37,18 @@ class Model(Protocol):
     def hash(self) -> str: ...
 
 
-def export(model: Model, path: str | Path, runtime: str = "native", platforms: Sequence[str] = ("host",)) -> Path:
+def export(
+    model: Model,
+    path: str | Path,
+    runtime: str = "native",
+    platforms: Sequence[str] = ("host",),
+    terminals: bool = True,
+) -> Path:
     """Write `model` as an FMI 2.0 co-simulation FMU and return its path.
 
     runtime: "native" (the kernel library is the FMU's binary; no Python on the importing machine) or "python"
     (pythonfmu's binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64".
+    terminals: with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md).
     The same model gives the same bytes; the file appears whole or not at all.
     Raises FmuError for unknown options and BuildError when a platform's library is missing or stale."""
     if runtime not in RUNTIMES:
@@ -50,6 +58,8 @@ def export(model: Model, path: str | Path, runtime: str = "native", platforms: S
         raise FmuError('platforms is empty: name at least one, e.g. "host"')
     libraries = {name: library_path("host" if name == host_platform() else name) for name in names}
     files = (_native_files if runtime == "native" else _python_files)(model, libraries)
+    if not terminals:
+        del files[TERMINALS]
     return write_archive(path, files)
 
 
@@ -120,7 +130,7 @@ def _common_files(model: Model, identifier: str, native: bool) -> dict[str, byte
     )
     return {
         "modelDescription.xml": model_description(identity, variables),
-        "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(variables),
+        TERMINALS: terminals_and_icons(variables),
         "documentation/index.html": page(identity, variables).encode(),
         **{f"documentation/licenses/{name}": text.encode() for name, text in licences(native).items()},
         MODEL_FILE: model.blob,

@@ -9,6 +9,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -105,24 +106,39 @@ def _binaries(folder: Path, description: ModelDescription) -> Iterator[tuple[str
 
 
 def _symbols(library: Path, exact: bool) -> Iterator[tuple[str, str, str]]:
-    """All co-simulation functions of FMI 2; a native FMU of ours exports nothing else but the gk_ functions."""
+    """All co-simulation functions of FMI 2; a native FMU of ours exports nothing else but those of model exchange,
+    which some loaders demand, and the gk_ functions."""
     exported, wanted = exported_symbols(library), fmi_functions()
     for name in sorted(wanted - exported):
         yield library.name, f"{name} is not exported", "importers look up every function of FMI 2"
     ours = any(name.startswith("gk_") for name in exported)
-    for name in sorted(n for n in exported - wanted if not n.startswith("gk_")) if exact and ours else ():
+    beyond = exported - wanted - exchange_functions() if exact and ours else set()
+    for name in sorted(n for n in beyond if not n.startswith("gk_")):
         yield library.name, f"{name} is exported", "hide it: another FMU in the process could take it for its own"
 
 
 def fmi_functions() -> set[str]:
     """Names of the functions that a co-simulation FMU exports, from the FMI 2 header."""
+    common, _, simulation = _declared()
+    return common | simulation
+
+
+def exchange_functions() -> set[str]:
+    """Names of the functions that a model exchange FMU exports besides the common ones."""
+    return _declared()[1]
+
+
+@cache
+def _declared() -> tuple[set[str], ...]:
+    """Functions of the FMI 2 header: common, of model exchange, of co-simulation."""
     text = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8", errors="replace")
-    exchange, simulation = "Functions for FMI2 for Model Exchange", "Functions for FMI2 for Co-Simulation"
-    declared = text.rindex("Common Functions")
-    names = set()
-    for part in (text[declared : text.rindex(exchange)], text[text.rindex(simulation) :]):
-        names |= {line.split()[2].rstrip(";") for line in part.splitlines() if line.strip().startswith("FMI2_Export")}
-    return names
+    heads = ("Common Functions", "Functions for FMI2 for Model Exchange", "Functions for FMI2 for Co-Simulation")
+    places = [*(text.rindex(head) for head in heads), len(text)]
+    parts = (text[start:end] for start, end in zip(places, places[1:], strict=False))
+    return tuple(
+        {line.split()[2].rstrip(";") for line in part.splitlines() if line.strip().startswith("FMI2_Export")}
+        for part in parts
+    )
 
 
 def _answers(folder: Path) -> Iterator[tuple[str, str, str]]:

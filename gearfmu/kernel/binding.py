@@ -10,7 +10,7 @@ from pathlib import Path
 from gearfmu.errors import ModelError
 from gearfmu.kernel.build import library_path
 
-ABI = 2
+ABI = 3
 MESSAGE = 512
 OUTCOMES = (
     "ok",
@@ -49,6 +49,7 @@ class VariableInfo(ctypes.Structure):
 _SIGNATURES = {
     "gk_abi": (c_int, []),
     "gk_outcome_text": (c_char_p, [c_int]),
+    "gk_status_text": (c_char_p, [c_int]),
     "gk_model_size": (c_size_t, []),
     "gk_model_open": (c_int, [c_void_p, c_void_p, c_size_t, c_char_p]),
     "gk_model_name": (c_char_p, [c_void_p]),
@@ -94,6 +95,15 @@ def load(path: Path | None = None) -> ctypes.CDLL:
             "reinstall gearfmu"
         )
     return library
+
+
+def status_words(status: int) -> list[str]:
+    """What the bits of solver.status say, in words."""
+    words, bit = [], 0
+    while (text := load().gk_status_text(bit)) is not None:
+        words += [text.decode()] if status >> bit & 1 else []
+        bit += 1
+    return words
 
 
 def aligned(size: int) -> tuple[ctypes.Array, int]:

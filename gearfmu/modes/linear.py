@@ -22,12 +22,11 @@ import scipy.linalg as sl
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND, SPIN, LinearModel
 from gearfmu.spec.general import ShaftBody
-from gearfmu.spec.turning import meshings, turns
 from gearfmu.stage import StageModel
 from gearfmu.stage.assembly import mount_sets
 from gearfmu.stage.groups import Group
 from gearfmu.stage.layout import stage_layout
-from gearfmu.stage.te import MeshPlace, place_of
+from gearfmu.stage.limits import places_of
 
 GROUPS = ("mesh", "bearings", "shafts", "bodies")
 FULL = 3.0  # level at which every oscillator is dynamic
@@ -84,31 +83,6 @@ def full_kernel(model: StageModel) -> Kernel:
     kernel = model.kernel(level=FULL)
     kernel.prepare()
     return kernel
-
-
-def places_of(model: StageModel) -> list[MeshPlace]:
-    """The engagements that turn with the ports."""
-    turning = turns(model.stage, model.shafts.input)
-    return [place_of(model, name) for name, meshing in meshings(model.stage).items() if meshing.rotor in turning]
-
-
-def largest_torque(model: StageModel) -> float:
-    """Torque on the input (N·m) that brings no engagement beyond its torque_max."""
-    return min(place.most for place in places_of(model))
-
-
-def engagements_per_turn(model: StageModel) -> list[float]:
-    """(E,): tooth engagements of every mesh in one revolution of the input, 0 where it does not turn with it."""
-    turning = turns(model.stage, model.shafts.input)
-    found = meshings(model.stage).values()
-    return [abs(float(m.relative(turning))) * m.teeth if m.rotor in turning else 0.0 for m in found]
-
-
-def largest_speed(model: StageModel) -> float:
-    """Speed of the input (rad/s) that brings no engagement beyond its speed_max."""
-    cycles, known = engagements_per_turn(model), meshings(model.stage)
-    meshes = zip(model.stage.engagements, cycles, strict=True)
-    return min(mesh.speed_max * known[mesh.name].teeth / each for mesh, each in meshes if each)
 
 
 def shaft_rows(model: StageModel, bodies: Sequence[Any]) -> np.ndarray | None:

@@ -36,6 +36,21 @@ def set_body_modes(spec: Any, name: str, count: int, progress: Progress | None =
     return _damped(found, gear.modal_damping)
 
 
+def uncoupled_carrier_modes(spec: Any, count: int, progress: Progress | None = None, scale: float = 1.0) -> BodyModes:
+    """The lowest elastic modes of the free carrier without its couplings: bolts and bore deform as they like.
+
+    BodyError for an imported carrier and for planets at uneven angles, which have no sector that repeats.
+    """
+    angles = CarrierGeometry.of(spec).angles
+    even = 2 * np.pi * np.arange(len(angles)) / len(angles)
+    if spec.carrier.imported is not None or not np.allclose(angles, even, atol=1e-9):
+        why = "only a carrier meshed here, of evenly spaced planets, is taken without couplings"
+        raise BodyError(f"{spec.source}: {why}")
+    sector = set_sector(spec, "carrier", scale)
+    found = cyclic_modes("carrier_uncoupled", sector, spec.carrier.material, count, progress)
+    return _damped(found, spec.carrier.modal_damping)
+
+
 def mounted_ring_modes(spec: Any, count: int, progress: Progress | None = None, scale: float = RING_SCALE) -> BodyModes:
     """The lowest modes of the ring on its mounts, with all its teeth.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,13 @@ import numpy as np
 from gearfmu.files import write_text
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.report import deformation as drawn
-from gearfmu.report import page, picture, plots, plots_nvh, plots_runup, plots_set
+from gearfmu.report import page, picture, plots, plots_nvh, plots_runup, plots_set, runup
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.plots import Plot
 from gearfmu.report.plots_set import PlanetSet
 from gearfmu.report.results import key_results, strict
-from gearfmu.report.signals import SETTLED, known_meshings, mesh_angles, meshes, window_of_interest
+from gearfmu.report.signals import SETTLED, Window, known_meshings, mesh_angles, meshes, window_of_interest
 from gearfmu.spec.expand import as_general
 from gearfmu.stage.deformation import Deformation, DeformationError
 from gearfmu.stage.meshes import tooth_phases
@@ -104,13 +105,30 @@ def _plots(
     if spec is not None and bodies:
         makers += [partial(picture.deformed_pair, trace, as_general(spec), mesh, bodies) for mesh in meshes(trace)]
     makers += deformed
-    makers.append(lambda: plots_nvh.force_spectrum(trace, window, angles))
+    run = _run_up(trace, window, spec, bodies)
+    if run is not None:
+        makers += [partial(make, run) for make in plots_runup.FIGURES]
+    else:
+        makers.append(lambda: plots_nvh.force_spectrum(trace, window, angles))
     makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in angles.items()]
-    makers.append(lambda: plots_nvh.force_spectrogram(trace, angles))
+    if run is None:
+        makers.append(lambda: plots_nvh.force_spectrogram(trace, angles))
     made, missing = _made(makers)
     if not angles:
         missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
     return made, missing
+
+
+def _run_up(trace: Trace, window: Window, spec: Any, bodies: Sequence[Any] | None) -> runup.RunUp | None:
+    """The run-up of a stage of one engagement, with its resonances where the stage is at hand; None for no run-up."""
+    known = known_meshings(trace, spec)
+    if len(known) != 1:
+        return None
+    ((mesh, meshing),) = known.items()
+    run = runup.run_up_of_pair(trace, mesh, meshing, window)
+    if run is None or spec is None or not bodies or f"{mesh}.force" not in run.signals:
+        return run
+    return replace(run, resonances=runup.resonances(run, mesh, spec, bodies))
 
 
 def _set_pair(trace: Trace, own: PlanetSet, spec: Any, bodies: Sequence[Any] | None) -> list[Callable[[], Plot | None]]:
@@ -131,7 +149,7 @@ def _of_set(
 ) -> list[Callable[[], Plot | None]]:
     """What makes the plots of a planetary set: its planets side by side instead of mesh by mesh."""
     window = window_of_interest(trace)
-    run = plots_runup.run_up(trace, own, window, spec, bodies)
+    run = runup.run_up_of_set(trace, own, window, spec, bodies)
     over_frequency: list[Callable[[], Plot | None]] = [lambda: plots_set.spectrum(trace, own, window)]
     if run is not None:
         over_frequency = [partial(make, run) for make in plots_runup.FIGURES]
@@ -192,6 +210,7 @@ def _document(
     body = [
         page.head(title, str(summary.get("outcome", "outcome not given")), f"{stage}{' · ' + about if about else ''}"),
         page.facts(_facts(summary)),
+        *[page.warning(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("warnings") or ()],
         *(_planets(trace, spec) or [page.section("Results", _results(trace))]),
         *[page.figure(plot) for plot in made if not plot.name.startswith(NVH)],
         *_warned(trace),
@@ -201,7 +220,10 @@ def _document(
         page.details("Where it comes from", page.pairs_table(_provenance(summary)), _channels(trace)),
     ]
     if missing:
-        body.insert(3, page.section("Not shown", *[page.note(reason) for reason in missing]))
+        body.insert(
+            3 + len(summary.get("warnings") or ()),
+            page.section("Not shown", *[page.note(reason) for reason in missing]),
+        )
     return page.page(f"{title} – {stage}", body)
 
 

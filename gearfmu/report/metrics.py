@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import firwin, resample_poly
 
 from gearfmu.errors import GearfmuError
 
 FLOOR = 1e-12
+OVERSAMPLING, FILTER_REACH = 4, 32  # FILTER_REACH: samples on either side
 HANN_NOISE_BANDWIDTH = 1.5
 OCTAVES = tuple((c / np.sqrt(2), c, c * np.sqrt(2)) for c in (63, 125, 250, 500, 1000, 2000, 4000, 8000, 16000))
 
@@ -92,23 +94,32 @@ def sample_step(time: np.ndarray) -> float:
     return step
 
 
-def amplitude_spectrum(values: np.ndarray, step: float, segment: int | None = None) -> Spectrum:
+def undo_mean(amplitude: np.ndarray, frequency: np.ndarray, averaged: float) -> np.ndarray:
+    """Amplitudes at frequency (Hz) of a signal whose samples are means over `averaged` s, as they are without: such a
+    mean multiplies a vibration by sin(π f T)/(π f T). 0: samples, as they are."""
+    return amplitude / np.sinc(frequency * averaged)
+
+
+def amplitude_spectrum(values: np.ndarray, step: float, segment: int | None = None, averaged: float = 0.0) -> Spectrum:
     """Hann spectrum of values (n,) sampled every `step` s, mean removed, segments overlapping by half.
 
-    segment : samples a window; all of them when None. Powers are averaged over segments.
+    segment : samples a window; all of them when None. Powers are averaged over segments. averaged : `undo_mean`.
     Raises MetricsError for fewer than 16 samples.
     """
     size = min(segment or values.size, values.size)
     frames = _frames(values, size, max(size // 2, 1))
     power = np.mean(_amplitudes(frames) ** 2, axis=0)
-    return Spectrum(np.fft.rfftfreq(size, step), np.sqrt(power), frames.shape[0])
+    frequency = np.fft.rfftfreq(size, step)
+    return Spectrum(frequency, undo_mean(np.sqrt(power), frequency, averaged), frames.shape[0])
 
 
-def spectrogram(values: np.ndarray, step: float, segment: int, hop: int) -> Spectrogram:
-    """Hann spectra of windows of `segment` samples every `hop` samples, mean of each window removed."""
+def spectrogram(values: np.ndarray, step: float, segment: int, hop: int, averaged: float = 0.0) -> Spectrogram:
+    """Hann spectra of windows of `segment` samples every `hop` samples, mean of each window removed; averaged:
+    `undo_mean`."""
     frames = _frames(values, segment, hop)
     centres = (np.arange(frames.shape[0]) * hop + (segment - 1) / 2) * step
-    return Spectrogram(centres, np.fft.rfftfreq(segment, step), _amplitudes(frames))
+    frequency = np.fft.rfftfreq(segment, step)
+    return Spectrogram(centres, frequency, undo_mean(_amplitudes(frames), frequency, averaged))
 
 
 def band_rms(spectrum: Spectrum, low: float, high: float) -> float:
@@ -134,12 +145,19 @@ def mesh_angle(time: np.ndarray, speed: np.ndarray, teeth: int) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))))
 
 
-def order_cuts(time: np.ndarray, values: np.ndarray, angle: np.ndarray, orders: int = 5, periods: int = 8) -> OrderCuts:
+def order_cuts(
+    time: np.ndarray,
+    values: np.ndarray,
+    angle: np.ndarray,
+    orders: int = 5,
+    periods: int = 8,
+    averaged: float = 0.0,
+) -> OrderCuts:
     """Follow mesh orders 1 … `orders` of values (n,) along the mesh angle (n,) rad (from `mesh_angle`).
 
     Each point is a Fourier coefficient over a Hann window of `periods` mesh periods *in angle*, so that a signal of
-    constant order keeps its amplitude while the speed changes. Points lie half a window apart. Raises MetricsError when
-    the record holds less than one window.
+    constant order keeps its amplitude while the speed changes. Points lie half a window apart. averaged : `undo_mean`.
+    Raises MetricsError when the record holds less than one window.
     """
     width = 2 * np.pi * periods
     if angle[-1] < width:
@@ -153,18 +171,26 @@ def order_cuts(time: np.ndarray, values: np.ndarray, angle: np.ndarray, orders: 
     mesh_frequency = np.interp(centres, angle, frequency)
     for column, centre in enumerate(centres):
         a, b = np.searchsorted(angle, [centre - width / 2, centre + width / 2])
-        usable = found * np.max(frequency[a:b]) < 0.45 / step if b - a >= 4 * periods else np.zeros(orders, dtype=bool)
+        usable = found * np.max(frequency[a:b]) < 0.45 / step if b - a > 2 * periods else np.zeros(orders, dtype=bool)
         amplitude[usable, column] = _coefficients(angle[a:b] - centre, values[a:b], found[usable], width)
+    amplitude = undo_mean(amplitude, found[:, None] * mesh_frequency, averaged)
     return OrderCuts(centre_time, mesh_frequency, found, amplitude)
 
 
-def order_map(time: np.ndarray, values: np.ndarray, angle: np.ndarray, highest: float, turns: int = 4) -> OrderMap:
+def order_map(
+    time: np.ndarray,
+    values: np.ndarray,
+    angle: np.ndarray,
+    highest: float,
+    turns: int = 4,
+    averaged: float = 0.0,
+) -> OrderMap:
     """Orders up to `highest` of values (n,) along the angle (n,) rad of a shaft, which grows all the time.
 
-    The signal is taken at equal steps of the angle (cubic spline), so that an order stays a line while the speed
+    The signal is taken at equal steps of the angle, so that an order stays a line while the speed
     changes; Hann windows of `turns` revolutions, one revolution apart: lines 1/turns of an order apart. Orders above
-    0.45 of the sampling rate at the window's speed are NaN. Raises MetricsError where the angle turns round or the
-    record holds less than one window.
+    0.45 of the sampling rate at the window's speed are NaN. averaged : `undo_mean`. Raises MetricsError where the angle
+    turns round or the record holds less than one window.
     """
     steps, interval = np.diff(angle), sample_step(time)
     if np.any(steps <= 0):
@@ -174,15 +200,27 @@ def order_map(time: np.ndarray, values: np.ndarray, angle: np.ndarray, highest: 
         raise MetricsError(f"the record holds {held:.1f} revolutions, an order map needs {turns}; record a longer run")
     each = int(np.ceil(2 * np.pi / steps.min()))  # samples a revolution: none is left out where the shaft is slowest
     even = angle[0] + np.arange(int((angle[-1] - angle[0]) / (2 * np.pi) * each)) * (2 * np.pi / each)
-    frames = _frames(CubicSpline(angle, values)(even), turns * each, each)
+    frames = _frames(_oversampled(angle, values)(even), turns * each, each)
     centres = angle[0] + 2 * np.pi * (np.arange(len(frames)) + 0.5 * turns)
-    speed = np.interp(centres, angle, np.gradient(angle, time))
+    ends = [np.interp(centres + side * np.pi / 2, angle, time) for side in (-1, 1)]
+    speed = np.pi / (ends[1] - ends[0])  # mean over half a revolution: free of the shaft's vibration
     order = np.arange(frames.shape[1] // 2 + 1) / turns
     kept = order <= highest
     amplitude = _amplitudes(frames)[:, kept]
     limit = 0.45 / interval * 2 * np.pi / speed
     amplitude[order[None, kept] > limit[:, None]] = np.nan
+    amplitude = undo_mean(amplitude, order[None, kept] * speed[:, None] / (2 * np.pi), averaged)
     return OrderMap(np.interp(centres, angle, time), speed, order[kept], amplitude)
+
+
+def _oversampled(angle: np.ndarray, values: np.ndarray) -> CubicSpline:
+    """The signal over the angle by a spline through OVERSAMPLING times as many points, which a band-limited filter puts
+    between the samples: a spline through the samples alone weakens what lies above a fifth of their rate."""
+    count = OVERSAMPLING * (angle.size - 1) + 1
+    between = firwin(2 * FILTER_REACH * OVERSAMPLING + 1, 1 / OVERSAMPLING, window=("kaiser", 8.0))  # ripple 1e-4
+    fine = resample_poly(values, OVERSAMPLING, 1, window=between, padtype="line")[:count]
+    places = np.arange(count) / OVERSAMPLING
+    return CubicSpline(CubicSpline(np.arange(angle.size), angle)(places), fine)
 
 
 def _coefficients(angle: np.ndarray, values: np.ndarray, orders: np.ndarray, width: float) -> np.ndarray:

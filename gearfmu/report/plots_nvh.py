@@ -19,6 +19,7 @@ RANGE_DB = 90
 ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
 DASHES = ((0, (4, 4)), (0, (1, 3)))  # of the orders of one mesh and the next
+MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 
@@ -31,6 +32,17 @@ def force_channels(trace: Trace) -> list[str]:
     return [name for name in best if name is not None]
 
 
+def averaging(trace: Trace, name: str) -> float:
+    """Time (s) over which a sample of the channel is a mean: the communication step of "…_mean", else 0."""
+    return metrics.sample_step(trace.time) if name.endswith("_mean") else 0.0
+
+
+def spectrum_of(part: Trace, name: str, size: int | None = None) -> metrics.Spectrum:
+    """Spectrum of a channel over the whole of `part`; of a mean over the step as it is without the averaging."""
+    step = metrics.sample_step(part.time)
+    return metrics.amplitude_spectrum(part[name], step, size, averaging(part, name))
+
+
 def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray]) -> Plot | None:
     """Level of every bearing and mesh force over frequency, mesh orders marked; None without forces. angles: mesh angle
     (n,) rad by engagement."""
@@ -39,7 +51,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
         return None
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
-    spectra = {name: metrics.amplitude_spectrum(part[name], step, segment(part.time.size)) for name in names}
+    spectra = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
     groups = _by_part(names)
     with styled():
         figure, axes = panels((1.7,) * len(groups) if len(groups) > 1 else (2.6,))
@@ -56,10 +68,11 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
         f"from {window.start:.3f} s to {window.end:.3f} s ({window.reason}). "
+        f"{MEANS if any(name.endswith('_mean') for name in names) else ''}"
         + (
             f"Dotted: {of_mesh(trace, ' and '.join(marked), 'mesh orders')}."
             if marked
-            else "Mesh orders are not marked: the speed is not known or not steady."
+            else "Mesh orders are not marked: the speed is not known or not steady, or they lie above the spectrum."
         )
     )
     return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
@@ -74,7 +87,11 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
     if not names:
         return None
     file = "orders" if not others else f"orders_{mesh}"
-    cuts = {name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS) for name in names}
+    cuts = {
+        name: metrics.order_cuts(trace.time, trace[name], mesh_angle, ORDERS, averaged=averaging(trace, name))
+        for name in names
+    }
+    _require_order(next(iter(cuts.values())), mesh, metrics.sample_step(trace.time))
     with styled():
         figure, axes = panels((1.6,) * len(cuts))
         for axis, (name, cut) in zip(axes, cuts.items(), strict=True):
@@ -108,7 +125,8 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     name = next((n for n in names if preferred in n), names[0])
     step = metrics.sample_step(trace.time)
     window_size = segment(trace.time.size, windows=14)
-    picture_data = metrics.spectrogram(trace[name], step, window_size, max(window_size // 16, 1))
+    hop = max(window_size // 16, 1)
+    picture_data = metrics.spectrogram(trace[name], step, window_size, hop, averaging(trace, name))
     if picture_data.time.size < 4:
         raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
     values = metrics.level(picture_data.amplitude)
@@ -145,8 +163,7 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
 def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
     """Octave-band levels in dB re 1 N by channel over `window`, from one full-length Hann window."""
     part = trace.window(window.start, window.end)
-    step = metrics.sample_step(part.time)
-    return {name: metrics.octave_levels(metrics.amplitude_spectrum(part[name], step)) for name in force_channels(trace)}
+    return {name: metrics.octave_levels(spectrum_of(part, name)) for name in force_channels(trace)}
 
 
 def _by_part(names: list[str]) -> list[list[str]]:
@@ -182,30 +199,42 @@ def sampling_warning(trace: Trace) -> str | None:
     )
 
 
+def _require_order(cuts: metrics.OrderCuts, mesh: str, step: float) -> None:
+    """MetricsError where not even the first order lies below the sampling limit anywhere in the run."""
+    if not np.any(np.isfinite(cuts.amplitude)):
+        lowest = float(cuts.mesh_frequency.min())
+        raise metrics.MetricsError(
+            f"Mesh orders of {mesh}: its mesh frequency, {lowest:.0f} Hz and more, lies above 0.45 of the sampling "
+            f"rate, {0.45 / step:.0f} Hz. Run again with a communication step of {0.45e6 / lowest / 5:.2g} µs for the "
+            "first five orders."
+        )
+
+
 def level_axis(axis: Axes, label: str, end: float | None = None) -> None:
     """Limit the level axis to RANGE_DB below the highest line, so that a silent line does not squeeze the rest."""
-    tops = [np.nanmax(line.get_ydata()) for line in axis.lines]
-    lows = [np.nanmin(line.get_ydata()) for line in axis.lines]
-    top = np.ceil((max(tops) + 3) / 10) * 10
-    axis.set_ylim(max(np.floor((min(lows) - 3) / 10) * 10, top - RANGE_DB), top)
+    shown = [line.get_ydata() for line in axis.lines if np.any(np.isfinite(line.get_ydata()))]
+    if shown:
+        top = np.ceil((max(map(np.nanmax, shown)) + 3) / 10) * 10
+        axis.set_ylim(max(np.floor((min(map(np.nanmin, shown)) - 3) / 10) * 10, top - RANGE_DB), top)
     axis.set_ylabel(label)
     axis.margins(x=0)
     if end is not None:
         axis.set_xlim(0, end)
-    elif len(axis.lines) > 1 or axis.lines[0].get_label():
+    elif axis.lines:
         axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
 
 
 def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray]) -> bool:
     """Mark the orders of an engagement (name, mesh angle) at the median speed, if nine tenths of the window stay within
-    10 %; whether it did."""
+    10 %; whether there was one to mark."""
     name, angle = mesh
     frequency = np.interp(time, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
     low, middle, high = np.percentile(frequency, [5, 50, 95])
     if middle <= 0 or high - low > 0.1 * middle:
         return False
     several = len(meshes(trace)) > 1
-    for order in range(1, min(int(axis.get_xlim()[1] * 1e3 / middle), 3 if several else 24) + 1):
+    highest = min(int(axis.get_xlim()[1] * 1e3 / middle), 3 if several else 24)
+    for order in range(1, highest + 1):
         axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
         axis.annotate(
             f"{name} {order}" if several else str(order),
@@ -216,7 +245,7 @@ def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh: tuple[str, np
             fontsize=8,
             color=MUTED,
         )
-    return True
+    return highest > 0
 
 
 def _overlay_orders(axis: Axes, trace: Trace, mesh: tuple[np.ndarray, Any], limit: float) -> None:

@@ -1,11 +1,6 @@
-"""Figures of a run-up of a planetary set: what its orders do while the speed grows."""
+"""Figures of a run-up: what the orders of a stage do while the speed grows."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,121 +8,41 @@ from matplotlib.axes import Axes
 from gearfmu.report import metrics
 from gearfmu.report.plots import RPM, Plot
 from gearfmu.report.plots_nvh import level_axis
-from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
-from gearfmu.report.ring_pickup import rim_velocity
-from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window
+from gearfmu.report.runup import PICKUP, RunUp, Signal
+from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED
 from gearfmu.report.style import COLOURS, MUTED, panels, png, styled, svg
-from gearfmu.stage.trace import Trace
 
-LEAST_RANGE = 0.3  # of the mean speed, that the carrier gathers in a run-up
-BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive
-SLOWEST = 0.02  # of it: slower than that there are no orders
-WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
-MESH_ORDERS = 3
 SHOWN_DB = 60
 BINS = 160  # windows of the frequency map over the run
-PICKUP = "pickup on the ring"
-
-
-@dataclass(frozen=True)
-class Signal:
-    """values (n,); unit, and what its level refers to; sides: for every mesh order the orders beside it, of the
-    carrier, that the signal has by the passing of the planets."""
-
-    values: np.ndarray
-    unit: str
-    reference: float
-    sides: Mapping[int, tuple[float, ...]]
-
-    def level(self, amplitude: np.ndarray) -> np.ndarray:
-        """Level in dB."""
-        return metrics.level(amplitude, self.reference)
-
-    @property
-    def label(self) -> str:
-        """Of a level."""
-        return f"dB re {self.reference:g} {self.unit}"
-
-
-@dataclass(frozen=True)
-class RunUp:
-    """Part of a trace in which the carrier gathers speed. each: mesh frequency over the carrier's; signals by name."""
-
-    part: Trace
-    carrier: str
-    each: float
-    signals: Mapping[str, Signal]
-
-    @cached_property
-    def orders(self) -> dict[str, metrics.OrderMap]:
-        """The order map of every signal."""
-        angle, time = self.part[f"{self.carrier}{GEAR_PHI}"], self.part.time
-        angle = angle if angle[-1] > angle[0] else -angle
-        highest = (MESH_ORDERS + 0.3) * self.each
-        return {name: metrics.order_map(time, own.values, angle, highest) for name, own in self.signals.items()}
-
-
-def run_up(
-    trace: Trace, own: PlanetSet, window: Window, spec: Any = None, bodies: Sequence[Any] | None = None
-) -> RunUp | None:
-    """The run-up of a set within `window`; None where its carrier does not gather speed (or lose it) steadily. spec and
-    bodies: for the pickup on the ring."""
-    part, names = trace.window(window.start, window.end), (own.meshing.rotor, own.carrier)
-    if any(f"{name}{GEAR_SPEED}" not in part for name in names) or f"{own.carrier}{GEAR_PHI}" not in part:
-        return None
-    speeds = {name: part[f"{name}{GEAR_SPEED}"] for name in names}
-    speed = np.abs(speeds[own.carrier])
-    gained, most = speed[-1] - speed[0], max(float(speed.mean()), 1e-9)
-    against = speed - np.maximum.accumulate(speed) if gained > 0 else np.minimum.accumulate(speed) - speed
-    if abs(gained) < LEAST_RANGE * most or against.min() < -BACKWARD * most or speed.min() < SLOWEST * most:
-        return None
-    each = float(np.mean(np.abs(own.meshing.relative(speeds)))) / most * own.meshing.teeth
-    each = round(each) if abs(each - round(each)) < WHOLE else each
-    signals = _signals(part, own, each)
-    velocity = None if spec is None or not bodies else rim_velocity(part, own, spec, bodies)
-    if velocity is not None:
-        beside = {k: passing_orders(k * each, len(own.planets)) for k in range(1, MESH_ORDERS + 1)}
-        signals = {PICKUP: Signal(velocity, "m/s", 1e-9, beside)} | signals
-    return RunUp(part, own.carrier, each, signals) if signals else None
-
-
-def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:
-    """Force of the ring on its mounts, whose direction goes round with the carrier, and a mesh of every central
-    gear."""
-    around = {k: (k * each - 1.0, k * each + 1.0) for k in range(1, MESH_ORDERS + 1)}
-    found = {name: Signal(values, "N", 1.0, around) for name, values in on_mounts(part).items() if name[-1] == "x"}
-    meshes = [next(iter(meshes.values())) for meshes in own.meshes.values()]
-    forces = {f"{mesh}.force": mean_or_sample(part, f"{mesh}.force") for mesh in meshes if f"{mesh}.force" in part}
-    return found | {name: Signal(values, "N", 1.0, {}) for name, values in forces.items()}
-
-
-def passing_orders(order: float, planets: int) -> tuple[float, ...]:
-    """Orders of the carrier beside a mesh order that equal planets make at a place on the ring: the nearest ones that
-    the number of planets divides (the mesh order itself is not among them)."""
-    below, above = np.ceil(order / planets) - 1, np.floor(order / planets) + 1
-    return float(below * planets), float(above * planets)
+CROSSED = " Circles: where an order meets a natural frequency of the stage, linearised under its mean load, that a "
+CROSSED += "transmission error drives."
+MARKED = " Ticks at the top, in the colour of the order: where it meets a natural frequency of the linearised stage."
+BESIDE = "; dotted the orders beside it that are marked in the order map, together"
+PASSING = " and, thin, what the passing of the planets makes beside them"
 
 
 def frequency_maps(run: RunUp) -> Plot:
-    """Level of every signal over frequency and speed of the carrier: the Campbell diagram of the run."""
+    """Level of every signal over frequency and speed of the shaft: the Campbell diagram of the run."""
     step, samples = metrics.sample_step(run.part.time), run.part.time.size
     size = min(samples, 2 ** max(6, round(np.log2(samples / 40))))
     hop = max(1, (samples - size) // BINS)
-    maps = {name: metrics.spectrogram(own.values, step, size, hop) for name, own in run.signals.items()}
-    top = min((MESH_ORDERS + 0.3) * run.each * _fastest(run), 0.5 / step)
+    maps = {name: metrics.spectrogram(own.values, step, size, hop, own.averaged) for name, own in run.signals.items()}
+    top = min((run.orders_shown + 0.3) * run.each * _fastest(run), 0.5 / step)
     first = next(iter(maps.values()))
-    speed, kept = _speed_at(run, first.time) * RPM, first.frequency <= top
+    speed, kept = _speed_at(run, first.time, size * step) * RPM, first.frequency <= top
     with styled():
         figure, axes = panels((2.7,) * len(maps))
         for axis, (name, found) in zip(axes, maps.items(), strict=True):
             _image(axis, (speed, found.frequency[kept] / 1e3, found.amplitude[:, kept].T), (name, run.signals[name]))
             axis.set(xlim=(speed.min(), speed.max()), ylim=(0, top / 1e3), ylabel="frequency in kHz")
             _rays(axis, run)
-        axes[-1].set_xlabel("speed of the carrier in rpm")
+            _circles(axis, run)
+        axes[-1].set_xlabel(f"speed of the {run.shaft} in rpm")
         picture = png(figure)
     caption = (
         f"Hann windows of {size * step * 1e3:.0f} ms, resolution {first.frequency[1]:.0f} Hz. Dashed: mesh orders "
-        f"k·f_m, f_m = {run.each:.6g} f_c. What lies level is a resonance.{_about_pickup(run)}"
+        f"k·f_m, f_m = {run.each:.6g} f of the {run.shaft}. What lies level is a resonance."
+        f"{CROSSED if run.resonances else ''}{_about_pickup(run)}"
     )
     data = {"speed_[rpm]": np.repeat(speed, kept.sum()), "frequency_[Hz]": np.tile(first.frequency[kept], speed.size)}
     data |= {_column(run, name): found.amplitude[:, kept].ravel() for name, found in maps.items()}
@@ -135,20 +50,21 @@ def frequency_maps(run: RunUp) -> Plot:
 
 
 def order_maps(run: RunUp) -> Plot:
-    """Level of every signal over order and speed of the carrier."""
+    """Level of every signal over order and speed of the shaft."""
     with styled():
         figure, axes = panels((2.7,) * len(run.orders))
         for axis, (name, found) in zip(axes, run.orders.items(), strict=True):
             _image(axis, (found.order, found.speed * RPM, found.amplitude), (name, run.signals[name]))
-            axis.set(xlim=(0, (MESH_ORDERS + 0.3) * run.each), ylabel="speed of the carrier in rpm")
+            axis.set(xlim=(0, (run.orders_shown + 0.3) * run.each), ylabel=f"speed of the {run.shaft} in rpm")
             _mark_orders(axis, run, run.signals[name])
-        axes[-1].set_xlabel("order of the carrier")
+        axes[-1].set_xlabel(f"order of the {run.shaft}")
         picture = png(figure)
     first = next(iter(run.orders.values()))
+    passing = PASSING if any(own.sides for own in run.signals.values()) else ""
     caption = (
-        f"Orders per revolution of the carrier, Hann windows of {1 / first.order[1]:.0f} revolutions. Marked at the "
-        f"top: mesh orders k × {run.each:.6g} and, thin, what the passing of the planets makes beside them. What "
-        "stands upright goes with the speed; a resonance lies on a hyperbola, frequency over speed."
+        f"Orders per revolution of the {run.shaft}, Hann windows of {1 / first.order[1]:.0f} revolutions. Marked at "
+        f"the top: mesh orders k × {run.each:.6g}{passing}. What stands upright goes with the speed; a resonance lies "
+        "on a hyperbola, frequency over speed."
     )
     data = {"speed_[rpm]": np.repeat(first.speed * RPM, first.order.size)}
     data |= {"order": np.tile(first.order, first.speed.size)}
@@ -160,6 +76,7 @@ def order_levels(run: RunUp) -> Plot:
     """Level of the first mesh orders, and of what is beside each, over the speed."""
     speed = next(iter(run.orders.values())).speed * RPM
     found = {name: _bands(run, name) for name in run.signals}
+    beside = any(own.sides for own in run.signals.values())
     with styled():
         figure, axes = panels((1.9,) * len(found))
         for axis, (name, bands) in zip(axes, found.items(), strict=True):
@@ -168,12 +85,13 @@ def order_levels(run: RunUp) -> Plot:
                 look = {"ls": ":", "lw": 1.3} if label.startswith("beside") else {"lw": 1.1}
                 axis.plot(speed, run.signals[name].level(amplitude), label=label, color=COLOURS[order - 1], **look)
             level_axis(axis, run.signals[name].label)
+            _ticks(axis, run, speed)
             axis.set_title(name, loc="right", color=MUTED)
-        axes[-1].set_xlabel("speed of the carrier in rpm")
+        axes[-1].set_xlabel(f"speed of the {run.shaft} in rpm")
         picture = svg(figure, "orders_speed")
     caption = (
-        f"Level within half an order of k × {run.each:.6g} orders of the carrier; dotted the orders beside it that are "
-        "marked in the order map, together. A peak is a resonance that the order meets."
+        f"Level within half an order of k × {run.each:.6g} orders of the {run.shaft}{BESIDE if beside else ''}. "
+        f"A peak is a resonance that the order meets.{MARKED if run.resonances else ''}"
     )
     data = {"speed_[rpm]": speed}
     data |= {f"{label} of {_column(run, name)}": a for name, bands in found.items() for label, a in bands.items()}
@@ -182,7 +100,7 @@ def order_levels(run: RunUp) -> Plot:
 
 def _bands(run: RunUp, name: str) -> dict[str, np.ndarray]:
     """Rms amplitude (T,) of every mesh order and of the orders beside it, by label."""
-    wanted: dict[str, tuple[float, ...]] = {f"order {k}": (k * run.each,) for k in range(1, MESH_ORDERS + 1)}
+    wanted: dict[str, tuple[float, ...]] = {f"order {k}": (k * run.each,) for k in range(1, run.orders_shown + 1)}
     wanted |= {f"beside {k}": orders for k, orders in run.signals[name].sides.items()}
     found, orders = {}, run.orders[name]
     for label, chosen in wanted.items():
@@ -214,7 +132,7 @@ def _image(axis: Axes, cells: tuple[np.ndarray, np.ndarray, np.ndarray], named: 
 
 
 def _mark_orders(axis: Axes, run: RunUp, own: Signal) -> None:
-    marks = [(k * run.each, 1.6) for k in range(1, MESH_ORDERS + 1)]
+    marks = [(k * run.each, 1.6) for k in range(1, run.orders_shown + 1)]
     marks += [(order, 0.8) for orders in own.sides.values() for order in orders]
     for at, width in marks:
         axis.plot([at, at], [1.0, 1.05], transform=axis.get_xaxis_transform(), color=MUTED, lw=width, clip_on=False)
@@ -222,19 +140,41 @@ def _mark_orders(axis: Axes, run: RunUp, own: Signal) -> None:
 
 def _rays(axis: Axes, run: RunUp) -> None:
     ends = np.array(axis.get_xlim())
-    for k in range(1, MESH_ORDERS + 1):
+    for k in range(1, run.orders_shown + 1):
         axis.plot(ends, k * run.each * ends / 60e3, color="white", lw=0.8, ls=(0, (2, 6)), alpha=0.6)
 
 
-def _speed_at(run: RunUp, centres: np.ndarray) -> np.ndarray:
-    """Speed (rad/s) at times (s) after the beginning of the part."""
-    speed = np.abs(run.part[f"{run.carrier}{GEAR_SPEED}"])
-    return np.interp(centres + run.part.time[0], run.part.time, speed)
+def crossings(run: RunUp) -> list[tuple[int, float, float]]:
+    """(mesh order, frequency in Hz, speed in rpm) where an order meets a natural frequency."""
+    orders = range(1, run.orders_shown + 1)
+    return [(k, f, 60 * f / (k * run.each)) for f in run.resonances for k in orders]
+
+
+def _circles(axis: Axes, run: RunUp) -> None:
+    (low, high), (_, top) = axis.get_xlim(), axis.get_ylim()
+    for _, frequency, rpm in crossings(run):
+        if low <= rpm <= high and frequency <= 1e3 * top:
+            axis.plot(rpm, frequency / 1e3, "o", ms=5, mfc="none", mec="white", mew=0.9)
+
+
+def _ticks(axis: Axes, run: RunUp, speed: np.ndarray) -> None:
+    for order, _, rpm in crossings(run):
+        if speed.min() <= rpm <= speed.max():
+            axis.plot([rpm, rpm], [0.94, 1.0], transform=axis.get_xaxis_transform(), color=COLOURS[order - 1], lw=1.4)
+
+
+def _speed_at(run: RunUp, centres: np.ndarray, width: float) -> np.ndarray:
+    """Mean speed (rad/s) over windows of `width` s around times (s) after the beginning of the part: what the shaft
+    turns in them, free of its vibration."""
+    time, angle = run.part.time - run.part.time[0], run.part[f"{run.shaft}{GEAR_PHI}"]
+    ends = [np.clip(centres + side * width, 0.0, time[-1]) for side in (-0.5, 0.5)]
+    turned = np.interp(ends[1], time, angle) - np.interp(ends[0], time, angle)
+    return np.asarray(np.abs(turned) / (ends[1] - ends[0]))
 
 
 def _fastest(run: RunUp) -> float:
     """Hz."""
-    return float(np.abs(run.part[f"{run.carrier}{GEAR_SPEED}"]).max()) / (2 * np.pi)
+    return float(np.abs(run.part[f"{run.shaft}{GEAR_SPEED}"]).max()) / (2 * np.pi)
 
 
 FIGURES = (frequency_maps, order_maps, order_levels)

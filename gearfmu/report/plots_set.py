@@ -234,7 +234,11 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     fixed = on_mounts(part)
     groups = {**{f"meshes of the {c}": own_names for c, own_names in names.items()}}
     groups |= {"ring on its mounts": list(fixed)} if fixed else {}
-    spectra = {n: metrics.amplitude_spectrum(v, step, segment(part.time.size, 1)) for n, v in (signals | fixed).items()}
+    size = segment(part.time.size, 1)
+    spectra = {
+        n: metrics.amplitude_spectrum(v, step, size, step if f"{n}_mean" in part else 0.0)
+        for n, v in (signals | fixed).items()
+    }
     mesh_frequency = _mesh_speed(part, own) / (2 * np.pi)
     speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
     carrier = float(np.median(speed)) / (2 * np.pi)

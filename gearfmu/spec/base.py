@@ -9,11 +9,13 @@ from __future__ import annotations
 import difflib
 import math
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from gearfmu.errors import Problem, SpecError, UnitError
@@ -149,6 +151,22 @@ def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:
     return path
 
 
+def raw_path(raw: Any, loc: tuple[str | int, ...]) -> list[Any]:
+    """Keys and positions in `raw` that lead to a place of the model."""
+    path: list[Any] = []
+    for part in loc:
+        if isinstance(raw, dict):
+            if part not in raw and part in _KINDS_OF_BODY:
+                continue
+            key = list(raw)[part] if isinstance(part, int) and part < len(raw) else part
+            raw = raw.get(key)
+        else:
+            key = part
+            raw = raw[part] if isinstance(raw, list) and isinstance(part, int) and part < len(raw) else None
+        path.append(key)
+    return path
+
+
 def _step(raw: Any, part: str | int) -> tuple[Any, str]:
     if isinstance(raw, dict):
         key = part if part in raw or isinstance(part, str) else list(raw)[part] if part < len(raw) else str(part)
@@ -168,11 +186,11 @@ def _problem(kind: type[Spec], raw: Any, file: str, entry: Any) -> Problem:
 def _remedy(kind: type[Spec], entry: Any) -> str:
     loc = entry["loc"]
     if entry["type"] == "missing":
-        field = _fields_at(kind, loc[:-1]).get(loc[-1])
+        field = fields_at(kind, loc[:-1]).get(loc[-1])
         meaning = f" ({field.description})" if field is not None and field.description else ""
         return f"this field is missing{meaning}: add it"
     if entry["type"] == "extra_forbidden":
-        return _unknown_key(str(loc[-1]), list(_fields_at(kind, loc[:-1])))
+        return _unknown_key(str(loc[-1]), list(fields_at(kind, loc[:-1])))
     if entry["type"] == "string_pattern_mismatch":
         return "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
     return entry["msg"][:1].lower() + entry["msg"][1:]
@@ -183,7 +201,7 @@ def _unknown_key(key: str, known: list[str]) -> str:
     return f'unknown key: did you mean "{near[0]}"?' if near else f"unknown key: known are {', '.join(sorted(known))}"
 
 
-def _fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
+def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:
     """The fields of the model that stands at `loc` inside a `kind`."""
     choices = [kind]
     for part in loc:
@@ -205,6 +223,13 @@ def _kinds(kind: type[BaseModel]) -> tuple[Any, ...]:
 def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
     """The fields by their keys in a file."""
     return {field.alias or name: field for name, field in kind.model_fields.items()}
+
+
+def metadata_of(field: FieldInfo) -> Iterator[Any]:
+    """Annotations of a field, also those inside `Annotated[…] | None`."""
+    yield from field.metadata
+    for part in get_args(field.annotation):
+        yield from getattr(part, "__metadata__", ())
 
 
 def inner_model(annotation: Any) -> type[BaseModel] | None:

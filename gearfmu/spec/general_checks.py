@@ -21,14 +21,30 @@ _SAME_RACK = ("normal_module", "pressure_angle")
 
 def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
     """Everything that is wrong with a stage whose single fields can be read."""
-    found = [*_rotors(stage), *_names(stage)]
-    problems = [Problem(file, *entry) for entry in found]
-    if problems:
-        return problems
-    problems = [Problem(file, *entry) for entry in (*_places(stage), *_held(stage))]
-    for engagement in stage.engagements:
-        problems += _mesh(file, stage, engagement)
+    problems = [Problem(file, *entry) for entry in (*_rotors(stage), *_names(stage))]
+    known = _what_can_be_judged(stage)
+    problems += [Problem(file, *entry) for entry in (*_places(known), *_held(known))]
+    for engagement in known.engagements:
+        problems += _mesh(file, known, engagement)
     return list(dict.fromkeys(problems))
+
+
+def _what_can_be_judged(stage: GeneralStage) -> GeneralStage:
+    """The stage without what names a body that there is not, or one that has no rotor of its own."""
+    counts = Counter(name for rotor in stage.rotors.values() for name in rotor.bodies)
+    good = {name for name in stage.bodies if counts[name] == 1}
+    gears = {gear.name for gear in stage.gears} & good
+    rotors = {
+        name: rotor.model_copy(update={"bodies": {body: z for body, z in rotor.bodies.items() if body in good}})
+        for name, rotor in stage.rotors.items()
+    }
+    kept = {
+        "rotors": {name: rotor for name, rotor in rotors.items() if rotor.bodies},
+        "engagements": tuple(mesh for mesh in stage.engagements if set(mesh.gears) <= gears),
+        "supports": tuple(s for s in stage.supports if {s.body, s.to} - {None} <= good),
+        "ports": {name: port for name, port in stage.ports.items() if port.body in good},
+    }
+    return stage.model_copy(update=kept)
 
 
 def _rotors(stage: GeneralStage) -> Found:

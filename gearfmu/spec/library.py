@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
+from gearfmu.spec.base import read_toml
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -28,7 +29,8 @@ def shipped_stages() -> list[str]:
 
 
 def find_stage(name: str | os.PathLike[str]) -> Path:
-    """The stage file meant by a path, a folder with a stage.toml or a shipped name; a path goes before a shipped name.
+    """The stage file meant by a path, a folder with a stage.toml, a shipped name ("fzg_c/stage_relief") or what a
+    shipped file calls itself (`name = "fzg_c_relief"`); the first of these goes before the next.
 
     SpecError names the nearest shipped stages when there is none.
     """
@@ -37,10 +39,18 @@ def find_stage(name: str | os.PathLike[str]) -> Path:
         for path in (place, place / "stage.toml", place.with_name(f"{place.name}.toml") if place.name else place):
             if path.is_file():
                 return path
+    if own.parent == Path(".") and (named := _shipped_of_name(str(name))) is not None:
+        return named
     shipped = shipped_stages()
     near = difflib.get_close_matches(str(name), shipped, n=1)
     hint = f'did you mean "{near[0]}"?' if near else f"give the path of a stage.toml, or one of: {', '.join(shipped)}"
     raise SpecError([Problem(str(name), "", "", f"there is no such stage: {hint}")])
+
+
+def _shipped_of_name(name: str) -> Path | None:
+    """The shipped stage file that says `name = …` so."""
+    files = (path for root in library_roots() for path in sorted(root.glob("*/stage*.toml")))
+    return next((path for path in files if read_toml(path).get("name") == name), None)
 
 
 def model_folder(spec: Any) -> Path:

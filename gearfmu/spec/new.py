@@ -13,13 +13,14 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Quantity, Spec, fields_by_key, inner_model
+from gearfmu.spec.base import Quantity, Spec, fields_by_key, inner_model, metadata_of
 from gearfmu.spec.layers import read_layers
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec, load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
+_DESCRIPTION = "made like {like}; say here in one line what it is"
 _HEAD = """# Gear stage "{name}", made like "{like}". Lengths, torques … are text with a unit.
 # A line such as "# slices = 5" shows a default.
 # Bodies (<gear>.h5) are made beside this file by `gearfmu reduce` and remade when anything that shapes them changes.
@@ -38,9 +39,10 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
         raise SpecError([Problem("", "name", f'"{name}"', remedy)])
     source = find_stage(like)
     if load_stage(source).kind == "general":
-        text = _renamed(source.read_text(encoding="utf-8"), name)
+        text = _renamed(source.read_text(encoding="utf-8"), name, str(like))
     else:
-        text = stage_text(read_layers(source).tables | {"name": name}, name, str(like))
+        own = {"name": name, "description": _DESCRIPTION.format(like=like)}
+        text = stage_text(read_layers(source).tables | own, name, str(like))
     try:
         _write_new(target, text)
     except FileExistsError:
@@ -57,9 +59,11 @@ def stage_text(raw: dict[str, Any], name: str, like: str) -> str:
     return _HEAD.format(name=name, like=like) + "\n".join(_table(kind, tables, ())) + "\n"
 
 
-def _renamed(text: str, name: str) -> str:
-    """The file of a general stage, which has its comments already, under another name."""
-    return re.sub(r'^name = ".*"', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
+def _renamed(text: str, name: str, like: str) -> str:
+    """The file of a general stage, which has its comments already, under another name and description."""
+    for key, value in (("name", name), ("description", _DESCRIPTION.format(like=like))):
+        text = re.sub(rf'^{key} = ".*"', f'{key} = "{value}"', text, count=1, flags=re.MULTILINE)
+    return text
 
 
 def _write_new(target: Path, text: str) -> None:
@@ -106,7 +110,7 @@ def _sub_table(kind: Any, raw: dict[str, Any] | None, place: tuple[str, ...], fi
 
 
 def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
-    quantity = next((part for part in _metadata(field) if isinstance(part, Quantity)), None)
+    quantity = next((part for part in metadata_of(field) if isinstance(part, Quantity)), None)
     unit = quantity.unit if quantity else ""
     text = f"{key} = {_toml(raw[key])}" if key in raw else f"# {key} = {_default(field, unit)}"
     meaning = field.description or ""
@@ -118,13 +122,6 @@ def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:
     if len(choices) > 1:
         meaning += f" ({' | '.join(choices)})"
     return f"{text:<42}  # {meaning}{f' [{unit}]' if unit else ''}"
-
-
-def _metadata(field: FieldInfo) -> Iterator[Any]:
-    """Annotations of a field, also those inside `Annotated[…] | None`."""
-    yield from field.metadata
-    for part in get_args(field.annotation):
-        yield from getattr(part, "__metadata__", ())
 
 
 def _default(field: FieldInfo, unit: str) -> str:

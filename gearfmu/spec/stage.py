@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,6 +19,7 @@ from gearfmu.spec.gear import GearSpec, PairSpec
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.general_checks import general_problems, with_relief_rolls
 from gearfmu.spec.imported import missing_files
+from gearfmu.spec.judge import read_and_judge
 from gearfmu.spec.layers import Layers, read_layers
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
@@ -104,17 +106,19 @@ def require_pair(spec: Any) -> None:
 def _load_pair(layers: Layers) -> StageSpec:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
-    spec, found = validate(StageSpec, raw | {"source": path}, str(path))
-    problems += found
-    if spec is not None:
-        problems += geometry_problems(str(path), spec.pair, spec.gears, spec.torque_max)
-        problems += _bearing_problems(str(path), spec)
-    else:
+    spec, found = read_and_judge(StageSpec, raw | {"source": path}, str(path), _pair_problems)
+    if spec is None and not found.judged:
         problems += _geometry_of_what_can_be_read(layers)
+    problems += found.problems
     problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
     return _with_relief_rolls(_with_import_paths(spec, layers))
+
+
+def _pair_problems(spec: StageSpec) -> list[Problem]:
+    file = str(spec.source)
+    return geometry_problems(file, spec.pair, spec.gears, spec.torque_max) + _bearing_problems(file, spec)
 
 
 def _bearing_problems(file: str, spec: StageSpec) -> list[Problem]:
@@ -138,10 +142,9 @@ def _load_set(layers: Layers) -> PlanetarySpec:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
     named = {key: raw[key] | {"name": key} for key in ("sun", "planet", "ring") if isinstance(raw.get(key), dict)}
-    spec, found = validate(PlanetarySpec, raw | named | {"source": path}, str(path))
-    problems += found
-    if spec is not None:
-        problems += set_problems(str(path), spec)
+    judge = partial(set_problems, str(path))
+    spec, found = read_and_judge(PlanetarySpec, raw | named | {"source": path}, str(path), judge)
+    problems += found.problems
     problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
@@ -157,10 +160,8 @@ def _load_set(layers: Layers) -> PlanetarySpec:
 def _load_general(layers: Layers) -> GeneralStage:
     path, raw = layers.path, layers.tables
     problems = [_unknown("source", raw)] if "source" in raw else []
-    spec, found = validate(GeneralStage, raw | {"source": path}, str(path))
-    problems += found
-    if spec is not None:
-        problems += general_problems(str(path), spec)
+    spec, found = read_and_judge(GeneralStage, raw | {"source": path}, str(path), partial(general_problems, str(path)))
+    problems += found.problems
     problems += missing_files(layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 from gearfmu.stage.model import StageModel
-from gearfmu.stage.te import place_of, statics_of
+from gearfmu.stage.place import place_of
+from gearfmu.stage.te import statics_of
 
 COSTS = "effects_cost.csv"
 

@@ -98,7 +98,10 @@ def fields() -> tuple[Field, ...]:
 def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
     """`sections` in the order of the table. AssertionError that lists every section that is missing, unknown, or of
     another type or shape: the writer's mistake, not the user's."""
-    sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True)) | {"carried": len(sections.get("carried", ()))}
+    sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True)) | {
+        "carried": len(sections.get("carried", ())),
+        "starts": len(sections.get("start_reference", ())),
+    }
     ordered, problems = {}, []
     for field, name, known in _instances(sections, sizes):
         if name not in sections:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
+
+import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, Variable
@@ -12,7 +15,7 @@ from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.turning import Shafts, shafts_of
-from gearfmu.stage.blob import blob_hash
+from gearfmu.stage.blob import blob_hash, read_blob, write_blob
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,22 @@ class StageModel:
     def kernel(self, **parameters: float) -> Kernel:
         """A fresh instance; dots in parameter names are written as they are: kernel(**{"effect.hertz": 0})."""
         return Kernel(self.blob, parameters)
+
+    def with_starts(self, starts: Mapping[str, float]) -> StageModel:
+        """The same model whose parameters start with other values, SI, an enumeration by its number: what an importer
+        finds that sets none. ModelError for a name that is no parameter and for a value out of range."""
+        kernel = self.kernel(**starts)
+        inputs = [name for name in starts if kernel.variables[name].causality != "parameter"]
+        if inputs:
+            raise ModelError(f"{', '.join(inputs)}: only parameters have starts of the model's own")
+        sections = read_blob(self.blob)
+        known = zip(sections.get("start_reference", ()), sections.get("start_value", ()), strict=True)
+        chosen = dict(known) | {kernel.variables[name].reference: value for name, value in starts.items()}
+        own = {
+            "start_reference": np.array(list(chosen), np.int32),
+            "start_value": np.array(list(chosen.values()), float),
+        }
+        return replace(self, blob=write_blob(sections | own)) if chosen else self
 
     def kernel_variables(self) -> list[Variable]:
         """All variables of this model in the order of the kernel's table."""

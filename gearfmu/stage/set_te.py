@@ -10,15 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.stage.limits import limit_named
 from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
-from gearfmu.stage.te import LEAST, TANGENT, common_columns, mesh_harmonics, place_of, statics_of
+from gearfmu.stage.place import place_of
+from gearfmu.stage.te import LEAST, TANGENT, common_columns, mesh_harmonics, statics_of
 
 GEARS = ("sun", "ring")  # whose meshes with the planets share the load
 
@@ -69,16 +72,16 @@ def set_te(model: StageModel, torques: Sequence[float], positions: int = 41, **p
     planets = model.spec.set.planets
     te, stiffness = np.empty((2, len(torques), positions))
     force = np.empty((len(torques), positions, len(GEARS), planets))
-    for i, torque in enumerate(torques):
+    for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
-        for j, part in enumerate(position):
-            at = -part * place.pitch
+        at = -part * place.pitch
+        with limit_named(model, torque):
             error = _error(model, kernel, at, carried)
             force[i, j] = _forces(kernel, at, carried, planets)
             ends = [_error(model, kernel, at, carried * (1 + sign * TANGENT), keep=True) for sign in (-1, 1)]
-            tangent = 2 * TANGENT * carried / (ends[1] - ends[0])
-            te[i, j] = error + (torque - carried) / tangent
-            stiffness[i, j] = abs(tangent / place.lever) * planets
+        tangent = 2 * TANGENT * carried / (ends[1] - ends[0])
+        te[i, j] = error + (torque - carried) / tangent
+        stiffness[i, j] = abs(tangent / place.lever) * planets
     mean = force.mean(axis=3)
     return SetTeResult(np.asarray(torques, float), position, te, stiffness, force / mean[..., None], mean)
 

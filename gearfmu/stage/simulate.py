@@ -6,11 +6,13 @@ import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
+from gearfmu.kernel.binding import status_words
 from gearfmu.spec.turning import meshings, turns
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.te import statics_of
@@ -23,16 +25,18 @@ Inputs = Callable[[float], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Steady:
-    """Inputs of a stage at constant speed and load: the outer ends of its input and output turn at constant speed,
-    wound up so that shafts and meshes carry the torque on average: τ/k on either port and the mean loaded transmission
-    between them.
+    """Inputs of a stage under a constant load: the outer ends of its input and output turn at constant speed, or gather
+    it at a constant rate, wound up so that shafts and meshes carry the torque on average: τ/k on either port and the
+    mean loaded transmission between them.
 
-    speed: of the input, rad/s; torque: on the input, N·m. For spring ports without a chain.
+    speed: of the input at the start, rad/s; torque: on the input, N·m; rate: of the speed, rad/s². For spring ports
+    without a chain.
     """
 
     model: StageModel
     speed: float
     torque: float
+    rate: float = 0.0
 
     @cached_property
     def winding(self) -> float:
@@ -58,8 +62,10 @@ class Steady:
             assert stiffness is not None, "the port is a spring"
             sense = 1.0 if port == shafts.input else -1.0
             wound = sense * self.torque / turn / stiffness + (self.winding if port == shafts.input else 0.0)
-            values[f"{port}.phi"] = wound + self.speed * turn * time
-            values[f"{port}.w"] = self.speed * turn
+            values[f"{port}.phi"] = wound + turn * (self.speed + 0.5 * self.rate * time) * time
+            values[f"{port}.w"] = turn * (self.speed + self.rate * time)
+            if self.rate:
+                values[f"{port}.a"] = turn * self.rate
         return values
 
 
@@ -96,11 +102,18 @@ def simulate(
     except SimulationError as error:
         outcome = error.outcome
     cpu = clock.process_time() - started
-    return Trace(
-        np.arange(done + 1) * step,
-        _channels(kernel, names, samples[: done + 1]),
-        _meta(model, kernel, outcome, cpu, done * step),
-    )
+    channels = _channels(kernel, names, samples[: done + 1])
+    price = {"cpu_s": cpu, "realtime_factor": cpu / (done * step) if done else None}
+    run = {"outcome": outcome, "simulated_s": done * step, "H": step, "energy_residual": relative_residual(channels)}
+    return Trace(np.arange(done + 1) * step, channels, _meta(model, kernel) | run | price)
+
+
+def relative_residual(channels: Mapping[str, Channel]) -> float | None:
+    """energy.residual at the end over the energy that the stage exchanged: the largest work of its ports and the
+    largest stored energy. None where nothing was exchanged."""
+    work, stored, residual = (channels[f"energy.{name}"].values for name in ("work", "stored", "residual"))
+    exchanged = float(np.abs(work).max() + stored.max())
+    return float(residual[-1]) / exchanged if exchanged else None
 
 
 def _set(kernel: Kernel, values: Mapping[str, float]) -> None:
@@ -117,20 +130,17 @@ def _channels(kernel: Kernel, names: Sequence[str], samples: np.ndarray) -> dict
     return found
 
 
-def _meta(model: StageModel, kernel: Kernel, outcome: str, cpu: float, simulated: float) -> dict:
+def _meta(model: StageModel, kernel: Kernel) -> dict[str, Any]:
     level = kernel.variables["level"].items[int(kernel.get("level"))]
     return {
         "stage": model.name,
-        "outcome": outcome,
-        "simulated_s": simulated,
-        "cpu_s": cpu,
-        "realtime_factor": cpu / simulated if simulated else None,
+        "stage_path": str(model.spec.source),
+        "meshes": {mesh: known.plain for mesh, known in meshings(model.stage).items()},
         "coupling_error": None,
-        "energy_residual": kernel.get("energy.residual"),
         "level": level,
         "n_dyn": int(kernel.get("solver.n_dyn")),
         "slices": int(kernel.get("slices")),
         "h": kernel.get("solver.h"),
         "hashes": {"model": model.hash, "bodies": list(model.body_hashes)},
-        "warning": kernel.warning,
+        "warnings": [*filter(None, [kernel.warning]), *status_words(int(kernel.get("solver.status")))],
     }

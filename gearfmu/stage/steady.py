@@ -1,4 +1,4 @@
-"""The standalone solver at constant speed and load, and settings of the kernel by name."""
+"""The standalone solver under a constant load, and settings of the kernel by name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 
 from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Variable
-from gearfmu.spec.turning import meshings, require_driven
+from gearfmu.spec.turning import require_driven
+from gearfmu.stage.limits import beyond_limits, limit_named
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.simulate import Steady, simulate
 from gearfmu.stage.trace import Trace
@@ -16,14 +17,25 @@ from gearfmu.stage.trace import Trace
 
 @dataclass(frozen=True)
 class Drive:
-    """Constant speed and load of a run: torque (N·m) and speed (rad/s) of the input, duration (s), time between
-    samples (s), time from which on results are taken (s)."""
+    """A run under a constant load: torque (N·m) and speed (rad/s) of the input, duration (s), time between samples (s),
+    time from which on results are taken (s); end_speed (rad/s), which the speed grows or falls to; None: it stays."""
 
     torque: float
     speed: float
     duration: float = 0.1
     step: float = 20e-6
     settle: float = 0.02
+    end_speed: float | None = None
+
+    @property
+    def rate(self) -> float:
+        """Of the speed, rad/s²."""
+        return 0.0 if self.end_speed is None else (self.end_speed - self.speed) / self.duration
+
+    @property
+    def fastest(self) -> float:
+        """The speed of larger magnitude, rad/s."""
+        return max(self.speed, self.speed if self.end_speed is None else self.end_speed, key=abs)
 
 
 def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, float]:
@@ -42,21 +54,20 @@ def steady_run(
     settings: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trace:
-    """Trace of the model at constant drive (`Steady`). settings: kernel parameters, as numbers (`parameters`); progress
+    """Trace of the model under this drive (`Steady`). settings: kernel parameters, as numbers (`parameters`); progress
     is called with the part done, 0 … 1. SpecError where a port that would have to turn is no spring port without a
     chain."""
     _require_springs(model)
-    inputs = Steady(model, drive.speed, drive.torque)
-    trace = simulate(model, inputs, drive.duration, drive.step, settings, progress)
-    exchanged = abs(trace["energy.work"]).max() + trace["energy.stored"].max()
+    inputs = Steady(model, drive.speed, drive.torque, drive.rate)
+    with limit_named(model, drive.torque):
+        trace = simulate(model, inputs, drive.duration, drive.step, settings, progress)
+    trace.meta["warnings"] = [*beyond_limits(model, drive.torque, drive.fastest), *trace.meta["warnings"]]
     trace.meta.update(
-        energy_residual=float(trace["energy.residual"][-1] / exchanged),
-        H=drive.step,
         settle=drive.settle,
-        scene="constant speed and load",
-        meshes={mesh: known.plain for mesh, known in meshings(model.stage).items()},
+        scene="constant speed and load" if drive.end_speed is None else "run-up under constant torque",
         torque=drive.torque,
         speed=drive.speed,
+        end_speed=drive.end_speed,
     )
     return trace
 

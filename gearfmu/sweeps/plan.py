@@ -30,7 +30,7 @@ from gearfmu.units import to_si
 
 RUN, SIMULATE, TE = "run", "simulate", "te"
 OWN = {  # keys of a stage that is computed alone, with their units
-    SIMULATE: {"torque": "N*m", "speed": "rad/s", "duration": "s", "step": "s", "settle": "s"},
+    SIMULATE: {"torque": "N*m", "speed": "rad/s", "duration": "s", "step": "s", "settle": "s", "end_speed": "rad/s"},
     TE: {"torque": "N*m", "positions": ""},
 }
 NEEDED = {RUN: (), SIMULATE: ("torque", "speed"), TE: ("torque",)}

@@ -10,6 +10,7 @@ import pytest
 from fmpy.fmi2 import fmi2CallbackLoggerTYPE
 
 from gearfmu.fmu.probes import CHECKS, ERROR, OK, Subject
+from gearfmu.fmu.validate import exchange_functions
 
 MODES = ("instantiated", "initialization", "step", "discarded", "terminated")
 ALLOWED = {
@@ -208,3 +209,59 @@ def test_many_instances_live_side_by_side(unpacked):
     assert [s.status("enterInitializationMode") for s in subjects] == [ERROR, OK] * 20
     for subject in subjects[1::2]:
         subject.close()
+
+
+def listening(folder: str) -> tuple[Subject, list[str]]:
+    """A fresh instance and the messages it sends."""
+    messages: list[str] = []
+    subject = Subject(folder)
+    subject.close()
+    subject.callbacks.logger = fmi2CallbackLoggerTYPE(
+        lambda _, name, status, kind, text: messages.append(text.decode())
+    )
+    subject.fmu.instantiate(callbacks=subject.callbacks, loggingOn=False)
+    return subject, messages
+
+
+def test_refused_values_name_the_variable_and_what_it_takes(unpacked):
+    subject, messages = listening(unpacked)
+    known = {v.name: v for v in subject.variables}
+    for name, setter, value, said in (
+        ("pinion.phi", "setReal", 1e12, "allowed are from -1e+09 to 1e+09 rad"),
+        ("slices", "setInteger", 11, "allowed are whole numbers from 1 to 10"),
+        ("level", "setInteger", 9, "allowed are 0, 1, ... for rigid|fast|standard|full|paper|explicit"),
+        ("mesh.te", "setReal", 0.0, "is an output"),
+    ):
+        assert subject.status(setter, [known[name].valueReference], [value]) == ERROR
+        assert f"{name} (value reference {known[name].valueReference})" in messages[-1] and said in messages[-1]
+    subject.fmu.setupExperiment()
+    subject.fmu.enterInitializationMode()
+    subject.fmu.exitInitializationMode()
+    subject.status("setInteger", [known["level"].valueReference], [1])
+    assert "level (value reference" in messages[-1] and "before the initialisation ends" in messages[-1]
+    subject.close()
+
+
+def test_after_a_discarded_step_it_says_what_may_follow(unpacked_other):
+    subject, messages = listening(unpacked_other)
+    subject.fmu.setupExperiment()
+    subject.fmu.enterInitializationMode()
+    subject.fmu.exitInitializationMode()
+    subject.fmu.setReal([reference(subject, "wheel.tau")], [-1e7])
+    assert 2 in [subject.status("doStep", k * 1e-4, 1e-4) for k in range(40)]
+    told = next(text for text in messages if "stopped at" in text)
+    assert "restore a saved state (fmi2SetFMUstate) or fmi2Reset, else fmi2Terminate" in told
+    refused = messages[-1]
+    assert "fmi2DoStep is not allowed in mode 'after a discarded step'; allowed are Terminate, Get, " in refused
+    assert refused.endswith("SetFMUstate, Reset and FreeInstance") and "DoStep," not in refused
+    subject.close()
+
+
+def test_model_exchange_is_refused_in_words(unpacked):
+    """Some loaders look these functions up in every FMU."""
+    subject, messages = listening(unpacked)
+    library = ctypes.CDLL(subject.fmu.dll._name)
+    for name in sorted(exchange_functions()):
+        assert getattr(library, name)(ctypes.c_void_p(subject.fmu.component), None, 0, None) == ERROR
+        assert messages[-1] == f"{name}: this FMU does not offer it (see modelDescription.xml)"
+    subject.close()

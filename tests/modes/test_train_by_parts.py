@@ -12,11 +12,12 @@ import pytest
 from train_by_parts import Load, frequencies
 
 from gearfmu.body import load_stage_bodies
-from gearfmu.modes.linear import FULL, Linearised, linearised, places_of
+from gearfmu.modes.linear import FULL, Linearised, linearised
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
+from gearfmu.stage.limits import places_of
 
 COUNT = 60
 LIGHT = 0.1  # N·m: frequencies move with the place at which gears stand, in proportion to the load: 3e-4 at 1 N·m

@@ -5,10 +5,17 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.sparse.linalg import eigsh
 
 from gearfmu import cli
+from gearfmu.fem import solids
+from gearfmu.femesh.carrier import whole_carrier
+from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.modes.planetary import set_body_modes, set_sector, uncoupled_carrier_modes
 from gearfmu.spec.library import find_stage
+from gearfmu.spec.stage import load_stage
 
 
 def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -76,3 +83,16 @@ def test_messages(
     given, out, err = call(*arguments, "--out", tmp_path / "out", capsys=capsys)
     assert given == code and message in " ".join(err.replace("│", " ").split()) and out == ""
     assert not (tmp_path / "out").exists()
+
+
+def test_a_carrier_without_couplings_is_that_of_its_finite_elements() -> None:
+    """By one sector, against the whole body; the couplings of its bolts and bore stiffen it."""
+    spec, scale = load_stage("planetary54"), 0.25
+    found = uncoupled_carrier_modes(spec, 5, scale=scale)
+    own = np.concatenate([[mode.frequency] * len(mode.numbers) for mode in found.modes])
+    mesh = whole_carrier(CarrierGeometry.of(spec), set_sector(spec, "carrier", scale))
+    k, m = solids.assemble(mesh.nodes, {"hexahedron20": mesh.elements}, spec.carrier.material)
+    values = eigsh(k.tocsc(), 6 + len(own), m.tocsc(), sigma=-((2 * np.pi * 300) ** 2), return_eigenvectors=False)
+    whole = np.sort(np.sqrt(np.abs(values)))[6:] / (2 * np.pi)
+    assert own == pytest.approx(whole, rel=1e-6)
+    assert set_body_modes(spec, "carrier", 1, scale=scale).modes[0].frequency > 1.2 * own[0]

@@ -109,3 +109,21 @@ def test_unusable_signals_are_refused_with_the_remedy() -> None:
 
 def test_level_of_silence_is_finite() -> None:
     assert metrics.level(0.0) == -240
+
+
+@pytest.mark.parametrize("turns", [8, 32])
+def test_means_over_the_step_give_the_amplitudes_of_the_signal(turns: int) -> None:
+    """Exact means of a vibration over every step: spectrum, spectrogram, cut and map tell its own level."""
+    step, frequency, n = 1e-4, 3125.0, 4096  # 3.2 samples a period
+    t = np.arange(1, n + 1) * step
+    omega = 2 * np.pi * frequency
+    means = (np.cos(omega * (t - step)) - np.cos(omega * t)) / (omega * step)  # of sin(ω t)
+    rms = np.sqrt(0.5)
+    assert metrics.amplitude_spectrum(means, step).amplitude.max() == pytest.approx(rms * np.sinc(0.3125), rel=1e-3)
+    assert metrics.amplitude_spectrum(means, step, averaged=step).amplitude.max() == pytest.approx(rms, rel=1e-3)
+    assert metrics.spectrogram(means, step, 512, 256, step).amplitude.max(axis=1) == pytest.approx(rms, rel=1e-3)
+    angle = omega * t
+    assert metrics.order_cuts(t, means, angle, 1, 8, step).amplitude == pytest.approx(rms, rel=1e-3)
+    shaft = angle / turns
+    found = metrics.order_map(t, means, shaft, turns + 2.0, 4, step)
+    assert found.amplitude[:, found.order == turns] == pytest.approx(rms, rel=1e-3)

@@ -290,3 +290,14 @@ def test_a_signal_seen_twice_is_drawn_once() -> None:
     t = np.arange(4.0)
     trace = Trace(t, {"a.w": Channel(t, "rad/s"), "b.w": Channel(t.copy(), "rad/s"), "c.w": Channel(-t, "rad/s")}, {})
     assert distinct(trace, trace.channels) == ["a.w", "c.w"]
+
+
+def test_a_mesh_frequency_above_the_sampling_limit_is_said_instead_of_drawn(tmp_path: Path) -> None:
+    """16 teeth at 14 000 rpm mesh at 3.7 kHz; samples every 200 µs tell orders up to 2.25 kHz."""
+    t = np.arange(SAMPLES) * 2 * STEP
+    speed = np.full(SAMPLES, 14000 * np.pi / 30)
+    channels = {"pinion.gear.w": Channel(speed, "rad/s"), "mesh.force": Channel(np.sin(16 * speed * t), "N")}
+    page = report.write(Trace(t, channels, {"meshes": {"mesh": ("pinion", 16)}}), {}, tmp_path).read_text("utf-8")
+    assert "its mesh frequency, 3733 Hz and more, lies above 0.45 of the sampling rate, 2250 Hz" in page
+    assert "communication step of 24 µs" in page and "Mesh orders are not marked" in page
+    assert not (tmp_path / "data" / "orders.csv").exists()

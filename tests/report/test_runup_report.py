@@ -10,9 +10,9 @@ import pytest
 from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report.metrics import MetricsError, order_map
-from gearfmu.report.plots_runup import PICKUP, passing_orders, run_up
 from gearfmu.report.plots_set import planet_set
 from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
+from gearfmu.report.runup import PICKUP, passing_orders, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.report.style import COLUMNS, MOST_POINTS, envelope
 from gearfmu.spec.stage import load_stage
@@ -80,7 +80,7 @@ def test_a_run_up_is_one_whose_carrier_gathers_speed() -> None:
         (sweep(150.0 + 80.0 * np.sin(9.0 * TIME), 150.0 * TIME - 80.0 / 9.0 * np.cos(9.0 * TIME)), False),
     ):
         own = planet_set(trace, known_meshings(trace))
-        found = run_up(trace, own, whole)
+        found = run_up_of_set(trace, own, whole)
         assert (found is not None) is is_one
         if found is not None:
             assert found.each == 54 and list(found.signals) == [

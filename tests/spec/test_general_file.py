@@ -119,3 +119,14 @@ def test_a_gear_that_is_held_elsewhere_has_no_bearing(tmp_path):
     table = '[bodies.pinion1.bearing]\nstiffness = "1e8 N/m"\n\n[bodies.pinion1.material]'
     found = problems(tmp_path, ("[bodies.pinion1.material]", table))
     assert any("[[supports]]" in text for text in found.values())
+
+
+def test_no_layer_of_problems_hides_the_next(tmp_path):
+    """An engagement of a gear that there is not does not keep the other one, and what cannot be read, from being
+    judged."""
+    found = problems(
+        tmp_path,
+        ('"wheel1"]', '"wheel9"]'), ('body = "output_shaft"\nat = "170 mm"', 'body = "output_shaft"\nat = "970 mm"'),
+        ("slices = ", "slicess = "),
+    )  # fmt: skip
+    assert {"engagements.stage1.gears", "ports.output.at"} <= set(found), found

@@ -144,3 +144,13 @@ def test_schema_knows_the_tables_of_a_set():
     assert set(read_toml(find_stage("planetary54"))) <= set(schema["properties"])
     assert "name" not in schema["$defs"]["RingSpec"]["required"] + schema["$defs"]["SetGearSpec"]["required"]
     assert schema["$defs"]["RingSpec"]["properties"]["rim_diameter"]["unit"] == "m"
+
+
+def test_no_layer_of_problems_hides_the_next(tmp_path):
+    found = problems(
+        tmp_path,
+        ("planets = 4", "planets = 5"), ('bolt_diameter = "16 mm"', 'bolt_diameter = "24 mm"'),
+        ('"131 mm"', '"130 mm"'), ("torque_max", "torque_maximum"), ('tip_diameter = "50 mm"', "tip_diameter = 0.06"),
+    )  # fmt: skip
+    assert {"torque_maximum", "torque_max", "set.planets", "carrier.bolt_diameter", "sun.tip_diameter"} <= set(found)
+    assert {"ring.tip_diameter"} <= set(found)

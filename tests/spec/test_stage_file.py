@@ -107,6 +107,7 @@ def test_a_stage_is_found_by_path_folder_and_name(write: Write, monkeypatch: pyt
     assert {find_stage(path), find_stage(str(path)), find_stage(path.parent)} == {path}
     assert {"fzg_c", "fzg_c/stage_relief"} <= set(shipped_stages())
     assert find_stage("fzg_c/stage_relief").name == find_stage("fzg_c/stage_relief.toml").name == "stage_relief.toml"
+    assert find_stage("fzg_c_relief") == find_stage("fzg_c/stage_relief"), "what the file calls itself"
     with pytest.raises(SpecError, match='did you mean "fzg_c"'):
         load_stage("fzg_b")
     monkeypatch.chdir(path.parent)
@@ -369,3 +370,24 @@ def test_index_deviations_of_no_tooth_or_beyond_every_tolerance(write: Write) ->
     assert "0.225 mm" in found["gears.pinion.index_deviation.3"].remedy
     found = problems(write({"gears.wheel.index_deviation": {"-1": "5 µm", "two": "5 µm", "3": 5e-6}}))
     assert len(found) == 3 and "unit" in found["gears.wheel.index_deviation.3"].remedy
+
+
+def test_no_layer_of_problems_hides_the_next(write: Write) -> None:
+    """Misspelt and bare fields do not keep the geometry, the bearings and the pair from being judged beside them."""
+    found = problems(
+        write(
+            {
+                "torque_max": 600,
+                "speed_maximum": "6000 rpm",
+                "speed_max": None,
+                "contact.slices": "five",
+                "gears.pinion.bore_diameter": "60 mm",
+                "gears.wheel.index_deviation": {"30": "1 um"},
+                "gears.pinion.bearing.axial": "1e8 N/m",
+                "gears.wheel.tip_relief": {"amount": "15 mm"},
+            }
+        )
+    )
+    read = {"torque_max", "speed_maximum", "speed_max", "contact.slices"}
+    judged = {"gears.pinion.bore_diameter", "gears.wheel.index_deviation.30", "gears.wheel.tip_relief.amount"}
+    assert read | judged | {"gears.pinion.bearing.tilt", "gears.wheel.bearing.axial"} <= set(found)

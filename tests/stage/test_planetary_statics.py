@@ -21,8 +21,9 @@ from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.turning import turns, with_ports
 from gearfmu.stage import StageModel, assemble, loaded_te
+from gearfmu.stage.place import place_of
 from gearfmu.stage.set_te import SetTeResult, set_te
-from gearfmu.stage.te import place_of, statics_of
+from gearfmu.stage.te import statics_of
 
 TORQUE = 600.0  # N·m on the carrier, driving
 R_SUN = 1.25e-3 * 18 * math.cos(math.radians(20))  # base radius of sun and planets, m

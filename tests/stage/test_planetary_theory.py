@@ -26,8 +26,8 @@ from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
+from gearfmu.stage.place import place_of
 from gearfmu.stage.set_te import SetTeResult, set_te
-from gearfmu.stage.te import place_of
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 

@@ -10,6 +10,7 @@ import pytest
 
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
+from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, Trace, loaded_te, simulate
 
 LOAD, SPEED = 302.0, 2000 * math.pi / 30  # N·m, rad/s of the pinion
@@ -162,3 +163,12 @@ def test_a_run_that_stops_keeps_its_samples(relieved: StageModel, tmp_path: Path
     assert all(np.all(np.isfinite(trace[name])) for name in trace.channels)
     trace.save(tmp_path / "trace.h5")
     assert Trace.load(tmp_path / "trace.h5").meta["outcome"] == trace.meta["outcome"]
+
+
+def test_meta_of_a_run_needs_nobody_to_complete_it(steady: Trace, relieved: StageModel) -> None:
+    """The residual is relative, orders and stage can be found again: the report of a trace made in Python."""
+    work, stored = abs(steady["energy.work"]).max(), steady["energy.stored"].max()
+    assert steady.meta["energy_residual"] == steady["energy.residual"][-1] / (work + stored)
+    assert abs(steady.meta["energy_residual"]) < 1e-2 and steady.meta["H"] == H
+    assert [gear for gear, *_ in steady.meta["meshes"].values()] == ["pinion"]
+    assert load_stage(steady.meta["stage"]) == load_stage(steady.meta["stage_path"]) == relieved.spec

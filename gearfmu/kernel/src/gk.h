@@ -19,7 +19,7 @@
 #define GK_API __attribute__((visibility("default")))
 #endif
 
-#define GK_ABI 2
+#define GK_ABI 3
 #define GK_MESSAGE 512
 
 typedef enum gk_outcome {
@@ -59,6 +59,7 @@ typedef struct gk_variable_info {
 /* model */
 GK_API int gk_abi(void);
 GK_API const char *gk_outcome_text(gk_outcome outcome);
+GK_API const char *gk_status_text(int bit); /* what bit 0, 1, … of solver.status means; NULL past the last */
 GK_API size_t gk_model_size(void);
 GK_API gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char message[GK_MESSAGE]);
 GK_API const char *gk_model_name(const gk_model *model); /* stage name                        */

@@ -4,6 +4,7 @@
  * the logger and changes nothing, the mode included. A step that the kernel gives up returns fmi2Discard;
  * fmi2LastSuccessfulTime tells how far it came. */
 #include "fmi2/fmi2_face.h"
+#include <stdio.h>
 #include <string.h>
 
 /* ---- who may call when (FMI 2.0.4, 4.2.4) ------------------------------------------------------------------------ */
@@ -92,12 +93,24 @@ static void withdraw(fmi2Component c)
     __atomic_store_n(&slots[k].taken, 0, __ATOMIC_RELEASE);
 }
 
+/* says why a call is refused, and what is allowed instead: not what always is, nor what never is */
+static void refuse_call(face *f, int call)
+{
+    char allowed[256] = "";
+    size_t used = 0;
+    for (size_t k = 0; k < sizeof calls / sizeof *calls; k++)
+        if ((calls[k].modes & (int)f->mode) && calls[k].modes != ANY)
+            used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s, ", calls[k].name);
+    SAY(f, LOG_ERROR, "fmi2%s is not allowed in mode '%s'; allowed are %sSetFMUstate, Reset and FreeInstance",
+        calls[call].name, mode_name(f->mode), allowed);
+}
+
 /* the instance, or NULL after having told why the call is refused */
 static face *enter(fmi2Component c, int call)
 {
     face *f = instance_of(c);
     if (!f || (calls[call].modes & (int)f->mode)) return f;
-    SAY(f, LOG_ERROR, "fmi2%s is not allowed in mode '%s'", calls[call].name, mode_name(f->mode));
+    refuse_call(f, call);
     return NULL;
 }
 
@@ -364,8 +377,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     f->mode = MODE_DISCARDED;
     f->step_status = fmi2Discard;
     f->last_good = gk_time(f->data);
-    SAY(f, LOG_DISCARD, "the step from %.17g s stopped at %.17g s: %s", currentCommunicationPoint, f->last_good,
-        gk_outcome_text(outcome));
+    SAY(f, LOG_DISCARD,
+        "the step from %.17g s stopped at %.17g s: %s. Values of that time can be read; to go on restore a saved state "
+        "(fmi2SetFMUstate) or fmi2Reset, else fmi2Terminate",
+        currentCommunicationPoint, f->last_good, gk_outcome_text(outcome));
     return fmi2Discard;
 }
 
@@ -442,3 +457,57 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) { return not_offered(c, __func__); }
+
+/* ---- model exchange: some loaders look these up in every FMU, also where only co-simulation is declared ----------- */
+fmi2Status fmi2EnterEventMode(fmi2Component c) { return not_offered(c, __func__); }
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
+{
+    (void)eventInfo;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return not_offered(c, __func__); }
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
+{
+    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
+{
+    (void)time;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
+{
+    (void)x, (void)nx;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
+{
+    (void)derivatives, (void)nx;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
+{
+    (void)eventIndicators, (void)ni;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
+{
+    (void)x, (void)nx;
+    return not_offered(c, __func__);
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
+{
+    (void)x_nominal, (void)nx;
+    return not_offered(c, __func__);
+}

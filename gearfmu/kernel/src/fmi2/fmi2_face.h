@@ -1,5 +1,6 @@
 /* Inside of the FMI 2.0 co-simulation face: one instance, its memory, its saved states. Everything here is hidden;
- * fmi2.c exports the 34 functions. fmi2.c           who may call what when, handles, the exported functions
+ * fmi2.c exports the 34 functions of co-simulation, and the ten of model exchange, which it refuses.
+ *   fmi2.c           who may call what when, handles, the exported functions
  *   fmi2_instance.c  making, settling, access to variables, log
  *   fmi2_state.c     saved states and their bytes
  *   fmi2_resource.c  resource location → bytes of model.gkb */

@@ -219,11 +219,33 @@ static int role(const face *f, fmi2ValueReference reference)
     return reference < f->references ? f->role[reference] : 0;
 }
 
+static int find_variable(const face *f, fmi2ValueReference reference, gk_variable_info *info)
+{
+    for (int k = 0; gk_variable(f->model, k, info) == GK_OK; k++)
+        if (info->reference == reference) return 1;
+    return 0;
+}
+
+/* "pinion.w (value reference 513)" */
+typedef struct label {
+    char text[96];
+} label;
+static label named(const face *f, fmi2ValueReference reference)
+{
+    label out;
+    gk_variable_info info;
+    if (find_variable(f, reference, &info))
+        snprintf(out.text, sizeof out.text, "%s (value reference %u)", info.name, reference);
+    else
+        snprintf(out.text, sizeof out.text, "value reference %u", reference);
+    return out;
+}
+
 static int refuse_type(face *f, const char *call, int type, fmi2ValueReference reference)
 {
     int what = role(f, reference);
     if ((what & ROLE_TYPE) == type) return 0;
-    SAY(f, LOG_ERROR, "%s %s: value reference %u is %s", call, type_name(type), reference,
+    SAY(f, LOG_ERROR, "%s %s: %s is %s", call, type_name(type), named(f, reference).text,
         what ? type_name(what) : "no variable of this model");
     return 1;
 }
@@ -238,7 +260,7 @@ fmi2Status face_get(face *f, int type, const fmi2ValueReference references[], si
         if (initial && !setting && face_settle(f) != fmi2OK) return fmi2Error;
         double value = 0;
         gk_outcome outcome = gk_get(f->model, initial && setting ? f->given : f->data, references[i], &value);
-        if (outcome != GK_OK) return REFUSE(f, "get: value reference %u: %s", references[i], gk_outcome_text(outcome));
+        if (outcome != GK_OK) return REFUSE(f, "get %s: %s", named(f, references[i]).text, gk_outcome_text(outcome));
         if (reals)
             reals[i] = value;
         else
@@ -251,12 +273,25 @@ static int refuse_setting(face *f, int type, fmi2ValueReference reference)
 {
     if (refuse_type(f, "set", type, reference)) return 1;
     int what = role(f, reference);
-    if (!(what & ROLE_SETTABLE)) return SAY(f, LOG_ERROR, "set: value reference %u is an output", reference), 1;
+    if (!(what & ROLE_SETTABLE)) return SAY(f, LOG_ERROR, "set: %s is an output", named(f, reference).text), 1;
     if (f->mode == MODE_STEP && !(what & ROLE_INPUT))
-        return SAY(f, LOG_ERROR, "set: value reference %u is a fixed parameter: set it before the initialisation ends",
-                   reference),
+        return SAY(f, LOG_ERROR, "set: %s is a fixed parameter: set it before the initialisation ends",
+                   named(f, reference).text),
                1;
     return 0;
+}
+
+static fmi2Status refuse_value(face *f, fmi2ValueReference reference, double value, gk_outcome outcome)
+{
+    gk_variable_info info;
+    const label own = named(f, reference);
+    const char *name = own.text;
+    if (outcome != GK_BAD_VALUE || !find_variable(f, reference, &info))
+        return REFUSE(f, "set %s = %.17g: %s", name, value, gk_outcome_text(outcome));
+    const char *whole = info.type == GK_REAL ? "" : " whole numbers";
+    if (info.items[0]) return REFUSE(f, "set %s = %.17g: allowed are 0, 1, ... for %s", name, value, info.items);
+    return REFUSE(f, "set %s = %.17g: allowed are%s from %g to %g %s", name, value, whole, info.minimum, info.maximum,
+                  info.unit);
 }
 
 /* all values or, when one is refused, none */
@@ -274,21 +309,19 @@ fmi2Status face_set(face *f, int type, const fmi2ValueReference references[], si
         gk_outcome outcome = gk_set(f->model, target, references[i], value);
         if (outcome == GK_OK) continue;
         for (size_t k = 0; k < i; k++) gk_set(f->model, target, references[k], f->old[references[k]]);
-        return REFUSE(f, "set: value reference %u = %.17g: %s", references[i], value, gk_outcome_text(outcome));
+        return refuse_value(f, references[i], value, outcome);
     }
     return fmi2OK;
 }
 
 void face_warn_of_trouble(face *f)
 {
-    static const char *const meanings[] = {"local contact law beyond its range", "fallback scheme in use",
-                                           "limit of solver rounds reached", "gamma lowered"};
     double status = 0;
     if (!(f->logged & LOG_WARNING) || gk_get(f->model, f->data, f->status_reference, &status) != GK_OK ||
         status == f->warned)
         return;
     unsigned fresh = (unsigned)status & ~(unsigned)f->warned;
-    for (unsigned k = 0; k < sizeof meanings / sizeof *meanings; k++)
-        if (fresh >> k & 1) SAY(f, LOG_WARNING, "until %.9g s: %s", gk_time(f->data), meanings[k]);
+    for (int k = 0; gk_status_text(k); k++)
+        if (fresh >> k & 1) SAY(f, LOG_WARNING, "until %.9g s: %s", gk_time(f->data), gk_status_text(k));
     f->warned = status;
 }

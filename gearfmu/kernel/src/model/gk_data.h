@@ -22,11 +22,14 @@ typedef enum { DG4, MIX4, EM, RK45, CENTRAL } gk_integrator;
 typedef enum { CONTACT_BY_LEVEL, CONTACT_LINE, CONTACT_NODAL } gk_contact_law;
 /* bits of solver.status */
 enum {
-    STATUS_LAW = 1,       /* local law beyond its range */
-    STATUS_FALLBACK = 2,  /* em in use */
-    STATUS_LIMIT = 4,     /* limit of iterations reached */
-    STATUS_GAMMA = 8,     /* γ lowered */
-    STATUS_TIP_ENDED = 16 /* a loaded flank ended with tip corners off */
+    STATUS_LAW = 1,        /* local law beyond its range */
+    STATUS_FALLBACK = 2,   /* em in use */
+    STATUS_LIMIT = 4,      /* limit of iterations reached */
+    STATUS_GAMMA = 8,      /* γ lowered */
+    STATUS_TIP_ENDED = 16, /* a loaded flank ended with tip corners off */
+    STATUS_TORQUE = 32,    /* mean mesh force over a tooth pitch beyond that of torque_max */
+    STATUS_SPEED = 64,     /* a tooth pitch passed faster than at speed_max */
+    STATUS_JUMP = 128      /* the first step moved at once what had started at rest */
 };
 
 typedef struct gk_key {
@@ -46,6 +49,8 @@ typedef struct gk_meshing { /* an engagement */
     double reach;     /* how far to look for contacts */
     double open_time; /* without any contact */
     double owed;      /* defect of energy that the balance of contacts tolerated so far */
+    double pitch_angle, pitch_time,
+        pitch_impulse; /* of the tooth pitch that passes: where it began, what it gathered */
     int64_t impacts;
     int32_t apart, pairs;
     gk_memory memory[MAX_PAIRS];

@@ -20,7 +20,7 @@ static const field TABLE[GK_FIELDS] = {
 
 static const char *const WORDS[SYMBOLS] = {"rotors",  "gears",     "engagements", "ports", "supports",
                                            "dampers", "functions", "rolls",       "z",     "modes",
-                                           "reads",   "ground",    "carried",     "own"};
+                                           "reads",   "ground",    "carried",     "own",   "starts"};
 
 static void section_name(const field *f, const gk_shape *shape, char out[32])
 {

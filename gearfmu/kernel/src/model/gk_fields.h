@@ -26,6 +26,7 @@ typedef enum gk_symbol {
     SYMBOL_ground,
     SYMBOL_carried,
     SYMBOL_own,
+    SYMBOL_starts,
     SYMBOLS
 } gk_symbol;
 

@@ -3,6 +3,7 @@
 #include "model/gk_model.h"
 #include "base/gk_lanes.h"
 #include "model/gk_fields.h"
+#include "model/gk_vars.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -414,6 +415,18 @@ static void read_engagements(reader *r, gk_model *m)
     }
 }
 
+static void read_starts(reader *r, gk_model *m)
+{
+    m->starts = (int)length_of(r, F_MODEL_start_reference);
+    demand(r, m->starts <= MAX_STARTS, "starts");
+    r->shape.size[SYMBOL_starts] = (uint64_t)m->starts;
+    m->start_reference = take(r, F_MODEL_start_reference);
+    m->start_value = take(r, F_MODEL_start_value);
+    if (m->starts && !m->start_value) refuse(r, "starts", "are missing");
+    for (int i = 0; i < m->starts && !r->outcome; i++)
+        demand(r, gk_start_allowed(m, (uint32_t)m->start_reference[i], m->start_value[i]), "starts");
+}
+
 gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char message[GK_MESSAGE])
 {
     memset(model, 0, sizeof *model);
@@ -432,6 +445,7 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     if (!r.outcome) read_engagements(&r, model);
     if (!r.outcome) read_nodal(&r, model);
     if (!r.outcome) model->spatial = is_spatial(model);
+    if (!r.outcome) read_starts(&r, model);
     return r.outcome;
 }
 
@@ -439,6 +453,21 @@ size_t gk_model_size(void) { return sizeof(gk_model); }
 const char *gk_model_name(const gk_model *model) { return model->name; }
 const char *gk_model_hash(const gk_model *model) { return model->blob.hash; }
 int gk_abi(void) { return GK_ABI; }
+
+const char *gk_status_text(int bit)
+{
+    static const char *const text[] = {
+        "local contact law beyond its range",
+        "fallback scheme in use",
+        "limit of iterations reached",
+        "gamma lowered: forces are damped more",
+        "a loaded flank ended although effect.tip_contact is off",
+        "mesh force beyond torque_max, which the model is made for",
+        "speed beyond speed_max, which the model is made for",
+        "the gears started at rest and were torn along in the first step: set speeds before the initialisation ends",
+    };
+    return bit >= 0 && bit < (int)(sizeof text / sizeof *text) ? text[bit] : NULL;
+}
 
 const char *gk_outcome_text(gk_outcome outcome)
 {

@@ -13,6 +13,7 @@ enum {
     MAX_SLICES = 10,
     MAX_FUNCTIONS = 8,
     LEADS = 33,       /* places across the face width where a lead is given */
+    MAX_STARTS = 64,  /* parameters whose start is not the table's */
     MAX_CARRIED = 32, /* bodies in the axes of turning rotors */
     MAX_MODES = 6000,
     MAX_TEETH = 1000,
@@ -88,6 +89,9 @@ typedef struct gk_ground {
 struct gk_model {
     gk_blob blob;
     const char *name;
+    int starts; /* parameters whose start is not the table's */
+    const int32_t *start_reference;
+    const double *start_value;
     int slices, rotors, gears, engagements, ports, supports, dampers, functions, rolls, sets, chains;
     int amplitudes; /* of observed gears, together */
     char rotor_name[MAX_ROTORS][NAME_LENGTH], support_name[MAX_SUPPORTS][NAME_LENGTH],

@@ -88,9 +88,16 @@ static double *value_of(gk_data *data, const gk_row *row, int instance)
     }
 }
 
-/* starts that the stage decides */
+static uint32_t reference_of(const gk_row *row, int instance)
+{
+    return (uint32_t)((row->scope == SCOPE_MODE ? MODES_FROM : INSTANCES * row->number) + instance);
+}
+
+/* starts that the model or its stage decides */
 static double start_of(const gk_model *model, const gk_row *row, int instance)
 {
+    for (int i = 0; i < model->starts; i++)
+        if ((uint32_t)model->start_reference[i] == reference_of(row, instance)) return model->start_value[i];
     if (row->scope == SCOPE_STAGE && row->place == V_SLICES) return model->slices;
     if (row->scope == SCOPE_MESH && row->place == V_BACKLASH) return model->engagement[instance].backlash;
     if (row->scope == SCOPE_MESH && row->place == V_DAMPING) return model->engagement[instance].damping;
@@ -206,7 +213,7 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
     const gk_row *row = listed(model, index, &instance);
     if (!row) return GK_BAD_VARIABLE;
     memset(info, 0, sizeof *info);
-    info->reference = (uint32_t)((row->scope == SCOPE_MODE ? MODES_FROM : INSTANCES * row->number) + instance);
+    info->reference = reference_of(row, instance);
     info->type = row->type;
     info->causality = row->causality;
     expand(info->name, sizeof info->name, model, row, instance);
@@ -233,6 +240,19 @@ gk_outcome gk_defaults(const gk_model *model, gk_data *data)
     return GK_OK;
 }
 
+static int in_range(const gk_row *row, double value)
+{
+    return gk_finite(value) && value >= row->minimum && value <= row->maximum &&
+           (row->type == GK_REAL || value == (double)(int)value);
+}
+
+int gk_start_allowed(const gk_model *model, uint32_t reference, double value)
+{
+    int instance;
+    const gk_row *row = row_of(model, reference, &instance);
+    return row && row->causality == GK_PARAMETER && in_range(row, value);
+}
+
 static gk_outcome acceptable(const gk_model *model, const gk_data *data, uint32_t reference, double value)
 {
     int instance;
@@ -241,9 +261,7 @@ static gk_outcome acceptable(const gk_model *model, const gk_data *data, uint32_
     if (row->causality == GK_OUTPUT) return GK_BAD_CALL;
     if (row->causality == GK_PARAMETER && data->phase != PHASE_NEW) return GK_BAD_CALL;
     if (data->phase == PHASE_FAILED) return GK_BAD_CALL;
-    if (!gk_finite(value) || value < row->minimum || value > row->maximum) return GK_BAD_VALUE;
-    if (row->type != GK_REAL && value != (double)(int)value) return GK_BAD_VALUE;
-    return GK_OK;
+    return in_range(row, value) ? GK_OK : GK_BAD_VALUE;
 }
 
 gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *references, size_t count,

@@ -78,4 +78,7 @@ enum {
 #undef GK_VAR
     MODE_VARS
 };
+
+/* may a parameter of this model start with this value? */
+int gk_start_allowed(const gk_model *model, uint32_t reference, double value);
 #endif

@@ -4,6 +4,7 @@
 #include "setup/gk_kinematics.h"
 
 static const double ULP = 2.220446049250313e-16;
+static const double JUMP = 10.0; /* rad/s: an input that begins to move faster than that was not there before */
 enum { HALVINGS = 3 };
 
 double gk_time(const gk_data *data) { return data->time_base + (double)data->count * data->step_H; }
@@ -151,6 +152,17 @@ static gk_outcome accept_step(gk_data *data, double time, double H)
     return GK_OK;
 }
 
+/* Inputs that were not given before the start: what stood then moves at the first step, and not by its acceleration */
+static int starts_late(const gk_model *model, const gk_data *data)
+{
+    for (int p = 0; p < model->ports; p++) {
+        const gk_motion was = data->input[p], next = motion_in(data, p);
+        const double gained = fabs(next.w) - 2.0 * fabs(next.a) * data->step_H;
+        if (model->port[p].kind == PORT_SPRING && was.w == 0.0 && gained > JUMP) return 1;
+    }
+    return 0;
+}
+
 /* takes the inputs over; what they jump by is faded out over the step */
 static span begin(const gk_model *model, gk_work *work, gk_data *data)
 {
@@ -181,6 +193,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     if (outcome) return outcome;
     const double count = data->step_H / setup->h * (1.0 - 1e-12);
     if (!(count < 1e9)) return GK_BAD_STEP;
+    if (data->steps == 0 && starts_late(model, data)) data->status |= STATUS_JUMP;
     const span c = begin(model, work, data);
     const int64_t steps = 1 + (int64_t)count; /* ceil, guarded against rounding of H / h */
     const double h = c.H / (double)steps;
@@ -221,7 +234,8 @@ static int all_small(const double *v, size_t count)
 static int good_meshing(const gk_meshing *m)
 {
     int good = m->pairs >= 0 && m->pairs <= MAX_PAIRS && all_small(m->still, POSE) && gk_finite(m->reach) &&
-               gk_finite(m->open_time) && gk_finite(m->owed);
+               gk_finite(m->open_time) && gk_finite(m->owed) && all_small(&m->pitch_angle, 1) &&
+               all_small(&m->pitch_time, 1) && all_small(&m->pitch_impulse, 1);
     for (int p = 0; good && p < m->pairs; p++)
         good = (m->memory[p].key.flank == 0 || m->memory[p].key.flank == 1) &&
                all_small(m->memory[p].force, 4 * MAX_SLICES);

@@ -1,6 +1,7 @@
 /* Outputs at the end of a communication step: forces, motions, energies, counters. */
 #include "run/gk_run.h"
 
+static const double OVER = 1.01;  /* of torque_max and speed_max: what rounding and ripple may take */
 static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
@@ -247,6 +248,25 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
 }
 
 /* ---- over a communication step ----------------------------------------------------------------------------------- */
+/* Over every tooth pitch that passes: is the mean force beyond that of torque_max, the speed beyond speed_max? */
+static void watch_limits(const gk_model *model, gk_data *data, int e, double H, double impulse)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    const gk_gear *A = &model->gear[engagement->gear[0]];
+    gk_meshing *meshing = &data->meshing[e];
+    const int f = gk_frame_of(model, engagement);
+    const double angle = data->x[A->rotor] - (f < 0 ? 0.0 : data->x[f]);
+    const double pitches = fabs(angle - meshing->pitch_angle) * A->z / (2.0 * GK_PI);
+    meshing->pitch_time += H;
+    meshing->pitch_impulse += impulse;
+    if (pitches < 1.0) return;
+    if (fabs(meshing->pitch_impulse) > OVER * engagement->force_max * meshing->pitch_time)
+        data->status |= STATUS_TORQUE;
+    if (meshing->pitch_time * OVER < pitches * model->period_min) data->status |= STATUS_SPEED;
+    meshing->pitch_angle = angle;
+    meshing->pitch_time = meshing->pitch_impulse = 0.0;
+}
+
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     outputs(model, setup, work, data, 0.0);
@@ -260,6 +280,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         v[V_MESH_FORCE_MEAN] = v[V_MESH_FORCE];
         v[V_FORCE_MAX] = gk_max(v[V_FORCE_DRIVE], v[V_FORCE_COAST]);
         data->meshing[e].apart = v[V_CONTACT] == 0.0;
+        watch_limits(model, data, e, 0.0, 0.0); /* where the first pitch begins */
     }
     data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
     for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
@@ -344,6 +365,7 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
     for (int e = 0; e < model->engagements; e++) {
         data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
         data->mesh[e][V_FORCE_MAX] = tally->highest[e];
+        watch_limits(model, data, e, H, tally->mesh[e]);
     }
     outputs(model, setup, work, data, h);
     for (int p = 0; p < model->ports; p++) {

@@ -1,0 +1,163 @@
+"""The part of a trace in which a shaft gathers or loses speed steadily, and the signals whose orders it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import SimulationError
+from gearfmu.modes.linear import stage_modes
+from gearfmu.report import metrics
+from gearfmu.report.campbell import loud
+from gearfmu.report.plots_set import PlanetSet, mean_or_sample, on_mounts
+from gearfmu.report.ring_pickup import rim_velocity
+from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED, Window, bearings
+from gearfmu.spec.turning import Meshing
+from gearfmu.stage import assemble
+from gearfmu.stage.place import place_of
+from gearfmu.stage.trace import Trace
+
+LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
+BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive
+SLOWEST = 0.02  # of it: slower than that there are no orders
+WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
+SET_ORDERS, PAIR_ORDERS = 3, 6  # mesh orders shown
+PICKUP = "pickup on the ring"
+LEAST_LOAD = 0.01  # of torque_max: below it flanks may part, and there is nothing to linearise
+MODES = 30  # of the linearised stage, the lowest
+
+
+@dataclass(frozen=True)
+class Signal:
+    """values (n,); unit, and what its level refers to; sides: for every mesh order the orders beside it, of the
+    carrier, that the signal has by the passing of the planets."""
+
+    values: np.ndarray
+    unit: str
+    reference: float
+    sides: Mapping[int, tuple[float, ...]]
+    averaged: float = 0.0  # s, over which every sample is a mean
+
+    def level(self, amplitude: np.ndarray) -> np.ndarray:
+        """Level in dB."""
+        return metrics.level(amplitude, self.reference)
+
+    @property
+    def label(self) -> str:
+        """Of a level."""
+        return f"dB re {self.reference:g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class RunUp:
+    """Part of a trace in which a shaft gathers speed (or loses it) steadily. each: mesh frequency over the shaft's;
+    signals by name; resonances: natural frequencies of the linearised stage that its transmission error drives, Hz."""
+
+    part: Trace
+    shaft: str
+    each: float
+    signals: Mapping[str, Signal]
+    resonances: tuple[float, ...] = ()
+    orders_shown: int = SET_ORDERS
+
+    @cached_property
+    def orders(self) -> dict[str, metrics.OrderMap]:
+        """The order map of every signal."""
+        angle, time = self.part[f"{self.shaft}{GEAR_PHI}"], self.part.time
+        angle = angle if angle[-1] > angle[0] else -angle
+        highest = (self.orders_shown + 0.3) * self.each
+        return {
+            name: metrics.order_map(time, own.values, angle, highest, averaged=own.averaged)
+            for name, own in self.signals.items()
+        }
+
+
+def run_up_of_set(
+    trace: Trace, own: PlanetSet, window: Window, spec: Any = None, bodies: Sequence[Any] | None = None
+) -> RunUp | None:
+    """The run-up of a set within `window`; None where its carrier does not gather speed (or lose it) steadily. spec and
+    bodies: for the pickup on the ring."""
+    part, names = trace.window(window.start, window.end), (own.meshing.rotor, own.carrier)
+    if any(f"{name}{GEAR_SPEED}" not in part for name in names) or f"{own.carrier}{GEAR_PHI}" not in part:
+        return None
+    speeds = {name: part[f"{name}{GEAR_SPEED}"] for name in names}
+    speed = np.abs(speeds[own.carrier])
+    if not _gathers(speed):
+        return None
+    each = float(np.mean(np.abs(own.meshing.relative(speeds)))) / float(speed.mean()) * own.meshing.teeth
+    each = round(each) if abs(each - round(each)) < WHOLE else each
+    signals = _signals(part, own, each)
+    velocity = None if spec is None or not bodies else rim_velocity(part, own, spec, bodies)
+    if velocity is not None:
+        beside = {k: passing_orders(k * each, len(own.planets)) for k in range(1, SET_ORDERS + 1)}
+        signals = {PICKUP: Signal(velocity, "m/s", 1e-9, beside)} | signals
+    return RunUp(part, own.carrier, each, signals) if signals else None
+
+
+def run_up_of_pair(trace: Trace, mesh: str, meshing: Meshing, window: Window) -> RunUp | None:
+    """The run-up of a stage of one engagement within `window`, by its gear A; None where that does not gather speed (or
+    lose it) steadily."""
+    part, gear = trace.window(window.start, window.end), meshing.rotor
+    if meshing.carrier is not None or any(f"{gear}{end}" not in part for end in (GEAR_SPEED, GEAR_PHI)):
+        return None
+    if not _gathers(np.abs(part[f"{gear}{GEAR_SPEED}"])):
+        return None
+    names = [f"bearing.{name}.fy" for name in bearings(part)] + [f"{mesh}.force"]
+    signals = {name: _force(part, name) for name in names if name in part or f"{name}_mean" in part}
+    return RunUp(part, gear, float(meshing.teeth), signals, orders_shown=PAIR_ORDERS) if signals else None
+
+
+def resonances(run: RunUp, mesh: str, spec: Any, bodies: Sequence[Any]) -> tuple[float, ...]:
+    """Natural frequencies (Hz) of a pair linearised under the run's mean mesh force, those modes that a transmission
+    error drives; none where the stage finds no equilibrium with its flanks in contact."""
+    model = assemble(spec, bodies)
+    place = place_of(model, mesh)
+    torque = float(np.mean(run.signals[f"{mesh}.force"].values)) * place.lever
+    if abs(torque) < LEAST_LOAD * place.most:
+        return ()
+    try:
+        found = stage_modes(model, bodies, torque, MODES, positions=3)
+    except SimulationError:
+        return ()
+    strong = np.any(loud(found), axis=1)
+    return tuple(float(f) for f in found.frequency.mean(axis=0)[strong])
+
+
+def _gathers(speed: np.ndarray) -> bool:
+    """Does a shaft gather speed, or lose it, steadily and without standing still?"""
+    gained, most = speed[-1] - speed[0], max(float(speed.mean()), 1e-9)
+    against = speed - np.maximum.accumulate(speed) if gained > 0 else np.minimum.accumulate(speed) - speed
+    return bool(
+        abs(gained) >= LEAST_RANGE * most and against.min() >= -BACKWARD * most and speed.min() >= SLOWEST * most
+    )
+
+
+def _force(part: Trace, name: str) -> Signal:
+    """A force, its mean over the step where that was recorded."""
+    step = metrics.sample_step(part.time) if f"{name}_mean" in part else 0.0
+    return Signal(mean_or_sample(part, name), "N", 1.0, {}, step)
+
+
+def _signals(part: Trace, own: PlanetSet, each: float) -> dict[str, Signal]:
+    """Force of the ring on its mounts, whose direction goes round with the carrier, and a mesh of every central
+    gear."""
+    around = {k: (k * each - 1.0, k * each + 1.0) for k in range(1, SET_ORDERS + 1)}
+    step = {True: metrics.sample_step(part.time), False: 0.0}
+    found = {
+        name: Signal(values, "N", 1.0, around, step[f"{name}_mean" in part])
+        for name, values in on_mounts(part).items()
+        if name[-1] == "x"
+    }
+    meshes = [next(iter(meshes.values())) for meshes in own.meshes.values()]
+    return found | {f"{mesh}.force": _force(part, f"{mesh}.force") for mesh in meshes if f"{mesh}.force" in part}
+
+
+def passing_orders(order: float, planets: int) -> tuple[float, ...]:
+    """Orders of the carrier beside a mesh order that equal planets make at a place on the ring: the nearest ones that
+    the number of planets divides (the mesh order itself is not among them)."""
+    below, above = np.ceil(order / planets) - 1, np.floor(order / planets) + 1
+    return float(below * planets), float(above * planets)
