@@ -37,9 +37,7 @@ COUPLED = (
 @click.option(
     "--out", type=click.Path(path_type=Path), default=Path("modes"), show_default=True, help="Folder to write to."
 )
-def modes(
-    stage: str, name: str | None, count: int, mounted: bool, uncoupled: bool, torque: float | None, out: Path
-) -> None:
+def modes(stage: str, name: str | None, count: int, torque: float | None, out: Path, **how: bool) -> None:
     """Natural frequencies of STAGE.
 
     With --body: elastic modes of one body, with nodal diameters, and per frequency a picture and a .vtu file. Without:
@@ -47,14 +45,13 @@ def modes(
     The torque acts on the input, the first port: a pair's pinion.
     """
     if name is None:
-        if mounted:
-            raise click.BadParameter("goes with --body ring", param_hint="--mounted")
-        if uncoupled:
-            raise click.BadParameter("goes with --body carrier", param_hint="--uncoupled")
+        for option, which in (("mounted", "ring"), ("uncoupled", "carrier")):
+            if how[option]:
+                raise click.BadParameter(f"goes with --body {which}", param_hint=f"--{option}")
         return _of_stage(stage, torque, count, out)
     if torque is not None:
         raise click.BadParameter("a body's modes know no torque: leave it away", param_hint="--torque")
-    body = _shapes(stage, name, count, (mounted, uncoupled))
+    body = _shapes(stage, name, count, (how["mounted"], how["uncoupled"]))
     for line in table(body):
         click.echo(line)
     if body.name == "carrier":

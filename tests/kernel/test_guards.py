@@ -17,6 +17,7 @@ from gearfmu.stage.blob import read_blob, write_blob
 STEP = 2e-5  # s, communication step: three internal ones
 QUARTER = math.pi / 2 / TEETH[0]  # rad of the pinion: a quarter of a pitch, what one step may turn it
 BEYOND_THE_LAW, FALLBACK, ROUNDS = 1, 2, 4
+TORQUE, SPEED = 32, 64
 BAD_CALL, DIVERGED, ENERGY = 4, 8, 10
 WIDTH, STRIP, YIELD = 14e-3, 1e-3, 2 * (1 - 0.3**2) / (math.pi * 206e9)  # of the small pair: m, m, 1/Pa
 
@@ -31,7 +32,8 @@ def spinning(speed: float, **parameters: float) -> Kernel:
 
 
 def status(kernel: Kernel) -> int:
-    return int(kernel.get("solver.status"))
+    """Without the bits of torque_max and speed_max, which these runs pass at will: stage/test_limits.py."""
+    return int(kernel.get("solver.status")) & ~(TORQUE | SPEED)
 
 
 @pytest.mark.parametrize("hertz", [1.0, 0.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,14 @@ import pytest
 from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report.metrics import MetricsError, order_map
+from gearfmu.report.plots_runup import crossings
 from gearfmu.report.plots_set import planet_set
 from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
-from gearfmu.report.runup import PICKUP, passing_orders, run_up_of_set
+from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_pair, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.report.style import COLUMNS, MOST_POINTS, envelope
 from gearfmu.spec.stage import load_stage
+from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stage.trace import Channel, Trace
 
 STEP, SLOW, FAST, DURATION = 5e-5, 60.0, 240.0, 1.0  # s, rad/s of the carrier
@@ -135,3 +138,67 @@ def test_long_curves_are_shown_by_their_envelope() -> None:
     assert shown_x.size == shown_y.size == 2 * COLUMNS and np.all(np.diff(shown_x) >= 0.0)
     assert (shown_y.min(), shown_y.max()) == (y.min(), y.max())
     assert envelope(x[:100], y[:100])[1].tobytes() == y[:100].tobytes()
+
+
+def pair_sweep() -> Trace:
+    """A pair of 16 teeth on the pinion: order 1 of the mesh, louder where it meets 800 Hz."""
+    angle = 2.0 * ANGLE
+    frequency = 16 * 2.0 * SPEED / (2 * np.pi)
+    loud = 1.0 / np.abs(1 - (frequency / 800.0) ** 2 + 0.06j * frequency / 800.0)
+    force = 1000.0 + 20.0 * loud * np.cos(16.0 * angle)
+    channels = {
+        "pinion.gear.w": Channel(2.0 * SPEED, "rad/s"),
+        "pinion.gear.phi": Channel(angle, "rad"),
+        "mesh.force": Channel(force, "N"),
+        "bearing.pinion.fx": Channel(0.3 * force, "N"),
+        "bearing.pinion.fy": Channel(0.9 * force, "N"),
+    }
+    return Trace(TIME, channels, {"scene": "sweep", "stage": "pair", "meshes": {"mesh": ["pinion", 16]}})
+
+
+def test_the_run_up_of_a_pair_has_its_maps_over_the_pinions_speed(tmp_path: Path) -> None:
+    trace = pair_sweep()
+    report.write(trace, trace.meta, tmp_path)
+    made = {path.stem for path in (tmp_path / "data").glob("*.csv")}
+    assert {"spectrogram_speed", "orders_map", "orders_speed", "orders"} <= made
+    assert not {"spectrum", "spectrogram"} & made
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "speed of the pinion in rpm" in text and "mesh orders k × 16" in text and "planets" not in text
+    own = run_up_of_pair(trace, "mesh", known_meshings(trace)["mesh"], Window(0.0, DURATION, "here"))
+    assert own is not None and list(own.signals) == ["bearing.pinion.fy", "mesh.force"] and own.resonances == ()
+    found = own.orders["mesh.force"]
+    peak = found.speed[np.argmax(found.amplitude[:, found.order == 16.0].ravel())]
+    assert 16 * peak / (2 * np.pi) == pytest.approx(800.0, rel=0.03)
+    marked = crossings(replace(own, resonances=(800.0,)))
+    assert marked[0] == (1, 800.0, pytest.approx(3000.0)) and [order for order, *_ in marked] == [1, 2, 3, 4, 5, 6]
+
+
+def test_orders_are_loudest_where_they_meet_the_linearised_stage() -> None:
+    """`simulate --end-speed` of the shipped pair: the second mesh order in the wheel's bearing peaks at a resonance."""
+    spec = load_stage("fzg_c/stage_relief")
+    bodies = load_bodies(spec)
+    model = assemble(spec, bodies)
+    start, end, duration = 3500 * np.pi / 30, 6000 * np.pi / 30, 0.3
+    drive = Steady(model, start, 150.0, (end - start) / duration)
+    trace = simulate(model, drive, duration, 40e-6, {"level": 1.0})
+    run = run_up_of_pair(trace, "mesh", known_meshings(trace)["mesh"], Window(0.02, duration, "settled"))
+    assert run is not None
+    found = run.orders["bearing.wheel.fy"]
+    near = np.abs(found.order - 32.0) < 0.6
+    peak = found.speed[np.argmax(np.linalg.norm(found.amplitude[:, near], axis=1))] * 32 / (2 * np.pi)
+    known = resonances(run, "mesh", spec, bodies)
+    print(f"peak {peak:.0f} Hz, resonances {[round(f) for f in known]}")
+    assert min(abs(peak / f - 1) for f in known) < 0.02
+    assert trace["pinion.gear.w"][-1] == pytest.approx(end, rel=0.01)
+
+
+def test_a_run_up_turns_through_the_angle_of_its_speeds() -> None:
+    spec = load_stage("fzg_c")
+    drive = Steady(assemble(spec, load_bodies(spec)), 30.0, 150.0, 400.0)
+    step = 1e-4
+    before, now, after = (drive(0.2 + side * step) for side in (-1, 0, 1))
+    for port in ("pinion", "wheel"):
+        speed = (after[f"{port}.phi"] - before[f"{port}.phi"]) / (2 * step)
+        assert speed == pytest.approx(now[f"{port}.w"], rel=1e-9)
+        assert (after[f"{port}.w"] - before[f"{port}.w"]) / (2 * step) == pytest.approx(now[f"{port}.a"], rel=1e-9)
+    assert now["pinion.w"] == pytest.approx(110.0) and now["wheel.w"] == pytest.approx(-110.0 * 16 / 24)

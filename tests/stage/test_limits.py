@@ -36,6 +36,19 @@ def test_torque_and_speed_beyond_the_limits_are_told(relieved: StageModel) -> No
     assert any("beyond torque_max" in word for word in words) and any("beyond speed_max" in word for word in words)
 
 
+def test_an_angle_at_the_start_is_no_speed(relieved: StageModel) -> None:
+    """Ports that begin many pitches away from zero, and are loaded there, have not turned by them."""
+    drive, ratio = Steady(relieved, 100.0, 302.0), relieved.shafts.ratio
+    kernel = Kernel(relieved.blob, FAST)
+    for n in range(3):
+        values = dict(drive(n * 1e-4))
+        values["pinion.phi"] += 40.0
+        values["wheel.phi"] += 40.0 / ratio
+        put(kernel, values)
+        kernel.initialize(0.0) if n == 0 else kernel.step((n - 1) * 1e-4, 1e-4)
+        assert int(kernel.get("solver.status")) == 0
+
+
 def test_limits_in_words_name_both_numbers(relieved: StageModel) -> None:
     assert beyond_limits(relieved, 600.0, 6000 * RPM) == []
     torque, speed = beyond_limits(relieved, -1500.0, 20000 * RPM)

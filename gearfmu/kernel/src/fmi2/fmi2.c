@@ -458,7 +458,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2CancelStep(fmi2Component c) { return not_offered(c, __func__); }
 
-/* ---- model exchange: some loaders look these up in every FMU, also where only co-simulation is declared ----------- */
+/* ---- model exchange: some loaders look these up in every FMU, also where only co-simulation is declared ---------- */
 fmi2Status fmi2EnterEventMode(fmi2Component c) { return not_offered(c, __func__); }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)

@@ -248,23 +248,34 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
 }
 
 /* ---- over a communication step ----------------------------------------------------------------------------------- */
+/* angle of gear A of an engagement in the axes that carry it */
+static double carried_angle(const gk_model *model, const gk_data *data, int e)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    const int f = gk_frame_of(model, engagement);
+    return data->x[model->gear[engagement->gear[0]].rotor] - (f < 0 ? 0.0 : data->x[f]);
+}
+
+static void begin_pitch(const gk_model *model, gk_data *data, int e)
+{
+    data->meshing[e].pitch_angle = carried_angle(model, data, e);
+    data->meshing[e].pitch_time = data->meshing[e].pitch_impulse = 0.0;
+}
+
 /* Over every tooth pitch that passes: is the mean force beyond that of torque_max, the speed beyond speed_max? */
 static void watch_limits(const gk_model *model, gk_data *data, int e, double H, double impulse)
 {
     const gk_engagement *engagement = &model->engagement[e];
-    const gk_gear *A = &model->gear[engagement->gear[0]];
     gk_meshing *meshing = &data->meshing[e];
-    const int f = gk_frame_of(model, engagement);
-    const double angle = data->x[A->rotor] - (f < 0 ? 0.0 : data->x[f]);
-    const double pitches = fabs(angle - meshing->pitch_angle) * A->z / (2.0 * GK_PI);
+    const double turned = fabs(carried_angle(model, data, e) - meshing->pitch_angle),
+                 pitches = turned * model->gear[engagement->gear[0]].z / (2.0 * GK_PI);
     meshing->pitch_time += H;
     meshing->pitch_impulse += impulse;
     if (pitches < 1.0) return;
     if (fabs(meshing->pitch_impulse) > OVER * engagement->force_max * meshing->pitch_time)
         data->status |= STATUS_TORQUE;
     if (meshing->pitch_time * OVER < pitches * model->period_min) data->status |= STATUS_SPEED;
-    meshing->pitch_angle = angle;
-    meshing->pitch_time = meshing->pitch_impulse = 0.0;
+    begin_pitch(model, data, e);
 }
 
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
@@ -280,7 +291,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
         v[V_MESH_FORCE_MEAN] = v[V_MESH_FORCE];
         v[V_FORCE_MAX] = gk_max(v[V_FORCE_DRIVE], v[V_FORCE_COAST]);
         data->meshing[e].apart = v[V_CONTACT] == 0.0;
-        watch_limits(model, data, e, 0.0, 0.0); /* where the first pitch begins */
+        begin_pitch(model, data, e);
     }
     data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
     for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
