@@ -60,13 +60,14 @@ def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress:
 def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
     """Every point, or why its stage or scene is refused."""
     variants: dict[Variant, tuple[Variant, str]] = {}
+    fitting: dict[tuple[str, ...], bool] = {}
     found: list[_Point | Outcome] = []
     for values in plan.points:
         try:
             stage, others = split(plan.what, values)
             asked = Variant(str(plan.stage_file(values)), tuple(sorted(stage.items(), key=lambda item: item[0])))
             if asked not in variants:
-                variants[asked] = _located(asked, out)
+                variants[asked] = _located(asked, out, fitting)
             variant, fingerprint = variants[asked]
             of_rest = load_scene(plan.subject, others).hash if plan.what == RUN else others
             parts = [FORMAT, plan.what, of_rest, fingerprint, program()]
@@ -76,13 +77,17 @@ def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
     return found
 
 
-def _located(variant: Variant, out: Path) -> tuple[Variant, str]:
+def _located(variant: Variant, out: Path, fitting: dict[tuple[str, ...], bool]) -> tuple[Variant, str]:
     """The variant with the folder of its bodies, and a fingerprint of its numbers: a stage that was changed so that
-    the bodies beside its file do not fit has bodies of its own in `out`."""
+    the bodies beside its file do not fit has bodies of its own in `out`. fitting: what is known of that, by the
+    fingerprints of bodies."""
     spec = variant.spec()
     hashes = body_hashes(spec)
     fingerprint = _digest([spec.model_dump(mode="json", exclude={"source"}), list(hashes)])
-    if not variant.changes or _fit(spec, None):
+    key = (variant.file, *hashes)
+    if variant.changes and key not in fitting:
+        fitting[key] = _fit(spec, None)
+    if not variant.changes or fitting[key]:
         return variant, fingerprint
     return replace(variant, folder=str((out / BODIES / _digest(list(hashes))[:12]).resolve())), fingerprint
 
