@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from gearfmu.spec.base import Quantity, metadata_of
 
 _IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi)}
-_SMALL = 1e-4  # m: below it lengths are told in micrometres
+_SCALES = {"m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)), "s": ((1.0, "s", 1.0), (1e-3, "ms", 1e3), (0.0, "µs", 1e6))}
 
 
 def shown(spec: BaseModel) -> dict[str, Any]:
@@ -26,9 +26,12 @@ def shown(spec: BaseModel) -> dict[str, Any]:
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """An SI number of this unit as text: lengths in mm or µm, angles in degrees, speeds in rpm."""
-    if unit == "m" and value:
-        value, unit = (1e3 * value, "mm") if abs(value) >= _SMALL else (1e6 * value, "µm")
+    """An SI number of this unit as text: lengths in mm or µm, times in s, ms or µs, angles in degrees, speeds in
+    rpm."""
+    if unit in _SCALES:
+        scales = _SCALES[unit]
+        _, unit, factor = next((scale for scale in scales if abs(value) >= scale[0]), scales[0]) if value else scales[0]
+        value *= factor
     elif unit in _IN:
         unit, factor = _IN[unit]
         value *= factor
