@@ -6,16 +6,16 @@ Run: python examples/drive_with_fmpy.py [fzg_c.fmu]
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 import fmpy
 
+import gearfmu as gf
+
 fmu = Path(sys.argv[1] if len(sys.argv) > 1 else "fzg_c.fmu")
 if not fmu.exists():
-    ports = ["--port", "pinion=torque", "--port", "wheel=fixed"]
-    subprocess.run([sys.executable, "-m", "gearfmu.cli", "export", "fzg_c", "-o", fmu, *ports], check=True)
+    gf.export(gf.assemble("fzg_c", ports={"pinion": "torque", "wheel": "fixed"}), fmu)
 
 result = fmpy.simulate_fmu(
     str(fmu),

@@ -15,28 +15,22 @@ import matplotlib
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
-from gearfmu.body import load_stage_bodies
-from gearfmu.fmu import export
-from gearfmu.spec.ports import ChainSpec
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage import assemble
+import gearfmu as gf
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 ENGINE, LOAD_INERTIA = 100.0, 0.2  # rad/s, kg·m²
 H, END = 1e-4, 0.2  # s
-CLUTCH = ChainSpec(inertia=0.15, disc_inertia=2e-3, shaft_k=15e3, shaft_c=1.0)
+CLUTCH = {"inertia": 0.15, "disc_inertia": 2e-3, "shaft_k": 15e3, "shaft_c": 1.0}  # SI
 INPUTS = ("pinion.phi", "pinion.w", "pinion.clutch.capacity", "wheel.phi", "wheel.w")
 SHOWN = ("pinion.clutch.tau", "pinion.clutch.slip", "mesh.force", "wheel.tau_mean", "pinion.clutch.locked")
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/examples")
 folder.mkdir(parents=True, exist_ok=True)
 
-spec = load_stage("fzg_c/stage_relief")
-ports = spec.ports | {"pinion": spec.ports["pinion"].model_copy(update={"chain": CLUTCH})}
-spec = spec.model_copy(update={"ports": ports})
-fmu = export(assemble(spec, load_stage_bodies(spec)), folder / "clutch.fmu")
+stage = gf.load("fzg_c/stage_relief", {f"ports.pinion.chain.{name}": value for name, value in CLUTCH.items()})
+fmu = gf.export(stage, folder / "clutch.fmu")
 
 description = fmpy.read_model_description(str(fmu))
 reference = {v.name + ("" if v.causality != "input" else " in"): v.valueReference for v in description.modelVariables}

@@ -10,11 +10,9 @@ import shutil
 import sys
 from pathlib import Path
 
-from gearfmu.body import reduce_stage
+import gearfmu as gf
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.new import new_stage
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage import assemble, loaded_te
 
 TORQUE = 302.0  # N·m on the pinion
 CHANGES = {
@@ -34,9 +32,8 @@ for old, new in CHANGES.items():
 path.write_text(text, encoding="utf-8")
 
 for stage in ("fzg_c", path):
-    spec = load_stage(stage)
-    model = assemble(spec, reduce_stage(spec))
-    te = 1e6 * loaded_te(model, [TORQUE], 32).te[0]
+    spec = gf.load(stage)
+    te = 1e6 * gf.te(spec, TORQUE, 32).te[0]
     ratio = PairGeometry.of(spec).tip_circle_contact_ratio
     print(
         f"{spec.name}: contact ratio {ratio:.3f}, transmission error mean {te.mean():.2f} µm, "

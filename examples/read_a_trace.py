@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import sys
 
+import gearfmu as gf
 from gearfmu.report.metrics import amplitude_spectrum, level, mesh_angle, order_cuts, sample_step
-from gearfmu.stage.trace import Trace
 
-trace = Trace.load(sys.argv[1])
+trace = gf.Trace.load(sys.argv[1])
 settled = trace.window(0.02)
 force = settled["bearing.pinion.fy"]
 

@@ -11,9 +11,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from gearfmu.body import load_stage_bodies
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage import Steady, assemble, simulate
+import gearfmu as gf
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -24,10 +22,9 @@ RATE = (END - START) / DURATION
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/examples")
 folder.mkdir(parents=True, exist_ok=True)
-spec = load_stage("fzg_c/stage_relief")
-model = assemble(spec, load_stage_bodies(spec))
-wound = Steady(model, START, TORQUE)(0.0)
-ratio = spec.gears[0].teeth / spec.gears[1].teeth
+model = gf.assemble("fzg_c/stage_relief")
+wound = gf.wound_up(model, TORQUE, START)(0.0)
+ratio = -1 / model.shafts.ratio
 
 
 def inputs(time: float) -> dict[str, float]:
@@ -43,7 +40,7 @@ def inputs(time: float) -> dict[str, float]:
     }
 
 
-trace = simulate(model, inputs, DURATION, STEP, {"level": 1})
+trace = gf.drive(model, inputs, DURATION, STEP, level="fast")
 rpm, force = trace["pinion.gear.w"] * 30 / np.pi, trace["mesh.force"]
 window = round(0.01 / STEP)
 mean = np.convolve(force, np.ones(window) / window, "same")

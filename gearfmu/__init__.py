@@ -1,1 +1,85 @@
-"""Elastic gear stages as FMUs."""
+"""Elastic gear stages as FMUs.
+
+    import gearfmu as gf
+
+    stage = gf.load("fzg_c/stage_relief")                     # numbers of a stage, checked
+    model = gf.assemble(stage)                                # its reduced bodies as a model
+    error = gf.te(model, ["100 N*m", "302 N*m"])              # loaded transmission error
+    trace = gf.simulate(model, "302 N*m", "2000 rpm", level="fast")
+    print(1e6 * error.te.mean(axis=1), trace["mesh.force"].mean())
+    gf.export(model, "fzg_c.fmu")                             # FMI 2.0, needs nothing where it is imported
+    gf.write_report(trace, "out/steady")
+    gf.run("pair_loaded", "out/loaded")                       # a scene: the stage in its drivetrain
+    gf.sweep("fzg_c", {"torque": [100.0, 200.0, 300.0]}, "out/harris")
+
+Numbers are SI; text carries its unit. `docs/howto-python.md` shows more, `gearfmu --help` the same on the command line.
+What is named here is imported when it is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gearfmu.api.models import assemble, load, load_scene, reduce
+    from gearfmu.api.results import convert, export, write_report
+    from gearfmu.api.runs import drive, run, simulate, te, wound_up
+    from gearfmu.api.sweeps import sweep
+    from gearfmu.errors import GearfmuError
+    from gearfmu.stage.model import StageModel
+    from gearfmu.stage.te import TeResult
+    from gearfmu.stage.trace import Channel, Trace
+    from gearfmu.sweeps.table import SweepTable
+
+    __version__: str
+
+__all__ = [
+    "Channel",
+    "GearfmuError",
+    "StageModel",
+    "SweepTable",
+    "TeResult",
+    "Trace",
+    "assemble",
+    "convert",
+    "drive",
+    "export",
+    "load",
+    "load_scene",
+    "reduce",
+    "run",
+    "simulate",
+    "sweep",
+    "te",
+    "wound_up",
+    "write_report",
+]
+_HOMES = {
+    "api.models": ("assemble", "load", "load_scene", "reduce"),
+    "api.results": ("convert", "export", "write_report"),
+    "api.runs": ("drive", "run", "simulate", "te", "wound_up"),
+    "api.sweeps": ("sweep",),
+    "errors": ("GearfmuError",),
+    "stage.model": ("StageModel",),
+    "stage.te": ("TeResult",),
+    "stage.trace": ("Channel", "Trace"),
+    "sweeps.table": ("SweepTable",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("gearfmu")
+    for home, names in _HOMES.items():
+        if name in names:
+            found = getattr(import_module(f"gearfmu.{home}"), name)
+            globals()[name] = found
+            return found
+    raise AttributeError(f"module 'gearfmu' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, "__version__"})

@@ -34,6 +34,8 @@ VERBS = {
     "run": ("gearfmu.commands.runs:run", "Run a scene: trace.h5, summary.json, report.html."),
     "simulate": ("gearfmu.commands.runs:simulate", "Run a stage alone, without FMU and drivetrain."),
     "report": ("gearfmu.commands.runs:report", "Write the report of a trace again."),
+    "sweep": ("gearfmu.commands.sweep:sweep", "Run a scene or a stage at many points: one table, pictures."),
+    "convert": ("gearfmu.commands.convert:convert", "Write a trace as CSV, MATLAB, Parquet or UFF58 file."),
     "deformed": ("gearfmu.commands.runs:deformed", "Gears that a run recorded deformed, as .vtu for ParaView."),
     "demo": ("gearfmu.commands.runs:demo", "Clutch closure on a shipped stage, through its FMU."),
     "study": ("gearfmu.commands.study:study", "What accuracy costs: error against time of the fidelity levels."),

@@ -167,7 +167,7 @@ def test_bodies_that_are_being_made_are_named_where_there_is_no_terminal(capsys:
 
     with reducing() as progress:
         for text in ("pinion: mesh", "pinion: modes", "wheel: mesh", "reducing ring"):
-            progress(text, 0.5)
+            progress(0.5, text)
     assert capsys.readouterr().err == "reducing pinion …\nreducing wheel …\nreducing ring …\n"
 
 

@@ -50,8 +50,6 @@ def imports_of(path: Path) -> set[str]:
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_imports_point_upward_only(path: Path) -> None:
     own = room_of("gearfmu." + path.relative_to(ROOT / "gearfmu").with_suffix("").as_posix().replace("/", "."))
-    if own == "__init__":
-        own = "errors"
     assert own in ORDER, f"{path} is in no room of docs/architecture.md"
     wrong = [m for m in imports_of(path) if room_of(m) and ORDER.get(room_of(m), len(ORDER)) > ORDER[own]]
     assert not wrong, f"{path.name} in room '{own}' imports from below: {wrong}"

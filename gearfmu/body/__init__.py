@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.body.bodies import current_bodies, load_bodies, reduce_bodies
+from gearfmu.body.bodies import body_hashes, current_bodies, load_bodies, reduce_apart, reduce_bodies
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
@@ -15,6 +15,7 @@ __all__ = [
     "InterfaceBody",
     "MountedRing",
     "ReducedBody",
+    "body_hashes",
     "body_path",
     "current_bodies",
     "inspect_file",
@@ -24,6 +25,7 @@ __all__ = [
     "load_set_bodies",
     "load_stage_bodies",
     "mounted",
+    "reduce_apart",
     "reduce_bodies",
     "reduce_set",
     "reduce_stage",

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
+from pathlib import Path
 from typing import Any
 
-from gearfmu.body.planetary import is_current_in_set, load_set_bodies, reduce_set
-from gearfmu.body.reduce import Progress, gears_of, is_current, load_stage_bodies, reduce_stage
+from gearfmu.body.planetary import is_current_in_set, load_set_bodies, reduce_set, set_hashes
+from gearfmu.body.reduce import Progress, gears_of, is_current, load_stage_bodies, reduce_stage, stage_hashes
+from gearfmu.spec.library import model_folder
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.planetary_body import SET_BODIES
 
@@ -18,6 +21,18 @@ def reduce_bodies(
     if isinstance(spec, PlanetarySpec):
         return list(reduce_set(spec, folder, force, progress))
     return list(reduce_stage(spec, folder, force, progress))
+
+
+def reduce_apart(
+    spec: Any, folder: str | os.PathLike[str], force: bool = False, progress: Progress | None = None
+) -> list[Any]:
+    """`reduce_bodies` of a stage that is not as its file says, into a folder of its own: bodies beside the file that
+    fit are taken over, and stay."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for path in model_folder(spec).glob("*.h5"):
+        if not (Path(folder) / path.name).exists():
+            shutil.copy(path, folder)
+    return reduce_bodies(spec, folder, force, progress)
 
 
 def current_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> set[str]:
@@ -32,3 +47,8 @@ def load_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> list
     if isinstance(spec, PlanetarySpec):
         return list(load_set_bodies(spec, folder))
     return list(load_stage_bodies(spec, folder))
+
+
+def body_hashes(spec: Any) -> tuple[str, ...]:
+    """Fingerprints that the bodies of a stage must carry, in the order of `load_bodies`."""
+    return set_hashes(spec) if isinstance(spec, PlanetarySpec) else stage_hashes(spec)

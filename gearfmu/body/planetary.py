@@ -45,6 +45,11 @@ def set_hash(spec: PlanetarySpec, name: str) -> str:
     return body_hash({**set_body_inputs(spec, name), "algorithm_version": ALGORITHM_VERSION})
 
 
+def set_hashes(spec: PlanetarySpec) -> tuple[str, ...]:
+    """`set_hash` of sun, planet, ring and carrier."""
+    return tuple(set_hash(spec, name) for name in SET_BODIES)
+
+
 def set_body_path(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None = None) -> Path:
     """Where a body lies: `<folder>/<name>.h5`, the folder of the stage file when None."""
     return (Path(folder) if folder is not None else model_folder(spec)) / f"{name}.h5"

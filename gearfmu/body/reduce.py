@@ -55,6 +55,11 @@ def expected_hash(spec: StageSpec, gear_index: int) -> str:
     return body_hash({**body_inputs(spec, gear_index), "algorithm_version": ALGORITHM_VERSION})
 
 
+def stage_hashes(spec: Stage) -> tuple[str, ...]:
+    """`expected_hash` of every gear of a stage."""
+    return tuple(expected_hash(own, index) for own, index in gears_of(spec))
+
+
 def body_path(spec: StageSpec, gear_index: int, folder: str | os.PathLike[str] | None = None) -> Path:
     """Where the body of a gear lies: `<folder>/<gear name>.h5`, the folder of the stage file when None."""
     home = Path(folder) if folder is not None else model_folder(spec)

@@ -58,7 +58,7 @@ def export(
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
     from gearfmu.commands.models import model_of
-    from gearfmu.commands.standalone import parameters
+    from gearfmu.commands.settings import parameters
 
     model = model_of(stage, port_kinds(ports), observe=observe)
     model = model.with_starts(parameters(model, starts, "--start"))

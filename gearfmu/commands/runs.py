@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +51,9 @@ def run(scene: str, out: Path | None, stage: str | None, step: float | None, **h
     spec = load_scene(scene)
     if stage is not None:
         spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
-    return run_scene(spec if step is None else with_step(spec, step), out or Path("out") / spec.name, **how)
+    unit = how["fmu_path"] if how["fmu_path"] is not None and how["unit"] == "fmu" else how["unit"]
+    spec = spec if step is None else with_step(spec, step)
+    return run_scene(spec, out or Path("out") / spec.name, unit=unit, verify=how["verify"])
 
 
 @click.command()
@@ -85,11 +86,12 @@ def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: A
     """Run STAGE alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
     the torque."""
     from gearfmu.commands.models import model_of
-    from gearfmu.commands.standalone import parameters, steady_run
+    from gearfmu.commands.settings import parameters
+    from gearfmu.stage.steady import Drive, steady_run
 
     model = model_of(stage)
     with progress_bar(model.name) as progress:
-        trace = steady_run(model, drive, parameters(model, settings), progress)
+        trace = steady_run(model, Drive(**drive), parameters(model, settings), progress)
     trace.meta["stage"] = stage
     return finish(trace, out or Path("out") / model.name, stage)
 
@@ -130,14 +132,7 @@ def report(path: Path, stage: str | None, out: Path | None) -> None:
 
     source = path / "trace.h5" if path.is_dir() else path
     trace = Trace.load(source)
-    click.echo(write_report(trace, out or source.parent, stage or stage_of(trace.meta), source.parent))
-
-
-def stage_of(meta: Mapping[str, Any]) -> str | None:
-    """STAGE of a run by its trace's meta: its file where that is still there, else its name; None where neither is
-    told."""
-    path = meta.get("stage_path")
-    return path if path and Path(path).is_file() else meta.get("stage")
+    click.echo(write_report(trace, out or source.parent, stage, source.parent))
 
 
 def with_step(scene: Any, step: float) -> Any:
@@ -149,12 +144,11 @@ def with_step(scene: Any, step: float) -> Any:
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
-    from gearfmu import cosim
-    from gearfmu.commands.models import bodies_for_motion
+    from gearfmu.api.results import recorded_deformation
+    from gearfmu.api.runs import run as run_it
 
-    bodies_for_motion(scene.stage.name)
     with progress_bar(scene.name) as progress:
-        trace = cosim.run(scene, out, progress=progress, **options)
+        trace = run_it(scene, out, progress=progress, **options)
     if scene.deformation is not None and scene.deformation.vtu:
         found = recorded_deformation(trace, out)
         assert found is not None
@@ -166,7 +160,7 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
 def finish(trace: Any, out: Path, stage: str | None) -> int:
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
     else 1."""
-    from gearfmu.report.page import REACHED_THE_END
+    from gearfmu.report.results import REACHED_THE_END
 
     trace.save(out / "trace.h5")
     page = write_report(trace, out, stage)
@@ -179,14 +173,6 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
         click.echo(f"warning: {text}", err=True)
     click.echo(page)
     return 0 if meta["outcome"] in REACHED_THE_END else 1
-
-
-def recorded_deformation(trace: Any, home: Path) -> Any:
-    """The Deformation of the run of `trace` in the folder `home`; None where the run recorded none."""
-    from gearfmu.stage.deformation import Deformation
-
-    name = trace.meta.get("deformation")
-    return Deformation.load(home / name) if name else None
 
 
 def write_deformed(deformation: Any, folder: Path, stage: str) -> list[Path]:
@@ -207,19 +193,7 @@ def write_deformed(deformation: Any, folder: Path, stage: str) -> list[Path]:
 
 
 def write_report(trace: Any, out: Path, stage: str | None, home: Path | None = None) -> Path:
-    """The report page of `trace` in `out`; with the deformed gears where the stage and its bodies can be read. home:
-    folder of the run's other files, `out` when None."""
-    from gearfmu import report as room
-    from gearfmu.body import load_bodies
-    from gearfmu.errors import GearfmuError
-    from gearfmu.spec.stage import load_stage
+    """`api.write_report`, its remark on standard error."""
+    from gearfmu.api.results import write_report as write
 
-    if not stage:
-        return room.write(trace, trace.meta, out)
-    try:
-        spec = load_stage(stage)
-        deformation = recorded_deformation(trace, home or out)
-        return room.write(trace, trace.meta, out, spec, load_bodies(spec), deformation)
-    except GearfmuError as error:
-        click.echo(f"gearfmu: the report goes without the deformed pair: {error}", err=True)
-        return room.write(trace, trace.meta, out)
+    return write(trace, out, stage, home, lambda text: click.echo(f"gearfmu: {text}", err=True))

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gearfmu.commands.models import reducing
+from gearfmu.commands.models import by_text, reducing
 from gearfmu.commands.shared import echo_pairs
 
 
@@ -67,7 +67,7 @@ def reduce(stage: str, out: Path | None, force: bool) -> None:
     spec, started = load_stage(stage), time.perf_counter()
     kept = set() if force else current_bodies(spec, out)
     with reducing() as progress:
-        bodies = reduce_bodies(spec, out, force, progress)
+        bodies = reduce_bodies(spec, out, force, by_text(progress))
     for body in bodies:
         click.echo(_told(body, body.name in kept))
     made = len(bodies) - len(kept)

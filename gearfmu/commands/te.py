@@ -65,7 +65,7 @@ def te(
         result = loaded_te(model, list(torques), positions, rigid_bearings, mesh)
         held = result if rigid_bearings else loaded_te(model, list(torques), positions, True, mesh)
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
-        write_columns(path, te_columns(result))
+        write_columns(path, result.columns())
         picture = path.with_suffix(".png")
         write_plot(result, picture)
         if len(meshes) > 1:
@@ -93,7 +93,7 @@ def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bo
     from gearfmu.stage.trace import write_columns
 
     result = set_te(model, torques, positions)
-    write_columns(out, set_te_columns(result))
+    write_columns(out, result.columns())
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     for line in set_te_lines(result, model.spec.set.load_sharing):
@@ -126,32 +126,3 @@ def _tell(result: Any, held: Any) -> None:
             f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
             f"mesh stiffness (bores held) {1e-6 * mesh.mean():.1f} N/µm{with_bearings}"
         )
-
-
-def te_columns(result: Any) -> dict[str, np.ndarray]:
-    """Columns of te.csv, torques one below the other: torque_Nm, position, te_um, mesh_stiffness_N_per_um, share_1 …"""
-    rows, positions = result.te.shape
-    columns = {
-        "torque_Nm": np.repeat(result.torque, positions),
-        "position": np.tile(result.position, rows),
-        "te_um": 1e6 * result.te.ravel(),
-        "mesh_stiffness_N_per_um": 1e-6 * result.stiffness.ravel(),
-    }
-    columns |= {f"share_{k + 1}": result.shares[:, :, k].ravel() for k in range(result.shares.shape[2])}
-    return columns
-
-
-def set_te_columns(result: Any) -> dict[str, np.ndarray]:
-    """Columns of a set's te.csv, torques one below the other: torque_Nm, position, te_um, stiffness_N_per_um,
-    sun_force_N and ring_force_N of the mean planet, sun_share_1 …, ring_share_1 …"""
-    rows, positions = result.te.shape
-    columns = {
-        "torque_Nm": np.repeat(result.torque, positions),
-        "position": np.tile(result.position, rows),
-        "te_um": 1e6 * result.te.ravel(),
-        "stiffness_N_per_um": 1e-6 * result.stiffness.ravel(),
-    }
-    columns |= {f"{gear}_force_N": result.force[:, :, g].ravel() for g, gear in enumerate(("sun", "ring"))}
-    for g, gear in enumerate(("sun", "ring")):
-        columns |= {f"{gear}_share_{k + 1}": result.sharing[:, :, g, k].ravel() for k in range(result.sharing.shape[3])}
-    return columns

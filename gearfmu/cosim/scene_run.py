@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,15 +40,32 @@ from gearfmu.stage.trace import Trace
 WHOLE = Wiring()
 
 
+@dataclass(frozen=True)
+class Staged:
+    """A scene with the model of its stage, whose ports are those that the scene's drivetrain needs."""
+
+    scene: SceneSpec
+    model: StageModel
+
+    @classmethod
+    def of(cls, scene: SceneSpec, spec: Any = None, bodies: Sequence[Any] | None = None) -> Staged:
+        """spec : of the stage, as the file that the scene names when None; bodies : of `load_bodies(spec)` when None.
+        SpecError, BodyError and ModelError as `load_stage`, `load_bodies` and `assemble`."""
+        spec = load_stage(scene.stage.name) if spec is None else spec
+        observe = scene.deformation.gears if scene.deformation is not None else ()
+        bodies = load_bodies(spec) if bodies is None else bodies
+        return cls(scene, assemble(in_drivetrain(scene, spec), bodies, observe=observe))
+
+
 def run(
-    scene: SceneSpec | str,
+    scene: Staged | SceneSpec | str,
     out_dir: str | Path | None = None,
     unit: str = "fmu",
     fmu_path: str | Path | None = None,
     verify: bool = False,
     progress: Progress | None = None,
 ) -> Trace:
-    """Run a scene (or the scene file or shipped scene of that name).
+    """Run a scene (or the scene file or shipped scene of that name; or one whose stage is assembled already).
 
     unit : "fmu" (exported into out_dir, or taken from fmu_path, which must have the scene's ports) or "kernel".
     verify : run again with half the communication step and estimate the coupling error. progress : told the done
@@ -58,8 +76,8 @@ def run(
     """
     if unit not in ("fmu", "kernel"):
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
-    scene = scene if isinstance(scene, SceneSpec) else load_scene(scene)
-    model = stage_model(scene)
+    staged = scene if isinstance(scene, Staged) else Staged.of(load_scene(scene) if isinstance(scene, str) else scene)
+    scene, model = staged.scene, staged.model
     with _source(model, unit, fmu_path, out_dir) as source:
         first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
         result = run_once(scene, source, first, frames=frame_plan(scene))
@@ -82,9 +100,7 @@ def run(
 
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
-    spec = load_stage(scene.stage.name)
-    observe = scene.deformation.gears if scene.deformation is not None else ()
-    return assemble(in_drivetrain(scene, spec), load_bodies(spec), observe=observe)
+    return Staged.of(scene).model
 
 
 def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 
 from gearfmu.report.plots import Plot
+from gearfmu.report.results import REACHED_THE_END
 
 CSS = """
 :root{--ink:#23262b;--muted:#6a7079;--line:#e3e6ea;--accent:#1f5a92}
@@ -40,9 +41,6 @@ details summary{cursor:pointer;font-weight:600}
 @media (max-width:700px){.facts{grid-template-columns:repeat(2,1fr)}}
 @media print{body{background:#fff}section{break-inside:avoid}}
 """
-
-
-REACHED_THE_END = ("completed", "ok")
 
 
 def page(title: str, body: Sequence[str]) -> str:

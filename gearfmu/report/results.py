@@ -12,6 +12,8 @@ from gearfmu.cosim.accuracy import alternating, rms
 from gearfmu.report.signals import SETTLED, bearings, lock_time, meshes, window_of_interest
 from gearfmu.stage.trace import Trace
 
+REACHED_THE_END = ("completed", "ok")  # outcomes of a run
+
 
 def key_results(trace: Trace) -> dict[str, float]:
     """The numbers to compare runs by, over the window of interest; names carry the unit. Peaks are left out: they do

@@ -26,8 +26,12 @@ class Layers:
     def tables(self) -> dict[str, Any]:
         merged: dict[str, Any] = {}
         for _, raw in reversed(self.files):
-            merged = _merged(merged, raw)
+            merged = merged_tables(merged, raw)
         return merged
+
+    def changed(self, tables: dict[str, Any]) -> Layers:
+        """The same file with what `tables` say instead, as if it stood there."""
+        return Layers(((self.path, tables), *self.files)) if tables else self
 
     def attributed(self, problem: Problem) -> Problem:
         """The problem with the name of the file that holds the field, or of the nearest file when none does."""
@@ -79,11 +83,15 @@ def read_layers(path: Path) -> Layers:
         current = following
 
 
-def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+def merged_tables(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """The tables `below`, but for what `above` says itself; None, which no file can say, takes a field away."""
     result = dict(below)
     for key, value in above.items():
+        if value is None:
+            result.pop(key, None)
+            continue
         both = isinstance(value, dict) and isinstance(below.get(key), dict)
-        result[key] = _merged(below[key], value) if both else value
+        result[key] = merged_tables(below[key], value) if both else value
     return result
 
 

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, Field
 
 from gearfmu.errors import Problem, SpecError
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Switch, Text, read_toml, validate
+from gearfmu.spec.changes import Changes, changed_tables
 from gearfmu.spec.deformation import DeformationChoice, deformation_problems
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
+from gearfmu.spec.layers import merged_tables
 from gearfmu.spec.parts import ClutchSpec, Drivetrain, drivetrain_problems
 from gearfmu.spec.shaft_loads import ShaftLoad, load_problems, time_problems
 
 SHIPPED = Path(__file__).parent.parent / "scenes"
+TORQUES = {"test_rig": "torque", "passenger_car": "engine_torque"}
+SPEED = "start.pinion_speed"
 DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
@@ -129,15 +133,37 @@ def shipped_scenes() -> list[str]:
     return sorted(path.stem for path in SHIPPED.glob("*.toml"))
 
 
-def load_scene(path_or_name: str | Path) -> SceneSpec:
-    """The scene in a TOML file, or the shipped one of that name. SpecError with everything that is wrong."""
+def load_scene(path_or_name: str | Path, changes: Changes | None = None) -> SceneSpec:
+    """The scene in a TOML file, or the shipped one of that name. SpecError with everything that is wrong.
+
+    changes : fields that are to be other than in the file (`changes.py`), {"stage.level": "fast"}; `torque` and `speed`
+    are short for those of the drive and of the start (`full_key`).
+    """
     path = scene_path(path_or_name)
-    scene, problems = validate(SceneSpec, read_toml(path), str(path))
+    tables = read_toml(path)
+    full = {full_key(tables, key, str(path)): value for key, value in (changes or {}).items()}
+    if SPEED in full and isinstance(tables.get("start"), dict):
+        tables["start"].pop("input_speed", None)  # its other name
+    scene, problems = validate(SceneSpec, merged_tables(tables, changed_tables(SceneSpec, full)), str(path))
     if scene is not None:
         problems = list(_problems(scene, str(path)))
     if scene is None or problems:
         raise SpecError(problems)
     return scene
+
+
+def full_key(tables: Mapping[str, Any], key: str, file: str) -> str:
+    """The key of a scene's field that `torque` (mean torque of the drive) or `speed` (of the input, at the start) is
+    short for; any other key as it is. SpecError where the scene has no single torque of its own."""
+    if key in ("speed", "start.input_speed"):
+        return SPEED
+    if key != "torque":
+        return key
+    found = next((f"{drive}.{name}" for drive, name in TORQUES.items() if drive in tables), None)
+    if found is None:
+        remedy = "this scene's drive has no single torque: name the field, such as shaft_loads.<port>.constant"
+        raise SpecError([Problem(file, "torque", "", remedy)])
+    return found
 
 
 def scene_path(path_or_name: str | Path) -> Path:

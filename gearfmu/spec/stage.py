@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,6 +13,7 @@ from pydantic import Field, field_validator, model_validator
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.base import Name, Quantity, Spec, Text, refuse, validate
+from gearfmu.spec.changes import Changes, changed_tables
 from gearfmu.spec.checks import geometry_problems
 from gearfmu.spec.gear import GearSpec, PairSpec
 from gearfmu.spec.general import GeneralStage
@@ -63,20 +65,28 @@ class StageSpec(Spec):
         return self
 
 
-def load_stage(stage: str | os.PathLike[str]) -> Any:
+def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Any:
     """The StageSpec, PlanetarySpec or GeneralStage of a file, a folder (its stage.toml) or a shipped name ("fzg_c",
     "fzg_c/stage_relief", "planetary54").
 
-    SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that cannot run or carry
-    `torque_max`.
+    changes : fields that are to be other than in the file (`changes.py`), {"gears.pinion.tip_relief.amount": "20 um"};
+    the file itself stays. SpecError lists everything that is wrong: unreadable or unknown fields, and geometry that
+    cannot run or carry `torque_max`.
     """
     layers = read_layers(find_stage(stage))
-    kind = layers.tables.get("kind", "external_pair")
-    if kind == "planetary_set":
+    kind = stage_class(layers.tables)
+    layers = layers.changed(changed_tables(kind, changes or {}))
+    if kind is PlanetarySpec:
         return _load_set(layers)
-    if kind == "general":
+    if kind is GeneralStage:
         return _load_general(layers)
     return _load_pair(layers)
+
+
+def stage_class(tables: Mapping[str, Any]) -> type[Spec]:
+    """StageSpec, PlanetarySpec or GeneralStage: what the tables of a stage file are read as."""
+    kinds: dict[Any, type[Spec]] = {"planetary_set": PlanetarySpec, "general": GeneralStage}
+    return kinds.get(tables.get("kind"), StageSpec)
 
 
 def load_pair(stage: str | os.PathLike[str]) -> StageSpec:

@@ -21,7 +21,7 @@ from gearfmu.stage.limits import limit_named
 from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
-from gearfmu.stage.te import LEAST, TANGENT, statics_of
+from gearfmu.stage.te import LEAST, TANGENT, common_columns, mesh_harmonics, statics_of
 
 GEARS = ("sun", "ring")  # whose meshes with the planets share the load
 
@@ -43,6 +43,19 @@ class SetTeResult:
     def load_factor(self) -> np.ndarray:
         """(T, 2): mesh load factor K_γ (ISO 6336-1) at sun and ring, the largest share at any position."""
         return self.sharing.max(axis=(1, 3))
+
+    def harmonics(self, count: int = 5) -> np.ndarray:
+        """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
+        return mesh_harmonics(self.te, count)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The table of the result, torques one below the other: torque_Nm, position, te_um, stiffness_N_per_um,
+        sun_force_N and ring_force_N of the mean planet, sun_share_1 …, ring_share_1 …"""
+        found = common_columns(self) | {"stiffness_N_per_um": 1e-6 * self.stiffness.ravel()}
+        found |= {f"{gear}_force_N": self.force[:, :, g].ravel() for g, gear in enumerate(GEARS)}
+        for g, gear in enumerate(GEARS):
+            found |= {f"{gear}_share_{k + 1}": self.sharing[:, :, g, k].ravel() for k in range(self.sharing.shape[3])}
+        return found
 
 
 def set_te(model: StageModel, torques: Sequence[float], positions: int = 41, **parameters: float) -> SetTeResult:

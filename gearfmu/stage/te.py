@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,34 @@ class TeResult:
     te: np.ndarray
     stiffness: np.ndarray
     shares: np.ndarray
+
+    def harmonics(self, count: int = 5) -> np.ndarray:
+        """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
+        return mesh_harmonics(self.te, count)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The table of the result, torques one below the other: torque_Nm, position, te_um, mesh_stiffness_N_per_um,
+        share_1 …"""
+        found = common_columns(self) | {"mesh_stiffness_N_per_um": 1e-6 * self.stiffness.ravel()}
+        return found | {f"share_{k + 1}": self.shares[:, :, k].ravel() for k in range(self.shares.shape[2])}
+
+
+def mesh_harmonics(te: np.ndarray, count: int) -> np.ndarray:
+    """(T, count), rms in the unit of te (T, P), whose P positions are even over one pitch: harmonics of the mesh, NaN
+    from half the number of positions on, where they are not told from lower ones."""
+    lines = np.abs(np.fft.rfft(te, axis=1))[:, 1 : count + 1] * math.sqrt(2) / te.shape[1]
+    lines[:, (te.shape[1] + 1) // 2 - 1 :] = np.nan
+    return np.pad(lines, ((0, 0), (0, count - lines.shape[1])), constant_values=np.nan)
+
+
+def common_columns(result: Any) -> dict[str, np.ndarray]:
+    """Columns that pairs and sets have in common."""
+    rows, positions = result.te.shape
+    return {
+        "torque_Nm": np.repeat(result.torque, positions),
+        "position": np.tile(result.position, rows),
+        "te_um": 1e6 * result.te.ravel(),
+    }
 
 
 def loaded_te(

@@ -7,14 +7,18 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from gearfmu.errors import GearfmuError
+from gearfmu.extras import required
 from gearfmu.files import written_whole
 from gearfmu.hdf5 import Format, reading, writing
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class TraceError(GearfmuError):
@@ -70,10 +74,40 @@ class Trace:
         channels = {name: Channel(c.values[keep], c.unit, c.description) for name, c in self.channels.items()}
         return Trace(self.time[keep], channels, self.meta)
 
+    def to_numpy(self, names: Iterable[str] | None = None) -> np.ndarray:
+        """Structured array (n,) with the fields "time" and `names` (all channels when None), as fmpy's results are."""
+        columns = {"time": self.time} | {name: self[name] for name in self.chosen(names)}
+        found = np.empty(self.time.size, [(name, values.dtype) for name, values in columns.items()])
+        for name, values in columns.items():
+            found[name] = values
+        return found
+
+    def to_xarray(self, names: Iterable[str] | None = None) -> xarray.Dataset:
+        """xarray Dataset of the channels `names` (all when None) over "time", a view of the same numbers; units and
+        descriptions are attributes `units` and `long_name`, meta is JSON in the attribute `meta` of the Dataset.
+
+        MissingPackage where xarray is not installed (gearfmu[data])."""
+        xr = required("xarray", "data")
+        chosen = {name: self.channels[name] for name in self.chosen(names)}
+        variables = {n: ("time", c.values, {"units": c.unit, "long_name": c.description}) for n, c in chosen.items()}
+        return xr.Dataset(variables, {"time": ("time", self.time, {"units": "s"})}, {"meta": self.meta_text})
+
+    @property
+    def meta_text(self) -> str:
+        """meta as JSON."""
+        return json.dumps(self.meta, sort_keys=True, default=_plain)
+
+    def chosen(self, names: Iterable[str] | None) -> list[str]:
+        """Names of channels, all when None; TraceError for one that there is not."""
+        found = list(self.channels) if names is None else list(names)
+        for name in found:
+            self[name]
+        return found
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the HDF5 file (docs/file-formats.md) under a temporary name, then rename it to `path`."""
         with writing(path, FILE) as file:
-            file.attrs["meta"] = json.dumps(self.meta, sort_keys=True, default=_plain)
+            file.attrs["meta"] = self.meta_text
             _write(file, "time", Channel(self.time, "s", "time"))
             group = file.create_group("channels", track_order=True)
             for name, channel in self.channels.items():
@@ -87,12 +121,8 @@ class Trace:
 
     def to_csv(self, path: str | os.PathLike[str], names: Iterable[str] | None = None) -> None:
         """Write time and the channels `names` (all when None) as CSV with one header row "name_[unit]"."""
-        chosen = list(self.channels) if names is None else list(names)
-        columns = {"time_[s]": self.time}
-        for name in chosen:
-            values = self[name]
-            columns[heading(name, self.channels[name].unit)] = values
-        write_columns(path, columns)
+        columns = {heading(name, self.channels[name].unit): self[name] for name in self.chosen(names)}
+        write_columns(path, {"time_[s]": self.time} | columns)
 
 
 def heading(name: str, unit: str) -> str:

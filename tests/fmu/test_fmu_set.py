@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from small_stage import unpack
 
+from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
-from gearfmu.commands.models import of_other_kinds
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.probes import Subject
 from gearfmu.fmu.terminals import shafts
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.full  # the blob holds four planets: packing and loadin
 
 def model(kind: str) -> StageModel:
     spec = load_stage("planetary54")
-    return assemble(of_other_kinds(spec, {"carrier": kind, "sun": kind}), load_bodies(spec))
+    return assemble(with_port_kinds(spec, {"carrier": kind, "sun": kind}), load_bodies(spec))
 
 
 @pytest.fixture(scope="module")

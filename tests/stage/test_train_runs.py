@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_stage_bodies
-from gearfmu.commands.standalone import steady_run
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.base import read_toml
 from gearfmu.spec.expand import expand_pair
@@ -22,6 +21,7 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.spec.turning import shafts_of, turns
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
 from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.steady import Drive, steady_run
 from gearfmu.stage.te import statics_of
 
 FAST, STEPS, H = 1, 60, 5e-5
@@ -252,7 +252,7 @@ def test_a_stage_without_input_and_output_is_refused(two_stage) -> None:
     third = stage.ports["input"].model_copy(update={"body": "intermediate_shaft"})
     crowded = stage.model_copy(update={"ports": stage.ports | {"third": third}})
     with pytest.raises(SpecError, match=r"ports\.third\.kind = .*simulate drives input and output only: make"):
-        steady_run(replace(two_stage, spec=crowded), {}, {}, None)
+        steady_run(replace(two_stage, spec=crowded), Drive(100.0, 50.0))
     apart = stage.model_copy(update={"engagements": stage.engagements[:1]})
     with pytest.raises(SpecError, match="no meshes lead from the first port to the second"):
         shafts_of(apart)

@@ -1,0 +1,1 @@
+"""What `import gearfmu` offers: the verbs of the command line as functions. Both call what lies below."""

@@ -1,0 +1,95 @@
+"""What is handed on: the FMU, the report, traces in other formats."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gearfmu import fmu
+from gearfmu.api.models import AnyStage, PathLike, Stage, load, model_of
+from gearfmu.body import load_bodies
+from gearfmu.errors import GearfmuError
+from gearfmu.report import write
+from gearfmu.stage import Trace
+from gearfmu.stage.deformation import Deformation
+from gearfmu.stage.exchange import convert as convert_trace
+from gearfmu.stage.steady import parameters
+
+
+def export(
+    stage: AnyStage,
+    path: PathLike | None = None,
+    runtime: str = "native",
+    platforms: Sequence[str] = ("host",),
+    terminals: bool = True,
+    **starts: Any,
+) -> Path:
+    """Export a stage as an FMI 2.0 co-simulation FMU; returns its path.
+
+    stage : a name or path, a `load`ed stage, or an `assemble`d model (for other kinds of port and observed gears).
+    path : <stage>.fmu in the working folder when None.
+    runtime : "native", which needs nothing where it is imported, or "python" for hosts that are Python.
+    platforms : "host", "linux64", "win64"; others than the host's need gearfmu[cross].
+    terminals : with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md).
+    starts : start values of parameters (docs/variables.md): level="fast", slices=10.
+
+    Raises FmuError and BuildError.
+    """
+    model = model_of(stage)
+    model = model.with_starts(parameters(model, starts))
+    return fmu.export(model, Path(f"{model.name}.fmu") if path is None else Path(path), runtime, platforms, terminals)
+
+
+def write_report(
+    trace: Trace | PathLike,
+    out: PathLike,
+    stage: PathLike | Stage | None = None,
+    home: PathLike | None = None,
+    tell: Callable[[str], None] = warnings.warn,
+) -> Path:
+    """Write report.html of a trace into the folder `out`; returns its path.
+
+    trace : a Trace, or the file of one.
+    stage : of the run, for the picture of the deformed gears; the one that the trace names when None.
+    home : folder of the run's other files (deformation.h5); `out` when None.
+    tell : is called with a sentence where stage or bodies cannot be read and the report goes without that picture.
+    """
+    trace = trace if isinstance(trace, Trace) else Trace.load(trace)
+    named = stage or stage_of(trace.meta)
+    if not named:
+        return write(trace, trace.meta, Path(out))
+    try:
+        spec = load(named) if isinstance(named, (str, os.PathLike)) else named
+        deformation = recorded_deformation(trace, Path(home or out))
+        return write(trace, trace.meta, Path(out), spec, load_bodies(spec), deformation)
+    except GearfmuError as error:
+        tell(f"the report goes without the deformed pair: {error}")
+        return write(trace, trace.meta, Path(out))
+
+
+def stage_of(meta: Mapping[str, Any]) -> str | None:
+    """STAGE of a run by its trace's meta: its file where that is still there, else its name; None where neither is
+    told."""
+    path = meta.get("stage_path")
+    return path if path and Path(path).is_file() else meta.get("stage")
+
+
+def recorded_deformation(trace: Trace, home: Path) -> Deformation | None:
+    """The Deformation of the run of `trace` in the folder `home`; None where the run recorded none."""
+    name = trace.meta.get("deformation")
+    return Deformation.load(home / name) if name else None
+
+
+def convert(trace: Trace | PathLike, path: PathLike, channels: Sequence[str] | None = None) -> Path:
+    """Write a trace, or the trace in a file, in the format of the suffix of `path`; returns the path.
+
+    .csv, .mat (MATLAB 5), .parquet, .uff or .unv (Universal File Format, data sets 58); Parquet and UFF
+    need gearfmu[data].
+    channels : names of those to write, all when None.
+
+    Raises GearfmuError for another suffix, TraceError for a channel that there is not.
+    """
+    return convert_trace(trace if isinstance(trace, Trace) else Trace.load(trace), path, channels)

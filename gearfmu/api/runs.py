@@ -1,0 +1,133 @@
+"""What a stage does: loaded transmission error, a run alone, a run in a scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from gearfmu import cosim
+from gearfmu.api.models import AnyStage, PathLike, Progress, Stage, load, load_scene, model_of, reduce
+from gearfmu.cosim.scene_run import Staged
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.stage import Steady, TeResult, Trace, loaded_te
+from gearfmu.stage import simulate as simulate_model
+from gearfmu.stage.set_te import SetTeResult, set_te
+from gearfmu.stage.simulate import Inputs
+from gearfmu.stage.steady import Drive, parameters, steady_run
+from gearfmu.units import to_si
+
+Quantity: TypeAlias = str | float  # "302 N*m", or the SI number
+
+
+def te(
+    stage: AnyStage,
+    torques: Quantity | Sequence[Quantity],
+    positions: int = 41,
+    rigid_bearings: bool = False,
+    mesh: str | None = None,
+    **settings: Any,
+) -> TeResult | SetTeResult:
+    """Quasi-static loaded transmission error over one pitch, output held, torque on the input (the first port).
+
+    stage : a name or path, a `load`ed stage, or an `assemble`d model.
+    torques : one or several, "302 N*m" or in N·m; 0 is the unloaded stage.
+    positions : over one pitch, end point left out.
+    rigid_bearings : hold the axes. mesh : of a train the engagement, the first when None. Neither is for sets.
+    settings : of the kernel (docs/variables.md): slices=10, **{"effect.hertz": False}.
+
+    Of a pair or a train a TeResult: te (T, P) m, mesh stiffness (T, P) N/m, shares of the tooth pairs; of a planetary
+    set a SetTeResult with the load sharing of its planets. Raises SimulationError where there is no equilibrium.
+    """
+    model, wanted = model_of(stage), [torques] if isinstance(torques, (str, float, int)) else list(torques)
+    values, known = [_si(torque, "N*m") for torque in wanted], parameters(model, settings)
+    if isinstance(model.spec, PlanetarySpec):
+        return set_te(model, values, positions, **known)
+    return loaded_te(model, values, positions, rigid_bearings, mesh, **known)
+
+
+def simulate(
+    stage: AnyStage,
+    torque: Quantity,
+    speed: Quantity | tuple[Quantity, Quantity],
+    duration: Quantity = 0.1,
+    step: Quantity = 20e-6,
+    settle: Quantity = 0.02,
+    **settings: Any,
+) -> Trace:
+    """Run a stage alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
+    the torque.
+
+    stage : as in `te`.
+    torque, speed : of the input: "302 N*m", "2000 rpm", or in N·m and rad/s; ("300 rpm", "6000 rpm") is a run-up.
+    duration, step : simulated time, time between samples; "0.1 s", or in s.
+    settle : from here on the report takes results and spectra.
+    settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
+
+    The trace's meta says the outcome: a run that stops early keeps its samples. Raises ModelError for an unknown
+    setting, SpecError for a port that this cannot turn.
+    """
+    model = model_of(stage)
+    times = (_si(value, "s") for value in (duration, step, settle))
+    start, *end = (_si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,)))
+    drive = Drive(_si(torque, "N*m"), start, *times, *end)
+    return steady_run(model, drive, parameters(model, settings))
+
+
+def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 20e-6, **settings: Any) -> Trace:
+    """Run a stage alone under inputs of one's own.
+
+    inputs : time (s) → values by input name, SI ({"pinion.phi": …, "pinion.w": …}); asked at the start of each step.
+        `wound_up` gives those that carry a torque at constant speed.
+    stage, duration, step, settings : as in `simulate`.
+    """
+    model = model_of(stage)
+    return simulate_model(model, inputs, _si(duration, "s"), _si(step, "s"), parameters(model, settings))
+
+
+def wound_up(stage: AnyStage, torque: Quantity, speed: Quantity) -> Steady:
+    """Inputs over time with which input and output of a stage turn at constant speed, wound up by the torque: a
+    function of time (s) that gives values by input name."""
+    return Steady(model_of(stage), _si(speed, "rad/s"), _si(torque, "N*m"))
+
+
+def run(
+    scene: PathLike | SceneSpec,
+    out: PathLike | None = None,
+    stage: PathLike | Stage | None = None,
+    unit: PathLike = "fmu",
+    verify: bool = False,
+    progress: Progress | None = None,
+) -> Trace:
+    """Run a scene: its stage in its drivetrain, as the command line's `run` does.
+
+    scene : a name or path, or a `load_scene`d one.
+    out : folder of trace.h5, summary.json and the FMU; nothing is written when None.
+    stage : another one than the scene's, by name or path or `load`ed (with changes).
+    unit : "fmu", exported for this run; "kernel", the same kernel without it: the same bits; or the path of an FMU
+        exported earlier.
+    verify : run again at half the communication step and estimate the coupling error.
+    progress : called with the part that is done, 0 … 1.
+
+    The trace's meta is the summary, with the outcome: "ok", or what stopped the run. Raises SpecError, BodyError,
+    FmuError and CouplingError where the run cannot begin.
+    """
+    spec = scene if isinstance(scene, SceneSpec) else load_scene(scene)
+    chosen = spec.stage.name if stage is None else stage
+    own = load(chosen) if isinstance(chosen, (str, os.PathLike)) else chosen
+    if stage is not None:
+        name = str(chosen) if isinstance(chosen, (str, os.PathLike)) else str(chosen.source)
+        spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": name})})
+    as_general(own)
+    staged = Staged.of(spec, own, reduce(own, progress=progress))
+    fmu = None if unit in ("fmu", "kernel") else Path(unit)
+    kind = "fmu" if fmu is not None else str(unit)
+    return cosim.run(staged, None if out is None else Path(out), kind, fmu, verify, progress)
+
+
+def _si(value: Quantity, unit: str) -> float:
+    """A quantity with its unit, or the SI number, as SI number."""
+    return to_si(value, unit) if isinstance(value, str) else float(value)

@@ -1,0 +1,149 @@
+"""Pictures of a sweep: Harris map, mesh harmonics over torque, levels over one or two swept keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from gearfmu.files import written_whole
+from gearfmu.report.metrics import level
+from gearfmu.report.style import panels, styled
+from gearfmu.report.te import write_plot
+from gearfmu.sweeps.table import SweepTable
+
+TORQUE, SPEED = "torque_Nm", "speed_rad_s"
+MOST_CURVES = 8
+RPM = 30 / np.pi
+LABELS = {TORQUE: "torque in N·m", SPEED: "speed in rpm"}
+
+
+def write_charts(table: SweepTable, out: Path) -> list[Path]:
+    """Write what the table allows as .png into `out`; returns the paths.
+
+    harris : transmission error over the mesh cycle, a curve a torque, of many at most 8. te_orders : its mesh orders
+    over torque. levels : of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two
+    swept keys or curves over one. Further swept keys are held at the values of the first point; titles name them.
+    """
+    axes = [name for name in table.axes if _numeric(table, name)]
+    found: list[Path] = []
+    if not np.any(table["outcome"] == "ok"):
+        return []
+    if TORQUE in axes and table.curves:
+        found += [_harris(table, out / "harris.png"), _orders(table, out / "te_orders.png")]
+    if axes and any(name.endswith("_rms_ac_N") for name in table.columns):
+        found.append(_levels(table, _by_torque(axes), out / "levels.png"))
+    return found
+
+
+def fixed(table: SweepTable, free: Sequence[str]) -> tuple[np.ndarray, str]:
+    """Mask (n,) of the rows with results in which all swept keys but `free` have the values of the first such row, and
+    these values as text."""
+    held = [name for name in table.axes if name not in free]
+    mask = table["outcome"] == "ok"
+    first = int(np.argmax(mask))
+    for name in held:
+        mask = mask & (table[name] == table[name][first])
+    return mask, ", ".join(f"{name} = {table[name][first]}" for name in held)
+
+
+def _harris(table: SweepTable, path: Path) -> Path:
+    rows, _ = fixed(table, [TORQUE])
+    some = np.flatnonzero(rows)[np.argsort(table[TORQUE][rows])]
+    chosen = some[np.unique(np.linspace(0, some.size - 1, min(some.size, MOST_CURVES)).round().astype(int))]
+    parts = [_curve(table.curves, row) for row in chosen]
+    te, stiffness = (next(n for n in table.curves if n.endswith(end)) for end in ("te_um", "stiffness_N_per_um"))
+    result: Any = SimpleNamespace(
+        torque=table[TORQUE][chosen],
+        position=parts[0]["position"],
+        te=np.array([1e-6 * part[te] for part in parts]),
+        stiffness=np.array([1e6 * part[stiffness] for part in parts]),
+    )
+    write_plot(result, path)
+    return path
+
+
+def _curve(curves: Mapping[str, np.ndarray], row: int) -> dict[str, np.ndarray]:
+    own = curves["point"] == row
+    return {name: values[own] for name, values in curves.items()}
+
+
+def _orders(table: SweepTable, path: Path) -> Path:
+    rows, title = fixed(table, [TORQUE])
+    names = [name for name in table.columns if "te_order_" in name]
+    with styled():
+        figure, (axis,) = panels((3.2,))
+        for name in names:
+            axis.plot(table[TORQUE][rows], table[name][rows], marker=".", label=_order_label(name))
+        axis.set(xlabel=LABELS[TORQUE], ylabel="transmission error, rms in µm", title=title, ylim=(0, None))
+        axis.legend(title="mesh order", ncols=len(names))
+        _save(figure, path)
+    return path
+
+
+def _order_label(name: str) -> str:
+    mesh, _, rest = name.partition("te_order_")
+    return f"{mesh.rstrip('_')} {rest.removesuffix('_um')}".strip()
+
+
+def _levels(table: SweepTable, axes: list[str], path: Path) -> Path:
+    rows, title = fixed(table, axes[:2])
+    names = [name for name in table.columns if name.endswith("_rms_ac_N")]
+    with styled():
+        figure, panes = panels((2.4,) * len(names) if len(axes) > 1 else (3.2,))
+        if len(axes) > 1:
+            for axis, name in zip(panes, names, strict=True):
+                _map(figure, axis, table, rows, axes, name)
+        else:
+            for name in names:
+                x = _ticks(table, axes[0])[rows]
+                panes[0].plot(x, level(table[name][rows]), marker=".", label=_plain(name))
+            panes[0].set_ylabel("level in dB re 1 N")
+            panes[0].legend()
+        panes[0].set_title(title)
+        panes[-1].set_xlabel(_label(axes[0]))
+        _save(figure, path)
+    return path
+
+
+def _map(figure: Any, axis: Any, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
+    """One colour map: the first key to the right, the second upwards."""
+    x, y = (_ticks(table, key)[rows] for key in axes[:2])
+    right, up = np.unique(x), np.unique(y)
+    grid = np.full((up.size, right.size), np.nan)
+    grid[np.searchsorted(up, y), np.searchsorted(right, x)] = level(table[name][rows])
+    image = axis.pcolormesh(right, up, grid, shading="nearest")
+    axis.grid(False)
+    axis.set_ylabel(_label(axes[1]))
+    figure.colorbar(image, ax=axis, label=f"{_plain(name)}\ndB re 1 N")
+
+
+def _by_torque(axes: list[str]) -> list[str]:
+    """Speed to the right and torque upwards where both are swept."""
+    order = {SPEED: -1, TORQUE: 1}
+    return sorted(axes, key=lambda name: order.get(name, 0)) if {SPEED, TORQUE} <= set(axes) else axes
+
+
+def _ticks(table: SweepTable, name: str) -> np.ndarray:
+    return table[name] * RPM if name == SPEED else table[name]
+
+
+def _label(name: str) -> str:
+    return LABELS.get(name, name)
+
+
+def _plain(name: str) -> str:
+    """ "bearing pinion" of "bearing_pinion_rms_ac_N"."""
+    return name.removesuffix("_rms_ac_N").replace("_", " ")
+
+
+def _numeric(table: SweepTable, name: str) -> bool:
+    return table[name].dtype.kind in "if"
+
+
+def _save(figure: Any, path: Path) -> None:
+    with written_whole(path) as temporary:
+        figure.savefig(temporary, dpi=150)

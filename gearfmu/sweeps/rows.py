@@ -1,0 +1,114 @@
+"""The numbers of a point: transmission errors over the mesh cycle, key results and mesh orders of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from gearfmu import cosim
+from gearfmu.cosim.scene_run import Staged
+from gearfmu.report.metrics import MetricsError, order_cuts
+from gearfmu.report.results import REACHED_THE_END, key_results
+from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_interest
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.stage import StageModel, Trace, loaded_te
+from gearfmu.stage.set_te import GEARS, set_te
+from gearfmu.stage.steady import Drive, parameters, steady_run
+from gearfmu.sweeps.plan import OWN, SIMULATE, TE
+from gearfmu.units import to_si
+
+ORDERS = 5  # of the mesh
+POSITIONS = 41
+
+
+def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Row and curve of a transmission error. te_mean_um, te_pp_um (peak to peak), te_order_1_um … (rms), mean of the
+    mesh stiffness; of several meshes with the mesh's name before; of a set K_gamma at sun and ring."""
+    own = _own(TE, values)
+    settings: dict[str, Any] = _settings(TE, model, values)
+    torque, positions = own["torque"], int(own.get("positions", POSITIONS))
+    if isinstance(model.spec, PlanetarySpec):
+        result = set_te(model, [torque], positions, **settings)
+        factors = {f"K_gamma_{gear}": float(k) for gear, k in zip(GEARS, result.load_factor[0], strict=True)}
+        return _te_numbers(result, "") | factors, _curve(result, "")
+    names = [mesh.name for mesh in model.stage.engagements]
+    row: dict[str, float] = {}
+    curve: dict[str, list[float]] = {}
+    for mesh in names:
+        found, before = loaded_te(model, [torque], positions, mesh=mesh, **settings), f"{mesh}_" * (len(names) > 1)
+        row |= _te_numbers(found, before)
+        curve |= _curve(found, before)
+    return row, curve
+
+
+def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
+    """`steady_run` at a point."""
+    return steady_run(model, Drive(**_own(SIMULATE, values)), _settings(SIMULATE, model, values))
+
+
+def run_scene(scene: SceneSpec, spec: Any, bodies: list[Any]) -> Trace:
+    """The scene on the stage of these bodies; by the kernel, which has the bits of its FMU."""
+    return cosim.run(Staged.of(scene, spec, bodies), unit="kernel")
+
+
+def ended(trace: Trace) -> tuple[str, str]:
+    """("ok", "") of a run that reached its end, else its outcome and when."""
+    name = str(trace.meta["outcome"])
+    if name in REACHED_THE_END:
+        return "ok", ""
+    return name, str(trace.meta.get("message") or f"the run stopped after {trace.time[-1]:.6g} s")
+
+
+def trace_row(trace: Trace) -> dict[str, float]:
+    """`key_results`, and rms amplitudes of mesh orders 1 … 5 of mesh force and bearing forces, over the window of
+    interest; NaN where an order lies above the sampling limit or the window is too short. price: processor seconds per
+    simulated second."""
+    window = window_of_interest(trace)
+    part = trace.window(window.start, window.end)
+    found, angles, several = dict(key_results(trace)), mesh_angles(part), len(meshes(part)) > 1
+    for mesh, angle in angles.items():
+        signals = {f"{mesh}_force" if several else "mesh_force": [f"{mesh}.force"]}
+        for bearing in bearings(part):
+            own = f"bearing_{bearing}_{mesh}" if several else f"bearing_{bearing}"
+            signals[own] = [f"bearing.{bearing}.f{d}" for d in "xy"]
+        for name, channels in signals.items():
+            orders = _orders(part, [c for c in channels if c in part], angle)
+            found |= {f"{name}_order_{k + 1}_N": value for k, value in enumerate(orders)}
+    return found | {"price": float(trace.meta.get("realtime_factor") or np.nan)}
+
+
+def _orders(part: Trace, channels: list[str], angle: np.ndarray) -> list[float]:
+    """Root of the summed mean squares of the channels, by mesh order."""
+    try:
+        cuts = [order_cuts(part.time, part[name], angle, ORDERS).amplitude for name in channels]
+    except MetricsError:
+        cuts = []
+    if not cuts:
+        return [np.nan] * ORDERS
+    return np.sqrt(sum(np.mean(cut**2, axis=1) for cut in cuts)).tolist()
+
+
+def _own(what: str, values: Mapping[str, Any]) -> dict[str, float]:
+    """The values that are no parameters of the kernel, SI."""
+    units = OWN[what]
+    own = {key: value for key, value in values.items() if key in units}
+    return {k: to_si(v, units[k]) if isinstance(v, str) else float(v) for k, v in own.items()}
+
+
+def _settings(what: str, model: StageModel, values: Mapping[str, Any]) -> dict[str, float]:
+    return parameters(model, {key: value for key, value in values.items() if key not in OWN[what]})
+
+
+def _te_numbers(result: Any, before: str) -> dict[str, float]:
+    te, stiffness = 1e6 * result.te[0], 1e-6 * result.stiffness[0]
+    found = {"te_mean_um": te.mean(), "te_pp_um": np.ptp(te), "mesh_stiffness_mean_N_per_um": stiffness.mean()}
+    found |= {f"te_order_{k + 1}_um": 1e6 * h for k, h in enumerate(result.harmonics(ORDERS)[0])}
+    return {before + name: float(value) for name, value in found.items()}
+
+
+def _curve(result: Any, before: str) -> dict[str, list[float]]:
+    columns = {name: values.tolist() for name, values in result.columns().items() if name != "torque_Nm"}
+    return {name if name == "position" else before + name: values for name, values in columns.items()}

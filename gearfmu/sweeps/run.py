@@ -1,0 +1,173 @@
+"""A sweep from its plan to its table."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body import body_hashes, load_bodies
+from gearfmu.errors import BodyError, GearfmuError
+from gearfmu.spec.scene import load_scene
+from gearfmu.sweeps.journal import Journal
+from gearfmu.sweeps.plan import RUN, Plan, split
+from gearfmu.sweeps.points import LOST, OK, Outcome, Task, Variant, compute, prepare, program
+from gearfmu.sweeps.runners import Lost, Runner
+from gearfmu.sweeps.table import SweepTable, column, column_name
+
+FORMAT = 1  # of what is kept: points of another format are computed anew
+JOURNAL, TRACES, BODIES = "points.jsonl", "traces", "bodies"
+Progress = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A point, the variant of the stage it stands on, and the fingerprint of all that decides its numbers."""
+
+    values: Mapping[str, Any]
+    variant: Variant
+    identity: str
+
+
+def sweep(plan: Plan, out: Path, runner: Runner, traces: bool = False, progress: Progress | None = None) -> SweepTable:
+    """Compute what is not yet in the folder `out` and return all of it.
+
+    Writes points.jsonl after every point; at the end sweep.parquet or sweep.csv, of transmission errors also curves.…;
+    traces/*.h5 where `traces`; bodies/ where points need other bodies than those beside the stage file, which are made
+    first. A point that fails is a row with its outcome. progress: called with the part done, 0 … 1, and a text.
+    """
+    told = progress or (lambda fraction, text="": None)
+    journal = Journal(out / JOURNAL)
+    points = _points(plan, out)
+    _prepare([p for p in points if isinstance(p, _Point)], runner, told)
+    outcomes: list[Outcome | None] = [_kept(p, journal, out, traces) for p in points]
+    open_ = [n for n, known in enumerate(outcomes) if known is None]
+    tasks = [_task(plan, points[n], traces) for n in open_]
+    failed, done = sum(known is not None and known.name != OK for known in outcomes), len(points) - len(open_)
+    for number, result in runner(compute, tasks):
+        n, outcome = open_[number], Outcome(LOST, result.message) if isinstance(result, Lost) else result
+        outcomes[n] = _keep(points[n], outcome, journal, out)
+        failed, done = failed + (outcome.name != OK), done + 1
+        told(done / len(points), f"{done} of {len(points)} points" + (f", {failed} failed" if failed else ""))
+    return _table(plan, points, [o for o in outcomes if o is not None], out)
+
+
+def _points(plan: Plan, out: Path) -> list[_Point | Outcome]:
+    """Every point, or why its stage or scene is refused."""
+    variants: dict[Variant, tuple[Variant, str]] = {}
+    fitting: dict[tuple[str, ...], bool] = {}
+    found: list[_Point | Outcome] = []
+    for values in plan.points:
+        try:
+            stage, others = split(plan.what, values)
+            asked = Variant(str(plan.stage_file(values)), tuple(sorted(stage.items(), key=lambda item: item[0])))
+            if asked not in variants:
+                variants[asked] = _located(asked, out, fitting)
+            variant, fingerprint = variants[asked]
+            of_rest = load_scene(plan.subject, others).hash if plan.what == RUN else others
+            parts = [FORMAT, plan.what, of_rest, fingerprint, program()]
+            found.append(_Point(values, variant, _digest(parts)))
+        except GearfmuError as error:
+            found.append(Outcome(type(error).__name__, str(error)))
+    return found
+
+
+def _located(variant: Variant, out: Path, fitting: dict[tuple[str, ...], bool]) -> tuple[Variant, str]:
+    """The variant with the folder of its bodies, and a fingerprint of its numbers: a stage that was changed so that
+    the bodies beside its file do not fit has bodies of its own in `out`. fitting: what is known of that, by the
+    fingerprints of bodies."""
+    spec = variant.spec()
+    hashes = body_hashes(spec)
+    fingerprint = _digest([spec.model_dump(mode="json", exclude={"source"}), list(hashes)])
+    key = (variant.file, *hashes)
+    if variant.changes and key not in fitting:
+        fitting[key] = _fit(spec, None)
+    if not variant.changes or fitting[key]:
+        return variant, fingerprint
+    return replace(variant, folder=str((out / BODIES / _digest(list(hashes))[:12]).resolve())), fingerprint
+
+
+def _fit(spec: Any, folder: str | None) -> bool:
+    """Whether the stored bodies are those of the stage."""
+    try:
+        load_bodies(spec, folder)
+    except BodyError:
+        return False
+    return True
+
+
+def _prepare(points: list[_Point], runner: Runner, told: Progress) -> None:
+    """Make missing bodies, a variant a task; BodyError where that fails."""
+    variants = {(v.folder or v.file): v for v in (point.variant for point in points)}
+    missing = [variant for variant in variants.values() if not _fit(variant.spec(), variant.folder)]
+    problems = []
+    for number, (_, problem) in enumerate(runner(prepare, missing)):
+        problems += [problem.message if isinstance(problem, Lost) else problem] if problem else []
+        told(0.0, f"bodies of {number + 1} of {len(missing)} stages")
+    if problems:
+        raise BodyError("\n".join(problems))
+
+
+def _kept(point: _Point | Outcome, journal: Journal, out: Path, traces: bool) -> Outcome | None:
+    """What is known of a point: refused ones, and those of the journal that need not be computed again."""
+    if isinstance(point, Outcome):
+        return point
+    known = journal.get(point.identity)
+    if known is None or known.name != OK or (traces and not (out / trace_name(point.identity)).is_file()):
+        return None
+    return known
+
+
+def _task(plan: Plan, point: Any, traces: bool) -> Task:
+    return Task(str(plan.subject), plan.what, point.values, point.variant, traces, program())
+
+
+def _keep(point: Any, outcome: Outcome, journal: Journal, out: Path) -> Outcome:
+    """The outcome without its trace, which is now in a file, noted in the journal."""
+    if outcome.trace is not None:
+        outcome.trace.save(out / trace_name(point.identity))
+    journal.add(point.identity, outcome)
+    return replace(outcome, trace=None)
+
+
+def trace_name(identity: str) -> str:
+    """File of a point's trace in the folder of the sweep."""
+    return f"{TRACES}/{identity[:16]}.h5"
+
+
+def _table(plan: Plan, points: list[_Point | Outcome], outcomes: list[Outcome], out: Path) -> SweepTable:
+    keys = {key: column_name(key, plan.unit(key)) for key in plan.points[0]}
+    columns = {"point": np.arange(len(outcomes))}
+    columns |= {name: column([plan.number(key, p[key]) for p in plan.points]) for key, name in keys.items()}
+    files = [trace_name(p.identity) if isinstance(p, _Point) else "" for p in points]
+    columns["outcome"] = column([outcome.name for outcome in outcomes])
+    columns["message"] = column([outcome.message for outcome in outcomes])
+    columns["trace"] = column([name if name and (out / name).is_file() else "" for name in files])
+    for name in dict.fromkeys(name for outcome in outcomes for name in outcome.row):
+        columns[name] = np.array([outcome.row.get(name, np.nan) for outcome in outcomes], dtype=float)
+    table = SweepTable(columns, tuple(keys[axis] for axis in plan.axes), out, _curves(columns, keys, outcomes))
+    table.write()
+    return table
+
+
+def _curves(columns: Mapping[str, Any], keys: Mapping[str, str], outcomes: list[Outcome]) -> dict[str, np.ndarray]:
+    """The curves of all points, one below the other, with the point and its values in every line."""
+    lengths = [len(outcome.curve.get("position", ())) for outcome in outcomes]
+    if not sum(lengths):
+        return {}
+    found = {name: np.repeat(columns[name], lengths) for name in ("point", *keys.values())}
+    for name in dict.fromkeys(name for outcome in outcomes for name in outcome.curve):
+        empty = [[np.nan] * length for length in lengths]
+        parts = [outcome.curve.get(name, none) for outcome, none in zip(outcomes, empty, strict=True)]
+        found[name] = np.concatenate([np.asarray(part, dtype=float) for part in parts])
+    return found
+
+
+def _digest(value: Any) -> str:
+    """SHA-256, hex, of a JSON value."""
+    return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()

@@ -1,0 +1,106 @@
+"""Sweeps: the numbers are those of the functions for one point; nothing is computed twice, failures are named."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearfmu as gf
+from gearfmu import cli
+from gearfmu.sweeps import table as tables
+from gearfmu.sweeps.charts import write_charts
+
+STAGE = "fzg_c/stage_relief"
+RELIEF = "stage.gears.pinion.tip_relief.amount"
+TORQUES = ["80 N*m", 302.0]
+
+
+@pytest.fixture(scope="module")
+def harris(tmp_path_factory: pytest.TempPathFactory) -> gf.SweepTable:
+    over = {"torque": TORQUES, RELIEF: ["10 um", "9 mm"], "positions": 8}
+    return gf.sweep(STAGE, over, tmp_path_factory.mktemp("harris"), on=1)
+
+
+def test_a_point_has_the_numbers_of_the_function_for_one(harris: gf.SweepTable) -> None:
+    stage = gf.load(STAGE, {"gears.pinion.tip_relief.amount": "10 um"})
+    one = gf.te(stage, TORQUES, 8)
+    good = harris["outcome"] == "ok"
+    assert harris["torque_Nm"][good].tolist() == [80.0, 302.0]
+    assert harris["te_mean_um"][good] == pytest.approx(1e6 * one.te.mean(axis=1), rel=1e-12)
+    assert harris["te_order_1_um"][good] == pytest.approx(1e6 * one.harmonics(1)[:, 0], rel=1e-12)
+    assert harris.curves["te_um"] == pytest.approx(1e6 * one.te.ravel(), rel=1e-12)
+
+
+def test_a_point_that_fails_is_a_row_with_its_reason(harris: gf.SweepTable) -> None:
+    assert harris["outcome"].tolist() == ["ok", "SpecError"] * 2
+    assert len(harris.failures) == 2 and "amount = 9 mm: more than a tenth of the module" in harris.failures[0]
+    assert np.isnan(harris["te_mean_um"][1])
+
+
+@pytest.mark.needs("xarray")
+def test_results_over_the_swept_keys(harris: gf.SweepTable) -> None:
+    grid = harris.to_xarray()["te_mean_um"]
+    assert grid.dims == ("torque_Nm", f"{RELIEF}_m") and grid.shape == (2, 2)
+    assert float(grid[1, 0]) == harris["te_mean_um"][2]
+
+
+def test_pictures(harris: gf.SweepTable, tmp_path: Path) -> None:
+    names = [path.name for path in write_charts(harris, tmp_path)]
+    assert names == ["harris.png", "te_orders.png"]
+    assert all((tmp_path / name).stat().st_size > 10_000 for name in names)
+
+
+def test_a_sweep_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last line of the journal is cut off, as by a process that was killed, and one point is new: two are computed
+    and the line of the other stays. Where pyarrow is missing the table is CSV."""
+    monkeypatch.setattr(tables, "has", lambda module: False)
+    gf.sweep(STAGE, {"torque": [50.0, 100.0], "positions": 4}, tmp_path, on=1)
+    journal = tmp_path / "points.jsonl"
+    kept, _ = journal.read_text(encoding="utf-8").splitlines()
+    journal.write_text(f'{kept}\n{{"identity": "cut o', encoding="utf-8")
+    done: list[float] = []
+    table = gf.sweep(
+        STAGE,
+        {"torque": [50.0, "100 N*m", 150.0], "positions": 4},
+        tmp_path,
+        on=1,
+        progress=lambda part, text="": done.append(part),
+    )
+    assert done == [pytest.approx(2 / 3), 1.0]
+    lines = journal.read_text(encoding="utf-8").splitlines()
+    assert lines[0] == kept and len(lines) == 4 and all(json.loads(line)["name"] == "ok" for line in lines[2:])
+    with (tmp_path / "sweep.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["te_mean_um"]) for row in rows] == table["te_mean_um"].tolist()
+    assert np.all(np.diff(table["te_mean_um"]) > 0)
+
+
+def test_a_scene_and_a_stage_alone_by_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Levels over torque and speed with traces; a run that is stopped, here refused by the kernel, is counted."""
+    short = ["--over", "duration=40 ms", "--over", "settle=10 ms", "--jobs", "1", "--out", str(tmp_path)]
+    over = ["--over", "torque=100, 200 N*m", "--over", "speed=3000 rpm", "--over", "level=rigid, fas"]
+    assert cli.outcome(["sweep", STAGE, *over, *short, "--traces"]) == 2
+    out, err = capsys.readouterr()
+    assert "4 points, 2 failed" in out and err.count("level = fas: expected rigid | fast") == 2
+    traces = sorted((tmp_path / "traces").glob("*.h5"))
+    assert len(traces) == 2 and (tmp_path / "levels.png").is_file()
+    force = {t.meta["torque"]: t.window(0.01)["mesh.force"].mean() for t in map(gf.Trace.load, traces)}
+    assert force[200.0] == pytest.approx(2 * force[100.0], rel=2e-3)
+
+    over = ["--over", "torque=100, 200 N*m", "--over", "stage.level=rigid", "--over", "coupling.step=50 us"]
+    assert cli.outcome(["sweep", "pair_loaded", *over, *short]) == 0
+    scene = {
+        "torque": "200 N*m",
+        "stage.level": "rigid",
+        "coupling.step": "50 us",
+        "duration": "40 ms",
+        "settle": "10 ms",
+    }
+    alone = gf.run(gf.load_scene("pair_loaded", scene), unit="kernel")
+    table = gf.sweep("pair_loaded", [scene], tmp_path, on=1)  # known already: nothing is computed
+    assert table["mesh_force_mean_N"][0] == pytest.approx(alone.window(0.01)["mesh.force"].mean(), rel=1e-12)
+    assert len((tmp_path / "points.jsonl").read_text(encoding="utf-8").splitlines()) == 6

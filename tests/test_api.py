@@ -1,0 +1,167 @@
+"""`import gearfmu`: at once, readable, and the same numbers as the command line."""
+
+from __future__ import annotations
+
+import csv
+import importlib.metadata
+import inspect
+import os
+import pydoc
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearfmu as gf
+from gearfmu import cli
+from gearfmu.spec.new import new_stage
+
+SMALL = {"modes": 12, "roll_points": 8, "width_functions": 3, "mesh.scale": 0.4}
+ROOT = Path(__file__).resolve().parents[1]
+HEAVY = ("numpy", "scipy", "matplotlib", "h5py", "pydantic", "pint", "xarray", "pandas", "pyarrow", "dask", "fmpy")
+
+
+def python(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)}
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_import_is_quick_and_loads_nothing_heavy() -> None:
+    """Processor time of the import alone, which does not wait for a busy machine; 0.02 s where it was written."""
+    code = (
+        "import sys, time; start = time.process_time(); import gearfmu; spent = time.process_time() - start\n"
+        "print(spent, *(name.split('.')[0] for name in sys.modules))"
+    )
+    spent, *loaded = python(code).split()
+    assert float(spent) < 0.2
+    assert not set(HEAVY) & set(loaded)
+
+
+def test_figures_and_tables_are_loaded_when_they_are_wanted() -> None:
+    """A stage is assembled and its transmission error taken without any of the optional and drawing packages (but
+    dask.base, which pint imports where it finds it)."""
+    code = (
+        "import sys, gearfmu as gf; gf.te(gf.assemble('fzg_c'), 100.0, 2)\n"
+        "print(*(name.split('.')[0] for name in sys.modules))"
+    )
+    assert not {"matplotlib", "xarray", "pandas", "pyarrow", "distributed"} & set(python(code).split())
+
+
+def test_help_is_readable() -> None:
+    """Every name has its signature and says what it takes, gives and raises; the ten lines stand at the top."""
+    text = pydoc.plain(pydoc.render_doc(gf))
+    assert text.index("import gearfmu as gf") < text.index("CLASSES") < text.index("FUNCTIONS")
+    lines = text[: text.index("\nDATA\n")].splitlines()
+    assert not [line for line in lines if len(line) > 124 and "->" not in line]  # signatures are one line each
+    for name in gf.__all__:
+        member = getattr(gf, name)
+        assert member.__doc__, name
+        if inspect.isfunction(member):
+            assert f"\n    {name}(" in text
+            assert "return" in member.__annotations__
+            parameters = inspect.signature(member).parameters
+            assert all(re.search(rf"\b{p}\b", member.__doc__) for p in parameters), f"{name}: a parameter is not told"
+    assert set(gf.__all__) <= set(dir(gf)) and gf.__version__ == importlib.metadata.version("gearfmu")
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        gf.simulat  # noqa: B018
+
+
+def test_te_is_that_of_the_command_line(tmp_path: Path) -> None:
+    out = tmp_path / "te.csv"
+    call = ["te", "fzg_c", "--torque", "80 N*m", "--torque", "302 N*m", "--positions", "6", "--out", str(out)]
+    assert cli.outcome(call) == 0
+    with out.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for te in (gf.te("fzg_c", ["80 N*m", 302], 6), gf.te(gf.assemble(gf.load("fzg_c")), [80.0, "0.302 kN*m"], 6)):
+        assert [float(row["te_um"]) for row in rows] == (1e6 * te.te.ravel()).tolist()
+
+
+def test_harmonics_of_a_sum_of_cosines() -> None:
+    """Amplitudes come out as rms; from half the number of positions on they cannot be told."""
+    position = np.arange(8) / 8
+    te = 5 + 3 * np.cos(2 * np.pi * position) + 2 * np.sin(6 * np.pi * position)
+    result = gf.TeResult(np.ones(1), position, te[None], np.ones((1, 8)), np.ones((1, 8, 4)))
+    assert result.harmonics(4)[0, :3] == pytest.approx([3 / 2**0.5, 0, 2 / 2**0.5], abs=1e-12)
+    assert np.isnan(result.harmonics(6)[0, 3:]).all()
+
+
+def test_simulate_is_that_of_the_command_line(tmp_path: Path) -> None:
+    call = ["simulate", "fzg_c", "--torque", "302 N*m", "--speed", "2000 rpm", "--duration", "4 ms", "--settle", "1 ms"]
+    assert cli.outcome([*call, "--set", "level=fast", "--set", "slices=3", "--out", str(tmp_path)]) == 0
+    other = gf.Trace.load(tmp_path / "trace.h5")
+    trace = gf.simulate("fzg_c", 302, "2000 rpm", "4 ms", settle=1e-3, level="fast", slices=3)
+    assert all(np.array_equal(trace[name], other[name]) for name in other.channels)
+    untold = {"cpu_s", "realtime_factor", "stage"}
+    assert {k: v for k, v in trace.meta.items() if k not in untold} == {
+        k: v for k, v in other.meta.items() if k not in untold
+    }
+    wound = gf.drive("fzg_c", gf.wound_up("fzg_c", 302, "2000 rpm"), 4e-3, level="fast", slices=3)
+    assert np.array_equal(wound["mesh.force"], trace["mesh.force"])
+
+
+def test_run_takes_other_stages_and_units(tmp_path: Path) -> None:
+    """Kernel and FMU give the same bits; a changed stage gives others."""
+    scene = gf.load_scene("pair_loaded", {"duration": "2 ms", "settle": 0.0, "stage.level": "rigid"})
+    by_fmu, by_kernel = gf.run(scene, tmp_path), gf.run(scene, unit="kernel")
+    again = gf.run(scene, unit=tmp_path / "fzg_c_relief.fmu")
+    assert np.array_equal(by_fmu["mesh.force"], by_kernel["mesh.force"])
+    assert np.array_equal(by_fmu["mesh.force"], again["mesh.force"]) and again.meta["unit"] == "fmu"
+    plain = gf.run(scene, stage="fzg_c", unit="kernel")
+    assert plain.meta["stage"] == "fzg_c" and not np.array_equal(plain["mesh.te"], by_fmu["mesh.te"])
+    changed = gf.load("fzg_c", {"gears.pinion.bearing.stiffness": "1e8 N/m"})
+    assert not np.array_equal(gf.run(scene, stage=changed, unit="kernel")["mesh.te"], plain["mesh.te"])
+
+
+def test_ports_and_bores_of_a_model() -> None:
+    model = gf.assemble("fzg_c", ports={"pinion": "torque", "wheel": "fixed"})
+    assert [port.kind for port in model.stage.ports.values()] == ["torque", "fixed"]
+    with pytest.raises(gf.GearfmuError, match=r"the stage has pinion, wheel[\s\S]*kinds spring, torque, fixed"):
+        gf.assemble("fzg_c", ports={"sun": "torque", "wheel": "glue"})
+    with pytest.raises(gf.GearfmuError, match="averaging or rigid"):
+        gf.assemble("fzg_c", bore="loose")
+    with pytest.raises(gf.GearfmuError, match="keep averaging bores"):
+        gf.assemble("planetary54", bore="rigid")
+    with pytest.raises(gf.GearfmuError, match="'levl' is no parameter; there are"):
+        gf.simulate("fzg_c", 1, 1, levl="fast")
+
+
+def readme_example() -> str:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)[0]
+
+
+def test_the_example_of_the_readme_runs(tmp_path: Path) -> None:
+    """Ten lines at most; what it prints is right: torque over base radius."""
+    code = readme_example()
+    assert len(code.strip().splitlines()) <= 10
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 0, done.stderr
+    numbers = [float(word) for word in re.findall(r"\d+\.\d+", done.stdout)]
+    assert numbers[-1] == pytest.approx(302 / (0.5 * 4.5e-3 * 16 * 0.9396926207859084), rel=1e-2)
+    assert (tmp_path / "fzg_c_relief.fmu").is_file() and (tmp_path / "out" / "steady" / "report.html").is_file()
+
+
+@pytest.mark.full
+def test_bodies_of_a_changed_stage_lie_apart(tmp_path: Path) -> None:
+    """A body that fits is taken over, one that does not is made, and those of the file stay. Coarse meshes."""
+    path = new_stage("small", "fzg_c", tmp_path)
+    coarse = {f"gears.{name}.body.{key}": n for name in ("pinion", "wheel") for key, n in SMALL.items()}
+    first = gf.reduce(gf.load(path, coarse), path.parent)
+    before = {file.name: file.read_bytes() for file in path.parent.glob("*.h5")}
+    narrow = gf.load(path, coarse | {"gears.pinion.face_width": "13 mm"})
+    made = gf.reduce(narrow)
+    (apart,) = path.parent.glob("bodies_*")
+    assert made[0].mass < first[0].mass and (apart / "wheel.h5").read_bytes() == before["wheel.h5"]
+    assert {file.name: file.read_bytes() for file in path.parent.glob("*.h5")} == before
