@@ -194,18 +194,18 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
 /* λ0 without dashpots: massless deflection and energy at the start; linear: forces of the step are (mix4) */
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
-    const size_t size = (size_t)s->stride * sizeof(double), joints = size - (size_t)s->contacts * sizeof(double);
+    const int quads = s->stride / 4, whole = s->contacts / 4, joints = quads - whole; /* quads with joints in them */
     s->limit_reached = s->rounds = s->dashpots = 0;
     s->alpha = 0.0;
-    memset(s->direction, 0, size);
-    memset(s->delta + s->contacts, 0, joints); /* links know no local law */
-    memset(s->yield + s->contacts, 0, joints);
-    memset(s->potential + s->contacts, 0, joints);
-    memcpy(s->force, s->force0, size);
+    gk_clear(s->direction, quads);
+    gk_clear(s->delta + 4 * whole, joints); /* links know no local law */
+    gk_clear(s->yield + 4 * whole, joints);
+    gk_clear(s->potential + 4 * whole, joints);
+    memcpy(s->force, s->force0, (size_t)quads * sizeof(gk_quad));
     if (linear)
-        memcpy(s->begin, s->end0, size);
+        memcpy(s->begin, s->end0, (size_t)quads * sizeof(gk_quad));
     else
-        memset(s->begin, 0, size);
+        gk_clear(s->begin, quads);
     for (int i = s->n - s->clutches; i < s->n; i++) {
         s->active[i] = (unsigned char)data->locked[s->port_of[i]];
         s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
