@@ -14,6 +14,7 @@ const gk_scheme *gk_scheme_of(gk_integrator integrator);
 
 /* gk_wide.c */
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
+gk_tally_function *gk_wide_count(int widest);
 /* gk_step.c */
 gk_step_function gk_step_once;
 int gk_step_remembered(const gk_meshing *meshing, gk_key key);

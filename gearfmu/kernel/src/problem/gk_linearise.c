@@ -184,7 +184,7 @@ static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
 static double pressed(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, int support)
 {
     const gk_position *at = &engaged->position[side->which];
-    const size_t points = (size_t)(side->candidates * setup->strips), width = (size_t)side->held.width;
+    const size_t points = (size_t)(side->candidates * setup->strips), width = (size_t)gk_padded(side->held.width);
     const int candidate = engaged->place[engaged->system.place_of[i]].candidate[side->which];
     const size_t point = (size_t)at->node * points + (size_t)(candidate * setup->strips + i % setup->strips);
     if (support < side->held.from || support >= side->held.from + side->held.width) return 0.0;

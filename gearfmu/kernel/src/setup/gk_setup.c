@@ -109,7 +109,7 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->residual = reals(b, 2 * nodes * C * strips * (size_t)side->columns);
     side->path = doubles(b, points * strips);
     side->port = doubles(b, points);
-    side->support = doubles(b, points * (size_t)model->supports);
+    side->support = doubles(b, points * (size_t)gk_padded(model->supports));
 }
 
 static void lay_out_nodes(bump *b, const gk_model *model, const gk_gear *gear, gk_nodes *nodes)
@@ -720,6 +720,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     memset(work, 0, sizeof *work);
     lay_out_work(model, setup, work, behind(work, sizeof *work));
     setup->step = gk_wide_step(1, setup->integrator);
+    setup->count = gk_wide_count(1);
     for (int g = 0; g < model->gears; g++) fill_modal(&model->gear[g], &setup->modal[g]);
     fill_base(model, setup, which);
     fill_ports(model, setup);

@@ -477,9 +477,10 @@ static void store_joints(const node *n, int at, const double *still)
             for (int s = 0; s < supports; s++) moved[s] += w * ground->support_rows[s * ground->n + list[k]];
             if (n->side->port_of >= 0) turned += w * ground->port_rows[n->side->port_of * ground->n + list[k]];
         }
+        double *to = side->support + ((size_t)at * points + i) * gk_padded(supports);
         for (int s = 0; s < supports; s++) {
             const double *kappa = ground->kappa + s * supports;
-            side->support[((size_t)at * points + i) * supports + s] = dot(kappa, moved, supports);
+            to[s] = dot(kappa, moved, supports);
             if (n->side->port_of >= 0)
                 turned -= fs[s] * dot(kappa, n->model->port_support + n->side->port_of * supports, supports);
         }
@@ -539,19 +540,21 @@ static node begin_node(const gk_model *model, const gk_setup *setup, double *roo
 static gk_span held_by(const double *support, size_t points, int supports)
 {
     int from = supports, to = 0;
-    for (size_t i = 0; i < points; i++)
+    for (size_t i = 0; i < points; i++, support += gk_padded(supports))
         for (int s = 0; s < supports; s++)
-            if (support[i * (size_t)supports + (size_t)s] != 0.0) from = s < from ? s : from, to = s >= to ? s + 1 : to;
+            if (support[s] != 0.0) from = s < from ? s : from, to = s >= to ? s + 1 : to;
     return from < to ? (gk_span){from, to - from} : (gk_span){0, 0};
 }
 
-/* rows over the supports become rows over those that the side loads */
+/* rows over the supports become rows of whole quads over those that the side loads */
 static void keep_held(gk_side *side, size_t rows, int supports)
 {
-    const size_t width = (size_t)side->held.width;
-    for (size_t r = 0; r < rows; r++)
-        memmove(side->support + r * width, side->support + r * (size_t)supports + side->held.from,
-                width * sizeof *side->support);
+    const size_t width = (size_t)gk_padded(side->held.width), held = (size_t)side->held.width;
+    for (size_t r = 0; r < rows; r++) {
+        double row[MAX_SUPPORTS] = {0};
+        memcpy(row, side->support + r * (size_t)gk_padded(supports) + side->held.from, held * sizeof *row);
+        memcpy(side->support + r * width, row, width * sizeof *row);
+    }
 }
 
 /* tables of a side that the level decides */
@@ -581,7 +584,7 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     }
     if (!setup->on.residual || n.e->kind == MESH_FLAT) {
         memset(side->port, 0, nodes * points * sizeof *side->port);
-        memset(side->support, 0, nodes * points * (size_t)model->supports * sizeof *side->support);
+        memset(side->support, 0, nodes * points * (size_t)gk_padded(model->supports) * sizeof *side->support);
     }
     side->held = held_by(side->support, nodes * points, model->supports);
     keep_held(side, nodes * points, model->supports);
