@@ -66,10 +66,10 @@
 #define gk_tangent_solve gk_tangent_solve_avx2
 #define gk_balance_solve gk_balance_solve_avx2
 #define gk_step_once gk_step_once_avx2
-#define gk_step_recall gk_step_recall_avx2
-#define gk_step_remembered gk_step_remembered_avx2
-#define gk_step_remember gk_step_remember_avx2
-#define gk_step_forget gk_step_forget_avx2
+#define gk_memory_recall gk_memory_recall_avx2
+#define gk_memory_find gk_memory_find_avx2
+#define gk_memory_keep gk_memory_keep_avx2
+#define gk_memory_forget gk_memory_forget_avx2
 #define gk_step_energy gk_step_energy_avx2
 #define gk_step_force gk_step_force_avx2
 #define gk_step_z gk_step_z_avx2
@@ -100,6 +100,7 @@
 #include "problem/gk_balance.c"
 #include "problem/gk_couple.c"
 #include "force/gk_nodal.c"
+#include "integrate/gk_memory.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"
