@@ -64,8 +64,7 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
                           : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
                                           engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++)
-        engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
+    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
     gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, &work->explicit_rows, work, e);
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;

@@ -71,7 +71,7 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
     const gk_system *s = &engaged->system;
     double *D = s->D, *A = s->A;
     const int64_t rest = s->contacts % 4;
-    const gk_bits contacts = (gk_bits){0, 1, 2, 3} < rest; /* of the last quad */
+    const gk_bits inside = (gk_bits){0, 1, 2, 3} < rest; /* contacts of their last quad */
     for (int place = 0, i = 0; place < engaged->places; place++) {
         size_t first = (size_t)(engaged->place[place].candidate[0] * strips) * p->row;
         size_t second = (size_t)(engaged->place[place].candidate[1] * strips) * q->row;
@@ -89,8 +89,8 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
             }
             if (end > s->contacts) {
                 gk_quad *last_D = (gk_quad *)(D + end) - 1, *last_A = (gk_quad *)(A + end) - 1;
-                *last_D = GK_CHOOSE(contacts, *last_D, GK_ALL(0.0)),
-                *last_A = GK_CHOOSE(contacts, *last_A, GK_ALL(0.0));
+                *last_D = GK_CHOOSE(inside, *last_D, GK_ALL(0.0));
+                *last_A = GK_CHOOSE(inside, *last_A, GK_ALL(0.0));
             }
             D += s->stride, A += s->stride;
         }

@@ -67,7 +67,7 @@ static void *take(bump *b, size_t bytes)
 static double *doubles(bump *b, size_t count) { return take(b, count * sizeof(double)); }
 static gk_real *reals(bump *b, size_t count) { return take(b, count * sizeof(gk_real)); }
 
-static int padded(int n) { return (n + LANES - 1) / LANES * LANES; }
+static int to_lanes(int n) { return (n + LANES - 1) / LANES * LANES; }
 
 /* number of lanes a half needs: one a pair, one a single mode */
 static int lanes_of(const gk_gear *gear, int modes)
@@ -80,7 +80,7 @@ static int lanes_of(const gk_gear *gear, int modes)
 static void lay_out_modal(bump *b, const gk_gear *gear, gk_modal *m, int modes)
 {
     m->count = modes;
-    m->pairs = padded(lanes_of(gear, modes));
+    m->pairs = to_lanes(lanes_of(gear, modes));
     m->n = 2 * m->pairs;
     const size_t n = (size_t)m->n, turns = (size_t)gear->z * (size_t)m->pairs;
     m->omega = doubles(b, n);

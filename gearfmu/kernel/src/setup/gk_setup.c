@@ -51,7 +51,7 @@ static void fill_centre(const gk_model *model, gk_base *base, int directions, in
         for (int c = 0; c < 6; c++) base->centre[g][c * base->n + slot] = gear->ground[base->set].centre[c * reads + k];
     }
     base->from[g] = from < to ? from / 4 * 4 : 0;
-    base->width[g] = from < to ? (to + 3) / 4 * 4 - base->from[g] : 0;
+    base->width[g] = from < to ? gk_padded(to) - base->from[g] : 0;
     base->motions[g] = 0;
     for (int c = 0; c < SPACE; c++) {
         const double *moved = base->centre[g] + GK_RIGID_ROW[c] * base->n + base->from[g];
@@ -67,7 +67,7 @@ static gk_span span_of(const double *row, int n)
     int from = n, to = 0;
     for (int k = 0; k < n; k++)
         if (row[k] != 0.0) from = k < from ? k : from, to = k + 1;
-    return from < to ? (gk_span){from / 4 * 4, (to + 3) / 4 * 4 - from / 4 * 4} : (gk_span){0, 0};
+    return from < to ? (gk_span){from / 4 * 4, gk_padded(to) - from / 4 * 4} : (gk_span){0, 0};
 }
 
 /* what turns with rotors: rows of the masses, and the load outward */
