@@ -17,7 +17,7 @@ int gk_memory_find(const gk_meshing *meshing, gk_key key)
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
     const int quads = s->stride / 4, whole = s->contacts / 4, joints = quads - whole; /* quads with joints in them */
-    s->limit_reached = s->rounds = s->dashpots = 0;
+    s->limit_reached = s->rounds = s->dashpots = s->dashpots_stand = 0;
     s->alpha = 0.0;
     gk_clear(s->direction, quads);
     gk_clear(s->delta + 4 * whole, joints); /* links know no local law */
