@@ -48,24 +48,27 @@ def lanes(model: StageModel, cut: float) -> int:
     return total
 
 
-def work(n: int, pairs: float, strips: int) -> dict[str, tuple[float, float]]:
-    """(floating-point operations, bytes) a step of the phases that do arithmetic: n lanes of single precision,
-    `pairs` tooth pairs of `strips` contact rows, six bilateral rows.
+def work(n: int, pairs: int, strips: int) -> dict[str, tuple[float, float]]:
+    """(floating-point operations, bytes) a step of the phases that do arithmetic: n lanes of single precision on both
+    gears, `pairs` tooth pairs of `strips` contact rows, a row for each port. The ground group is left out.
 
-    predict: eight coefficients, three states. rows: four grid rolls and a turn to the tooth. system: readings of all
-    rows, 16 cells of D, K and Q between any two places on either gear, rigid motion into D and A. solve: tangent, its
+    predict: eight coefficients, three states. rows: two nodes of both tables. system: what the rows read, D and A by
+    block rows from two tables of either gear, two motions of either gear and the spins into both. solve: tangent, its
     factors, two solutions and four products. correct: scatter of two forces, new state, damping."""
-    m, cells = pairs * strips + 6, 2 * pairs * (pairs + 1) / 2 * 16 * 3 * strips**2
     rows = pairs * strips
+    m, cells = rows + 2, rows * (rows + 4) / 2
     return {
         "predict": (12 * n, 4 * n * (8 + 3 + 2)),
-        "rows": (10 * rows * n, 4 * n * 5 * rows),
-        "system": (2 * (m + 2) * n + 2 * cells + 24 * m * m, 4 * n * (m + 2) + 4 * cells + 8 * 5 * m * m),
+        "rows": (3 * rows * n, 4 * n * 3 * rows),
+        "system": (
+            2 * rows * n + cells * (2 * 2 * 6 + 4 * 2 * 4 + 2 * 2 * 2),
+            4 * n * rows + cells * (4 * 2 * 2 * 3 + 8 * 2),
+        ),
         "solve": (
             2 * m * m * (1 + 3 * strips) + 2 / 3 * m**3 + 2 * 2 * m * m + 4 * 2 * m * m,
             8 * m * m * (3 + 2 + 2 + 4),
         ),
-        "correct": (4 * (rows + 4) * n + 16 * n, 4 * n * (rows + 4 + 12)),
+        "correct": (4 * rows * n + 16 * n, 4 * n * (rows + 12)),
     }
 
 

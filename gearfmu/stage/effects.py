@@ -88,7 +88,7 @@ EFFECTS: tuple[Effect, ...] = (
             "it (fzg_c, 302 N·m)"
         ),
         off="rigid gears; a contact yields by its local law alone, bearings and ports as before",
-        code="gk_setup.c (choose): no modes, no tables of compliance",
+        code="gk_choose.c (gk_choose): no modes, no tables of compliance",
     ),
     Effect(
         name="modes",
@@ -100,7 +100,10 @@ EFFECTS: tuple[Effect, ...] = (
             "kHz on fzg_c)"
         ),
         off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
-        code="gk_setup.c (modes_below, fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, correct_damped)",
+        code=(
+            "gk_choose.c (modes_below), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
+            "correct_damped)"
+        ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
         off_setting={"level": 0.0},
         on_setting={"level": 1.0},

@@ -44,6 +44,21 @@ static inline double gk_largest(const gk_quad *x) { return gk_max(gk_max((*x)[0]
     default: f(__VA_ARGS__, quads);                                                                                    \
     }
 
+/* zeros in a few quads, as stores instead of a call */
+GK_INLINE void gk_clear(double *x, int quads)
+{
+    const gk_quad zero = {0};
+    gk_quad *to = (gk_quad *)x;
+    switch (quads) {
+    case 4: to[3] = zero; /* fall through */
+    case 3: to[2] = zero; /* fall through */
+    case 2: to[1] = zero; /* fall through */
+    case 1: to[0] = zero; /* fall through */
+    case 0: break;
+    default: memset(x, 0, (size_t)quads * sizeof *to);
+    }
+}
+
 /* f(…, quads, block) for every block of a quad of rows, blocks as constants too where quads is one */
 #define GK_BLOCKS(quads, f, ...)                                                                                       \
     f(__VA_ARGS__, quads, 0);                                                                                          \

@@ -14,12 +14,14 @@ const gk_scheme *gk_scheme_of(gk_integrator integrator);
 
 /* gk_wide.c */
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
+gk_tally_function *gk_wide_count(int widest);
+/* gk_memory.c */
+int gk_memory_find(const gk_meshing *meshing, gk_key key);
+void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
+void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
+void gk_memory_forget(gk_engaged *engaged);
 /* gk_step.c */
 gk_step_function gk_step_once;
-int gk_step_remembered(const gk_meshing *meshing, gk_key key);
-void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
-void gk_step_remember(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
-void gk_step_forget(gk_engaged *engaged);
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
 const double *gk_step_force(const gk_system *s);
 const double *gk_step_z(const gk_system *s);

@@ -64,13 +64,12 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
                           : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
                                           engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++)
-        engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
+    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
     gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, &work->explicit_rows, work, e);
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;
     if (setup->nodal) gk_nodal_leave(s);
-    gk_step_recall(setup, work, data, e, s);
+    gk_memory_recall(setup, work, data, e, s);
     for (int r = 0; r < s->n; r++)
         if (s->kind[r] == ROW_SPRING) s->clip[r] = 2;
     gk_solve_status(s);
@@ -274,7 +273,7 @@ gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *w
     }
     memcpy(work->outer_before, from, sizeof from);
     memcpy(work->outer, to, sizeof to);
-    for (int e = 0; e < model->engagements; e++) gk_step_remember(setup, &work->engaged[e], data, e);
+    for (int e = 0; e < model->engagements; e++) gk_memory_keep(setup, &work->engaged[e], data, e);
     gk_rk45_angles(model, work, data);
     for (int e = 0; e < model->engagements; e++) { /* the mean over so short a time is its end */
         gk_system *s = &work->engaged[e].system;

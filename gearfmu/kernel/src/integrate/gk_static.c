@@ -228,11 +228,11 @@ static int form(rest *r, int e)
     for (int p = 0; p < engaged->places; p++) {
         gk_place *place = &engaged->place[p];
         gk_flank_move(&r->setup, place, moved);
-        place->memory = gk_step_remembered(&r->data->meshing[e], place->key);
+        place->memory = gk_memory_find(&r->data->meshing[e], place->key);
     }
     gk_rows_form(&r->setup, work, e);
     gk_form_system(r->model, &r->setup, r->data, &r->k, work, e);
-    gk_step_recall(&r->setup, work, r->data, e, &engaged->system);
+    gk_memory_recall(&r->setup, work, r->data, e, &engaged->system);
     return 1;
 }
 
@@ -603,7 +603,7 @@ static int search(rest *r)
         if (shares(r) && close_to_rest(r, length) && length > 0.5 * last) break; /* rounding of the rows is left */
     }
     for (int e = 0; e < r->model->engagements; e++)
-        if (searched(r, e)) gk_step_remember(&r->setup, &r->work->engaged[e], r->data, e);
+        if (searched(r, e)) gk_memory_keep(&r->setup, &r->work->engaged[e], r->data, e);
     return close_to_rest(r, length);
 }
 
@@ -626,7 +626,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     set_joints(&r);
     set_compliance(&r);
     find_motions(&r);
-    for (int e = 0; e < model->engagements; e++) gk_step_forget(&work->engaged[e]);
+    for (int e = 0; e < model->engagements; e++) gk_memory_forget(&work->engaged[e]);
     if (!keep) memset(data->x, 0, sizeof data->x);
     int found = 1;
     for (r.island = 0; r.island < r.setup.islands && found; r.island++) {
@@ -636,72 +636,5 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     clear_compliance(&r);
     if (!found) return GK_NO_EQUILIBRIUM;
     spread(&r);
-    return GK_OK;
-}
-
-/* angle of a port's bore under its torque: what the rows move it by comes on top of the spin */
-static double driven_angle(const gk_model *model, const gk_work *work, int port)
-{
-    double angle = 0.0;
-    for (int e = 0; e < model->engagements; e++) {
-        const gk_system *s = &work->engaged[e].system;
-        for (int i = s->contacts; i < s->n; i++)
-            if (s->port_of[i] == port && s->joint_of[i] == JOINT_PORT)
-                angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-    }
-    return angle;
-}
-
-gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const double *torque,
-                   double *phi)
-{
-    gk_boundary b[MAX_PORTS];
-    for (int p = 0; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, torque[p], 0.0, 0.0};
-    const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, 0);
-    for (int p = 0; p < model->ports && outcome == GK_OK; p++) phi[p] = driven_angle(model, work, p);
-    return outcome;
-}
-
-/* a port beyond input and output: free, but where carriers turn its spring holds it */
-static gk_boundary further(const gk_model *model, int p)
-{
-    const int held = model->carried && model->port[p].kind != PORT_TORQUE;
-    return held ? (gk_boundary){PORT_SPRING, 0.0, 0.0, model->port[p].k} : (gk_boundary){PORT_TORQUE, 0.0, 0.0, 0.0};
-}
-
-/* Quasi-static transmission (eq. 13): torque on the bore of the first port, the bore of the second held at phi_out,
- * other ports free; what chains the ports have is left out. out: te (m) of engagement e, angle (rad) of the first
- * port's bore, then for every tooth pair of e {flank, tooth of gear A, force of each slice}; room for 2 +
- * MAX_PAIRS·(2 + MAX_SLICES) numbers. `keep` continues from the last call. */
-gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
-                 double torque, int e, int keep, double *out, int *places)
-{
-    gk_boundary b[MAX_PORTS] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_out, 0.0}};
-    double angle[MAX_ROTORS];
-    if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;
-    for (int p = 2; p < model->ports; p++) b[p] = further(model, p);
-    gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
-    if (outcome) return outcome;
-    for (int r = 0; r < model->rotors; r++) angle[r] = data->x[r];
-    angle[model->port[0].rotor] = driven_angle(model, work, 0);
-    angle[model->port[1].rotor] = phi_out;
-    const gk_engagement *mesh = &model->engagement[e];
-    const gk_gear *A = &model->gear[mesh->gear[0]], *B = &model->gear[mesh->gear[1]];
-    const gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    const int f = setup->mesh[e].frame;
-    const double frame = f < 0 ? 0.0 : angle[f];
-    *out++ = A->r_b * (angle[A->rotor] - frame) + mesh->kind * B->r_b * (angle[B->rotor] - frame);
-    *out++ = angle[model->port[0].rotor];
-    *places = engaged->places;
-    for (int p = 0; p < *places; p++, out += 2 + setup->slices) {
-        out[0] = engaged->place[p].key.flank;
-        out[1] = engaged->place[p].key.tooth;
-        for (int i = 0; i < setup->slices; i++) {
-            const int strip = i < s->strips ? i : setup->slices - 1 - i;
-            out[2 + i] = s->force[p * s->strips + strip] * mesh->width /
-                         (setup->slices * setup->mesh[e].strip_width[strip]);
-        }
-    }
     return GK_OK;
 }

@@ -3,9 +3,6 @@
  * another h, so a step that fails can be repeated with another h or scheme. */
 #include "integrate/gk_integrate.h"
 
-static const double PAYABLE =
-    1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot repay
-                                       waits */
 static const double ENERGY_SMALL = 1e-300, HUGE_FORCE = 1e15; /* N: no gear lives here */
 static const double FARTHEST = 0.25 * 2.0 * GK_PI;            /* a quarter of a pitch */
 
@@ -169,14 +166,6 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
     return 1;
 }
 
-/* entry of the memory that a tooth pair has, −1: none */
-int gk_step_remembered(const gk_meshing *meshing, gk_key key)
-{
-    for (int i = 0; i < meshing->pairs; i++)
-        if (meshing->memory[i].key.flank == key.flank && meshing->memory[i].key.tooth == key.tooth) return i;
-    return -1;
-}
-
 /* places of an engagement at the predicted poses, and their rows */
 static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
@@ -190,78 +179,10 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
             : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
     if (engaged->places < 0) return engaged->places = 0, GK_DIVERGED;
     for (int p = 0; p < engaged->places; p++) {
-        engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
+        engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
         if (engaged->place[p].gap < -model->engagement[e].overlap_max) return GK_PENETRATION;
     }
     return GK_OK;
-}
-
-/* ---- the start of the step --------------------------------------------------------------------------------------- */
-/* λ0 without dashpots: massless deflection and energy at the start; linear: forces of the step are (mix4) */
-static void recall_forces(const gk_data *data, gk_system *s, int linear)
-{
-    const size_t size = (size_t)s->stride * sizeof(double), joints = size - (size_t)s->contacts * sizeof(double);
-    s->limit_reached = s->rounds = s->dashpots = s->dashpots_stand = 0;
-    s->alpha = 0.0;
-    memset(s->direction, 0, size);
-    memset(s->delta + s->contacts, 0, joints); /* links know no local law */
-    memset(s->yield + s->contacts, 0, joints);
-    memset(s->potential + s->contacts, 0, joints);
-    memcpy(s->force, s->force0, size);
-    if (linear)
-        memcpy(s->begin, s->end0, size);
-    else
-        memset(s->begin, 0, size);
-    for (int i = s->n - s->clutches; i < s->n; i++) {
-        s->active[i] = (unsigned char)data->locked[s->port_of[i]];
-        s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
-    }
-    gk_law_apply(s);
-    gk_solve_begin(s);
-    s->stored0 = gk_solve_stored(s);
-    s->held0 = 0.0;
-    for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
-}
-
-/* The start of the step as this step's compliance sees it: massless deflection and energy under λ0, gaps g0 = s0 − C′λ0
- * − δ(λ0); then the first guess of status and forces */
-void gk_step_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s)
-{
-    const gk_engaged *engaged = &work->engaged[e];
-    int given = 0; /* forces that are not those of the last step */
-    s->curved = GK_ON(setup, hertz) && s->contacts > 0;
-    recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
-    for (int i = 0; i < s->n; i++) {
-        const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
-        s->beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;
-        s->tail[i] = acted ? -0.25 * (1.0 - GK_MEMORY) * s->dash0[i] - GK_MEMORY * s->end0[i] : 0.0;
-        s->g0[i] = -gk_solve_massless(s, i);
-        s->hold[i] = 0;
-    }
-    for (int i = 0; i < s->contacts; i++) {
-        const int memory = engaged->place[s->place_of[i]].memory;
-        s->recalled[i] = memory >= 0;
-        s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
-                              : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
-        s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
-        s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
-    }
-    for (int i = s->contacts; i < s->n; i++) {
-        s->clip[i] = s->kind[i] == ROW_SPRING ? 0 : 2;
-        if (s->kind[i] == ROW_SPRING) s->active[i] = 1;
-        if (s->kind[i] == ROW_CLUTCH) s->g0[i] = s->g[i];
-        if (s->kind[i] != ROW_TORQUE) continue;
-        s->active[i] = 0;
-        s->force[i] = work->torque[s->port_of[i]];
-        given |= s->force[i] != s->force0[i];
-    }
-    gk_solve_status(s);
-    if (given)
-        gk_solve_settle(s);
-    else
-        gk_solve_begin_dashpots(s);
-    s->owed = data->meshing[e].owed;
-    s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
 /* Tip corners off: did a pair that carried load end with its flank? */
@@ -461,41 +382,6 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
     return gk_solve_stored(s) + held;
 }
 
-void gk_step_remember(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
-{
-    const gk_system *s = &engaged->system;
-    gk_meshing *meshing = &data->meshing[e];
-    double deepest = 0.0;
-    const int most = meshing->pairs > engaged->places ? meshing->pairs : engaged->places;
-    memset(meshing->memory, 0, (size_t)most * sizeof *meshing->memory);
-    meshing->pairs = engaged->places;
-    for (int p = 0; p < engaged->places; p++) meshing->memory[p].key = engaged->place[p].key;
-    for (int p = 0, i = 0; p < engaged->places; p++) {
-        gk_memory *m = &meshing->memory[p];
-        deepest = gk_max(deepest, -engaged->place[p].gap);
-        for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
-            m->force[strip] = s->force[i];
-            m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-            m->dash[strip] = s->dash[i];
-            m->end[strip] = s->end[i];
-            if (GK_ON(setup, hertz) && s->force[i] > s->law[i / 4].high[i % 4] * s->width[i])
-                data->status |= STATUS_LAW;
-        }
-    }
-    for (int i = s->contacts; i < s->n; i++)
-        data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){
-            s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i], s->dash[i], s->end[i]};
-    meshing->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
-    meshing->owed = s->owed;
-}
-
-/* an engagement without rows */
-void gk_step_forget(gk_engaged *engaged)
-{
-    engaged->places = 0;
-    engaged->system.n = engaged->system.contacts = engaged->system.stride = engaged->system.clutches = 0;
-}
-
 /* ---- the step ---------------------------------------------------------------------------------------------------- */
 /* problems of all engagements, island by island */
 static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
@@ -556,7 +442,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     GK_LAP(work, PHASE_ROWS);
     for (int e = 0; e < model->engagements; e++) {
         gk_form_system(model, setup, data, k, work, e);
-        gk_step_recall(setup, work, data, e, &work->engaged[e].system);
+        gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
     }
     GK_LAP(work, PHASE_SYSTEM);
     if ((outcome = solve_all(model, setup, work, data, k)) != GK_OK) return outcome;
@@ -565,7 +451,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     correct(model, setup, work, data, k);
     GK_LAP(work, PHASE_CORRECT);
     settle_accounts(model, work, data);
-    for (int e = 0; e < model->engagements; e++) gk_step_remember(setup, &work->engaged[e], data, e);
+    for (int e = 0; e < model->engagements; e++) gk_memory_keep(setup, &work->engaged[e], data, e);
     data->expressed_h = h, data->expressed_gamma = gamma;
     data->steps++;
     GK_LAP(work, PHASE_REMEMBER);

@@ -66,10 +66,10 @@
 #define gk_tangent_solve gk_tangent_solve_avx2
 #define gk_balance_solve gk_balance_solve_avx2
 #define gk_step_once gk_step_once_avx2
-#define gk_step_recall gk_step_recall_avx2
-#define gk_step_remembered gk_step_remembered_avx2
-#define gk_step_remember gk_step_remember_avx2
-#define gk_step_forget gk_step_forget_avx2
+#define gk_memory_recall gk_memory_recall_avx2
+#define gk_memory_find gk_memory_find_avx2
+#define gk_memory_keep gk_memory_keep_avx2
+#define gk_memory_forget gk_memory_forget_avx2
 #define gk_step_energy gk_step_energy_avx2
 #define gk_step_force gk_step_force_avx2
 #define gk_step_z gk_step_z_avx2
@@ -84,6 +84,14 @@
 #define gk_rk45_angles gk_rk45_angles_avx2
 #define gk_rk45_step gk_rk45_step_avx2
 #define gk_central_step gk_central_step_avx2
+#define gk_supports_motion gk_supports_motion_avx2
+#define gk_supports_by_motion gk_supports_by_motion_avx2
+#define gk_supports_add_direct gk_supports_add_direct_avx2
+#define gk_supports_forces gk_supports_forces_avx2
+#define gk_supports_turn gk_supports_turn_avx2
+#define gk_tally_begin gk_tally_begin_avx2
+#define gk_tally_count gk_tally_count_avx2
+#define gk_tally_means gk_tally_means_avx2
 #include "force/gk_law.c"
 #include "setup/gk_flow.c"
 #include "force/gk_flank.c"
@@ -99,12 +107,16 @@
 #include "problem/gk_couple.c"
 #include "force/gk_nodal.c"
 #include "integrate/gk_frame.c"
+#include "integrate/gk_memory.c"
 #include "integrate/gk_step.c"
 #include "integrate/gk_rk45.c"
 #include "integrate/gk_central.c"
+#include "run/gk_supports.c"
+#include "run/gk_tally.c"
 #undef gk_step_once
 #undef gk_central_step
 #undef gk_rk45_step
+#undef gk_tally_count
 #if defined(__clang__)
 #pragma clang attribute pop
 #else
@@ -112,6 +124,7 @@
 #endif
 
 gk_step_function gk_step_once, gk_central_step, gk_rk45_step;
+gk_tally_function gk_tally_count;
 
 /* AVX2 in the processor, and its registers kept by the system over a task switch */
 static int has_avx2(void)
@@ -132,8 +145,15 @@ gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
     default: return wide ? gk_step_once_avx2 : gk_step_once;
     }
 }
+
+gk_tally_function *gk_wide_count(int widest) { return widest > 0 && has_avx2() ? gk_tally_count_avx2 : gk_tally_count; }
 #else
-#include "integrate/gk_integrate.h"
+#include "run/gk_run.h"
+gk_tally_function *gk_wide_count(int widest)
+{
+    (void)widest;
+    return gk_tally_count;
+}
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
 {
     (void)widest;

@@ -168,18 +168,36 @@ static double root_of(const balance *b)
     return fabs(divisor) > 0.0 ? -2.0 * b->defect / divisor : 0.0;
 }
 
+typedef struct bracket { /* where the defect was negative and where it was positive last; known: 1, 2 */
+    double negative, positive;
+    int known;
+} bracket;
+
+/* The move of α from here: Newton's, or to the middle of the bracket when that leads out of it. Contacts that take turns
+ * with α make Newton's moves go to and fro between two quadratics. */
+static double kept_within(bracket *ends, double alpha, double defect, double move)
+{
+    *(defect < 0.0 ? &ends->negative : &ends->positive) = alpha;
+    ends->known |= defect < 0.0 ? 1 : 2;
+    const double low = gk_min(ends->negative, ends->positive), high = gk_max(ends->negative, ends->positive);
+    if (ends->known != 3 || (alpha + move > low && alpha + move < high)) return move;
+    return 0.5 * (low + high) - alpha;
+}
+
 /* α by Newton on the quadratic; 0 when the limit of iterations is reached or no direction is left */
 static int find_alpha(const gk_island *island, balance b)
 {
     double p[MAX_STRIDE], dash[MAX_STRIDE];
+    bracket ends = {0};
     for (int round = 0; round < GK_ENERGY_LIMIT; round++) {
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
             sensitivity(s, s->along, dash);
             expand(s, s->along, dash, &b);
         }
-        const double a = root_of(&b);
-        if (!(fabs(a) > 0.0)) return 0;
+        const double root = root_of(&b);
+        if (!(fabs(root) > 0.0)) return 0;
+        const double a = kept_within(&ends, island->member[0]->alpha, b.defect, root);
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
             memcpy(p, s->along, (size_t)s->stride * sizeof *p);

@@ -70,6 +70,8 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
 {
     const gk_system *s = &engaged->system;
     double *D = s->D, *A = s->A;
+    const int64_t rest = s->contacts % 4;
+    const gk_bits inside = (gk_bits){0, 1, 2, 3} < rest; /* contacts of their last quad */
     for (int place = 0, i = 0; place < engaged->places; place++) {
         size_t first = (size_t)(engaged->place[place].candidate[0] * strips) * p->row;
         size_t second = (size_t)(engaged->place[place].candidate[1] * strips) * q->row;
@@ -85,7 +87,11 @@ GK_INLINE void table_rows(const gk_engaged *engaged, const blend *p, const blend
                     *(gk_quad *)(A + parts[c].column) = BLENDED(*p, a) + BLENDED(*q, b);
                 }
             }
-            for (int j = s->contacts; j < end; j++) D[j] = A[j] = 0.0;
+            if (end > s->contacts) {
+                gk_quad *last_D = (gk_quad *)(D + end) - 1, *last_A = (gk_quad *)(A + end) - 1;
+                *last_D = GK_CHOOSE(inside, *last_D, GK_ALL(0.0));
+                *last_A = GK_CHOOSE(inside, *last_A, GK_ALL(0.0));
+            }
             D += s->stride, A += s->stride;
         }
     }
@@ -110,8 +116,8 @@ static void between_contacts(const gk_setup *setup, const gk_engaged *engaged, i
         memset(s->D, 0, (size_t)(s->contacts * s->stride) * sizeof *s->D);
         GK_STRIPPED(strips, table_rows, engaged, &of[0], &of[1], parts, count, 0)
     }
-    memset(s->D + s->contacts * s->stride, 0, (size_t)((s->stride - s->contacts) * s->stride) * sizeof *s->D);
-    memset(s->A + s->contacts * s->stride, 0, (size_t)((s->stride - s->contacts) * s->stride) * sizeof *s->A);
+    const int first = s->contacts * s->stride, quads = (s->stride - s->contacts) * s->stride / 4;
+    gk_clear(s->D + first, quads), gk_clear(s->A + first, quads);
 }
 
 /* rows diag(mobility) rowsᵀ and −rows diag(κ) rowsᵀ, added to D and A: for a step that has no table */

@@ -41,8 +41,9 @@ GK_INLINE void pull(const gk_setup *setup, const gk_engaged *engaged, const gk_s
     const int points = side->candidates * strips, *motion = setup->base.motion[side->gear];
     const int bore = quads == 1 ? PLANE : SPACE, each = quads == 1 ? strips : 1; /* strips with the same gradient */
     const gk_quad *const node = (const gk_quad *)table->pulls + 2 * (size_t)(at->node * points) * quads;
+    const int whole = s->contacts / 4 * 4, rest = s->stride / 4 - s->contacts / 4; /* rows; quads with joints in them */
     for (int m = 0; m < motions; m++)
-        for (int i = s->contacts; i < s->stride; i++) p[m].g[i] = p[m].moved[i] = p[m].yielded[i] = 0.0;
+        gk_clear(p[m].g + whole, rest), gk_clear(p[m].moved + whole, rest), gk_clear(p[m].yielded + whole, rest);
     for (int place = 0, i = 0; place < engaged->places; place++) {
         const gk_place *found = &engaged->place[place];
         const gk_quad *low = node + 2 * (size_t)(found->candidate[side->which] * strips) * quads,

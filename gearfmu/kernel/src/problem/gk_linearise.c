@@ -71,8 +71,7 @@ static int form(const gk_model *model, const gk_setup *setup, gk_work *work, con
             ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->reach, engaged->position, engaged->place)
             : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++)
-        engaged->place[p].memory = gk_step_remembered(meshing, engaged->place[p].key);
+    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
     gk_rows_form(setup, work, e);
     gk_form_system(model, setup, data, &work->explicit_rows, work, e);
     memcpy(s->force, s->force0, (size_t)s->stride * sizeof *s->force);
@@ -184,7 +183,7 @@ static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
 static double pressed(const gk_setup *setup, const gk_engaged *engaged, const gk_side *side, int i, int support)
 {
     const gk_position *at = &engaged->position[side->which];
-    const size_t points = (size_t)(side->candidates * setup->strips), width = (size_t)side->held.width;
+    const size_t points = (size_t)(side->candidates * setup->strips), width = (size_t)gk_padded(side->held.width);
     const int candidate = engaged->place[engaged->system.place_of[i]].candidate[side->which];
     const size_t point = (size_t)at->node * points + (size_t)(candidate * setup->strips + i % setup->strips);
     if (support < side->held.from || support >= side->held.from + side->held.width) return 0.0;

@@ -38,6 +38,25 @@ void gk_solve_times(const gk_system *s, const double *matrix, const double *x, d
 
 void gk_solve_path(const gk_system *s, const double *x, double *y) { gk_solve_times(s, s->P, x, y); }
 
+/* D z, Aλ and A f in one pass over both matrices; without dashpots f deflects nothing */
+GK_INLINE void products(const gk_system *s, const double *f, const int dashpots, double *lag, double *Dz, double *Al,
+                        const int quads)
+{
+    gk_quad moved[MAX_STRIDE / 4], yielded[MAX_STRIDE / 4], lagged[MAX_STRIDE / 4];
+    for (int q = 0; q < quads; q++) moved[q] = yielded[q] = lagged[q] = (gk_quad){0};
+    for (int j = 0; j < s->n; j++) {
+        const gk_quad *D = (const gk_quad *)(s->D + j * 4 * quads), *A = (const gk_quad *)(s->A + j * 4 * quads);
+        for (int q = 0; q < quads; q++) {
+            moved[q] += s->z[j] * D[q];
+            yielded[q] += s->force[j] * A[q];
+            if (dashpots) lagged[q] += f[j] * A[q];
+        }
+    }
+    memcpy(Dz, moved, (size_t)quads * sizeof *moved);
+    memcpy(Al, yielded, (size_t)quads * sizeof *yielded);
+    memcpy(lag, lagged, (size_t)quads * sizeof *lagged);
+}
+
 /* rows and dashpots as numbers, after their status has changed */
 void gk_solve_status(gk_system *s)
 {
@@ -75,12 +94,10 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
 #undef OF
     for (int i = s->n - s->clutches; i < s->n; i++)
         s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
-    times(s, s->D, s->z, s->Dz, quads);
-    times(s, s->A, s->force, s->Al, quads);
     if (s->dashpots)
-        times(s, s->A, s->end, s->lag, quads);
+        products(s, s->end, 1, s->lag, s->Dz, s->Al, quads);
     else
-        memset(s->lag, 0, (size_t)quads * sizeof(gk_quad));
+        products(s, s->end, 0, s->lag, s->Dz, s->Al, quads);
 }
 
 /* everything that follows from λ, α and the status of rows and dashpots; the law has been applied */
@@ -103,9 +120,7 @@ void gk_solve_begin(gk_system *s)
     }
     for (int i = s->n - s->clutches; i < s->n; i++)
         s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
-    gk_solve_times(s, s->D, s->z, s->Dz);
-    gk_solve_times(s, s->A, s->force, s->Al);
-    gk_solve_times(s, s->A, s->end0, s->lag0);
+    GK_SIZED(quads, products, s, s->end0, 1, s->lag0, s->Dz, s->Al)
 }
 
 /* and what is left of these at its end */

@@ -125,17 +125,26 @@ void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work,
 /* gk_still.c */
 int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *still,
                   const double *pose, gk_position position[2], gk_place *place);
+/* gk_choose.c */
+gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
+int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g);
+int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *which);
+/* gk_layout.c */
+void gk_layout_plan(const gk_model *model, gk_setup *setup);
+void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
+void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work);
 /* gk_side.c */
-size_t gk_side_scratch(const gk_model *model);
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
+/* gk_node.c */
+size_t gk_node_scratch(const gk_model *model);
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     int gear, flank, tooth, strips;
     double force[MAX_SLICES], roll[MAX_SLICES];
     gk_strip_weights width;
 } gk_strip_load;
-void gk_side_push(const gk_model *model, const gk_strip_load *load, int first, double *sum);
-void gk_side_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
+void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum);
+void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);

@@ -30,8 +30,8 @@ static void push_contacts(const gk_model *model, const gk_setup *setup, const gk
     gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
     for (int p = 0; p < engaged->places; p++)
         if (strip_load(setup, engaged, p, which, &load) > 0.0) {
-            gk_side_push(model, &load, setup->modal[g].count, modes);
-            gk_side_push_ground(model, setup, e, which, &load, ground);
+            gk_node_push(model, &load, setup->modal[g].count, modes);
+            gk_node_push_ground(model, setup, e, which, &load, ground);
         }
 }
 

@@ -199,7 +199,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     const double h = c.H / (double)steps;
     int first = data->steps == 0; /* the balance begins after the run's first whole step */
     gk_tally tally;
-    gk_outputs_begin(model, setup, work, data, &tally);
+    gk_tally_begin(model, setup, work, data, &tally);
     if (!(data->table_h > 0.0)) data->table_h = h;
     gk_limit_run(model, setup, work, data);
     for (int64_t i = 0; i < steps; i++) {
@@ -210,7 +210,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
             stand_at(data, c.start + (double)i * h);
             return outcome;
         }
-        gk_outputs_count(model, setup, work, data, h, &tally);
+        setup->count(model, setup, work, data, h, &tally);
         if (first) gk_outputs_balance(model, setup, work, data, h, 1);
         first = 0;
     }

@@ -56,90 +56,6 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
     }
 }
 
-/* what moves the springs of the supports, and what their dashpots see, of the dynamic oscillators */
-static void support_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved,
-                           double *speed)
-{
-    const int n = setup->base.n;
-    const gk_quad *x = (const gk_quad *)gk_ground_seen(data), *v = x + n / 4, *f = v + n / 4;
-    const gk_quad *kappa = (const gk_quad *)gk_flow_known(work, data->state_h, data->state_gamma)->ground.kappa;
-    for (int q = 0; q < n / 4; q++) {
-        ((gk_quad *)moved)[q] = x[q] - kappa[q] * f[q];
-        ((gk_quad *)speed)[q] = v[q];
-    }
-}
-
-/* forces on the supports by such motion (or its integral) */
-static void forces_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,
-                             double *out)
-{
-    const gk_base *base = &setup->base;
-    for (int s = 0; s < model->supports; s++) {
-        out[s] = gk_dot_span(base->support_span[s], base->support_rows + s * base->n, moved);
-        if (s < model->dampers)
-            out[s] += model->ground[base->set].damper[s] *
-                      gk_dot_span(base->damper_span[s], base->damper_rows + s * base->n, speed);
-    }
-}
-
-/* adds the forces on the supports that contacts, joints and turning axes make directly, beside the oscillators */
-static void add_direct_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                              double *out)
-{
-    for (int e = 0; e < model->engagements; e++) {
-        const gk_engaged *engaged = &work->engaged[e];
-        const gk_system *system = &engaged->system;
-        double force[MAX_ROWS];
-        for (int i = 0; i < system->n; i++) force[i] = gk_reported(system, i);
-        for (int w = 0; w < 2; w++) {
-            const gk_side *side = &setup->mesh[e].side[w];
-            const gk_position *at = &engaged->position[w];
-            const size_t width = (size_t)side->held.width, next = (size_t)(side->candidates * setup->strips) * width;
-            const double *node = side->support + (size_t)at->node * next, high = at->part, low = 1.0 - high;
-            for (size_t s = 0; s < width; s++) {
-                double sum = 0.0;
-                for (int p = 0, i = 0; p < engaged->places; p++) {
-                    const double *table = node + (size_t)(engaged->place[p].candidate[w] * setup->strips) * width + s;
-                    for (int strip = 0; strip < setup->strips; strip++, i++, table += width)
-                        sum += force[i] * (low * table[0] + high * table[next]);
-                }
-                out[(size_t)side->held.from + s] -= sum;
-            }
-        }
-        for (int i = system->contacts; i < system->n; i++)
-            if (gk_rows_at_bore(setup, system, i))
-                for (int s = 0; s < model->supports; s++)
-                    out[s] += force[i] * setup->port_support[system->port_of[i]][s];
-    }
-    for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
-        for (int i = 0; i < model->supports; i++)
-            out[i] += data->v[r] * data->v[r] * setup->base.outward_support[r * model->supports + i];
-}
-
-/* forces on the supports at the end of the step */
-static void support_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                           double *out)
-{
-    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS];
-    support_motion(setup, work, data, moved, speed);
-    forces_by_motion(model, setup, moved, speed, out);
-    add_direct_forces(model, setup, work, data, out);
-}
-
-/* forces on the ground that are kept in the axes of a carrier, turned into those of the ground (sense 1), or back
- * (−1) */
-static void turn_supports(const gk_model *model, const gk_data *data, double sense, double *force)
-{
-    for (int s = 0; model->support_turn && s < model->supports; s++) {
-        const int turn = model->support_turn[s];
-        double sine, cosine;
-        if (turn < 0 || turn % 2) continue;
-        gk_sincos(sense * data->x[turn / 2], &sine, &cosine);
-        const double x = force[s], y = force[s + 1];
-        force[s] = cosine * x - sine * y, force[s + 1] = sine * x + cosine * y;
-    }
-}
-
 static void support_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, const double *force)
 {
     for (int s = 0; s < model->supports; s++) {
@@ -201,8 +117,8 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
         joint_outputs(model, setup, work, data, &work->engaged[e].system);
     }
     for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, h);
-    support_forces(model, setup, work, data, force);
-    turn_supports(model, data, 1.0, force);
+    gk_supports_forces(model, setup, work, data, force);
+    gk_supports_turn(model, data, 1.0, force);
     support_outputs(model, setup, data, force);
     for (int e = 0; e < model->engagements; e++) data->mesh[e][V_TE] = transmission_error(model, data, e);
     gk_amplitudes(model, setup, work, data);
@@ -297,87 +213,11 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
     for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
 }
 
-void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)
-{
-    const size_t size = (size_t)setup->base.n * sizeof(double);
-    memset(tally, 0, offsetof(gk_tally, moved));
-    memset(tally->moved, 0, size);
-    memset(tally->speed, 0, size);
-    if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
-    support_motion(setup, work, data, tally->last_moved, tally->last_speed);
-    forces_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
-    double now[MAX_SUPPORTS];
-    for (int s = 0; s < model->supports; s++) now[s] = data->support[s][V_FORCE];
-    turn_supports(model, data, -1.0, now);
-    for (int s = 0; s < model->supports; s++) tally->last[s] = now[s] - tally->last[s];
-}
-
-static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h, gk_tally *tally)
-{
-    const gk_system *s = &engaged->system;
-    gk_meshing *meshing = &data->meshing[e];
-    double side[2] = {0, 0};
-    int touches = 0;
-    for (int i = 0; i < s->contacts; i++) {
-        side[engaged->place[s->place_of[i]].flank] += gk_solve_mean(s, i);
-        touches |= s->force[i] > 0.0;
-    }
-    for (int i = s->contacts; i < s->n; i++)
-        if (s->joint_of[i] == JOINT_PORT) tally->port[s->port_of[i]] -= gk_solve_mean(s, i) * h;
-    tally->mesh[e] += (side[0] - side[1]) * h;
-    tally->highest[e] = gk_max(tally->highest[e], gk_max(side[0], side[1]));
-    if (touches) {
-        meshing->impacts += meshing->apart;
-        meshing->apart = 0;
-    } else {
-        meshing->apart = 1;
-        meshing->open_time += h;
-    }
-}
-
-/* trapezoid of a vector over a step: sum += ½h (last + now), last ← now */
-static void integrate(double *sum, double *last, const double *now, int n, double h)
-{
-    const double half = 0.5 * h;
-    for (int q = 0; q < n / 4; q++) {
-        const gk_quad x = ((const gk_quad *)now)[q];
-        ((gk_quad *)sum)[q] += half * (((gk_quad *)last)[q] + x);
-        ((gk_quad *)last)[q] = x;
-    }
-}
-
-/* one internal step */
-void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
-                      gk_tally *tally)
-{
-    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS], direct[MAX_SUPPORTS];
-    for (int e = 0; e < model->engagements; e++) count_mesh(&work->engaged[e], data, e, h, tally);
-    support_motion(setup, work, data, moved, speed);
-    integrate(tally->moved, tally->last_moved, moved, setup->base.n, h);
-    integrate(tally->speed, tally->last_speed, speed, setup->base.n, h);
-    memset(direct, 0, (size_t)model->supports * sizeof *direct);
-    add_direct_forces(model, setup, work, data, direct);
-    for (int s = 0; s < model->supports; s++) {
-        tally->support[s] += 0.5 * h * (tally->last[s] + direct[s]);
-        tally->last[s] = direct[s];
-    }
-}
-
 void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
                     const gk_tally *tally)
 {
-    for (int p = 0; p < model->ports; p++)
-        if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
-    double force[MAX_SUPPORTS];
-    forces_by_motion(model, setup, tally->moved, tally->speed, force);
-    for (int s = 0; s < model->supports; s++) force[s] = (force[s] + tally->support[s]) / H;
-    turn_supports(model, data, 1.0, force);
-    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = force[s];
-    for (int e = 0; e < model->engagements; e++) {
-        data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
-        data->mesh[e][V_FORCE_MAX] = tally->highest[e];
-        watch_limits(model, data, e, H, tally->mesh[e]);
-    }
+    gk_tally_means(model, setup, data, H, tally);
+    for (int e = 0; e < model->engagements; e++) watch_limits(model, data, e, H, tally->mesh[e]);
     outputs(model, setup, work, data, h);
     for (int p = 0; p < model->ports; p++) {
         double *v = data->shaft[p];

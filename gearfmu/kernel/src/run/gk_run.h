@@ -3,14 +3,14 @@
 #define GK_RUN_H
 #include "integrate/gk_integrate.h"
 
-typedef struct gk_tally { /* integrals over a communication step */
+struct gk_tally { /* integrals over a communication step */
     double mesh[MAX_ENGAGEMENTS], highest[MAX_ENGAGEMENTS], port[MAX_PORTS];
     double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* forces that contacts and joints put on the supports directly;
                                                          last: at the end of the step before */
     double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS]; /* what moves springs and dashpots of
                                                                                       the supports */
     double last_moved[MAX_GROUND + 4 * MAX_ROTORS], last_speed[MAX_GROUND + 4 * MAX_ROTORS];
-} gk_tally;
+};
 
 /* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never
  * pulls. */
@@ -18,13 +18,22 @@ static inline double gk_reported(const gk_system *s, int i) { return s->force[i]
 
 /* gk_amplitudes.c */
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
+/* gk_supports.c: vectors of the ground oscillators, and of the supports */
+void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved, double *speed);
+void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,
+                           double *out);
+void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                            double *out);
+void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                        double *out);
+void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force);
+/* gk_tally.c */
+void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally);
+gk_tally_function gk_tally_count;
+void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data *data, double H, const gk_tally *tally);
 /* gk_outputs.c */
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
-void gk_outputs_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                      gk_tally *tally);
 void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data);
-void gk_outputs_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
-                      gk_tally *tally);
 void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
                     const gk_tally *tally);
 int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h, int first);

@@ -112,7 +112,7 @@ typedef struct gk_side {
     int port_of;   /* the port that the gear feels, −1: none */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
     gk_span held;  /* the supports that this side loads */
-    double *support; /* (nodes + 1, candidates, strips, those): force on them beside the oscillators' */
+    double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
 } gk_side;
 
 typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
@@ -179,6 +179,9 @@ typedef struct gk_coefficients {
 /* share of the correction κ that a free mass has: γ lowers it below ½ only (gk_flow.c) */
 static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamma); }
 
+typedef struct gk_tally gk_tally;
+typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
+                               double h, gk_tally *tally);
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
 
@@ -208,6 +211,7 @@ struct gk_setup {
     int islands;
     gk_point_rows point_rows[MAX_GEARS]; /* nodal contact */
     gk_step_function *step;              /* of the integrator, in the widest vectors of this processor */
+    gk_tally_function *count;            /* what is summed after every step, likewise */
     size_t amplitudes;                   /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
@@ -258,6 +262,8 @@ void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
                        const double roll[2], int strip);
 void gk_strips_row(const gk_model *model, int g, double from, double to, double *out);
+/* entries of whole quads that hold n */
+static inline int gk_padded(int n) { return (n + 3) / 4 * 4; }
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
 /* Σ of a row over its span, and its multiple added there */
 static inline double gk_dot_span(gk_span span, const double *row, const double *x)

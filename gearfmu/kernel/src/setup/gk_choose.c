@@ -1,0 +1,150 @@
+/* What a run is made of: level, integrator, effects and contact that go together, and the oscillators that are dynamic
+ * then. */
+#include "integrate/gk_integrate.h"
+#include <stdio.h>
+
+/* ---- level and integrator ---------------------------------------------------------------------------------------- */
+static int has_nodes(const gk_model *model, const gk_data *data)
+{
+    int all = model->engagements > 0;
+    for (int e = 0; e < model->engagements; e++) {
+        all &= data->mesh[e][V_PENALTY] > 0.0;
+        for (int w = 0; w < 2; w++) all &= model->gear[model->engagement[e].gear[w]].nodes[0] > 0;
+    }
+    return all;
+}
+
+/* contact by nodes, where it is asked for or the way of the level; needs an explicit integrator */
+static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+{
+    const gk_contact_law law = (gk_contact_law)(int)data->stage[V_CONTACT_LAW];
+    const int is_explicit = gk_scheme_of(setup->integrator)->is_explicit, there = has_nodes(model, data);
+    setup->nodal = law == CONTACT_NODAL ||
+                   (law == CONTACT_BY_LEVEL && setup->level == LEVEL_PAPER && is_explicit && there);
+    if (!setup->nodal) return GK_OK;
+    if (!there) {
+        snprintf(
+            message, GK_MESSAGE,
+            "contact nodal: this model has no flank nodes, or contact_penalty is 0; make the model again with this "
+            "version of gearfmu, or give contact_penalty");
+        return GK_BAD_VALUE;
+    }
+    if (!is_explicit) {
+        snprintf(message, GK_MESSAGE,
+                 "contact nodal is a force that follows from positions: use integrator rk45 or central (levels paper, "
+                 "explicit) and a stage without a clutch in its ports, or contact line");
+        return GK_BAD_VALUE;
+    }
+    setup->on.residual = 0;
+    snprintf(message, GK_MESSAGE,
+             "contact nodal leaves the static compliance of all higher modes out: teeth are too stiff, and nodes make "
+             "noise; use "
+             "it for comparison only");
+    return GK_OK;
+}
+
+/* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal
+ * contact, rk45 (dg4 and lines of contact where a clutch hangs on a port) */
+gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
+{
+    double damping = 0.0;
+    setup->level = (gk_level)(int)data->stage[V_LEVEL];
+    setup->integrator = (gk_integrator)(int)data->stage[V_INTEGRATOR];
+    setup->on = gk_effects_of(data);
+    setup->slices = (int)data->stage[V_SLICES];
+    setup->spatial = model->spatial;
+    setup->strips = gk_strips_count(model, setup->slices);
+    for (int e = 0; e < model->engagements; e++) damping = gk_max(damping, data->mesh[e][V_DAMPING]);
+    if (damping == 0.0) setup->on.contact_damping = 0;
+    setup->base.set = model->sets > 1 && !setup->on.bearings;
+    if (setup->level == LEVEL_EXPLICIT && setup->integrator == DG4) setup->integrator = CENTRAL;
+    if (gk_scheme_of(setup->integrator)->is_explicit && model->chains) {
+        snprintf(message, GK_MESSAGE,
+                 "integrators rk45 and central (level explicit) know no clutch: use dg4, or export the stage without "
+                 "the chain");
+        return GK_BAD_VALUE;
+    }
+    if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
+    const gk_outcome outcome = choose_contact(model, data, setup, message);
+    if (outcome || setup->nodal) return outcome;
+    if (setup->level == LEVEL_PAPER) {
+        setup->on.residual = 0;
+        snprintf(message, GK_MESSAGE,
+                 "level paper leaves the static compliance of all higher modes out: tooth stiffness is 15 to 40 %% too "
+                 "high; use it for comparison only");
+    } else if (!setup->on.elastic) {
+        setup->on.residual = 0;
+    } else if (!setup->on.residual) {
+        snprintf(message, GK_MESSAGE,
+                 "effect.residual = false leaves the static compliance of all higher modes out: allowed at level paper "
+                 "only");
+        return GK_BAD_VALUE;
+    }
+    return GK_OK;
+}
+
+/* ---- which oscillators are dynamic ------------------------------------------------------------------------------- */
+/* number of modes below the wished cut, moved to the widest relative gap within 15 %: never inside a cluster, never
+ * inside a pair */
+static int modes_below(const gk_gear *gear, double cut_hz)
+{
+    double cut = 2.0 * GK_PI * cut_hz, widest = 0.0;
+    int best = 0;
+    while (best < gear->modes && gear->omega[best] < cut) best++;
+    if (best == gear->modes) return best;
+    for (int k = 1; k < gear->modes; k++) {
+        if (gear->member[k] == 2 || gear->omega[k] < 0.85 * cut || gear->omega[k - 1] > 1.15 * cut) continue;
+        double gap = gear->omega[k] / gear->omega[k - 1] - 1.0;
+        if (gap > widest) widest = gap, best = k;
+    }
+    if (best < gear->modes && gear->member[best] == 2) best++;
+    return best;
+}
+
+/* Modes below a share of the cut of level fast by which engagements of one gear feel each other (the ovals of a ring
+ * between planets) are dynamic at every level: what is static is known within an engagement alone. */
+static const double SHARED_BELOW = 0.25;
+
+int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
+{
+    const gk_gear *gear = &model->gear[g];
+    switch (setup->level) {
+    case LEVEL_RIGID: return setup->engagements_of[g] > 1 ? modes_below(gear, SHARED_BELOW * model->cut[0]) : 0;
+    case LEVEL_FAST: return modes_below(gear, model->cut[0]);
+    case LEVEL_STANDARD: return modes_below(gear, model->cut[1]);
+    default: return gear->modes;
+    }
+}
+
+/* what moves rigidly is dynamic at every level; of the rest what lies below the cut. Rigid gears whose bores are
+ * held do not move. */
+static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
+{
+    const gk_ground *ground = &model->ground[setup->base.set];
+    if (!setup->on.elastic && !setup->on.bearings) return 0;
+    if (ground->rigid_share[k] > 0.5) return 1;
+    if (!setup->on.elastic || setup->level == LEVEL_RIGID) return 0;
+    if (setup->level != LEVEL_FAST && setup->level != LEVEL_STANDARD) return 1;
+    return ground->omega[k] < 2.0 * GK_PI * model->cut[setup->level == LEVEL_STANDARD];
+}
+
+/* the rotor whose part of the ground group an oscillator belongs to: of the first gear that reads it */
+static int rotor_of(const gk_model *model, int set, int k)
+{
+    for (int g = 0; g < model->gears; g++)
+        for (int i = 0; i < model->gear[g].ground[set].reads; i++)
+            if (model->gear[g].ground[set].list[i] == k) return model->gear[g].rotor;
+    return model->rotors - 1;
+}
+
+/* dynamic oscillators in order, rotor by rotor, each padded to quads with −1; returns their number */
+int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *which)
+{
+    int n = 0;
+    for (int r = 0; r < model->rotors; r++) {
+        for (int k = 0; k < model->ground[setup->base.set].n; k++)
+            if (is_dynamic(model, setup, k) && rotor_of(model, setup->base.set, k) == r) which[n++] = k;
+        while (n % 4) which[n++] = -1;
+    }
+    return n;
+}

@@ -1,0 +1,277 @@
+/* One node of a side's tables: where its points lie on the flanks, and what they read there of all stored modes and of
+ * every ground oscillator; the same for loads at given lengths of roll. */
+#include "setup/gk_node.h"
+
+double gk_node_tan(double angle)
+{
+    double sine, cosine;
+    gk_sincos(angle, &sine, &cosine);
+    return sine / cosine;
+}
+
+double gk_node_roll(const gk_side *side, int flank, double position, int offset)
+{
+    const double roll = (position + offset) * side->pitch;
+    return flank ? side->both - roll : roll;
+}
+
+/* ---- where, and what is read there ------------------------------------------------------------------------------- */
+static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
+
+size_t gk_node_scratch(const gk_model *model)
+{
+    size_t modes = 0, reads = 0;
+    for (int g = 0; g < model->gears; g++) {
+        modes = modes > (size_t)model->gear[g].modes ? modes : (size_t)model->gear[g].modes;
+        for (int s = 0; s < model->sets; s++)
+            reads = reads > (size_t)model->gear[g].ground[s].reads ? reads : (size_t)model->gear[g].ground[s].reads;
+    }
+    const size_t of_node = points_of(model) * (modes + 2 * reads + (size_t)model->supports + 1) + modes;
+    const size_t of_step = 4 * points_of(model) * (modes + LANES);
+    return of_node > of_step ? of_node : of_step;
+}
+
+/* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
+static void blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out)
+{
+    const int A = n->model->functions;
+    const double *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
+    for (int k = 0; k < width; k++) out[k] = 0.0;
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < A; a++, t += width) {
+            const double w = p->grid.weight[i] * p->width[a];
+            for (int k = 0; k < width; k++) out[k] += w * t[k];
+        }
+}
+
+static void turn_row(const gk_gear *gear, int offset, double *row)
+{
+    for (int k = 0; k < gear->modes; k++) {
+        double sine, cosine;
+        const int64_t turned = (int64_t)gear->diameter[k] * offset % gear->z;
+        gk_sincos(2.0 * GK_PI * (double)turned / gear->z, &sine, &cosine);
+        if (gear->member[k] == 1) {
+            const double a = row[k], b = row[k + 1];
+            row[k] = a * cosine - b * sine;
+            row[k + 1] = a * sine + b * cosine;
+            k++;
+        } else {
+            row[k] *= cosine;
+        }
+    }
+}
+
+typedef struct direction { /* in ground axes, at the nominal place of contact */
+    double angle;          /* of the tooth */
+    double n[3], arm[3];   /* outward normal; point of contact from the gear's centre × normal */
+} direction;
+
+static direction direction_of(const gk_node *n, const gk_spot *p)
+{
+    const gk_engagement *e = n->e;
+    const double dx = e->position[1][0] - e->position[0][0], dy = e->position[1][1] - e->position[0][1];
+    const double R = gk_base_reach(n->model, e), sg = p->flank ? -1.0 : 1.0, second = n->side->which == 1 ? -1.0 : 1.0;
+    const int ring = e->kind == MESH_INTERNAL && n->side->which == 1;
+    const double facing = e->kind == MESH_EXTERNAL ? second : 1.0, hollow = ring ? -1.0 : 1.0;
+    direction d;
+    double sine, cosine, helix_sine, helix_cosine, t = gk_atan2(dy, dx);
+    if (e->kind == MESH_INTERNAL) t = gk_atan2(-dy, -dx);
+    t -= sg * gk_acos(R / sqrt(dx * dx + dy * dy));
+    gk_sincos(t, &sine, &cosine);
+    gk_sincos(n->gear->helix, &helix_sine, &helix_cosine);
+    const double nx = -second * sg * sine, ny = second * sg * cosine, r_b = n->gear->r_b;
+    d.angle = (facing < 0.0 ? t + GK_PI : t) + sg * (p->middle / r_b - n->gear->psi_b);
+    d.n[0] = helix_cosine * nx, d.n[1] = helix_cosine * ny, d.n[2] = -hollow * sg * helix_sine;
+    const double x = facing * r_b * cosine + hollow * p->nominal * nx,
+                 y = facing * r_b * sine + hollow * p->nominal * ny;
+    d.arm[0] = y * d.n[2] - p->z * d.n[1];
+    d.arm[1] = p->z * d.n[0] - x * d.n[2];
+    d.arm[2] = helix_cosine * hollow * sg * r_b;
+    return d;
+}
+
+/* what the ground oscillators of the gear move at a point, outward; C_fs there */
+static void ground_point(const gk_node *n, const gk_spot *p, double *row, double *rigid, double *support)
+{
+    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
+    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
+    const direction d = direction_of(n, p);
+    const double *centre = n->gear->ground[set].centre,
+                 along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
+    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
+    gk_sincos(d.angle, &trig[2], &trig[1]);
+    for (int k = 0; k < reads; k++) {
+        rigid[k] = 0.0;
+        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
+        row[k] = rigid[k];
+    }
+    for (int s = 0; s < supports; s++) support[s] = 0.0;
+    for (int c = 0; c < 3; c++) {
+        blend(n, n->gear->ground[set].rows + c * size * reads, p, reads, part);
+        for (int k = 0; k < reads; k++) row[k] += trig[c] * part[k];
+        blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
+        for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
+    }
+}
+
+/* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
+ * action (docs/theory.md, eq. 6, with the gap closed) */
+static double corner_roll(const gk_node *n, const gk_spot *p)
+{
+    const gk_engagement *e = n->e;
+    const gk_gear *tip = &n->model->gear[e->gear[1 - n->side->which]];
+    const double x = e->position[1][0] - e->position[0][0], y = e->position[1][1] - e->position[0][1];
+    const double a = sqrt(x * x + y * y), R = gk_base_reach(n->model, e), L = sqrt(a * a - R * R);
+    const int inside = e->kind == MESH_INTERNAL, on_ring = inside && n->side->which == 1;
+    const double roll = inside ? p->nominal + (on_ring ? -L : L) : L - p->nominal;
+    const int past = inside && !on_ring ? roll < tip->s_tip : roll > tip->s_tip;
+    if (e->kind == MESH_FLAT || !n->setup->on.tip_contact || !past) return p->nominal;
+    const double sg = p->flank ? -1.0 : 1.0, angle = sg * (roll / tip->r_b - gk_acos(R / a) - tip->corner_angle);
+    double sine, cosine;
+    gk_sincos(angle, &sine, &cosine);
+    const double dx = tip->corner_radius * cosine + (on_ring ? a : -a), dy = tip->corner_radius * sine;
+    const double l2 = dx * dx + dy * dy - n->gear->r_b * n->gear->r_b;
+    return l2 > 0.0 ? sqrt(l2) - (on_ring ? -tip->edge : tip->edge) : 0.0;
+}
+
+/* Where a strip carries at the nominal centre distance: its part on both flanks, with a length of its own */
+static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int strip)
+{
+    p->z = mesh->strip_middle[strip];
+    memcpy(p->width, n->weight[strip], sizeof p->width);
+    if (n->e->kind == MESH_FLAT || n->gear->helix == 0.0) return;
+    const int own = n->side->which, internal = n->e->kind == MESH_INTERNAL;
+    double roll[2];
+    roll[own] = p->middle;
+    roll[1 - own] = internal ? p->middle + (own ? -n->length : n->length) : n->length - p->middle;
+    const gk_part part = gk_strips_part(n->model, n->setup, mesh, p->flank ? -1.0 : 1.0, roll, strip);
+    if (part.share >= 1.0) return;
+    const double slice = n->e->width / n->setup->slices, half = 0.5 * part.share * slice;
+    const double low = mesh->strip_middle[strip] - 0.5 * slice + half, high = low + slice - 2.0 * half;
+    const double middle = gk_clamp(part.middle, low, high);
+    p->z = part.middle;
+    gk_strips_row(n->model, n->side->gear, middle - half, middle + half, p->width);
+}
+
+void gk_node_gather(gk_node *n, double position)
+{
+    const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
+    const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
+    double ports[MAX_PORTS];
+    for (int i = 0; i < n->points; i++) {
+        gk_spot *p = &n->at[i];
+        const int c = i / strips, strip = i % strips;
+        p->flank = c >= n->side->count[0];
+        p->offset = n->side->first[p->flank] + n->side->step * (p->flank ? c - n->side->count[0] : c);
+        p->middle = n->e->kind == MESH_FLAT ? n->gear->s_form : gk_node_roll(n->side, p->flank, position, p->offset);
+        find_part(n, mesh, p, strip);
+        p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * gk_node_tan(n->gear->helix);
+        p->roll = corner_roll(n, p);
+        p->grid = gk_grid_at(n->model, n->gear, p->roll);
+        blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
+        if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
+        blend(n, n->gear->port_residual, p, n->model->ports, ports);
+        n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
+        if (n->e->kind != MESH_FLAT)
+            ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
+                         n->rigid + (size_t)i * n->gear->ground[set].reads,
+                         n->support + (size_t)i * n->model->supports);
+    }
+}
+
+gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
+{
+    gk_node n = {
+        .model = model, .setup = setup, .e = &model->engagement[e], .gear = &model->gear[side->gear], .side = side};
+    const size_t most = points_of(model), reads = (size_t)n.gear->ground[setup->base.set].reads;
+    n.points = side->candidates * setup->strips;
+    n.rows = room, room += most * (size_t)n.gear->modes;
+    n.ground = room, room += most * reads;
+    n.rigid = room, room += most * reads;
+    n.support = room, room += most * (size_t)model->supports;
+    n.port = room, room += most;
+    n.flexibility = room;
+    for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
+    gk_strips_rows(model, setup, n.e, side->gear, n.weight);
+    const double x = n.e->position[1][0] - n.e->position[0][0], y = n.e->position[1][1] - n.e->position[0][1];
+    const double R = gk_base_reach(model, n.e);
+    n.length = sqrt(gk_max(x * x + y * y - R * R, 0.0));
+    return n;
+}
+
+/* ---- loads ------------------------------------------------------------------------------------------------------- */
+/* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
+static void add_rows(const gk_model *model, const gk_gear *gear, const gk_spot *p, int first,
+                     double weight[4][MAX_FUNCTIONS], double *sum)
+{
+    const size_t modes = (size_t)gear->modes;
+    const double *row = gear->rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * modes;
+    for (int i = 0; i < 4; i++)
+        for (int a = 0; a < model->functions; a++, row += modes) {
+            for (int k = first; k < gear->modes; k++) sum[k] += weight[i][a] * row[k];
+            weight[i][a] = 0.0;
+        }
+}
+
+/* adds a row of tooth 0 turned to another tooth, modes from `first` on, which begins no pair's second */
+static void add_turned(const gk_gear *gear, int tooth, int first, const double *row, double *sum)
+{
+    double cosine[MAX_TEETH], sine[MAX_TEETH];
+    for (int m = 0; m < gear->z; m++) gk_sincos(2.0 * GK_PI * m / gear->z, &sine[m], &cosine[m]);
+    for (int k = first; k < gear->modes; k++) {
+        const int m = (int)((int64_t)gear->diameter[k] * tooth % gear->z);
+        if (gear->member[k] == 1) {
+            sum[k] += row[k] * cosine[m] - row[k + 1] * sine[m];
+            sum[k + 1] += row[k] * sine[m] + row[k + 1] * cosine[m];
+            k++;
+        } else {
+            sum[k] += row[k] * cosine[m];
+        }
+    }
+}
+
+/* Adds the modal forces of a gear group, modes from `first` on, by outward forces on the strips of a tooth at these
+ * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
+void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum)
+{
+    const gk_gear *gear = &model->gear[load->gear];
+    double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
+    gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
+    memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
+    for (int strip = 0; strip < load->strips; strip++) {
+        next.grid = gk_grid_at(model, gear, load->roll[strip]);
+        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(model, gear, &p, first, weight, row);
+        p = next;
+        for (int i = 0; i < 4; i++)
+            for (int a = 0; a < model->functions; a++)
+                weight[i][a] += load->force[strip] * p.grid.weight[i] * load->width[strip][a];
+    }
+    add_rows(model, gear, &p, first, weight, row);
+    add_turned(gear, load->tooth, first, row, sum);
+}
+
+/* adds the forces on ground oscillators that are not dynamic, by outward forces on the strips of a tooth of one gear */
+void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
+                         double *sum)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    const gk_node n = {.model = model,
+                       .setup = setup,
+                       .e = &model->engagement[e],
+                       .gear = &model->gear[load->gear],
+                       .side = &mesh->side[which]};
+    const int reads = n.gear->ground[setup->base.set].reads;
+    const int32_t *list = n.gear->ground[setup->base.set].list;
+    double row[MAX_GROUND], rigid[MAX_GROUND], support[MAX_SUPPORTS];
+    for (int strip = 0; strip < load->strips; strip++) {
+        const double roll = load->roll[strip], z = mesh->strip_middle[strip], sg = load->flank ? -1.0 : 1.0;
+        gk_spot p = {
+            .flank = load->flank, .grid = gk_grid_at(model, n.gear, roll), .nominal = roll, .roll = roll, .z = z};
+        p.middle = roll - sg * z * gk_node_tan(n.gear->helix);
+        memcpy(p.width, load->width[strip], sizeof p.width);
+        if (load->force[strip] == 0.0) continue;
+        ground_point(&n, &p, row, rigid, support);
+        for (int k = 0; k < reads; k++)
+            if (setup->base.slot[list[k]] < 0) sum[list[k]] += load->force[strip] * row[k];
+    }
+}

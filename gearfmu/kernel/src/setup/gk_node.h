@@ -1,0 +1,37 @@
+/* One node of a side's tables (gk_node.c): what its points read of all stored modes and of every ground oscillator. */
+#ifndef GK_NODE_H
+#define GK_NODE_H
+#include "problem/gk_work.h"
+
+typedef struct gk_spot { /* a candidate's strip at a node */
+    int flank, offset;
+    gk_grid grid;                   /* of where contact is */
+    double middle, nominal, roll;   /* length of roll on the line of action at mid-width, here; where contact is */
+    double z, width[MAX_FUNCTIONS]; /* middle of the part that carries; its weights on the width functions */
+} gk_spot;
+
+typedef struct gk_node { /* what a node's tables are made from */
+    const gk_model *model;
+    const gk_setup *setup;
+    const gk_engagement *e;
+    const gk_gear *gear;
+    const gk_side *side;
+    int points;                              /* candidates × strips */
+    gk_spot at[MAX_CANDIDATES * MAX_SLICES]; /* points */
+    gk_strip_weights weight;
+    double length;       /* of the line of action between the base circles, nominal */
+    double *rows;        /* (points, modes): all stored modes, tooth offset included */
+    double *ground;      /* (points, reads): outward, rigid motion included, of every ground oscillator */
+    double *rigid;       /* (points, reads): the part of it that is rigid motion */
+    double *support;     /* (points, supports): C_fs */
+    double *port;        /* (points) */
+    double *flexibility; /* (modes) 1/ω² of the dynamic ones */
+} gk_node;
+
+gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side);
+/* `position`: share of the pitch */
+void gk_node_gather(gk_node *n, double position);
+/* length of roll of a candidate on the line of action at mid-width */
+double gk_node_roll(const gk_side *side, int flank, double position, int offset);
+double gk_node_tan(double angle);
+#endif
