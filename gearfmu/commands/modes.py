@@ -71,9 +71,9 @@ def _of_stage(stage: str, torque: float | None, count: int, out: Path) -> None:
     from gearfmu.stage.trace import write_columns
 
     model = assemble(spec, bodies)
+    found = stage_modes(model, bodies, largest_torque(model) if torque is None else torque, count)
     if torque is not None:
         warn_of_limits(model, (torque,))
-    found = stage_modes(model, bodies, largest_torque(model) if torque is None else torque, count)
     for line in stage_table(found):
         click.echo(line)
     name, cycles, speed_max = model.shafts.input, engagements_per_turn(model), largest_speed(model)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,6 @@ def te(
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage, bores=bore)
-    warn_of_limits(model, torques)
     if model.spec.kind == "planetary_set":
         return _of_set(model, list(torques), positions, rigid_bearings, out)
     from gearfmu.report.te import write_plot
@@ -72,9 +72,10 @@ def te(
             click.echo(mesh)
         _tell(result, held)
         click.echo(f"{path}, {picture}")
+    warn_of_limits(model, torques)
 
 
-def warn_of_limits(model: Any, torques: tuple[float, ...]) -> None:
+def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
     """Say on standard error which torques (N·m) on the input are beyond what the stage is made for."""
     from gearfmu.stage.limits import beyond_limits
 
@@ -99,6 +100,7 @@ def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bo
     for line in set_te_lines(result, model.spec.set.load_sharing):
         click.echo(line)
     click.echo(f"{out}, {picture}")
+    warn_of_limits(model, torques)
 
 
 def set_te_lines(result: Any, load_sharing: float) -> list[str]:
