@@ -157,7 +157,9 @@ class TorqueMaster:
         """One communication step."""
         stage, drive = self.cut.stage, self.cut.drive
         now, change = self._speeds[-1], (self._speeds[-1] - self._speeds[0]) / max(1, len(self._speeds) - 1)
-        drive.tau = self._each("mean", (time, h), now + 0.5 * change) if self.foreseen else self._each("at", (time,), now)
+        drive.tau = (
+            self._each("mean", (time, h), now + 0.5 * change) if self.foreseen else self._each("at", (time,), now)
+        )
         stage.set(self._tau, drive.tau)
         start = stage.get(self._phi).copy()
         stage.step(time, h)
