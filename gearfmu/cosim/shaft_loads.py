@@ -2,13 +2,13 @@
 
 The stage's ports are torque ports: torque in, motion out. In every communication step the torque is held at its mean:
 of the functions of time exactly, of what follows the speed at the speed in the middle of the step, to which the mean
-change of the last four steps is carried on. Second order in the step; `jacobi` holds the torque of the step's beginning,
-as importers do: first order.
+change of the last four steps is carried on. Second order in the step; `jacobi` holds the torque of the step's
+beginning, as importers do: first order.
 
 Why four steps: a torque that follows the speed of an elastic shaft late feeds resonances whose half period is shorter
 than the delay. At frequency f it gives them the part D of what an undelayed damper would take, worst at f H of 0.7:
-D = −0.22 when the speed of the step's beginning is held, −0.52 when the last step's change is carried on (it doubles what
-alternates), −0.25 with that of four.
+D = −0.22 when the speed of the step's beginning is held, −0.52 when the last step's change is carried on (it doubles
+what alternates), −0.25 with that of four.
 """
 
 from __future__ import annotations

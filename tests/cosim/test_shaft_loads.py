@@ -176,8 +176,8 @@ def test_a_braked_rotor_runs_down_as_the_exponential_of_its_order(name: str, ord
 
 
 class Resonator(Rotor):
-    """A rotor whose port is a resonance of its own, k and c against the rotor that its mean turns: angle and speed of the
-    port are those of two masses, moved exactly under a held torque."""
+    """A rotor whose port is a resonance of its own: angle and speed of the port are the rotor's and those of a damped
+    oscillator, both moved exactly under a held torque."""
 
     LIGHT, FREQUENCY, DAMPING = 1e-4, 33.3e3, 4e-3  # kg·m², Hz, of critical
 
@@ -196,8 +196,8 @@ class Resonator(Rotor):
 
 
 def test_a_brake_does_not_feed_a_resonance_beyond_half_the_sampling_rate() -> None:
-    """A brake of 0.44 N·m·s/rad at 20 µs, a resonance of the bore at 33 kHz with 0.4 % of damping. With the change of the
-    last step alone carried on the resonance grows, by a factor of 20 in this run."""
+    """A brake of 0.44 N·m·s/rad at 20 µs, a resonance of the bore at 33 kHz with 0.4 % of damping. With the change of
+    the last step alone carried on the resonance grows, by a factor of 9 in this run."""
     load = ShaftLoad(proportional={"torque": -0.44, "speed": 1.0}, constant=0.44 * 100.0)
     cut = Loaded(Resonator(100.0), ShaftLoads({"shaft": load}), {"shaft": 100.0})
     cut.stage.swing[1] = 1.0
