@@ -1,14 +1,20 @@
 """Stages under torques that are known as functions of time and speed: no drivetrain with a state of its own.
 
 The stage's ports are torque ports: torque in, motion out. In every communication step the torque is held at its mean:
-of the functions of time exactly, of what follows the speed at the speed in the middle of the step, to which the last
-step's change of speed is carried on. Second order in the step; `jacobi` holds the torque of the step's beginning, as
-importers do: first order.
+of the functions of time exactly, of what follows the speed at the speed in the middle of the step, to which the mean
+change of the last four steps is carried on. Second order in the step; `jacobi` holds the torque of the step's
+beginning, as importers do: first order.
+
+Why four steps: a torque that follows the speed of an elastic shaft late feeds resonances whose half period is shorter
+than the delay. At frequency f it gives them the part D of what an undelayed damper would take, worst at f H of 0.7:
+D = −0.22 when the speed of the step's beginning is held, −0.52 when the last step's change is carried on (it doubles
+what alternates), −0.25 with that of four.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,6 +31,7 @@ from gearfmu.spec.shaft_loads import ShaftLoad
 from gearfmu.spec.turning import turns, undriven
 
 ORDERS = {"gs_mean": 2, "jacobi": 1}
+CARRIED_ON = 4  # steps whose mean change of speed is carried on
 
 
 @dataclass(frozen=True)
@@ -136,20 +143,23 @@ class TorqueMaster:
         self._tau: Any = stage.resolve([f"{name}.tau" for name in names])
         self._phi: Any = stage.resolve([f"{name}.phi" for name in names])
         self._w: Any = stage.resolve([f"{name}.w" for name in names])
-        self._before = self._now = np.array([self.cut.start[name] for name in names])
+        start = np.array([self.cut.start[name] for name in names])
+        self._speeds = deque([start], maxlen=CARRIED_ON + 1)
 
     def begin(self, time: float) -> None:
         """Initialise the stage at rest under the torques of the start."""
         drive = self.cut.drive
-        drive.tau = self._each("at", (time,), self._now)
+        drive.tau = self._each("at", (time,), self._speeds[-1])
         self.cut.stage.set(self._tau, drive.tau)
         self.cut.stage.initialize(time)
 
     def step(self, time: float, h: float) -> None:
         """One communication step."""
         stage, drive = self.cut.stage, self.cut.drive
-        middle = 1.5 * self._now - 0.5 * self._before
-        drive.tau = self._each("mean", (time, h), middle) if self.foreseen else self._each("at", (time,), self._now)
+        now, change = self._speeds[-1], (self._speeds[-1] - self._speeds[0]) / max(1, len(self._speeds) - 1)
+        drive.tau = (
+            self._each("mean", (time, h), now + 0.5 * change) if self.foreseen else self._each("at", (time,), now)
+        )
         stage.set(self._tau, drive.tau)
         start = stage.get(self._phi).copy()
         stage.step(time, h)
@@ -157,7 +167,7 @@ class TorqueMaster:
         drive.work = drive.work + given
         self.ports.work -= float(given.sum())
         self.ports.throughput += float(np.abs(given).sum())
-        self._before, self._now = self._now, stage.get(self._w).copy()
+        self._speeds.append(stage.get(self._w).copy())
 
     def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
         laws = zip(self.cut.drive.laws.values(), speeds.tolist(), strict=True)

@@ -51,7 +51,7 @@ def test_every_level_once_and_modes_pay(made: tuple[Path, tuple[Row, ...]]) -> N
     assert errors["rigid"] > 3 * errors["fast"] > 0, "measured: 27 times"
     assert [errors[level] / errors["full"] for level in ("fast", "standard")] == pytest.approx([1.0, 1.0], abs=0.1)
     assert by_level["rigid"].n_dyn == 4 < by_level["fast"].n_dyn < by_level["full"].n_dyn
-    assert all(0 < row.realtime_factor < 100 and row.slices == 5 for row in rows)
+    assert all(row.realtime_factor > 0 and row.slices == 5 for row in rows)
     assert 1.1 < by_level["full"].cpu_ratio / by_level["rigid"].cpu_ratio < 3.0, "sums over modes are tabulated"
     assert (out / "study.csv").read_text().splitlines()[0] == COLUMNS
     reference = read_rows(out / "references.csv", ReferenceRow)[0]

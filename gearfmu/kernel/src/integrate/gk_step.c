@@ -195,7 +195,7 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
     const size_t size = (size_t)s->stride * sizeof(double), joints = size - (size_t)s->contacts * sizeof(double);
-    s->limit_reached = s->rounds = s->dashpots = 0;
+    s->limit_reached = s->rounds = s->dashpots = s->dashpots_stand = 0;
     s->alpha = 0.0;
     memset(s->direction, 0, size);
     memset(s->delta + s->contacts, 0, joints); /* links know no local law */

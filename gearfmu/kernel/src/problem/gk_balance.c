@@ -152,6 +152,14 @@ static int leave(const gk_island *island, const balance *b)
     return 1;
 }
 
+/* what the steps before left to this one */
+static double due_of(const gk_island *island)
+{
+    double sum = 0.0;
+    for (int m = 0; m < island->count; m++) sum += island->member[m]->due;
+    return sum;
+}
+
 /* a move of α that brings the defect to 0: the root nearest to 0 of the quadratic; 0: there is none */
 static double root_of(const balance *b)
 {
@@ -208,8 +216,9 @@ void gk_balance_solve(const gk_island *island)
         if (find_alpha(island, b)) return;
     }
     gk_balance_plain(island);
-    const balance b = defect_of_all(island);
+    balance b = defect_of_all(island);
     leave(island, &b);
+    b.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
     if (open_balance(&b, steady))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }

@@ -4,7 +4,7 @@
  * three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
 #include "problem/gk_work.h"
 
-enum { SWEEPS = 40 };
+enum { SWEEPS = 40, SETTLED = 20 }; /* from then on dashpots stand: they may go on limiting each other in turns */
 #ifdef GK_DOUBLE_MODES
 static const double TOLERANCE = 1e-11;
 #else
@@ -213,12 +213,14 @@ static void sweep(const gk_island *island)
         for (int e = 0; e < c->model->engagements; e++) {
             if (!within(c, e)) continue;
             change = gk_max(change, take_whole(c, e));
+            c->work->engaged[e].system.dashpots_stand = round >= SETTLED;
             gk_solve_contacts(&c->work->engaged[e].system);
             give(c, e, WHOLE);
         }
         if (round) c->rate = gk_min(1.0, change / last);
         next = change * c->rate; /* what another sweep would find */
     }
+    for (int m = 0; m < island->count; m++) island->member[m]->dashpots_stand = 0;
     part_at_once(c, AT_ONCE);
     if (!(next < TOLERANCE)) island->member[0]->limit_reached = 1;
 }

@@ -231,7 +231,7 @@ static int limit_dashpots(gk_system *s)
 /* λ and z for the present α; starts from the present active set, settled */
 void gk_solve_contacts(gk_system *s)
 {
-    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = DASHPOT_ROUNDS;
+    int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = s->dashpots_stand ? 0 : DASHPOT_ROUNDS;
     s->limit_reached = 0; /* of the solution that is used in the end */
     for (int round = 0; round < ROUND_LIMIT; round++) {
         newton(s);

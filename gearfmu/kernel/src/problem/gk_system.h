@@ -68,6 +68,7 @@ typedef struct gk_system {
     double held0;     /* energy that the dampers' force holds in Q at the start */
     double owed, due; /* defect of energy that the steps before left; what of it this step should make good */
     int rounds, limit_reached, curved;
+    int dashpots_stand; /* where they are: no search for what limits them */
     double outer[MAX_STRIDE],
         beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
                                                      deflection at once */
