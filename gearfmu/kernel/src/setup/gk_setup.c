@@ -3,7 +3,7 @@
 #include "integrate/gk_integrate.h"
 #include <stdio.h>
 
-/* ---- modes and ground group ----------------------------------------------------------------------------------------- */
+/* ---- modes and ground group -------------------------------------------------------------------------------------- */
 static void fill_modal(const gk_gear *gear, gk_modal *m)
 {
     const int P = m->pairs, n = m->n;
