@@ -173,8 +173,8 @@ typedef struct bracket { /* where the defect was negative and where it was posit
     int known;
 } bracket;
 
-/* The move of α from here: Newton's, or to the middle of the bracket when that leads out of it. Contacts that take turns
- * with α make Newton's moves go to and fro between two quadratics. */
+/* The move of α from here: Newton's, or to the middle of the bracket when that leads out of it. Contacts that take
+ * turns with α make Newton's moves go to and fro between two quadratics. */
 static double kept_within(bracket *ends, double alpha, double defect, double move)
 {
     *(defect < 0.0 ? &ends->negative : &ends->positive) = alpha;

@@ -39,7 +39,7 @@ static void count_engagements(const gk_model *model, gk_setup *setup)
 }
 
 /* ---- the plan ---------------------------------------------------------------------------------------------------- */
-/* what sizes depend on, once level and effects are chosen: islands, engagements of every gear, candidates of every side */
+/* what sizes depend on once level and effects are chosen: islands, engagements of a gear, candidates of a side */
 void gk_layout_plan(const gk_model *model, gk_setup *setup)
 {
     find_islands(model, setup);
@@ -50,7 +50,7 @@ void gk_layout_plan(const gk_model *model, gk_setup *setup)
     }
 }
 
-/* ---- arrays ------------------------------------------------------------------------------------------------------- */
+/* ---- arrays ------------------------------------------------------------------------------------------------------ */
 /* memory is handed out twice with the same code: first counting (base NULL), then for real */
 typedef struct bump {
     char *base;

@@ -4,7 +4,7 @@
 #include "setup/gk_kinematics.h"
 #include <stdio.h>
 
-/* ---- modes and ground group ----------------------------------------------------------------------------------------- */
+/* ---- modes and ground group -------------------------------------------------------------------------------------- */
 static void fill_modal(const gk_gear *gear, gk_modal *m)
 {
     const int P = m->pairs, n = m->n;
