@@ -48,7 +48,8 @@ def main() -> None:
     for stage, torque, speed in RUNS:
         rows.append((stage, torque, speed, *(f"{value:.2g}" for value in errors(stage, torque, speed))))
         print(
-            f"{stage:>14} {torque:5.0f} N·m {speed:6.1f} rad/s: te, mesh force, bearing force {', '.join(rows[-1][3:])} %"
+            f"{stage:>14} {torque:5.0f} N·m {speed:6.1f} rad/s: "
+            f"te, mesh force, bearing force {', '.join(rows[-1][3:])} %"
         )
     with TABLE.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])

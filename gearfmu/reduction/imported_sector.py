@@ -65,6 +65,11 @@ class ImportedSector(SectorBody):
         return averaging_rows(self.cut.nodes - self.patch_point, self.faces.within(self.bore))[:3]
 
     @property
+    def knows_stress(self) -> bool:
+        """No: material and elements may be another program's."""
+        return False
+
+    @property
     def tangent_rows(self) -> np.ndarray:
         """Loads along the profile are made on our own meshes only: (0, 3N)."""
         return np.zeros((0, self.cut.nodes.size))

@@ -61,7 +61,7 @@ class _FamilyModes:
     bore_rows: np.ndarray
     shapes: np.ndarray
     surface: np.ndarray
-    spin: FamilySpin
+    spin: FamilySpin | None
 
 
 def elastic_modes(
@@ -120,7 +120,7 @@ def _solve(body: SectorBody, key: tuple[int, int], count: int, sample: sp.csr_ar
     surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
     for k in range(len(squared) if sample.shape[0] else 0):
         surface[k] = sample @ fields[:, k].reshape(-1, 3)
-    spin = family_spin(body, key[1], family.weight, fields)
+    spin = family_spin(body, key[1], family.weight, fields) if body.knows_stress else None
     pictures = fields[:, :_SHAPES].copy()
     return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
 
@@ -141,7 +141,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
     entries = [(m.squared[k], key, k) for key, m in found.items() for k in range(len(m.squared))]
     entries.sort(key=lambda entry: entry[0])
     columns: dict[str, list] = {name: [] for name in COLUMNS}
-    spins: list[tuple[FamilySpin, int, int]] = []
+    spins: list[tuple[FamilySpin, int, int]] = []  # none where the body does not know them
     shapes: dict[int, np.ndarray] = {}
     for squared, key, k in entries:
         modes = found[key]
@@ -154,7 +154,8 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
             columns["frequency"].append(np.sqrt(squared) / (2 * np.pi))
             columns["diameter"].append(key[1])
             columns["part"].append(part)
-            spins.append((modes.spin, k, part))
+            if modes.spin is not None:
+                spins.append((modes.spin, k, part))
             columns["parity"].append(body.spaces[key[0]].parity)
             columns["flank"].append(modes.flank_rows[:, k].imag if part == 2 else modes.flank_rows[:, k].real)
             columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
@@ -172,5 +173,5 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
         shapes,
         tangent,
         np.array(columns["surface"]),
-        join_spin(body, spins),
+        join_spin(body, spins) if spins else None,
     )

@@ -122,6 +122,11 @@ class SectorBody:
         fields = rigid_modes(self.mesh.nodes)
         return turned_sum(fields.T @ (self.mass_matrix @ fields), self.teeth)
 
+    @property
+    def knows_stress(self) -> bool:
+        """Whether stresses of the spinning body can be told from its mesh, and so what its modes feel."""
+        return True
+
     @cached_property
     def growth(self) -> np.ndarray:
         """Displacement (3N,) of the sector under centrifugal load per square of the speed, m·s²."""
