@@ -179,9 +179,11 @@ def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path) -> None:
     models = [assemble(spec, bodies), assemble(own, [reduce_gear(own, 0), wheel])]
     results = [loaded_te(model, [302.0], 6, rigid_bearings=True).te for model in models]
     assert np.abs(results[0] / results[1] - 1).max() < 1e-6
-    runs = [simulate(model, Steady(model, 100.0, 302.0), 0.012, 1e-4, {"level": 1}) for model in models]
+    settings = {"level": 1, "effect.gyroscopic": 0}  # patterns of the imported body do not know how they whirl
+    runs = [simulate(model, Steady(model, 100.0, 302.0), 0.012, 1e-4, settings) for model in models]
     assert np.abs(runs[0]["mesh.te"] - runs[1]["mesh.te"]).max() < 1e-6 * np.abs(runs[1]["mesh.te"]).max()
     assert runs[0]["mesh.force"].mean() == pytest.approx(302.0 / 0.033829, rel=0.05)
-    nodal = [simulate(model, Steady(model, 100.0, 302.0), 2e-4, 1e-5, {"level": 4, "contact": 2}) for model in models]
+    settings |= {"level": 4, "contact": 2}
+    nodal = [simulate(model, Steady(model, 100.0, 302.0), 2e-4, 1e-5, settings) for model in models]
     assert np.abs(nodal[0]["mesh.te"] - nodal[1]["mesh.te"]).max() < 1e-5 * np.abs(nodal[1]["mesh.te"]).max()
     assert nodal[0]["mesh.pairs"].min() >= 1
