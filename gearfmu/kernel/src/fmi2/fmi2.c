@@ -427,87 +427,9 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
     return fmi2OK;
 }
 
-/* ---- what modelDescription.xml does not declare ------------------------------------------------------------------ */
-static fmi2Status not_offered(fmi2Component c, const char *what)
+/* ---- what modelDescription.xml does not declare (fmi2_absent.c) ---------------------------------------------------- */
+fmi2Status face_absent(fmi2Component c, const char *what)
 {
     ENTER(NotOffered);
     return REFUSE(f, "%s: this FMU does not offer it (see modelDescription.xml)", what);
-}
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
-                                        const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
-                                        fmi2Real dvUnknown[])
-{
-    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[])
-{
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                        const fmi2Integer order[], fmi2Real value[])
-{
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2CancelStep(fmi2Component c) { return not_offered(c, __func__); }
-
-/* ---- model exchange: some loaders look these up in every FMU, also where only co-simulation is declared ---------- */
-fmi2Status fmi2EnterEventMode(fmi2Component c) { return not_offered(c, __func__); }
-
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
-{
-    (void)eventInfo;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return not_offered(c, __func__); }
-
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
-{
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
-{
-    (void)time;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
-{
-    (void)x, (void)nx;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
-{
-    (void)derivatives, (void)nx;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
-{
-    (void)eventIndicators, (void)ni;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
-{
-    (void)x, (void)nx;
-    return not_offered(c, __func__);
-}
-
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
-{
-    (void)x_nominal, (void)nx;
-    return not_offered(c, __func__);
 }

@@ -121,4 +121,8 @@ fmi2Status face_state_read(face *f, const void *bytes, size_t size, face_state *
  * *bytes */
 void *face_read_model(fmi2String location, const fmi2CallbackFunctions *environment, const unsigned char **bytes,
                       size_t *size, char message[GK_MESSAGE]);
+
+/* refuses a function that this FMU does not offer */
+fmi2Status face_absent(fmi2Component c, const char *what);
+
 #endif
