@@ -427,7 +427,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
     return fmi2OK;
 }
 
-/* ---- what modelDescription.xml does not declare (fmi2_absent.c) ---------------------------------------------------- */
+/* ---- what modelDescription.xml does not declare (fmi2_absent.c) -------------------------------------------------- */
 fmi2Status face_absent(fmi2Component c, const char *what)
 {
     ENTER(NotOffered);

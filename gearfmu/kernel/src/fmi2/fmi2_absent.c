@@ -1,5 +1,5 @@
-/* Functions of FMI 2.0 that this FMU does not offer: each refuses, says so and changes nothing. Some loaders look up those
- * of model exchange in every FMU, also where only co-simulation is declared. */
+/* Functions of FMI 2.0 that this FMU does not offer: each refuses, says so and changes nothing. Some loaders look up
+ * those of model exchange in every FMU, also where only co-simulation is declared. */
 #include "fmi2/fmi2_face.h"
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
