@@ -72,15 +72,15 @@ def test_no_flank_pulls(relieved: StageModel) -> None:
 def test_means_sum_to_the_impulse(bodies, plain: StageModel) -> None:
     """Without relief the line of action keeps its arm: what a gear that nothing else turns gains is −r_b ΣF̄H, to
     rounding of its elastic modes."""
-    kernel = plain.kernel(level=0)
-    for name, value in Steady(plain, 100.0, 50.0)(0.0).items():
+    kernel, steady = plain.kernel(level=0), Steady(plain, 100.0, 50.0)
+    for name, value in steady(0.0).items():
         kernel.set(name, value)
     kernel.initialize()
     inertia = bodies[0].inertia[2, 2]
     r_b = plain.pair.pair.normal_module * plain.pair.gears[0].teeth / 2 * math.cos(plain.pair.pair.pressure_angle)
     before, impulse = kernel.get("pinion.gear.w"), 0.0
     for k in range(200):
-        for name, value in Steady(plain, 100.0, 50.0)(k * H).items():
+        for name, value in steady(k * H).items():
             kernel.set(name, value)
         kernel.step(k * H, H)
         impulse += H * (-r_b * kernel.get("mesh.force_mean") - kernel.get("pinion.tau_mean"))
