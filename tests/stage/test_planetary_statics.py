@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
+from gearfmu.api.models import with_port_kinds
 from gearfmu.body import load_bodies
-from gearfmu.commands.models import of_other_kinds
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import SPIN
@@ -77,7 +77,7 @@ def test_without_coast_flanks_the_set_is_driven_through_those_that_carry(name: s
     turns the other way: which flanks are left out is decided mesh by mesh. Against that load teeth pass through."""
     stage = load_stage(name)
     first, second = list(stage.ports)[:2]
-    driven = assemble(of_other_kinds(stage, {first: "torque", second: "torque"}), load_bodies(stage))
+    driven = assemble(with_port_kinds(stage, {first: "torque", second: "torque"}), load_bodies(stage))
     ratio = driven.shafts.ratio
     found = []
     for torque, coast in ((TORQUE / 10, 1.0), (TORQUE / 10, 0.0), (-TORQUE / 10, 0.0)):
