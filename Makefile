@@ -6,6 +6,7 @@ STAMP   = $(VENV)/.installed
 JOBS   ?= 2
 BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
 OUT    ?= out
+STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -50,14 +51,18 @@ wheel: $(STAMP)
 	$(RUN) -m pip install --quiet build
 	GEARFMU_PLATFORMS="linux64 win64" $(RUN) -m build --wheel --outdir dist
 
-## make models      reduce the bodies of the model library again from its stage files
+## make models      reduce all bodies of the model library again from their stage files (half an hour on two cores)
 models: $(STAMP)
-	$(RUN) -m gearfmu.cli reduce fzg_c --force
+	for stage in $(STAGES); do $(RUN) -m gearfmu.cli reduce $$stage --force || exit 1; done
 
 ## make docs        regenerate docs/variables.md and docs/effects.md from the tables in the code
 docs: $(VENV)/.base
 	$(RUN) -m gearfmu.cli schema variables --out docs/variables.md
 	$(RUN) -m gearfmu.cli schema effects --out docs/effects.md
+
+## make site        the documentation as a site, out/site/index.html; warnings are errors
+site: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(RUN) -m mkdocs build --quiet --strict --site-dir $(abspath $(OUT))/site
 
 ## make lint        form of the sources: ruff (rules, format), mypy, clang-format
 lint: $(STAMP)
@@ -76,4 +81,4 @@ $(STAMP): $(VENV)/.base
 	$(RUN) -m pip install --quiet -e ".[test]"
 	@touch $@
 
-.PHONY: help demo test test-full bench study study-bodies stability wheel models docs lint
+.PHONY: help demo test test-full bench study study-bodies stability wheel models docs site lint

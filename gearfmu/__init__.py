@@ -23,7 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gearfmu.api.models import assemble, load, load_scene, reduce
-    from gearfmu.api.results import convert, export, write_report
+    from gearfmu.api.plans import plan, run_plan
+    from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import drive, run, simulate, te, wound_up
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
@@ -42,13 +43,16 @@ __all__ = [
     "TeResult",
     "Trace",
     "assemble",
+    "compare",
     "convert",
     "drive",
     "export",
     "load",
     "load_scene",
+    "plan",
     "reduce",
     "run",
+    "run_plan",
     "simulate",
     "sweep",
     "te",
@@ -57,7 +61,8 @@ __all__ = [
 ]
 _HOMES = {
     "api.models": ("assemble", "load", "load_scene", "reduce"),
-    "api.results": ("convert", "export", "write_report"),
+    "api.plans": ("plan", "run_plan"),
+    "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("drive", "run", "simulate", "te", "wound_up"),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),

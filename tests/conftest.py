@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
+from pathlib import Path
 
 import pytest
+from builds import double_library as double_build
+from builds import inner_library as inner_build
 
 REMEDY = {
     "chromium": "apt-get install chromium",
@@ -28,3 +31,15 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
                 pytest.skip(f"needs the program {name}: {REMEDY[name]}")
             if name not in REMEDY and importlib.util.find_spec(name) is None:
                 pytest.skip(f"needs the Python package {name}: pip install {name}")
+
+
+@pytest.fixture(scope="session")
+def double_library() -> Path:
+    """The kernel with modal states and rows in double, for comparison to the last digits."""
+    return double_build()
+
+
+@pytest.fixture(scope="session")
+def inner_library() -> Path:
+    """Kernel and inner_probe.c in one library."""
+    return inner_build()

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import venv
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -162,12 +163,17 @@ def test_demo_ends_with_a_report_and_the_fmu_is_the_solver_all_the_way(tmp_path:
     assert 0.05 < summary["results"]["lock_time_s"] < 0.3 and summary["chain_in_fmu"]
 
 
+@pytest.fixture(scope="module")
+def wheel() -> Path:
+    """The wheel for Linux and Windows, made as users are told."""
+    subprocess.run(["make", "wheel", f"VENV={sys.prefix}"], cwd=ROOT, check=True, capture_output=True)
+    return max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
+
+
 @pytest.mark.full
 @pytest.mark.needs("ziglang", "build")
-def test_the_wheel_runs_the_demo_in_an_empty_environment(tmp_path: Path) -> None:
+def test_the_wheel_runs_the_demo_in_an_empty_environment(wheel: Path, tmp_path: Path) -> None:
     """Installed without compiler and away from the checkout; needs a package index for the dependencies."""
-    subprocess.run(["make", "wheel", f"VENV={sys.prefix}"], cwd=ROOT, check=True, capture_output=True)
-    wheel = max((ROOT / "dist").glob("gearfmu-*.whl"), key=lambda path: path.stat().st_mtime)
     venv.create(tmp_path / "venv", with_pip=True)
     python = tmp_path / "venv" / "bin" / "python"
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
@@ -175,3 +181,17 @@ def test_the_wheel_runs_the_demo_in_an_empty_environment(tmp_path: Path) -> None
     command = [tmp_path / "venv" / "bin" / "gearfmu", "demo", "--out", tmp_path / "out"]
     subprocess.run(command, check=True, cwd=tmp_path, env={**environment, "CC": "false"}, capture_output=True)
     assert (tmp_path / "out" / "report.html").is_file()
+
+
+@pytest.mark.full
+@pytest.mark.needs("ziglang", "build")
+def test_the_wheel_is_for_linux_and_windows(wheel: Path, tmp_path: Path) -> None:
+    """Both kernels are in it and export the same names; the Windows one is not loaded here."""
+    from gearfmu.fmu.symbols import exported_symbols
+
+    assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.manylinux_2_17_x86_64.win_amd64.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path)
+    folder = tmp_path / "gearfmu" / "kernel" / "lib"
+    names = [exported_symbols(folder / file) for file in ("linux64/gearfmu_kernel.so", "win64/gearfmu_kernel.dll")]
+    assert names[0] == names[1] and len(names[0]) > 40

@@ -13,6 +13,7 @@ from gearfmu.api.models import AnyStage, PathLike, Stage, load, model_of
 from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError
 from gearfmu.report import write
+from gearfmu.report.run import Run
 from gearfmu.stage import Trace
 from gearfmu.stage.deformation import Deformation
 from gearfmu.stage.exchange import convert as convert_trace
@@ -49,6 +50,7 @@ def write_report(
     stage: PathLike | Stage | None = None,
     home: PathLike | None = None,
     tell: Callable[[str], None] = warnings.warn,
+    sound: str | None = None,
 ) -> Path:
     """Write report.html of a trace into the folder `out`; returns its path.
 
@@ -56,18 +58,67 @@ def write_report(
     stage : of the run, for the picture of the deformed gears; the one that the trace names when None.
     home : folder of the run's other files (deformation.h5); `out` when None.
     tell : is called with a sentence where stage or bodies cannot be read and the report goes without that picture.
+    sound : the channel to be heard, a bearing or mesh force when None. TraceError for one that there is not.
     """
     trace = trace if isinstance(trace, Trace) else Trace.load(trace)
+    summary = {**trace.meta, "sound": trace.chosen([sound])[0]} if sound is not None else trace.meta
     named = stage or stage_of(trace.meta)
     if not named:
-        return write(trace, trace.meta, Path(out))
+        return write(trace, summary, Path(out))
     try:
         spec = load(named) if isinstance(named, (str, os.PathLike)) else named
         deformation = recorded_deformation(trace, Path(home or out))
-        return write(trace, trace.meta, Path(out), spec, load_bodies(spec), deformation)
+        return write(trace, summary, Path(out), spec, load_bodies(spec), deformation)
     except GearfmuError as error:
         tell(f"the report goes without the deformed pair: {error}")
-        return write(trace, trace.meta, Path(out))
+        return write(trace, summary, Path(out))
+
+
+def compare(traces: Mapping[str, Trace | PathLike] | Sequence[Trace | PathLike], path: PathLike) -> Path:
+    """Write one page that compares two or more traces with the first of them: results, transmission error, spectra,
+    octave bands, mesh orders; returns its path.
+
+    traces : Trace objects, files of traces or folders that hold trace.h5; by the name each is to have on the page, else
+        by that of its stage, scene or folder.
+
+    Raises GearfmuError for fewer than two.
+    """
+    from gearfmu.report.compare import Compared, write_comparison
+
+    named = list(traces.items()) if isinstance(traces, Mapping) else [("", trace) for trace in traces]
+    if len(named) < 2:
+        raise GearfmuError("a comparison needs two traces or more")
+    runs = [_run(trace) for _, trace in named]
+    given = [name for name, _ in named]
+    labels = given if all(given) else _labels(runs, [trace for _, trace in named])
+    return write_comparison([Compared(*own) for own in zip(labels, runs, strict=True)], Path(path))
+
+
+def _run(source: Trace | PathLike) -> Run:
+    """A trace with its stage and bodies where they can be read."""
+    trace = source if isinstance(source, Trace) else Trace.load(trace_file(source))
+    try:
+        spec = load(stage_of(trace.meta) or "")
+        return Run(trace, trace.meta, spec, load_bodies(spec))
+    except GearfmuError:
+        return Run(trace, trace.meta)
+
+
+def trace_file(path: PathLike) -> Path:
+    """The file of a trace, or trace.h5 in a folder."""
+    return Path(path) / "trace.h5" if Path(path).is_dir() else Path(path)
+
+
+def _labels(runs: Sequence[Run], sources: Sequence[Trace | PathLike]) -> list[str]:
+    """What tells the runs apart: stage, else scene, else folder or file, else a number."""
+    files = [str(n + 1) if isinstance(s, Trace) else _short(s) for n, s in enumerate(sources)]
+    choices = ([run.stage_name for run in runs], [run.title for run in runs], files)
+    return next((found for found in choices if len(set(found)) == len(found)), [str(n + 1) for n in range(len(runs))])
+
+
+def _short(path: PathLike) -> str:
+    file = trace_file(path)
+    return file.parent.name if file.name == "trace.h5" else file.stem
 
 
 def stage_of(meta: Mapping[str, Any]) -> str | None:

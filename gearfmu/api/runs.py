@@ -29,14 +29,16 @@ def te(
     positions: int = 41,
     rigid_bearings: bool = False,
     mesh: str | None = None,
+    pitches: int = 1,
     **settings: Any,
 ) -> TeResult | SetTeResult:
-    """Quasi-static loaded transmission error over one pitch, output held, torque on the input (the first port).
+    """Quasi-static loaded transmission error over one pitch or more, output held, torque on the input (the first port).
 
     stage : a name or path, a `load`ed stage, or an `assemble`d model.
     torques : one or several, "302 N*m" or in N·m; 0 is the unloaded stage.
     positions : over one pitch, end point left out.
     rigid_bearings : hold the axes. mesh : of a train the engagement, the first when None. Neither is for sets.
+    pitches : teeth of gear A for deviations that differ from tooth to tooth.
     settings : of the kernel (docs/variables.md): slices=10, **{"effect.hertz": False}.
 
     Of a pair or a train a TeResult: te (T, P) m, mesh stiffness (T, P) N/m, shares of the tooth pairs; of a planetary
@@ -45,8 +47,8 @@ def te(
     model, wanted = model_of(stage), [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, known = [_si(torque, "N*m") for torque in wanted], parameters(model, settings)
     if isinstance(model.spec, PlanetarySpec):
-        return set_te(model, values, positions, **known)
-    return loaded_te(model, values, positions, rigid_bearings, mesh, **known)
+        return set_te(model, values, positions, pitches, **known)
+    return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
 
 
 def simulate(

@@ -57,7 +57,7 @@ def _facts(body: ReducedBody) -> dict[str, Any]:
         "roll_points": len(body.roll),
         "width_functions": body.width_functions,
         "tooth_offsets": f"all {body.teeth}" if body.all_offsets else f"−{offsets // 2} to {offsets // 2}",
-        "rows_along_profile": body.tangent is not None,
+        "rows_along_profile": body.knows_profile,
         "tooth_compliance_mid_flank_m_per_N": float(body.static_ff[0, 0, 0, middle, middle, 0, 0]),
         **_mounts(body),
     }

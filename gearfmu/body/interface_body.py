@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.layout import Entry
+from gearfmu.body.layout import ALGORITHM_VERSION, Entry
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 
@@ -51,6 +51,7 @@ class InterfaceBody:
     frf_error: np.ndarray
     length: float
     trusted_to: float
+    algorithm_version: int = ALGORITHM_VERSION
 
     def __post_init__(self) -> None:
         if problems := _problems(self):
@@ -114,6 +115,7 @@ def save_interface_body(body: InterfaceBody, path: str | os.PathLike[str]) -> No
     """Write a body under a temporary name, then rename it to `path`."""
     with writing(path, FILE) as file:
         file.attrs["name"], file.attrs["input_hash"] = body.name, body.input_hash
+        file.attrs["algorithm_version"] = body.algorithm_version
         for text in TEXTS:
             file.attrs[text] = json.dumps(getattr(body, text), sort_keys=True)
         for entry in ENTRIES:
@@ -129,7 +131,8 @@ def load_interface_body(path: str | os.PathLike[str]) -> InterfaceBody:
         texts: dict[str, Any] = {name: json.loads(file.attrs[name]) for name in TEXTS}
         texts["interfaces"], texts["ground"] = tuple(texts["interfaces"]), tuple(texts["ground"])
         name, input_hash = (str(file.attrs[name]) for name in ("name", "input_hash"))
-        return InterfaceBody(name=name, input_hash=input_hash, **texts, **values)
+        version = int(file.attrs.get("algorithm_version", 1))  # files of the first version do not say it
+        return InterfaceBody(name=name, input_hash=input_hash, algorithm_version=version, **texts, **values)
 
 
 def interface_facts(body: InterfaceBody) -> dict[str, Any]:
@@ -137,6 +140,7 @@ def interface_facts(body: InterfaceBody) -> dict[str, Any]:
     return {
         "name": body.name,
         "input_hash": body.input_hash,
+        "algorithm_version": body.algorithm_version,
         "facts": {
             "method": body.method,
             "modes": body.modes,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 FORMAT = "gearfmu-body"
 FORMAT_VERSION = 2
-ALGORITHM_VERSION = 1  # raise it when the numbers of a body change: every stored body is then stale
+ALGORITHM_VERSION = 2  # raise it when the numbers of a body change: every stored body is then stale
 
 
 @dataclass(frozen=True)

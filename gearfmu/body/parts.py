@@ -1,4 +1,4 @@
-"""What every road to a gear body gives, and its pictures: shared by bodies meshed here and bodies made elsewhere."""
+"""What every method to a gear body gives, and its pictures: shared by bodies meshed here and bodies made elsewhere."""
 
 from __future__ import annotations
 

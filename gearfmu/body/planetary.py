@@ -17,6 +17,7 @@ from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.provenance import provenance
 from gearfmu.body.reduce import reduced_gear
 from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.stale import refuse_stale
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report
@@ -26,6 +27,7 @@ from gearfmu.geometry.planetary import set_geometry
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.mesh_error import carrier_mesh_error
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import Oscillators, oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
@@ -61,11 +63,7 @@ def load_set_bodies(spec: PlanetarySpec, folder: str | os.PathLike[str] | None =
     for name in SET_BODIES:
         path = set_body_path(spec, name, folder)
         body = _load(name, path)
-        if body.input_hash != set_hash(spec, name):
-            raise BodyError(
-                f"{path}: stale: made from other numbers, or by another version, than {spec.source} asks for now; "
-                "make it again with 'gearfmu reduce STAGE'"
-            )
+        refuse_stale(path, body, set_hash(spec, name), spec.source)
         bodies.append(body)
     return bodies
 
@@ -144,15 +142,19 @@ def _carrier(spec: PlanetarySpec, progress: Progress | None) -> InterfaceBody:
     judging = Judging.over(damping_ratio=spec.carrier.modal_damping)
     exact = reference(full, judging)
     error = relative_error(exact.matrix, transfer(model, judging, full.ground, residual=True))
-    mesh = mesh or _carrier_facts(spec, full.size)
+    if mesh is None:
+        _tell(progress, "carrier: frequencies of a finer mesh", 0.8)
+        mesh = _carrier_facts(spec, full.size)
     evidence = _Evidence(judging.frequency, error)
     return _interface_body(full, model, evidence, spec, {"mesh": mesh, "started": started})
 
 
 def _carrier_facts(spec: PlanetarySpec, size: int) -> dict[str, Any]:
-    """Plain facts about our own mesh of a carrier of `size` unknowns."""
+    """Plain facts about our own mesh of a carrier of `size` unknowns, its error measured on a finer one."""
     facts = mesh_report(carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh))
-    return {**facts, "counts": spec.carrier.mesh.model_dump(), "dof_body": size, "dof_sector": facts["dof"]}
+    size_facts = {"dof_body": size, "dof_sector": facts["dof"]}
+    counts, error = spec.carrier.mesh.model_dump(), carrier_mesh_error(spec)
+    return {**facts, **size_facts, "counts": counts, "frequency_error": error}
 
 
 class _Evidence:

@@ -26,6 +26,7 @@ from gearfmu.body.parts import (
 )
 from gearfmu.body.provenance import provenance
 from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.stale import refuse_stale
 from gearfmu.body.store import load_body, save_body
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.femesh import mesh_report, sector_mesh
@@ -73,11 +74,7 @@ def load_stage_bodies(spec: Stage, folder: str | os.PathLike[str] | None = None)
     for own, index in gears_of(spec):
         path = body_path(own, index, folder)
         body = load_body(path)
-        if body.input_hash != expected_hash(own, index):
-            raise BodyError(
-                f"{path}: stale: made from other numbers, or by another version, than {spec.source} asks for now; "
-                "make it again with 'gearfmu reduce STAGE'"
-            )
+        refuse_stale(path, body, expected_hash(own, index), spec.source)
         bodies.append(body)
     return bodies
 

@@ -58,9 +58,9 @@ class ReducedBody:
     static_bb (6, 6). M is z, or 2K + 1 where only the tooth offsets −K … K are kept: offset m stands at m mod M.
     input_hash: SHA-256 of the inputs and of the version of the algorithms, 64 hex digits. rim: of a ring, whose
     rim takes the place of the bore in bore_rows, static_fb and static_bb; None of an external one. tangent: rows along
-    the profile, None where none were made. shapes: surface of a sector and how it moves in every mode, None where none
-    was made. spin: what the modes feel when the body turns, None of an imported one and of one that was stored before
-    there was such a group. base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
+    the profile, None of an imported gear with all its teeth. shapes: surface of a sector and how it moves in every
+    mode, None where none was made. spin: what the modes feel when the body turns, None of an imported one.
+    base_helix_angle: rad, positive for a right-handed gear, 0 for a spur one.
     Raises BodyError naming every field that cannot be.
     """
 
@@ -118,11 +118,16 @@ class ReducedBody:
         has = {
             "rim": self.internal,
             "helix": self.base_helix_angle != 0,
-            "tangent": self.tangent is not None,
+            "tangent": self.knows_profile,
             "shapes": self.shapes is not None,
             "spin": self.spin is not None,
         }
         return tuple(name for name, there in has.items() if there)
+
+    @property
+    def knows_profile(self) -> bool:
+        """Whether flanks can be loaded and read along the profile, as friction does."""
+        return self.tangent is not None
 
     @property
     def all_offsets(self) -> bool:

@@ -1,1 +1,1 @@
-"""Room of the command line's verbs: thin callers of the rooms above, one file a family."""
+"""The command line's verbs: thin callers of the packages above, one file a family."""

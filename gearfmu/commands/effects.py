@@ -101,7 +101,9 @@ def _numbers(stage: str) -> dict[str, str]:
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
     from gearfmu.spec.planetary import PlanetarySpec
+    from gearfmu.spec.shapes import gear_shape
     from gearfmu.stage.effects import torque_on_flanks_alone
+    from gearfmu.stage.flanks import FlankField
     from gearfmu.stage.meshes import mesh_geometry
 
     model = model_of(stage)
@@ -114,7 +116,9 @@ def _numbers(stage: str) -> dict[str, str]:
     widths = [min(g.face_width for g in gears if g.name in mesh.gears) for mesh in meshes]
     alone = [torque_on_flanks_alone(model, mesh.name) for mesh in meshes]
     reliefs = [1e6 * gear.tip_relief.amount if gear.tip_relief else 0.0 for gear in gears]
-    misplaced = [1e6 * max(map(abs, gear.index_deviation.values()), default=0.0) for gear in gears]
+    fields = [FlankField(gear, gear_shape(gear)) for gear in gears]
+    misplaced = [1e6 * float(abs(field.index()).max()) for field in fields]
+    deviating = [1e6 * field.span for field in fields]
     return {
         "elastic": f"{stored} stored modes",
         "modes": modes,
@@ -134,7 +138,24 @@ def _numbers(stage: str) -> dict[str, str]:
         "coriolis": turning,
         "centrifugal": turning,
         "gyroscopic": _whirling(model),
+        "flank_deviations": _listed(f"{size:.3g} µm" for size in deviating) + _idle(not any(deviating)),
+        "friction": _listed(map(_friction, meshes)),
+        "runout": _listed(map(_runout, gears)) + _idle(not any(g.eccentricity or g.wobble for g in gears)),
     }
+
+
+def _runout(gear: Any) -> str:
+    """Eccentricity and wobble of a gear."""
+    eccentricity, wobble = (part.amount if part else 0.0 for part in (gear.eccentricity, gear.wobble))
+    return f"{1e6 * eccentricity:g} µm with {1e6 * wobble:g} µrad"
+
+
+def _friction(mesh: Any) -> str:
+    """Law of a mesh."""
+    if mesh.friction is None:
+        return "none is stated: it costs nothing"
+    constant = mesh.friction.law == "constant"
+    return f"coefficient {mesh.friction.coefficient:g}" if constant else f"law {mesh.friction.law}"
 
 
 def _whirling(model: Any) -> str:

@@ -28,7 +28,7 @@ PORT_KINDS = ("spring", "torque", "fixed")
     "--platform",
     "platforms",
     multiple=True,
-    type=click.Choice(["host", "linux64", "win64"]),
+    type=click.Choice(["host", "linux64", "win64", "darwin64"]),
     default=("host",),
     help="Platforms to put in; others than the host's need the [cross] extra; may repeat.",
 )
@@ -52,6 +52,7 @@ PORT_KINDS = ("spring", "torque", "fixed")
     show_default=True,
     help="The file terminalsAndIcons.xml, which some importers read wrongly: docs/howto-fmu.md.",
 )
+@click.option("--sources", is_flag=True, help="Also the C sources of the binary and how to build it.")
 def export(
     stage: str, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], observe: tuple[str, ...], **how: Any
 ) -> None:

@@ -1,4 +1,4 @@
-"""Verbs that simulate and report: run, simulate, report, demo."""
+"""Verbs that simulate and report: run, simulate, report, compare, demo."""
 
 from __future__ import annotations
 
@@ -26,8 +26,14 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
 
 
 @click.command()
-@click.argument("scene")
+@click.argument("scene", required=False)
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<scene> when not given.")
+@click.option(
+    "--plan",
+    "plan_path",
+    type=click.Path(path_type=Path),
+    help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned, by the kernel.",
+)
 @click.option(
     "--unit",
     type=click.Choice(["fmu", "kernel"]),
@@ -44,10 +50,16 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
 )
-def run(scene: str, out: Path | None, stage: str | None, step: float | None, **how: Any) -> int:
+def run(scene: str | None, out: Path | None, stage: str | None, step: float | None, **how: Any) -> int:
     """Run SCENE and write trace.h5, summary.json and report.html."""
     from gearfmu.spec.scene import load_scene
 
+    if how["plan_path"] is not None:
+        if scene is not None or stage is not None or step is not None or how["verify"]:
+            raise click.UsageError("--plan names scene, stage and step itself, and verifies by spot checks: give none")
+        return run_plan(how["plan_path"], out)
+    if scene is None:
+        raise click.UsageError("name a SCENE, or a plan with --plan")
     spec = load_scene(scene)
     if stage is not None:
         spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
@@ -126,13 +138,26 @@ def deformed(path: Path, stage: str | None, out: Path | None) -> None:
 @click.argument("path", type=click.Path(path_type=Path), metavar="TRACE")
 @click.option("--stage", help="STAGE of the run, for the picture of the deformed gears.")
 @click.option("--out", type=OUT, help="Folder of the report; that of the trace when not given.")
-def report(path: Path, stage: str | None, out: Path | None) -> None:
+@click.option("--sound", metavar="CHANNEL", help="Channel to be heard: data/sound.wav and in the page.")
+def report(path: Path, stage: str | None, out: Path | None, sound: str | None) -> None:
     """Write the report of a trace (the file, or the folder that holds trace.h5) again."""
-    from gearfmu.stage.trace import Trace
+    from gearfmu.api.results import trace_file, write_report
 
-    source = path / "trace.h5" if path.is_dir() else path
-    trace = Trace.load(source)
-    click.echo(write_report(trace, out or source.parent, stage, source.parent))
+    source = trace_file(path)
+    click.echo(write_report(source, out or source.parent, stage, source.parent, _tell, sound))
+
+
+@click.command()
+@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True), metavar="TRACE…")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="The page; comparison.html by default.")
+@click.option("--name", "names", multiple=True, help="What a trace is called on the page; once for each.")
+def compare(paths: tuple[Path, ...], out: Path | None, names: tuple[str, ...]) -> None:
+    """Compare two or more traces (files, or folders that hold trace.h5) with the first of them, in one page."""
+    from gearfmu.api.results import compare as write
+
+    if names and len(set(names)) != len(paths):
+        raise click.BadParameter(f"{len(paths)} traces need as many different names", param_hint="--name")
+    click.echo(write(dict(zip(names, paths, strict=True)) if names else paths, out or Path("comparison.html")))
 
 
 def with_step(scene: Any, step: float) -> Any:
@@ -155,6 +180,20 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
         for path in write_deformed(found, out / "deformation", scene.stage.name):
             click.echo(path)
     return finish(trace, out, scene.stage.name)
+
+
+def run_plan(path: Path, out: Path | None) -> int:
+    """Run a plan.toml, print what became of it; 0 when the run reached its end, else 1."""
+    from gearfmu.api.plans import run_plan as run_it
+    from gearfmu.planning.book import Plan
+    from gearfmu.planning.table import run_text
+
+    plan = Plan.load(path)
+    folder = out or Path("out") / Path(plan.scene).stem
+    with progress_bar(plan.scene) as progress:
+        trace = run_it(plan, folder, progress)
+    click.echo(run_text(trace.meta["plan"]))
+    return finish(trace, folder, trace.meta["stage"])
 
 
 def finish(trace: Any, out: Path, stage: str | None) -> int:
@@ -196,4 +235,8 @@ def write_report(trace: Any, out: Path, stage: str | None, home: Path | None = N
     """`api.write_report`, its remark on standard error."""
     from gearfmu.api.results import write_report as write
 
-    return write(trace, out, stage, home, lambda text: click.echo(f"gearfmu: {text}", err=True))
+    return write(trace, out, stage, home, _tell)
+
+
+def _tell(text: str) -> None:
+    click.echo(f"gearfmu: {text}", err=True)

@@ -32,8 +32,8 @@ def sweep(
 
     SCENE may be a STAGE too: with a speed it is run alone as by 'simulate', without one its loaded transmission error
     is taken as by 'te' (Harris map). Keys: torque, speed; stage.<field of the stage file>; of a scene its fields; of a
-    stage duration, step, settle, positions and parameters of docs/variables.md. An interrupted sweep goes on when it is
-    called again. Exit code: the number of points that failed (at most 99)."""
+    stage duration, step, settle, positions, pitches and parameters of docs/variables.md. An interrupted sweep goes on
+    when it is called again. Exit code: the number of points that failed (at most 99)."""
     from gearfmu.api.sweeps import sweep as run_sweep
     from gearfmu.sweeps.charts import write_charts
     from gearfmu.sweeps.values import key_and_values

@@ -30,6 +30,13 @@ from gearfmu.commands.shared import Quantity
     show_default=True,
     help="Positions over one pitch, end point left out.",
 )
+@click.option(
+    "--pitches",
+    type=click.IntRange(1, 10_000),
+    default=1,
+    show_default=True,
+    help="Pitches that follow each other: as many as gear A has teeth for deviations that differ from tooth to tooth.",
+)
 @click.option("--rigid-bearings", is_flag=True, help="Hold the axes.")
 @click.option(
     "--bore",
@@ -44,10 +51,9 @@ from gearfmu.commands.shared import Quantity
     show_default=True,
     help="Table; the plot has the same name. Of a train one of each for every mesh, its name added.",
 )
-def te(
-    stage: str, torques: tuple[float, ...], positions: int, rigid_bearings: bool, bore: str | None, out: Path
-) -> None:
-    """Loaded transmission error of STAGE over one pitch, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of every mesh.
+def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **where: Any) -> None:
+    """Loaded transmission error of STAGE over one pitch or more, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of
+    every mesh.
 
     Of a planetary set te_um = 1e6·r_b,s (φ_s − (1 + z_r/z_s) φ_c) over one mesh period, and how its planets share the
     load at sun and ring: normal force over the mean of all planets, and the mesh load factor K_γ (ISO 6336-1).
@@ -55,15 +61,16 @@ def te(
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage, bores=bore)
     if model.spec.kind == "planetary_set":
-        return _of_set(model, list(torques), positions, rigid_bearings, out)
+        return _of_set(model, list(torques), out, **where)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te
     from gearfmu.stage.trace import write_columns
 
     meshes = [mesh.name for mesh in model.stage.engagements]
     for mesh in meshes:
-        result = loaded_te(model, list(torques), positions, rigid_bearings, mesh)
-        held = result if rigid_bearings else loaded_te(model, list(torques), positions, True, mesh)
+        result = loaded_te(model, list(torques), mesh=mesh, **where)
+        firm = where | {"rigid_bearings": True}
+        held = result if where["rigid_bearings"] else loaded_te(model, list(torques), mesh=mesh, **firm)
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
         write_columns(path, result.columns())
         picture = path.with_suffix(".png")
@@ -72,7 +79,17 @@ def te(
             click.echo(mesh)
         _tell(result, held)
         click.echo(f"{path}, {picture}")
+    _draw_flanks(model, out)
     warn_of_limits(model, torques)
+
+
+def _draw_flanks(model: Any, out: Path) -> None:
+    """A picture of the flanks beside the table, where they are not nominal."""
+    from gearfmu.report.flanks import write_flanks
+
+    picture = out.with_name(f"{out.stem}_flanks.png")
+    if write_flanks(model.stage, picture):
+        click.echo(str(picture))
 
 
 def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
@@ -84,8 +101,8 @@ def warn_of_limits(model: Any, torques: Sequence[float]) -> None:
             click.echo(f"warning: {text}", err=True)
 
 
-def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bool, out: Path) -> None:
-    if rigid_bearings:
+def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
+    if where["rigid_bearings"]:
         raise click.BadParameter(
             "a planetary set shares its load by what its bearings yield", param_hint="--rigid-bearings"
         )
@@ -93,13 +110,14 @@ def _of_set(model: Any, torques: list[float], positions: int, rigid_bearings: bo
     from gearfmu.stage.set_te import set_te
     from gearfmu.stage.trace import write_columns
 
-    result = set_te(model, torques, positions)
+    result = set_te(model, torques, where["positions"], where["pitches"])
     write_columns(out, result.columns())
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
     for line in set_te_lines(result, model.spec.set.load_sharing):
         click.echo(line)
     click.echo(f"{out}, {picture}")
+    _draw_flanks(model, out)
     warn_of_limits(model, torques)
 
 

@@ -25,6 +25,9 @@ WHEN = {
     "SLICES_DIFFER": "helical or tilting gears, slices of the stage file",
     "CARRIED": "a carrier that carries other rotors",
     "SPINNING": "bodies that tilt or bend when they turn",
+    "DEVIATING": "flanks that are not nominal",
+    "RUNNING_OUT": "a toothing that does not run true",
+    "RUBBING": "bodies with rows along the profile",
     "OBSERVED": "a gear that is observed",
 }
 FIELDS = re.compile(r'\s*("(?:[^"\\]|\\.)*"|[^,]+?)\s*(?:,|$)')

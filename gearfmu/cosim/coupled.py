@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 from gearfmu.cosim.frames import FramePlan, FrameRecorder
+from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Master, master
 from gearfmu.cosim.recorder import Recorder
 from gearfmu.cosim.shaft_loads import Loaded
@@ -66,7 +67,7 @@ def run_coupled(cut: Cut | Loaded, plan: Plan) -> Result:
     """Run to the end, or until a unit fails: then the outcome has a name and the trace ends at the last good
     communication point. A failure before the first point is raised as it is."""
     timed = _Timed(cut.stage)
-    coupled = _Run(replace(cut, stage=cast(Unit, timed)), plan)
+    coupled = CoupledRun(replace(cut, stage=cast(Unit, timed)), plan)
     outcome, message, started, wall = OK, "", clock.process_time(), clock.perf_counter()
     try:
         coupled.go()
@@ -106,33 +107,83 @@ class _Timed:
         self.seconds += clock.perf_counter() - started
 
 
-class _Run:
+@dataclass(frozen=True)
+class Saved:
+    """Where a coupled run stands: step number, state of the stage, of master and drivetrain."""
+
+    at: int
+    stage: Any
+    master: Any
+
+
+class CoupledRun:
+    """A run that is stepped piece by piece: begun or taken over from another, saved and restored at communication
+    points. `at`: number of the step that comes next."""
+
     def __init__(self, cut: Cut | Loaded, plan: Plan) -> None:
-        self.cut, self.plan = cut, plan
+        self.cut, self.plan, self.at = cut, plan, 0
         self.master: Master = master(plan.master, cut)
-        frames = plan.frames
-        omit = plan.omit if frames is None else (*plan.omit, *frames.patterns)
-        self.recorder = Recorder(cut.stage, cut.drive, plan.record, plan.steps + 1, omit)
-        self.frames = None if frames is None else FrameRecorder(cut.stage, frames)
+        self.new_recorder(plan.steps)
+        self.frames = None if plan.frames is None else FrameRecorder(cut.stage, plan.frames)
         known = cut.stage.outputs()
         self._fact_names = [name for name in FACTS if name in known]
         self._facts: Any = cut.stage.resolve(self._fact_names)
 
-    def go(self) -> None:
-        """Every communication step; time is n·H."""
-        h, tell = self.plan.step, max(1, self.plan.steps // 200)
-        self.master.begin(0.0)
-        self._record(0, 0.0)
-        for n in range(self.plan.steps):
-            self.master.step(n * h, h)
-            self._record(n + 1, (n + 1) * h)
-            if self.plan.progress and (n + 1) % tell == 0:
-                self.plan.progress((n + 1) / self.plan.steps)
+    def new_recorder(self, steps: int) -> None:
+        """Record anew from here, at most `steps` steps and the point they begin at."""
+        frames, plan = self.plan.frames, self.plan
+        omit = plan.omit if frames is None else (*plan.omit, *frames.patterns)
+        self.recorder = Recorder(self.cut.stage, self.cut.drive, plan.record, steps + 1, omit)
 
-    def _record(self, number: int, time: float) -> None:
-        self.recorder.take(time)
+    @property
+    def time(self) -> float:
+        """s, n·H."""
+        return self.at * self.plan.step
+
+    def go(self) -> None:
+        """From the start to the end."""
+        self.begin()
+        self.advance(self.plan.steps)
+
+    def begin(self) -> None:
+        """Initialise both sides and record the start."""
+        self.master.begin(0.0)
+        self.record()
+
+    def advance(self, to: int) -> None:
+        """Every communication step up to number `to`."""
+        h, tell = self.plan.step, max(1, self.plan.steps // 200)
+        while self.at < to:
+            self.master.step(self.at * h, h)
+            self.at += 1
+            self.record()
+            if self.plan.progress and self.at % tell == 0:
+                self.plan.progress(self.at / self.plan.steps)
+
+    def record(self) -> None:
+        """Record this point."""
+        self.recorder.take(self.time)
         if self.frames is not None:
-            self.frames.take(number, time)
+            self.frames.take(self.at, self.time)
+
+    def save(self) -> Saved:
+        """Everything but what is recorded."""
+        return Saved(self.at, self.cut.stage.save(), self.master.save())
+
+    def restore(self, saved: Saved) -> None:
+        """Back to a point; what is recorded stays."""
+        self.at = saved.at
+        self.cut.stage.restore(saved.stage)
+        self.master.restore(saved.master)
+
+    def take_over(self, other: CoupledRun) -> None:
+        """Go on where another run of the same scene stands that has just made a step, its stage with other settings.
+        ModelError where the kernel cannot. Units of the kernel only."""
+        stage, old = self.cut.stage, other.cut.stage
+        assert isinstance(stage, KernelUnit) and isinstance(old, KernelUnit), "FMUs know states of their own kind only"
+        self.at = other.at
+        stage.adopt(old)
+        self.master.restore(other.master.save())
 
     def facts(self) -> dict[str, float]:
         """Numbers about the run itself. After a failure those of the last good time: a failed step leaves the stage

@@ -185,7 +185,7 @@ class FmuUnit:
     def outputs(self) -> dict[str, Variable]:
         """The numeric outputs of the FMU, in its order."""
         return {
-            name: Variable(variable.unit or "", variable.description or "", variable.type != "Real")
+            name: Variable(_plain(variable.unit), variable.description or "", variable.type != "Real")
             for name, variable in self.variables.items()
             if variable.causality == "output" and variable.type in KINDS
         }
@@ -295,6 +295,11 @@ def outcome_of(message: str) -> str:
     "discarded" for another FMU's words."""
     texts = {name: load().gk_outcome_text(number).decode() for number, name in enumerate(OUTCOMES)}
     return next((name for name, text in texts.items() if message.rstrip().endswith(text)), "discarded")
+
+
+def _plain(unit: str | None) -> str:
+    """A trace's word for a unit of a model description: numbers without one are "1" there and "" here."""
+    return "" if unit in (None, "1") else unit
 
 
 def _address(function: Any) -> int:

@@ -118,5 +118,9 @@ class KernelUnit:
         """Back to a saved state."""
         self.kernel.restore(state)
 
+    def adopt(self, other: KernelUnit) -> None:
+        """Instead of `initialize`: go on where `other` stands (`Kernel.adopt`)."""
+        self.kernel.adopt(other.kernel)
+
     def close(self) -> None:
         """Nothing to free: Python owns the memory."""

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.cosim.ports import KEYS, ports_of
+from gearfmu.cosim.ports import KEYS, Ports, ports_of
 from gearfmu.cosim.shaft_loads import Loaded, TorqueMaster
 from gearfmu.cosim.signals import Signal
 from gearfmu.cosim.units import Unit
@@ -105,7 +105,23 @@ class _Exchange:
         return self.stage.resolve([f"{shaft}.{key}" for shaft in self.cut.shafts])
 
 
-class GsMean:
+class _Exchanging:
+    """What both masters of a cut save: the drivetrain, torques held on it, work done on it."""
+
+    ports: Ports
+
+    def save(self) -> Any:
+        """State of drivetrain and ports."""
+        return self.ports.unit.save(), list(self.ports.tau), self.ports.work, self.ports.throughput
+
+    def restore(self, state: Any) -> None:
+        """Back to a saved one."""
+        drive, tau, self.ports.work, self.ports.throughput = state
+        self.ports.tau = list(tau)
+        self.ports.unit.restore(drive)
+
+
+class GsMean(_Exchanging):
     """Master `gs_mean`."""
 
     def __init__(self, cut: Cut) -> None:
@@ -127,7 +143,7 @@ class GsMean:
         self.ports.step(self.stage.get(self._mean).tolist(), time, h)
 
 
-class Jacobi:
+class Jacobi(_Exchanging):
     """Master `jacobi`."""
 
     def __init__(self, cut: Cut) -> None:

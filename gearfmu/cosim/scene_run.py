@@ -13,7 +13,7 @@ from typing import Any
 from gearfmu import fmu
 from gearfmu.body import load_bodies
 from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
-from gearfmu.cosim.coupled import OK, Plan, Progress, Result, run_coupled
+from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.frames import FramePlan, frame_plan
 from gearfmu.cosim.kernel_unit import KernelUnit
@@ -140,8 +140,23 @@ def run_once(
 ) -> Result:
     """One run of the scene with fresh units; wiring: what of the stage is connected; frames: of moving gears, from a
     model that observes them, as `stage_model` makes it."""
-    model, choice = source.model, scene.stage
-    parameters = {
+    stage = source.unit(_parameters(scene, source.model))
+    try:
+        return run_coupled(*_coupled(scene, stage, source.model, (progress, wiring, frames)))
+    finally:
+        stage.close()
+
+
+def coupled_run(scene: SceneSpec, source: UnitSource, progress: Progress | None = None) -> CoupledRun:
+    """A run of the scene that is stepped from outside; not begun."""
+    stage = source.unit(_parameters(scene, source.model))
+    return CoupledRun(*_coupled(scene, stage, source.model, (progress, WHOLE, None)))
+
+
+def _parameters(scene: SceneSpec, model: StageModel) -> dict[str, float | str]:
+    """Of the stage: what the scene chooses and what follows from it."""
+    choice = scene.stage
+    return {
         "level": choice.level,
         "integrator": choice.integrator,
         "contact": choice.contact,
@@ -150,14 +165,17 @@ def run_once(
         **{f"effect.{name}": 0.0 for name in choice.effects.off},
         **_start(scene, model),
     }
-    stage = source.unit(parameters)
-    try:
-        cut = _cut(scene, stage, model, parameters, wiring)
-        coupling = scene.coupling
-        omit = stage_joints(scene, model.shafts) if scene.drivetrain is None else ()
-        return run_coupled(cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit, frames))
-    finally:
-        stage.close()
+
+
+def _coupled(
+    scene: SceneSpec, stage: Unit, model: StageModel, how: tuple[Progress | None, Wiring, FramePlan | None]
+) -> tuple[Cut | Loaded, Plan]:
+    """The cut and how it is stepped. how: progress, wiring, frames."""
+    progress, wiring, frames = how
+    cut = _cut(scene, stage, model, _parameters(scene, model), wiring)
+    omit = stage_joints(scene, model.shafts) if scene.drivetrain is None else ()
+    coupling = scene.coupling
+    return cut, Plan(coupling.master, coupling.step, scene.steps, scene.record, progress, omit, frames)
 
 
 def _start(scene: SceneSpec, model: StageModel) -> dict[str, float]:

@@ -169,6 +169,17 @@ class TorqueMaster:
         self.ports.throughput += float(np.abs(given).sum())
         self._speeds.append(stage.get(self._w).copy())
 
+    def save(self) -> Any:
+        """Torques, works and the last speeds."""
+        drive, ports = self.cut.drive, self.ports
+        return drive.tau.copy(), drive.work.copy(), tuple(self._speeds), ports.work, ports.throughput
+
+    def restore(self, state: Any) -> None:
+        """Back to a saved state."""
+        drive = self.cut.drive
+        drive.tau, drive.work, speeds, self.ports.work, self.ports.throughput = state
+        self._speeds = deque(speeds, maxlen=CARRIED_ON + 1)
+
     def _each(self, what: str, when: tuple[float, ...], speeds: np.ndarray) -> np.ndarray:
         laws = zip(self.cut.drive.laws.values(), speeds.tolist(), strict=True)
         return np.array([getattr(law, what)(*when, w) for law, w in laws])

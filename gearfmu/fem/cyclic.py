@@ -12,7 +12,8 @@ Int. J. Numer. Meth. Eng. 14 (1979) 81 (cyclic symmetry).
 A surface may be rigid (a bore on a stiff shaft): its nodes are eliminated for the rigid motions of that surface, which
 join the cuts as unknowns of the condensed system. Seen from sector j a motion q of the whole surface turns back by
 2πj/z: ν = 0 has translation along and rotation about the axis, ν = 1 translation across it and tilts, as amplitudes a
-of (q_x, q_y) = (1, i) a, and for ν ≥ 2 the surface stands still.
+of (q_x, q_y) = (1, i) a, and for ν ≥ 2 the surface stands still. A rigid patch inside every sector (the seat of a bolt)
+has six unknowns of its own in each, which are inner ones like any other.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ class Sector:
 
     nodes (N, 3), m; elements (E, 20); stiffness, mass (3N, 3N) csr; teeth z ≥ 3; cut_minus, cut_plus (c,): paired
     nodes. helical: no mirror at mid-width is looked for. rigid (r,): nodes of a surface that moves as one rigid body
-    over all sectors; None or empty: there is none.
+    over all sectors; None or empty: there is none. patch (p,): nodes off the cuts that move as a rigid body of their
+    own in every sector, of a sector without mirror; None: there are none.
     """
 
     nodes: np.ndarray
@@ -50,6 +52,7 @@ class Sector:
     cut_plus: np.ndarray
     helical: bool = False
     rigid: np.ndarray | None = None
+    patch: np.ndarray | None = None
 
 
 class SectorSpace:
@@ -65,8 +68,10 @@ class SectorSpace:
         self.parity, self.teeth = parity, sector.teeth
         basis, owner = _parity_basis(mirror, parity) if parity else _all_fields(sector)
         minus, plus, interior = _split(owner, sector)
-        self.interior, self.cut = len(interior), len(minus)
-        self.to_nodes = sp.csc_array(_turn_plus(sector) @ basis[:, np.concatenate([interior, minus, plus])])
+        patch = _patch_motions(sector)
+        self.interior, self.cut = len(interior) + patch.shape[1], len(minus)
+        columns = sp.hstack([basis[:, interior], sp.csc_array(patch), basis[:, np.concatenate([minus, plus])]])
+        self.to_nodes = sp.csc_array(_turn_plus(sector) @ sp.csc_array(columns))
         self.motions, length, moved = _rigid_surface(sector, parity)
         if len(self.motions):
             self.to_nodes = sp.csc_array(sp.hstack([self.to_nodes, sp.csc_array(moved)]))
@@ -78,6 +83,10 @@ class SectorSpace:
             self.rigid[self.interior + 2 * self.cut :] = (np.eye(6) * length)[self.motions]
         inside, border = slice(0, self.interior), slice(self.interior, None)
         inner = owner[interior] // 3
+        if sector.patch is not None:
+            mirror = mirror.copy()
+            mirror[sector.patch] = first = sector.patch.min()  # stands for all of them
+            inner = np.concatenate([inner, np.full(6, first)])
         self._factor = Factor(stiffness[inside, inside], _cells(sector.elements, mirror, inner), inner)
         self.coupling = sp.csr_array(stiffness[inside, border])
         self.influence = self._factor.solve(self.coupling.toarray())
@@ -307,8 +316,18 @@ def _rigid_surface(sector: Sector, parity: int) -> tuple[np.ndarray, np.ndarray,
     return motions, length, moved.reshape(-1, 6)[:, motions]
 
 
+def _patch_motions(sector: Sector) -> np.ndarray:
+    """Displacement (3N, 6) of the rigid patch, orthonormal; (3N, 0) without one."""
+    if sector.patch is None:
+        return np.zeros((sector.nodes.size, 0))
+    moved = np.zeros((len(sector.nodes), 3, 6))
+    fields = rigid_fields(sector.nodes[sector.patch] - sector.nodes[sector.patch].mean(axis=0))
+    moved[sector.patch] = np.linalg.qr(fields.reshape(-1, 6))[0].reshape(fields.shape)
+    return moved.reshape(-1, 6)
+
+
 def _split(owner: np.ndarray, sector: Sector) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Columns on the minus cut, on the plus cut in the same order, and inside; without those of the rigid surface."""
+    """Columns on the minus cut, on the plus cut in the same order, and inside; without those of rigid surfaces."""
     column = np.full(sector.nodes.size, -1)
     column[owner] = np.arange(len(owner))
     pairs = np.stack([(3 * cut[:, None] + np.arange(3)).ravel() for cut in (sector.cut_minus, sector.cut_plus)])
@@ -317,9 +336,10 @@ def _split(owner: np.ndarray, sector: Sector) -> tuple[np.ndarray, np.ndarray, n
         raise MeshError("the two cut faces have different node order about mid-width")
     minus, plus = minus[minus >= 0], plus[plus >= 0]
     inside = np.setdiff1d(np.arange(len(owner)), np.concatenate([minus, plus]))
-    if sector.rigid is None:
+    held = [nodes for nodes in (sector.rigid, sector.patch) if nodes is not None]
+    if not held:
         return minus, plus, inside
-    elastic = ~np.isin(owner // 3, sector.rigid)
+    elastic = ~np.isin(owner // 3, np.concatenate(held))
     return minus[elastic[minus]], plus[elastic[plus]], inside[elastic[inside]]
 
 

@@ -4,7 +4,9 @@
     bolt:  three blocks from the core to the bolt's circle
     plate: three blocks from that circle to the outer edge, to the cut between two bolts and to the bore
 
-for y ≥ 0; the other half is the mirror image. Blocks meet on two rays from the bolt's axis.
+for y ≥ 0; the other half is the mirror image. Blocks meet on two rays from the bolt's axis. Elements are small at the
+bolt's foot, where the plate's surface meets the bolt, and at the ends of seat and bore, which rigid couplings hold:
+stresses are singular there, and the frequencies of an evenly spaced mesh converge slowly.
 """
 
 from __future__ import annotations
@@ -16,7 +18,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.errors import MeshError
-from gearfmu.femesh.lattice import extruded, graded, mirrored, numbered, quads_of, transfinite
+from gearfmu.femesh.lattice import (
+    extruded,
+    graded,
+    graded_to_both,
+    graded_to_end,
+    mirrored,
+    numbered,
+    quads_of,
+    transfinite,
+)
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.quality import scaled_jacobian
 from gearfmu.geometry.carrier import CarrierGeometry
@@ -24,6 +35,8 @@ from gearfmu.spec.planetary import CarrierMeshSpec
 
 _CORE = 0.55  # reach of the core in parts of the bolt's radius
 _OUTWARD, _INWARD = math.radians(52), math.radians(128)  # the two rays, seen from the bolt's axis
+_FOOT = 3.0  # growth of elements away from the bolt's foot, the end of its seat and the plate's faces
+_DISC = 2.5  # … and in the plate away from bolt and edges
 _TOLERANCE = 1e-9  # of the outer radius
 
 
@@ -35,11 +48,12 @@ def carrier_sector(geometry: CarrierGeometry, mesh: CarrierMeshSpec) -> FeMesh:
     """
     bolt, plate = _section(geometry, mesh)
     low, high, top = geometry.plate_low, geometry.plate_high, geometry.seat / 2
-    through = low + (high - low) * graded(mesh.scaled(mesh.plate), 1.0)
+    foot = mesh.growth(_FOOT)
+    through = low + (high - low) * graded_to_both(mesh.scaled(mesh.plate), foot)
     through[-1] = high
-    neck = high + geometry.gap * graded(1, 1.0)
+    neck = high + geometry.gap * graded_to_both(mesh.scaled(mesh.neck), foot)
     neck[-1] = -top
-    seat = -top + 2 * top * graded(mesh.scaled(mesh.length), 1.0)
+    seat = -top + 2 * top * graded(mesh.scaled(mesh.length), foot)
     layers = [extruded(np.concatenate([bolt, plate]), through), extruded(bolt, neck), extruded(bolt, seat)]
     nodes, elements = numbered(np.concatenate(layers))
     result = FeMesh(nodes, elements, _sets(geometry, nodes), geometry.planets, *_cuts(geometry, nodes))
@@ -79,8 +93,10 @@ def _section(g: CarrierGeometry, mesh: CarrierMeshSpec) -> tuple[np.ndarray, np.
     bottom = core[2][-1] + np.outer(sides, core[0][0] - core[2][-1])
     bottom[0], bottom[-1], bottom[:, 1] = core[2][-1], core[0][0], 0.0
     inner = quads_of(transfinite(core[2][::-1], core[0], bottom, core[1][::-1]))
-    ring = [quads_of(_between(core[k], circle[k], graded(mesh.scaled(mesh.bolt), 1.0))) for k in range(3)]
-    plate = [quads_of(_between(circle[k], edge[k], graded(mesh.scaled(mesh.disc), 1.15))) for k in range(3)]
+    inward = graded_to_end(mesh.scaled(mesh.bolt), mesh.growth(_FOOT))
+    outward = graded_to_both(mesh.scaled(mesh.disc), mesh.growth(_DISC))
+    ring = [quads_of(_between(core[k], circle[k], inward)) for k in range(3)]
+    plate = [quads_of(_between(circle[k], edge[k], outward)) for k in range(3)]
     return _both_halves([inner, *ring]), _both_halves(plate)
 
 

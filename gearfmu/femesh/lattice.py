@@ -7,13 +7,18 @@ import numpy as np
 
 def graded(elements: int, growth: float) -> np.ndarray:
     """Parameters (2·elements + 1,) from 0 to 1 of corner and mid nodes; elements grow by the factor `growth`."""
-    sizes = growth ** np.arange(elements)
-    corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
-    corners[-1] = 1.0
-    result = np.empty(2 * elements + 1)
-    result[::2] = corners
-    result[1::2] = 0.5 * (corners[1:] + corners[:-1])
-    return result
+    return _parameters(growth ** np.arange(elements))
+
+
+def graded_to_end(elements: int, growth: float) -> np.ndarray:
+    """The same with the smallest element at 1."""
+    return 1 - graded(elements, growth)[::-1]
+
+
+def graded_to_both(elements: int, growth: float) -> np.ndarray:
+    """The same with elements that grow from either end to the middle."""
+    place = np.arange(elements)
+    return _parameters(growth ** np.minimum(place, place[::-1]))
 
 
 def transfinite(low: np.ndarray, high: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -75,6 +80,16 @@ def numbered(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (N, 3) and elements (E, 20) from coordinates (E, 20, 3); nodes coincide where they are exactly equal."""
     nodes, index = np.unique((elements + 0.0).reshape(-1, 3), axis=0, return_inverse=True)
     return nodes, index.reshape(-1, 20)
+
+
+def _parameters(sizes: np.ndarray) -> np.ndarray:
+    """Corner and mid nodes from 0 to 1 of elements of these sizes."""
+    corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
+    corners[-1] = 1.0
+    result = np.empty(2 * len(sizes) + 1)
+    result[::2] = corners
+    result[1::2] = 0.5 * (corners[1:] + corners[:-1])
+    return result
 
 
 def _at_level(plane: np.ndarray, level: float) -> np.ndarray:

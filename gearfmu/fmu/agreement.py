@@ -10,6 +10,7 @@ from fmpy.model_description import ScalarVariable
 
 from gearfmu.fmu.description import value_text
 from gearfmu.fmu.symbols import exported_symbols
+from gearfmu.fmu.units import unit_of
 from gearfmu.kernel import Kernel, Variable
 from gearfmu.kernel.build import SUFFIX, host_platform
 
@@ -44,6 +45,6 @@ def _fields(ours: Variable, theirs: ScalarVariable) -> Iterator[tuple[str, objec
     yield "valueReference", ours.reference, theirs.valueReference
     yield "type", ours.type, theirs.type
     yield "causality", ours.causality, theirs.causality
-    yield "unit", ours.unit or None, theirs.unit
+    yield "unit", unit_of(ours), theirs.unit
     if ours.causality != "output":
         yield "start", value_text(ours, ours.start), theirs.start

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from gearfmu.fmu.units import DISPLAY, base_exponents
+from gearfmu.fmu.units import DISPLAY, base_exponents, unit_of
 from gearfmu.kernel import Variable
 
 DEFAULT_STEP = 1e-4
@@ -25,7 +25,7 @@ class Identity:
     """What modelDescription.xml says about the FMU as a whole.
 
     identifier: modelIdentifier, a C name; guid: hash of the model, checked by the binary; native: the binary needs
-    nothing else on the importing machine (else Python with pythonfmu's binary)."""
+    nothing else on the importing machine (else Python with pythonfmu's binary); sources: C files below sources/."""
 
     name: str
     identifier: str
@@ -33,6 +33,7 @@ class Identity:
     version: str
     description: str = ""
     native: bool = True
+    sources: tuple[str, ...] = ()
 
 
 def model_description(identity: Identity, variables: Sequence[Variable]) -> bytes:
@@ -51,7 +52,11 @@ def model_description(identity: Identity, variables: Sequence[Variable]) -> byte
             "numberOfEventIndicators": "0",
         },
     )
-    ET.SubElement(root, "CoSimulation", _capabilities(identity))
+    simulation = ET.SubElement(root, "CoSimulation", _capabilities(identity))
+    if identity.sources:
+        listed = ET.SubElement(simulation, "SourceFiles")
+        for name in identity.sources:
+            ET.SubElement(listed, "File", {"name": name})
     _add_units(root, variables)
     _add_enumerations(root, variables)
     categories = ET.SubElement(root, "LogCategories")
@@ -95,7 +100,7 @@ def _capabilities(identity: Identity) -> dict[str, str]:
 
 def _add_units(root: ET.Element, variables: Sequence[Variable]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in sorted({v.unit for v in variables if v.unit}):
+    for unit in sorted({unit for v in variables if (unit := unit_of(v))}):
         node = ET.SubElement(definitions, "Unit", {"name": unit})
         ET.SubElement(node, "BaseUnit", {base: str(power) for base, power in base_exponents(unit).items()})
         for name, factor in DISPLAY.get(unit, ()):
@@ -127,8 +132,8 @@ def _add_variable(listed: ET.Element, variable: Variable) -> None:
         attributes["initial"] = "calculated" if output else "exact"
     node = ET.SubElement(listed, "ScalarVariable", attributes)
     detail = {"declaredType": enumeration_type(variable)} if variable.type == "Enumeration" else {}
-    if variable.type == "Real":
-        detail["unit"] = variable.unit
+    if unit := unit_of(variable):
+        detail["unit"] = unit
     if not output and variable.type != "Boolean":
         detail.update(min=value_text(variable, variable.minimum), max=value_text(variable, variable.maximum))
     if not output:

@@ -14,6 +14,7 @@ from gearfmu.errors import FmuError
 from gearfmu.files import written_whole
 from gearfmu.fmu.description import Identity, model_description
 from gearfmu.fmu.documentation import licences, page
+from gearfmu.fmu.source_code import build_description, compiled, source_files
 from gearfmu.fmu.terminals import terminals_and_icons
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import host_platform, library_path
@@ -43,12 +44,15 @@ def export(
     runtime: str = "native",
     platforms: Sequence[str] = ("host",),
     terminals: bool = True,
+    sources: bool = False,
 ) -> Path:
     """Write `model` as an FMI 2.0 co-simulation FMU and return its path.
 
     runtime: "native" (the kernel library is the FMU's binary; no Python on the importing machine) or "python"
-    (pythonfmu's binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64".
-    terminals: with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md).
+    (pythonfmu's binary, for Python hosts; the same library works below). platforms: "host", "linux64", "win64",
+    "darwin64".
+    terminals: with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md). sources: with the C
+    sources of the binary and a build description (native only).
     The same model gives the same bytes; the file appears whole or not at all.
     Raises FmuError for unknown options and BuildError when a platform's library is missing or stale."""
     if runtime not in RUNTIMES:
@@ -57,7 +61,9 @@ def export(
     if not names:
         raise FmuError('platforms is empty: name at least one, e.g. "host"')
     libraries = {name: library_path("host" if name == host_platform() else name) for name in names}
-    files = (_native_files if runtime == "native" else _python_files)(model, libraries)
+    if sources and runtime != "native":
+        raise FmuError("sources belong to the compiled FMU: export with runtime native")
+    files = _native_files(model, libraries, sources) if runtime == "native" else _python_files(model, libraries)
     if not terminals:
         del files[TERMINALS]
     return write_archive(path, files)
@@ -87,10 +93,14 @@ def content_identifier(name: str, contents: Sequence[bytes]) -> str:
     return f"{'_' if plain[0].isdigit() else ''}{plain}_{digest.hexdigest()[:12]}"
 
 
-def _native_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, bytes]:
+def _native_files(model: Model, libraries: Mapping[str, Path], with_sources: bool) -> dict[str, bytes]:
     binaries = {name: path.read_bytes() for name, path in libraries.items()}
-    identifier = content_identifier(model.name, [model.blob, *binaries.values()])
-    files = _common_files(model, identifier, native=True)
+    code = source_files() if with_sources else {}
+    identifier = content_identifier(model.name, [model.blob, *binaries.values(), *code.values()])
+    files = _common_files(model, identifier, native=True, sources=tuple(compiled(list(code))))
+    files |= {f"sources/{name}": content for name, content in code.items()}
+    if code:
+        files["sources/buildDescription.xml"] = build_description(identifier, list(code))
     for name, content in binaries.items():
         files[f"binaries/{name}/{identifier}{libraries[name].suffix}"] = content
     return files
@@ -118,7 +128,7 @@ def _python_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, byte
     return files
 
 
-def _common_files(model: Model, identifier: str, native: bool) -> dict[str, bytes]:
+def _common_files(model: Model, identifier: str, native: bool, sources: tuple[str, ...] = ()) -> dict[str, bytes]:
     variables = list(Kernel(model.blob).variables.values())
     identity = Identity(
         model.name,
@@ -127,6 +137,7 @@ def _common_files(model: Model, identifier: str, native: bool) -> dict[str, byte
         metadata.version("gearfmu"),
         getattr(getattr(model, "spec", None), "description", ""),
         native,
+        sources,
     )
     return {
         "modelDescription.xml": model_description(identity, variables),

@@ -1,17 +1,22 @@
-"""Names that a shared library exports, read from the file itself: ELF (Linux) and PE (Windows), 64 bit, little-endian.
+"""Names that a shared library exports, read from the file itself: ELF (Linux), PE (Windows) and Mach-O (macOS), 64
+bit, little-endian.
 
-Nothing is loaded, so that a Windows binary can be checked on Linux.
-Sources: System V ABI (gABI), chapters 4 and 5; Microsoft PE Format."""
+Nothing is loaded, so that the binaries of other systems can be checked on Linux.
+Sources: System V ABI (gABI), chapters 4 and 5; Microsoft PE Format; Apple, mach-o/loader.h."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 from gearfmu.errors import FmuError
 
 DYNSYM, SECTION_UNDEFINED = 11, 0
 EXPORT_DIRECTORY = 0
+MACH, MACH_UNIVERSAL = b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
+MACH_TRIES = {0x80000022: 40, 0x80000033: 8}  # load command with an export trie → place of its offset
+MACH_LINKER = {"_mh_dylib_header", "__dso_handle"}  # zig's linker exports its own two from every library
 
 
 def exported_symbols(path: str | Path) -> set[str]:
@@ -22,9 +27,11 @@ def exported_symbols(path: str | Path) -> set[str]:
             return _elf_symbols(data)
         if data[:2] == b"MZ":
             return _pe_symbols(data)
-    except (struct.error, IndexError, ValueError) as error:
+        if data[:4] in (MACH, MACH_UNIVERSAL):
+            return _mach_symbols(data)
+    except (struct.error, IndexError, ValueError, StopIteration, RecursionError) as error:
         raise FmuError(f"{path}: damaged library: {error}") from error
-    raise FmuError(f"{path}: neither a 64-bit ELF nor a PE library")
+    raise FmuError(f"{path}: no 64-bit ELF, PE or Mach-O library")
 
 
 def _text(data: bytes, start: int) -> str:
@@ -66,3 +73,65 @@ def _pe_symbols(data: bytes) -> set[str]:
     exports = place(directory)
     count, names = struct.unpack_from("<I", data, exports + 24)[0], struct.unpack_from("<I", data, exports + 32)[0]
     return {_text(data, place(address)) for address in struct.unpack_from(f"<{count}I", data, place(names))}
+
+
+def mach_slices(data: bytes) -> list[bytes]:
+    """The single libraries in a Mach-O file, one for each processor; the file itself when it is no universal one.
+
+    Source: Apple, mach-o/fat.h and loader.h."""
+    if data[:4] != MACH_UNIVERSAL:
+        return [data]
+    count = struct.unpack_from(">I", data, 4)[0]
+    entries = [struct.unpack_from(">IIIII", data, 8 + 20 * k) for k in range(count)]
+    return [data[offset : offset + size] for _, _, offset, size, _ in entries]
+
+
+def load_commands(data: bytes) -> list[tuple[int, bytes]]:
+    """Kind and bytes of every load command of one 64-bit Mach-O library."""
+    count, at, found = struct.unpack_from("<I", data, 16)[0], 32, []
+    for _ in range(count):
+        kind, size = struct.unpack_from("<II", data, at)
+        found.append((kind, data[at : at + size]))
+        at += size
+    return found
+
+
+def _mach_symbols(data: bytes) -> set[str]:
+    """Names in the export tries, without the underscore that C names get; the same in every slice."""
+    slices = []
+    for library in mach_slices(data):
+        offset = next(
+            struct.unpack_from("<I", content, MACH_TRIES[kind])[0]
+            for kind, content in load_commands(library)
+            if kind in MACH_TRIES
+        )
+        names = {name.decode().removeprefix("_") for name in _leaves(library[offset:], 0, b"")}
+        slices.append(names - MACH_LINKER)
+    if any(names != slices[0] for names in slices):
+        raise ValueError("its parts export different names")
+    return slices[0]
+
+
+def _leaves(trie: bytes, at: int, name: bytes) -> Iterator[bytes]:
+    """Names below a node of an export trie: size of the own entry, number of children, their labels and places."""
+    size, at = _leb128(trie, at)
+    if size:
+        yield name
+    at += size
+    children, at = trie[at], at + 1
+    for _ in range(children):
+        end = trie.index(b"\0", at)
+        place, following = _leb128(trie, end + 1)
+        yield from _leaves(trie, place, name + trie[at:end])
+        at = following
+
+
+def _leb128(data: bytes, at: int) -> tuple[int, int]:
+    """An unsigned number of variable length, and where the next begins."""
+    value, shift = 0, 0
+    while True:
+        byte, at = data[at], at + 1
+        value |= (byte & 0x7F) << shift
+        if not byte & 0x80:
+            return value, at
+        shift += 7

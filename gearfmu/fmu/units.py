@@ -6,6 +6,7 @@ import math
 import re
 
 from gearfmu.errors import FmuError
+from gearfmu.kernel import Variable
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 ATOMS: dict[str, dict[str, int]] = {
@@ -24,11 +25,19 @@ DISPLAY = {
 }
 
 
+def unit_of(variable: Variable) -> str | None:
+    """Name of a variable's unit in the model description: "1" for a Real without one, as in Modelica; None for other
+    types."""
+    return (variable.unit or "1") if variable.type == "Real" else None
+
+
 def base_exponents(unit: str) -> dict[str, int]:
     """Exponents of the SI base units of a unit in Modelica notation, e.g. "N.s/m2" → {"kg": 1, "m": -1, "s": -1}.
 
     Products are written with ".", one "/" divides by all that follows it. Raises FmuError on anything else."""
     exponents: dict[str, int] = {}
+    if unit == "1":
+        return exponents
     above, _, below = unit.partition("/")
     for part, sign in ((above, 1), (below, -1)):
         for factor in filter(None, part.split(".")):

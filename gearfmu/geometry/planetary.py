@@ -77,6 +77,10 @@ class RingMesh:
         """Roll (m) of the point of single contact that is nearer to the tip of the planet (0) or of the ring (1)."""
         return (self.path["A"] + self.base_pitch, self.path["E"] - self.base_pitch + self.length)[gear]
 
+    def inner_single_contact(self, gear: int) -> float:
+        """Roll (m) of the point of single contact that is nearer to the root of the planet (0) or of the ring (1)."""
+        return (self.path["E"] - self.base_pitch, self.path["A"] + self.base_pitch + self.length)[gear]
+
     @property
     def normal_backlash(self) -> float:
         """Gap (m) of the coast flanks along their normal while the drive flanks touch, j_bn = j_wt cos α_wt cos β_b."""

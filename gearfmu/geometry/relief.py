@@ -1,30 +1,41 @@
-"""Tip relief: material taken off the flank towards the tip, normal to the involute."""
+"""Relief: material taken off a flank towards one of its ends, normal to the involute."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+Kind = Literal["linear", "parabolic", "arc"]
+
+
+def relief_depth(kind: Kind, amount: float, length: float, share: np.ndarray) -> np.ndarray:
+    """Depth (m) of a relief that grows from nothing at share u = 0 to `amount` (m) at u = 1 of its `length` (m).
+
+    linear: C u; parabolic: C u²; arc: ρ − √(ρ² − (ℓ u)²), the arc of the radius ρ = (ℓ² + C²)/(2 C) that is tangent to
+    the flank where it begins. It differs from the parabola by about C³/(4 ℓ²), less than a nanometre.
+    """
+    if kind == "linear":
+        return amount * share
+    if kind == "parabolic" or amount == 0.0:
+        return amount * share**2
+    radius, along = (length**2 + amount**2) / (2 * amount), length * share
+    return along**2 / (radius + np.sqrt(radius**2 - along**2))
+
 
 @dataclass(frozen=True)
 class ReliefCurve:
-    """Relief δ(s) = amount·((s − start)/(s_a − start))² for s > start, else 0 (tip relief C_a of ISO 21771).
-
-    amount: m, normal to the involute, at the roll s_a of the tip circle. start, s_a: rolls, m; start < s_a.
-    """
+    """Relief δ(s), of size `amount` (m) at the roll `end` and nothing before `start` (ISO 21771: tip relief C_a, root
+    relief C_f); `end` may lie on either side of `start`. Shapes: `relief_depth`."""
 
     amount: float
     start: float
-    s_a: float
+    end: float
+    kind: Kind = "parabolic"
 
     def depth(self, roll: ArrayLike) -> np.ndarray:
         """δ (m), positive into the tooth, at rolls of any shape."""
-        part = np.maximum(np.asarray(roll, float) - self.start, 0.0) / (self.s_a - self.start)
-        return self.amount * part**2
-
-    def slope(self, roll: ArrayLike) -> np.ndarray:
-        """dδ/ds (dimensionless)."""
-        reach = self.s_a - self.start
-        return 2 * self.amount * np.maximum(np.asarray(roll, float) - self.start, 0.0) / reach**2
+        share = np.maximum((np.asarray(roll, float) - self.start) / (self.end - self.start), 0.0)
+        return relief_depth(self.kind, self.amount, abs(self.end - self.start), share)

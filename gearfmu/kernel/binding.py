@@ -10,7 +10,7 @@ from pathlib import Path
 from gearfmu.errors import ModelError
 from gearfmu.kernel.build import library_path
 
-ABI = 3
+ABI = 4
 MESSAGE = 512
 OUTCOMES = (
     "ok",
@@ -75,6 +75,7 @@ _SIGNATURES = {
     "gk_rest": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, POINTER(c_double), POINTER(c_double)]),
     "gk_linearise_room": (c_int, [c_void_p, c_void_p, c_void_p]),
     "gk_linearise": (c_int, [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p]),
+    "gk_adopt": (c_int, [c_void_p] * 6),
     "gk_profile": (c_int, [c_void_p, c_int, POINTER(c_char_p), POINTER(c_uint64)]),
     "gk_state_size": (c_size_t, [c_void_p]),
     "gk_state_check": (c_int, [c_void_p, c_void_p, c_void_p, c_size_t]),

@@ -18,6 +18,7 @@ import importlib.util
 import os
 import platform as _platform
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -29,7 +30,11 @@ from gearfmu.errors import GearfmuError
 HERE = Path(__file__).resolve().parent
 STEM = "gearfmu_kernel"
 SUFFIX = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
-ZIG_TARGET = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
+ZIG_TARGETS = {
+    "linux64": ("x86_64-linux-gnu.2.17",),
+    "win64": ("x86_64-windows-gnu",),
+    "darwin64": ("x86_64-macos.11.0", "aarch64-macos.11.0"),  # one file for both
+}
 FLAGS = (
     "-std=c99",
     "-O3",
@@ -41,6 +46,7 @@ FLAGS = (
     "-Werror",
 )
 REBUILD = "python -m gearfmu.kernel"
+_PAGE = 14  # Apple processors have pages of 2^14 bytes
 CROSS = 'pip install "gearfmu[cross]"'
 
 
@@ -111,7 +117,7 @@ def build_library(
 ) -> Path:
     """Compile and link the library; returns its path.
 
-    platform: "host", or "linux64" / "win64" cross-compiled with ziglang.
+    platform: "host", or "linux64" / "win64" / "darwin64" (Intel and Apple in one file) cross-compiled with ziglang.
     sanitize: AddressSanitizer and UBSan, any finding ends the process (system compiler).
     pattern:  uninitialised variables are filled with a pattern (-ftrivial-auto-var-init).
     real:     type of modal rows and states, "float" (product) or "double" (tests: -DGK_DOUBLE_MODES).
@@ -127,25 +133,17 @@ def build_library(
     variant = [("sanitize", sanitize), ("pattern", pattern), ("double", real == "double"), ("other", compiler)]
     folder = HERE / "lib" / "-".join([name, *(label for label, on in variant if on)])
     target = Path(out) if out else folder / (STEM + SUFFIX[name])
-    command, own_flags = (compiler[:1], compiler[1:]) if compiler else (_compiler(name, sanitize), ())
+    commands, own_flags = ([compiler[:1]], compiler[1:]) if compiler else (_compilers(name, sanitize), ())
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=".build-") as work:
-        made = Path(work) / target.name
-        _run(
-            [
-                *command,
-                *FLAGS,
-                *_variant_flags(sanitize, pattern, real),
-                *_link_flags(name, sanitize),
-                f"-I{fmi_headers()}",
-                f"-I{HERE / 'src'}",
-                *own_flags,
-                "-o",
-                str(made),
-                *[str(p) for p in files if p.suffix == ".c"],
-                *_libraries(name),
-            ]
-        )
+        parts = [Path(work) / str(k) / target.name for k in range(len(commands))]
+        flags = [*FLAGS, *_variant_flags(sanitize, pattern, real), *_link_flags(name, sanitize)]
+        folders = [f"-I{fmi_headers()}", f"-I{HERE / 'src'}"]
+        compiled = [str(p) for p in files if p.suffix == ".c"]
+        for command, part in zip(commands, parts, strict=True):
+            part.parent.mkdir()
+            _run([*command, *flags, *folders, *own_flags, "-o", str(part), *compiled, *_libraries(name)])
+        made = parts[0] if len(parts) == 1 else _universal(parts, Path(work) / target.name)
         digest = Path(work) / "digest"
         digest.write_text(source_hash(files) + "\n")
         os.replace(made, target)
@@ -160,7 +158,7 @@ def compile_program(source: Path, out: Path, platform: str = "host", sanitize: b
     name = _platform_name(platform)
     _run(
         [
-            *_compiler(name, sanitize),
+            *_compilers(name, sanitize)[0],
             *FLAGS,
             *_variant_flags(sanitize, pattern=False, real="float"),
             f"-I{fmi_headers()}",
@@ -198,16 +196,30 @@ def _package_folders() -> list[Path]:
     return folders if HERE in folders else [HERE, *folders]
 
 
-def _compiler(name: str, sanitize: bool) -> tuple[str, ...]:
-    """ziglang when installed (old glibc, cross-compiling), else the system's compiler; sanitizers need the latter."""
+def _universal(parts: Sequence[Path], out: Path) -> Path:
+    """Mach-O libraries for several processors in one file (Apple, mach-o/fat.h), as `lipo -create` makes it."""
+    contents, at = [part.read_bytes() for part in parts], 1 << _PAGE
+    header, body = struct.pack(">II", 0xCAFEBABE, len(contents)), b""
+    for content in contents:
+        kind, subkind = struct.unpack_from("<II", content, 4)
+        header += struct.pack(">IIIII", kind, subkind, at + len(body), len(content), _PAGE)
+        body += content + b"\0" * (-len(content) % (1 << _PAGE))
+    out.write_bytes(header.ljust(at, b"\0") + body)
+    return out
+
+
+def _compilers(name: str, sanitize: bool) -> list[tuple[str, ...]]:
+    """ziglang when installed (old glibc, cross-compiling), else the system's compiler; sanitizers need the latter. More
+    than one where the platform's library is for several processors."""
     serves = name != host_platform() or _platform.machine().lower() in ("x86_64", "amd64")
-    if not sanitize and serves and name in ZIG_TARGET and importlib.util.find_spec("ziglang"):
-        return (sys.executable, "-m", "ziglang", "cc", "-target", ZIG_TARGET[name], "-fno-sanitize=undefined")
+    if not sanitize and serves and name in ZIG_TARGETS and importlib.util.find_spec("ziglang"):
+        zig = (sys.executable, "-m", "ziglang", "cc", "-fno-sanitize=undefined", "-target")
+        return [(*zig, target) for target in ZIG_TARGETS[name]]
     if name != host_platform():
         raise BuildError(f"cross-compiling for {name} needs ziglang: {CROSS}")
     for command in filter(None, (os.environ.get("CC"), "cc", "gcc", "clang")):
         if shutil.which(command):
-            return (command,)
+            return [(command,)]
     raise BuildError(f"no C compiler found: install gcc or clang, or {CROSS}")
 
 
@@ -222,7 +234,7 @@ def _link_flags(name: str, sanitize: bool) -> list[str]:
     if name == "win64":
         return ["-shared", "-Wl,-s"]
     if name == "darwin64":
-        return ["-fPIC", "-shared"]
+        return ["-fPIC", "-shared", "-Wl,-install_name,@rpath/gearfmu_kernel.dylib"]
     return ["-fPIC", "-shared", "-Wl,-Bsymbolic", *([] if sanitize else ["-Wl,--no-undefined", "-Wl,-s"])]
 
 
@@ -260,7 +272,7 @@ def _built_from(library: Path) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line of this module; exit code 0 on success, 1 with one message when the build failed."""
     parser = argparse.ArgumentParser(prog=REBUILD, description="Build the kernel library from the package's C sources.")
-    parser.add_argument("--platform", default="host", help="host (default), linux64 or win64")
+    parser.add_argument("--platform", default="host", help="host (default), linux64, win64 or darwin64")
     parser.add_argument("--sanitize", action="store_true", help="with ASan and UBSan, in a folder of its own")
     parser.add_argument("--pattern", action="store_true", help="fill uninitialised variables, in a folder of its own")
     parser.add_argument("--real", default="float", choices=("float", "double"), help="type of modal rows and states")

@@ -129,11 +129,11 @@ class Kernel:
         return value.value
 
     def set_reference(self, reference: int, value: float) -> int:
-        """Fast road: outcome number of gk_set."""
+        """Fast path: outcome number of gk_set."""
         return self._lib.gk_set(self._model, self._data, reference, value)
 
     def get_reference(self, reference: int, out: ctypes.c_double) -> int:
-        """Fast road: outcome number of gk_get, the value in `out`."""
+        """Fast path: outcome number of gk_get, the value in `out`."""
         return self._lib.gk_get(self._model, self._data, reference, ctypes.byref(out))
 
     def set_many(self, references: ctypes.Array, values: ctypes.Array) -> int:
@@ -166,7 +166,7 @@ class Kernel:
             self._check(outcome)
 
     def try_step(self, time: float, h: float) -> int:
-        """Fast road: outcome number of gk_step. With h = NaN it is refused before anything is done: what the call
+        """Fast path: outcome number of gk_step. With h = NaN it is refused before anything is done: what the call
         alone costs."""
         return self._lib.gk_step(self._model, self._setup, self._work, self._data, time, h)
 
@@ -182,6 +182,21 @@ class Kernel:
                 "parameters"
             )
         ctypes.memmove(self._data, state, len(state))
+
+    def adopt(self, other: Kernel) -> None:
+        """Prepare and go on from where `other` stands, a kernel of the same model that has just made a step: its motion
+        at this level, with these effects, slices and step. What was compliance and is dynamic here begins at rest in
+        its static place, contacts begin anew. Inputs are taken too. ModelError where that cannot be: another model,
+        an explicit integrator, bearings on in one of them only."""
+        if self.hash != other.hash:
+            raise ModelError(f"{self.name} cannot go on from a state of {other.name}: another model")
+        self.prepare()
+        states = (other._setup, other._work, other._data, self._setup, self._data)
+        if self._lib.gk_adopt(self._model, *states):
+            raise ModelError(
+                f"{self.name} cannot go on from this state: both need an implicit integrator and the same "
+                "effect.bearings, and the other must have made a step"
+            )
 
     def transmission(self, phi_out: float, torque: float, mesh: int = 0, keep: bool = False) -> TeState:
         """Quasi-static equilibrium with the second port's bore held at phi_out (rad) and `torque` (N·m) on the first

@@ -15,8 +15,8 @@ from gearfmu.reduction.imported_carrier import imported_carrier
 def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
     """The carrier of a PlanetarySpec: interfaces bolt0 … bolt<N−1> and bore, each coupled as the file says.
 
-    scale : factor on all element counts (1: about 70 000 unknowns); an imported carrier has none and is taken as it is.
-    Rotations count with the bolt circle's radius. Raises MeshError.
+    scale : factor on all element counts (1: about 150 000 unknowns); an imported carrier has none and is taken as it
+    is. Rotations count with the bolt circle's radius. Raises MeshError.
     """
     if spec.carrier.imported is not None:
         return imported_carrier(spec).full

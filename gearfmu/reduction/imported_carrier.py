@@ -53,7 +53,7 @@ def imported_carrier(spec: Any) -> ImportedCarrier:
         body = Elements(mesh.nodes, mesh.repeated_cells, matrices.stiffness, matrices.mass)
         full = full_order("carrier", body, couplings, Judgement(("bore",), geometry.a))
     dofs = {"dof_body": full.size, "dof_sector": full.size, "teeth": 1}
-    return ImportedCarrier(full, mesh_facts(mesh) | {"road": "whole body"} | dofs)
+    return ImportedCarrier(full, mesh_facts(mesh) | {"method": "whole body"} | dofs)
 
 
 def _points(

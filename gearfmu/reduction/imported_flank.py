@@ -20,7 +20,7 @@ from gearfmu.fem.patches import triangle_gradient, triangle_shape
 from gearfmu.fem.solids import Faces
 from gearfmu.geometry import involute
 from gearfmu.geometry.involute_fit import FitError, FlankPoints, InvoluteFit, fit_involute, flank_faces
-from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.flank import Direction, Points, ToothFlank
 
 _STEEP = 0.3  # largest axial component of a flank face's normal
 _INWARD = 0.3  # smallest share of r_b by which a flank face's normal passes the axis
@@ -126,18 +126,25 @@ def _nodes_of(nodes: np.ndarray, corners: np.ndarray, faces: FlankPoints, wanted
 
 
 def tooth_loads(
-    nodes: np.ndarray, faces: Faces, flank: ToothFlank, points: Points, tooth_angle: float = 0.0
+    nodes: np.ndarray,
+    faces: Faces,
+    flank: ToothFlank,
+    points: Points,
+    tooth_angle: float = 0.0,
+    direction: Direction | None = None,
 ) -> sp.csr_array:
     """Unit loads of both flanks of one tooth as rows (2·R·A, 3N), order side, roll, function; components x, y, z of the
     frame of `nodes`.
 
-    nodes (N, 3) m in the frame of the gear. tooth_angle : rad, where the tooth stands. MeshError when the faces do not
-    cover the flank from form circle to tip over the face width.
+    nodes (N, 3) m in the frame of the gear. tooth_angle : rad, where the tooth stands. direction : as of
+    `flank.flank_loads`. MeshError when the faces do not cover the flank from form circle to tip over the face width.
     """
     c, s = np.cos(tooth_angle), np.sin(tooth_angle)
     back = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     local = nodes @ back
-    sides = [_side_loads(local, _flank_part(local, faces, flank, side), flank, points, side) for side in (0, 1)]
+    direction = direction or flank.normal
+    parts = [_flank_part(local, faces, flank, side) for side in (0, 1)]
+    sides = [_side_loads(local, part, flank, points, side, direction) for side, part in enumerate(parts)]
     rows = sp.csr_array(sp.vstack(sides))
     turn = sp.kron(sp.identity(len(nodes)), sp.csr_array(back.T), format="csr")
     return rows if tooth_angle == 0.0 else sp.csr_array(rows @ turn)
@@ -180,7 +187,9 @@ def _flank_part(local: np.ndarray, faces: Faces, flank: ToothFlank, side: int) -
     return Faces(*parts)
 
 
-def _side_loads(local: np.ndarray, part: Faces, flank: ToothFlank, points: Points, side: int) -> sp.csr_array:
+def _side_loads(
+    local: np.ndarray, part: Faces, flank: ToothFlank, points: Points, side: int, direction: Direction
+) -> sp.csr_array:
     arc = (local[:, 0] ** 2 + local[:, 1] ** 2 - flank.r_b**2) / (2 * flank.r_b)
     if len(part.nodes) == 0:
         raise MeshError("there is no face on one of the flanks")
@@ -198,8 +207,8 @@ def _side_loads(local: np.ndarray, part: Faces, flank: ToothFlank, points: Point
         along = weight * roll / flank.r_b / (last - first)
         place = np.stack(np.meshgrid(roll**2 / (2 * flank.r_b), across, indexing="ij"), axis=-1).reshape(-1, 2)
         lookup = _on_surface(chart, part, place)
-        normal = flank.normal(roll, side)
-        force = np.einsum("p,pc,qa->apqc", along, normal, legendre).reshape(points.functions, len(place), 3)
+        vectors = direction(roll, side, np.zeros(1))  # of a spur gear the same across the width
+        force = np.einsum("p,pc,qa->apqc", along, vectors, legendre).reshape(points.functions, len(place), 3)
         rows += [sp.csr_array((lookup.T @ f).reshape(1, -1)) for f in force]
     return sp.csr_array(sp.vstack(rows))
 

@@ -64,8 +64,8 @@ class CheckedGear:
 def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
     """Read, check, fit and place the finite elements of a gear.
 
-    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, goes the
-    cyclic road; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore go by the mean tooth.
+    source : ImportSpec, its files as they can be opened. A sector mesh, and a whole mesh that is cyclic, is reduced by
+    cyclic symmetry; a whole mesh that is not, a whole gear's ready-made matrices and a rigid bore by the mean tooth.
     MeshError lists what is wrong with the files.
     """
     file = Path(source.file)
@@ -89,9 +89,9 @@ def checked_gear(source: Any, wanted: Wanted) -> CheckedGear:
             raise MeshError(
                 'a sector takes the averaging bore only: write bore_coupling = "averaging", or mesh the whole gear'
             )
-        road = "mean tooth" if cut is None else "cyclic"
+        method = "mean tooth" if cut is None else "cyclic"
         dofs = 3 * (len(mesh.nodes) if cut is None else wanted.teeth * (len(cut.nodes) - len(cut.cut_plus)))
-        facts = _facts(placed, fit) | {"road": road, "dof_sector": dofs // wanted.teeth, "dof_body": dofs}
+        facts = _facts(placed, fit) | {"method": method, "dof_sector": dofs // wanted.teeth, "dof_body": dofs}
         return CheckedGear(placed, matrices, cut, facts)
 
 

@@ -69,10 +69,11 @@ class ImportedSector(SectorBody):
         """No: material and elements may be another program's."""
         return False
 
-    @property
+    @cached_property
     def tangent_rows(self) -> np.ndarray:
-        """Loads along the profile are made on our own meshes only: (0, 3N)."""
-        return np.zeros((0, self.cut.nodes.size))
+        """The same of unit loads along the profile: (2·R·A, 3N)."""
+        direction = self.flank.tangent
+        return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points, direction=direction).toarray()
 
     @property
     def patch_point(self) -> np.ndarray:

@@ -75,9 +75,7 @@ class SectorBody:
 
     @cached_property
     def tangent_rows(self) -> np.ndarray:
-        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N); (0, 3N) of an internal gear."""
-        if self.internal:
-            return np.zeros((0, self.mesh.nodes.size))
+        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N)."""
         both = [
             flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points, self.flank.tangent)
             for s in (0, 1)

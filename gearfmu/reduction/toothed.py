@@ -1,6 +1,6 @@
 """Ring, sun and planet before reduction, as whole bodies without any symmetry: one input node a tooth, bore or mounts.
 
-The road through cyclic symmetry (`sector`) takes far finer meshes; this one serves every method of reduction.
+The method through cyclic symmetry (`sector`) takes far finer meshes; this one serves every method of reduction.
 """
 
 from __future__ import annotations

@@ -123,13 +123,13 @@ class Assembly:
 @dataclass(frozen=True)
 class Motion:
     """time (T,) s; interfaces: name of member → (T, p) displacements of its rows; tension (T, j) N of the joints;
-    energy (T,) J: kinetic, elastic and that of the joints (without residuals). rounds: active sets of all steps."""
+    energy (T,) J: kinetic, elastic and that of the joints (without residuals). iterations: active sets of all steps."""
 
     time: np.ndarray
     interfaces: dict[str, np.ndarray]
     tension: np.ndarray
     energy: np.ndarray
-    rounds: int
+    iterations: int
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def integrate(assembly: Assembly, scheme: Scheme) -> Motion:
             motion.interfaces[state.member.name][n] = state.correct(rows.T @ tension)
         motion.tension[n] = tension
         motion.energy[n] = sum(state.energy() for state in states) + 0.5 * np.sum(tension**2 / joints.stiffness)
-    return replace(motion, rounds=solver.rounds)
+    return replace(motion, iterations=solver.iterations)
 
 
 def _check(assembly: Assembly, scheme: Scheme) -> None:
@@ -234,12 +234,12 @@ class _JointSolver:
         self.matrix = 0.5 * (compliance + compliance.T) + np.diag(1 / joints.stiffness)
         self.unilateral = joints.unilateral
         self.active = ~joints.unilateral
-        self.rounds = 0
+        self.iterations = 0
 
     def solve(self, free: np.ndarray) -> np.ndarray:
         """Tensions (j,) for the elongations `free` (j,) that the joints would have without."""
         for _ in range(_ROUNDS):
-            self.rounds += 1
+            self.iterations += 1
             tension = self._with(self.active, free)
             left = free - self.matrix @ tension
             active = ~self.unilateral | np.where(self.active, tension < 0, left < 0)

@@ -20,8 +20,8 @@ from matplotlib.patches import Circle
 from PIL import Image
 
 from gearfmu.modes.deformed import DeformedGear
+from gearfmu.report.chart import Plot
 from gearfmu.report.picture import round_scale
-from gearfmu.report.plots import Plot
 from gearfmu.report.scene3d import STEEL
 from gearfmu.report.signals import GEAR_PHI
 from gearfmu.report.style import INK, MUTED, WIDTH, png, styled
@@ -32,7 +32,7 @@ from gearfmu.stage.trace import Trace
 
 SHOWN = 0.035  # of the gear's diameter: how large the largest elastic displacement is drawn
 IN_A_ROW = 3
-FRAME_MS, FILM_DPI, FILM_COLOURS = 90, 76, 96
+FRAME_MS, FILM_DPI, FILM_COLOURS = 90, 60, 64
 MICRO = 1e6
 
 

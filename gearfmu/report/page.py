@@ -1,80 +1,123 @@
-"""The page itself: one HTML file that carries its own style and pictures and refers to nothing outside."""
+"""The page itself: one HTML file that carries style, scripts, numbers and pictures and refers to nothing outside."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from html import escape
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
-from gearfmu.report.plots import Plot
+from gearfmu.extras import MissingPackage
+from gearfmu.report.chart import Chart, Plot
+from gearfmu.report.figures import chart_element, chart_numbers
+from gearfmu.report.packed import Pack, squeezed
 from gearfmu.report.results import REACHED_THE_END
 
-CSS = """
-:root{--ink:#23262b;--muted:#6a7079;--line:#e3e6ea;--accent:#1f5a92}
-*{box-sizing:border-box}
-body{margin:0;background:#f4f5f7;color:var(--ink);font:15px/1.5 "Helvetica Neue",Arial,"Liberation Sans",sans-serif}
-main{max-width:1060px;margin:0 auto;padding:28px 20px 60px}
-header h1{font-size:26px;margin:0 0 2px;letter-spacing:-.01em}
-header p{margin:0 0 14px;color:var(--muted)}
-section{background:#fff;border:1px solid var(--line);border-radius:6px;padding:16px 20px 12px;margin:0 0 16px}
-h2{font-size:16px;margin:0 0 8px}
-h3{font-size:14px;margin:14px 0 4px}
-figure{margin:0}
-svg,img{display:block;width:100%;height:auto}
-figcaption,.note{color:var(--muted);font-size:13px;margin:6px 0 4px}
-a{color:var(--accent)}
-.facts{display:grid;grid-template-columns:repeat(4,1fr);gap:1px;background:var(--line);
-border:1px solid var(--line);border-radius:6px;overflow:hidden;margin:0 0 16px}
-.facts div{background:#fff;padding:9px 14px}
-.facts b{display:block;font-size:18px;font-weight:600;letter-spacing:-.01em;overflow-wrap:anywhere}
-.facts span{color:var(--muted);font-size:12.5px}
-.ok,.bad{display:inline-block;border-radius:4px;padding:1px
-9px;font-size:13px;font-weight:600;vertical-align:5px;margin-left:8px}
-.ok{background:#dff0e4;color:#20623a}.bad{background:#f8dcd9;color:#8f2018}
-.warning{border-left:4px solid #c8642b;background:#fdf4ec;border-radius:4px;padding:10px 16px;margin:0 0
-16px;font-size:14px}
-table{border-collapse:collapse;font-size:13.5px;min-width:min(560px,100%)}
-th,td{text-align:left;padding:4px 22px 4px 0;border-bottom:1px solid var(--line);vertical-align:top}
-th{color:var(--muted);font-weight:500}
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}
-code{font:12.5px ui-monospace,"DejaVu Sans Mono",Menlo,monospace;overflow-wrap:anywhere}
-details summary{cursor:pointer;font-weight:600}
-@media (max-width:700px){.facts{grid-template-columns:repeat(2,1fr)}}
-@media print{body{background:#fff}section{break-inside:avoid}}
-"""
+NO_SCRIPT = "A script inside this page draws the figures; it is switched off. Their data lie in the folder data."
 
 
-def page(title: str, body: Sequence[str]) -> str:
-    """The whole document around the given parts."""
-    meta = '<meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-    top = f'<!DOCTYPE html>\n<html lang="en"><head>{meta}<title>{escape(title)}</title><style>{CSS}</style></head>'
-    return top + "<body><main>\n" + "\n".join(body) + "\n</main></body></html>\n"
+def page(title: str, body: Sequence[str], plots: Sequence[Plot] = (), stage: Any = None) -> str:
+    """The whole document around the given parts. plots: those among them whose charts the script draws; stage: the
+    numbers of the turning view (`moving.View`), None without one."""
+    charts = {plot.name: plot.picture for plot in plots if isinstance(plot.picture, Chart)}
+    meta = '<meta charset="utf-8"><meta name="viewport" content="width=device-width,initial-scale=1">'
+    style = f"<style>{_own('page.css')}</style>"
+    top = f'<!DOCTYPE html>\n<html lang="en"><head>{meta}<title>{escape(title)}</title>{style}</head>'
+    scripts = _scripts(charts, stage) if charts or stage is not None else ""
+    return f"{top}<body><main>\n" + "\n".join(body) + f"\n</main>{scripts}</body></html>\n"
+
+
+def _scripts(charts: Mapping[str, Chart], stage: Any) -> str:
+    pack = Pack()
+    content: dict[str, Any] = {"figures": {name: chart_numbers(chart, pack) for name, chart in charts.items()}}
+    if stage is not None:
+        content["stage"] = stage.numbers(pack)
+    carried = f'<script type="text/plain" id="numbers">{pack.text(content)}</script>'
+    if charts:
+        carried += f'<script type="text/plain" id="plotly">{_plotly()}</script>'
+    names = (["stage.js"] if stage is not None else []) + ["report.js"]
+    return f"<noscript><p>{NO_SCRIPT}</p></noscript>{carried}<script>{''.join(_own(name) for name in names)}</script>"
+
+
+@cache
+def _own(name: str) -> str:
+    return (files("gearfmu.report") / "web" / name).read_text(encoding="utf-8")
+
+
+@cache
+def _plotly() -> str:
+    """Plotly's script, packed: 4.8 MB become 2.0 MB. The package is only looked up, not imported."""
+    found = find_spec("plotly")
+    if found is None or not found.submodule_search_locations:
+        raise MissingPackage("reports need the package plotly: pip install plotly")
+    return squeezed((Path(found.submodule_search_locations[0]) / "package_data" / "plotly.min.js").read_bytes())
 
 
 def head(title: str, outcome: str, subtitle: str) -> str:
     """Title with the outcome as a badge."""
     kind = "ok" if outcome in REACHED_THE_END else "bad"
-    badge = f'<span class="{kind}">{escape(outcome)}</span>'
+    badge = f'<span class="{kind}">{escape(outcome)}</span>' if outcome else ""
     return f"<header><h1>{escape(title)}{badge}</h1><p>{escape(subtitle)}</p></header>"
 
 
+def contents(links: Mapping[str, str]) -> str:
+    """Links to sections: id → words."""
+    return "<nav>" + "".join(f'<a href="#{name}">{escape(words)}</a>' for name, words in links.items()) + "</nav>"
+
+
+def tiles(results: Sequence[tuple[str, str, str]]) -> str:
+    """The key results: value, unit, what it is."""
+    found = "".join(
+        f"<div><b>{escape(value.replace('-', '−'))}<small>{escape(unit)}</small></b><span>{escape(label)}</span></div>"
+        for value, unit, label in results
+    )
+    return f'<div class="tiles">{found}</div>' if found else ""
+
+
 def facts(pairs: Mapping[str, str]) -> str:
-    """The row of tiles: what it is → value."""
-    tiles = "".join(f"<div><b>{escape(value)}</b><span>{escape(label)}</span></div>" for label, value in pairs.items())
-    return f'<div class="facts">{tiles}</div>'
+    """How it was run: what it is → value."""
+    rows = "".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in pairs.items())
+    return f'<dl class="run">{rows}</dl>'
 
 
-def figure(plot: Plot) -> str:
-    """A section with one plot, its caption and the link to its data."""
-    link = f'<a href="data/{plot.name}.csv">data/{plot.name}.csv</a>'
+def figure(plot: Plot, folder: str = "data") -> str:
+    """A section with one plot, its caption and the link to its data in `folder`."""
+    at = escape(f"{folder}/{plot.name}.csv", quote=True)
+    link = f'<a href="{at}">{at}</a>'
+    seen = chart_element(plot.name, plot.picture) if isinstance(plot.picture, Chart) else _told(plot)
     return (
-        f"<section><h2>{escape(plot.title)}</h2><figure>{plot.picture}"
+        f'<section id="{escape(plot.name, quote=True)}"><h2>{escape(plot.title)}</h2><figure>{seen}'
         f"<figcaption>{escape(plot.caption)} {link}</figcaption></figure></section>"
     )
 
 
-def section(title: str, *parts: str) -> str:
-    """A titled section around ready-made parts."""
-    return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+def stage_view(title: str, caption: str) -> str:
+    """The place of the turning stage with its controls; the script `stage.js` draws it."""
+    label = escape(f"{title}. {caption}", quote=True)
+    return (
+        f'<section id="stage" class="stage"><h2>{escape(title)}</h2><figure>'
+        f'<canvas role="img" tabindex="0" aria-label="{label}"></canvas><div class="controls">'
+        '<button type="button" class="play">Play</button><button type="button" class="closer">Mesh close up</button>'
+        '<label>time <input class="moment" type="range" min="0" max="1" step="0.001" value="0">'
+        "<output></output></label>"
+        '<label>enlarged <input class="enlarge" type="range" min="-1" max="0.7" step="0.01" value="0">'
+        '<span class="factor"></span></label><span class="scale" title="elastic displacement: none to largest"></span>'
+        f'</div><figcaption class="note">{escape(caption)}</figcaption></figure></section>'
+    )
+
+
+def _told(plot: Plot) -> str:
+    """A picture with its caption for those who do not see it."""
+    return str(plot.picture).replace('alt=""', f'alt="{escape(plot.title, quote=True)}: see the caption"', 1)
+
+
+def section(title: str, *parts: str, name: str = "") -> str:
+    """A titled section around ready-made parts; name: what links call it."""
+    mark = f' id="{name}"' if name else ""
+    return f"<section{mark}><h2>{escape(title)}</h2>{''.join(parts)}</section>"
 
 
 def details(title: str, *parts: str) -> str:
@@ -90,7 +133,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
         "<tr>" + "".join(f"<td{mark}>{escape(cell)}</td>" for mark, cell in zip(marks, row, strict=True)) + "</tr>"
         for row in rows
     )
-    return f"<table><tr>{top}</tr>{body}</table>"
+    return f'<div class="scroll"><table><tr>{top}</tr>{body}</table></div>'
 
 
 def pairs_table(pairs: Mapping[str, str]) -> str:
@@ -98,7 +141,7 @@ def pairs_table(pairs: Mapping[str, str]) -> str:
     rows = "".join(
         f"<tr><th>{escape(name)}</th><td><code>{escape(value)}</code></td></tr>" for name, value in pairs.items()
     )
-    return f"<table>{rows}</table>"
+    return f'<div class="scroll"><table>{rows}</table></div>'
 
 
 def note(text: str) -> str:

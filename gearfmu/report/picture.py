@@ -11,10 +11,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gearfmu.geometry import PairGeometry
-from gearfmu.report.plots import Plot, of_mesh
+from gearfmu.report.chart import Plot
+from gearfmu.report.plots import of_mesh
 from gearfmu.report.scene3d import Shape, draw
 from gearfmu.report.signals import GEAR_PHI
 from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.shapes import MeshShape
 from gearfmu.stage.meshes import mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.trace import Trace
 
@@ -95,29 +97,25 @@ def meshing_angles(pair: PairGeometry, phi: float, sg: int) -> tuple[float, floa
     """Body angles (rad) of pinion and wheel at pinion angle `phi` with flanks of side `sg` just touching:
     the rolls of docs/theory eq. 4 add up to L."""
     a, b = pair.gears
-    t = _action_angle(pair, sg)
+    t = -sg * pair.alpha_wt
     roll = a.r_b * sg * (phi + sg * a.psi_b - t)
     beta = t + math.pi + sg * (pair.length - roll) / b.r_b
     return phi, beta - sg * b.psi_b
 
 
-def contacts_at(pair: PairGeometry, angles: tuple[float, float], sg: int) -> list[Contact]:
-    """The tooth pairs whose contact point lies on both flanks, from the pinion's root outward."""
-    a, b = pair.gears
-    t = _action_angle(pair, sg)
+def contacts_at(pair: MeshShape, angles: Sequence[float], sg: int) -> list[Contact]:
+    """The tooth pairs whose contact point lies on both flanks `sg`, from gear A's root outward. angles (rad) of the
+    bodies from the line of their centres, A to B; of a ring, B, from its axis to A's."""
+    (a, b), external = pair.gears, isinstance(pair, PairGeometry)
+    t = -sg * pair.alpha_wt
     found = []
     for k in range(a.z):
         roll = a.r_b * sg * _wrapped(angles[0] + 2 * math.pi * k / a.z + sg * a.psi_b - t)
-        opposite = pair.length - roll
-        if a.s_form <= roll <= a.s_tip and b.s_form <= opposite <= b.s_tip:
-            turn = t + math.pi + sg * opposite / b.r_b - sg * b.psi_b - angles[1]
+        opposite = pair.length - roll if external else pair.length + roll
+        if a.s_form <= roll <= a.s_tip and min(b.s_form, b.s_tip) <= opposite <= max(b.s_form, b.s_tip):
+            turn = t + (math.pi if external else 0.0) + sg * (opposite / b.r_b - b.psi_b) - angles[1]
             found.append(Contact((k, round(turn * b.z / (2 * math.pi)) % b.z), (roll, opposite)))
     return sorted(found, key=lambda contact: contact.rolls[0])
-
-
-def _action_angle(pair: PairGeometry, sg: int) -> float:
-    a, b = pair.gears
-    return -sg * math.acos((a.r_b + b.r_b) / pair.a)
 
 
 def _wrapped(angle: float) -> float:
@@ -132,7 +130,7 @@ def _displacement(body: Any, teeth: int, loads: Sequence[tuple[int, float]], for
     for tooth, roll in loads:
         unit = _at_roll(np.asarray(display.loads, dtype=float), np.asarray(display.load_roll, dtype=float), roll)
         if force < 0:
-            unit = _mirrored(np.asarray(display.points, dtype=float), unit)
+            unit = mirrored(np.asarray(display.points, dtype=float), unit)
         total -= abs(force) / len(loads) * _on_tooth(unit, tooth, teeth)
     return total
 
@@ -152,7 +150,7 @@ def _on_tooth(unit: np.ndarray, tooth: int, teeth: int) -> np.ndarray:
     return turned @ _rotation(2 * math.pi * tooth / teeth).T
 
 
-def _mirrored(points: np.ndarray, unit: np.ndarray) -> np.ndarray:
+def mirrored(points: np.ndarray, unit: np.ndarray) -> np.ndarray:
     """The field of flank 1 from that of flank 0 by half a turn about the tooth's middle line, the x axis: it leaves
     spur and helical gears as they are."""
     mirror = np.array([1.0, -1.0, -1.0])
@@ -173,7 +171,7 @@ def _approach(
     pair: PairGeometry, contacts: Sequence[Contact], sg: int, placed: Sequence[np.ndarray], moved: Sequence[np.ndarray]
 ) -> float:
     """How far (m) the flanks recede from each other along the line of action, mean over the pairs in contact."""
-    t = _action_angle(pair, sg)
+    t = -sg * pair.alpha_wt
     normal = sg * np.array([-math.sin(t), math.cos(t), 0])
     tangent_point = pair.gears[0].r_b * np.array([math.cos(t), math.sin(t), 0])
     spots = np.array([tangent_point + contact.rolls[0] * normal for contact in contacts])

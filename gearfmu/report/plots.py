@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 
+from gearfmu.report.chart import SPANS, Curve, Panel, Plot, Span, over_time
 from gearfmu.report.signals import LOCKED, bearings, lock_time, meshes, spans
-from gearfmu.report.style import COAST, INK, MUTED, OPEN, panels, styled, svg
 from gearfmu.stage.trace import Trace, heading
 
 CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
 RPM = 30 / np.pi
-LEAST_LABELLED = 0.08  # of the run: locked shorter than that gets no word
-
-
-@dataclass(frozen=True)
-class Plot:
-    """A figure of the report: file name of its data, title, caption, picture (an element), columns of its CSV."""
-
-    name: str
-    title: str
-    caption: str
-    picture: str
-    columns: dict[str, np.ndarray]
+MOST_SPANS = 300  # shaded in a panel
 
 
 def torque_and_slip(trace: Trace) -> Plot | None:
@@ -38,25 +24,16 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     all_torques = clutch + [name for name in trace.channels if name.endswith(".tau") and name not in clutch]
     others = [name for name in distinct(trace, all_torques) if name not in clutch]
     slips = [name for name in trace.channels if name.endswith(".slip")]
-    rows = [
-        (names, label)
-        for names, label in ((clutch, "torque in N·m"), (others, "torque in N·m"), (slips, "slip in rad/s"))
-        if names
-    ]
     if not clutch and not others:
         return None
-    with styled():
-        figure, axes = panels(tuple(1.3 if names is slips else 2.0 for names, _ in rows))
-        for axis, (names, label) in zip(axes, rows, strict=True):
-            for name in names:
-                axis.plot(trace.time, trace[name], label=name, **(_DASHED if name.endswith(".capacity") else {}))
-            finish(axis, label)
-        _mark_lock(trace, axes)
-        axes[-1].set_xlabel("time in s")
-        picture = svg(figure, "torque")
-    locked = lock_time(trace)
-    caption = "" if locked is None else f"The clutch stays locked from {locked:.4f} s on."
-    return Plot("torque", "Torque and slip", caption, picture, columns(trace, clutch + others + slips))
+    locked = tuple(_locked(trace))
+    rows = ((clutch, "torque in N·m", 190), (others, "torque in N·m", 190), (slips, "slip in rad/s", 130))
+    panels = [
+        Panel(label, channels(trace, names), spans=locked, height=height) for names, label, height in rows if names
+    ]
+    at = lock_time(trace)
+    caption = "" if at is None else f"The clutch stays locked from {at:.4f} s on."
+    return Plot("torque", "Torque and slip", caption, over_time(panels), columns(trace, clutch + others + slips))
 
 
 def speeds(trace: Trace) -> Plot | None:
@@ -66,14 +43,9 @@ def speeds(trace: Trace) -> Plot | None:
     )
     if not names:
         return None
-    with styled():
-        figure, (axis,) = panels((2.3,))
-        for name in names:
-            axis.plot(trace.time, np.abs(trace[name]) * RPM, label=name)
-        finish(axis, "speed in rpm")
-        axis.set_xlabel("time in s")
-        picture = svg(figure, "speed")
-    return Plot("speed", "Speeds", "Magnitudes; the data keep sign and rad/s.", picture, columns(trace, names))
+    curves = tuple(Curve(trace.time, np.abs(trace[name]) * RPM, name, "rpm") for name in names)
+    chart = over_time([Panel("speed in rpm", curves, height=200)])
+    return Plot("speed", "Speeds", "Magnitudes; the data keep sign and rad/s.", chart, columns(trace, names))
 
 
 def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | None = None) -> Plot | None:
@@ -83,21 +55,17 @@ def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | 
     names = [name for name in scales if name in trace]
     if not names:
         return None
-    part = trace if window is None else trace.window(*window)
-    with styled():
-        figure, axes = panels((1.9,) * len(names))
-        for axis, name in zip(axes, names, strict=True):
-            scale, label = scales[name]
-            axis.plot(part.time, part[name] * scale, lw=0.8 if window is None else 1.2)
-            axis.set_ylabel(label)
-            axis.margins(x=0)
-        _shade_contact(part, mesh, axes)
-        axes[-1].set_xlabel("time in s")
-        file = mesh if window is None else f"{mesh}_detail"
-        picture = svg(figure, file)
+    part, shaded = trace if window is None else trace.window(*window), tuple(_contact(trace, mesh, window))
+    panels = []
+    for name in names:
+        scale, label = scales[name]
+        curve = Curve(part.time, part[name] * scale, name, label.split()[-1])
+        panels.append(Panel(label, (curve,), spans=shaded))
+    file = mesh if window is None else f"{mesh}_detail"
     title = of_mesh(trace, mesh, "Mesh force and transmission error") + ("" if window is None else ", detail")
     extra = [n for n in (f"{mesh}.contact", f"{mesh}.pairs") if n in part]
-    return Plot(file, title, _contact_words(part, mesh), picture, columns(part, names + extra))
+    chart = over_time(panels, "time" if window is None else file)
+    return Plot(file, title, _contact_words(part, mesh), chart, columns(part, names + extra))
 
 
 def of_mesh(trace: Trace, mesh: str, title: str) -> str:
@@ -107,24 +75,31 @@ def of_mesh(trace: Trace, mesh: str, title: str) -> str:
 
 def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
     """Bearing forces x and y of every bearing over time; None without them. carried: of a planetary set."""
-    groups = [found for b in bearings(trace) if (found := [n for d in "xy" if (n := f"bearing.{b}.f{d}") in trace])]
+    groups = {b: found for b in bearings(trace) if (found := [n for d in "xy" if (n := f"bearing.{b}.f{d}") in trace])}
     if not groups:
         return None
-    with styled():
-        figure, axes = panels((1.7,) * len(groups))
-        for axis, found in zip(axes, groups, strict=True):
-            for name in found:
-                axis.plot(trace.time, trace[name] * 1e-3, label=name, lw=0.8)
-            finish(axis, "force in kN")
-        axes[-1].set_xlabel("time in s")
-        picture = svg(figure, "bearing")
-    names = [name for found in groups for name in found]
+    panels = [Panel(f"{name}: force in kN", channels(trace, found, 1e-3, "kN")) for name, found in groups.items()]
+    names = [name for found in groups.values() for name in found]
     caption = "Force of the shaft on its bearing, along the axes x and y of the stage."
     if carried:
         caption = "Force of the body on its bearing, along the fixed axes x and y."
     elif len(meshes(trace)) == 1:
         caption = "Force of the gear on its bearing; x points from pinion to wheel."
-    return Plot("bearing", "Bearing forces", caption, picture, columns(trace, names))
+    return Plot("bearing", "Bearing forces", caption, over_time(panels), columns(trace, names))
+
+
+def channels(trace: Trace, names: Iterable[str], scale: float = 1.0, unit: str | None = None) -> tuple[Curve, ...]:
+    """Curves of channels over time, times `scale`, in `unit` or their own."""
+    return tuple(
+        Curve(
+            trace.time,
+            trace[name] * scale,
+            name,
+            trace.channels[name].unit.replace("N.m", "N·m") if unit is None else unit,
+            "dashed" if name.endswith(".capacity") else "",
+        )
+        for name in names
+    )
 
 
 def columns(trace: Trace, names: Iterable[str]) -> dict[str, np.ndarray]:
@@ -143,46 +118,35 @@ def distinct(trace: Trace, names: Iterable[str]) -> list[str]:
     return list(found.values())
 
 
-_DASHED: dict[str, Any] = {"ls": "--", "color": MUTED, "lw": 1.2}
+def _locked(trace: Trace) -> list[Span]:
+    """Where a clutch is locked."""
+    names = [name for name in trace.channels if name.endswith(LOCKED)]
+    return [Span(*ends, "locked") for name in names for ends in spans(trace.time, trace[name].astype(bool))]
 
 
-def finish(axis: Axes, label: str) -> None:
-    """Label, no margin along time, legend above the panel."""
-    axis.set_ylabel(label)
-    axis.margins(x=0)
-    axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
-
-
-def _mark_lock(trace: Trace, axes: list[Axes]) -> None:
-    for name in trace.channels:
-        if name.endswith(LOCKED):
-            for start, end in spans(trace.time, trace[name].astype(bool)):
-                for axis in axes:
-                    axis.axvspan(start, end, color=COAST, alpha=0.45, lw=0)
-                if end - start < LEAST_LABELLED * (trace.time[-1] - trace.time[0]):
-                    continue
-                axes[-1].annotate(
-                    "locked",
-                    (start, 1),
-                    (4, -4),
-                    xycoords=("data", "axes fraction"),
-                    color=INK,
-                    textcoords="offset points",
-                    va="top",
-                    fontsize=8.5,
-                )
-
-
-def _shade_contact(trace: Trace, mesh: str, axes: list[Axes]) -> None:
+def _contact(trace: Trace, mesh: str, window: tuple[float, float] | None) -> list[Span]:
+    """Where the teeth of an engagement are apart, on the coast flanks or on both."""
     if f"{mesh}.contact" not in trace:
-        return
-    for state, colour in ((0, OPEN), (-1, COAST), (2, GREY_BOTH)):
-        for start, end in spans(trace.time, trace[f"{mesh}.contact"] == state):
-            for axis in axes:
-                axis.axvspan(start, end, color=colour, lw=0)
+        return []
+    part = trace if window is None else trace.window(*window)
+    state = part[f"{mesh}.contact"]
+    found = [Span(*ends, kind) for code, kind in SPANS.items() for ends in spans(part.time, state == code)]
+    return joined(found, float(part.time[-1] - part.time[0]) / MOST_SPANS)
 
 
-GREY_BOTH = "#dcdfe3"
+def joined(found: Sequence[Span], gap: float) -> list[Span]:
+    """Spans of a kind that lie nearer than `gap` to each other as one: nobody sees them apart, and a page with
+    thousands is slow."""
+    if len(found) <= MOST_SPANS:
+        return list(found)
+    merged: list[Span] = []
+    for span in found:
+        last = merged[-1] if merged else None
+        if last is not None and last.kind == span.kind and span.start - last.end < gap:
+            merged[-1] = Span(last.start, span.end, span.kind)
+        else:
+            merged.append(span)
+    return merged
 
 
 def _contact_words(trace: Trace, mesh: str) -> str:

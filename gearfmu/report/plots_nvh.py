@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import cycle
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from gearfmu.report import metrics
-from gearfmu.report.plots import Plot, of_mesh
+from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits, over_time
+from gearfmu.report.names import shown
+from gearfmu.report.plots import of_mesh
 from gearfmu.report.signals import Window, bearings, meshes
-from gearfmu.report.style import INK, MUTED, panels, png, styled, svg
 from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
 ORDERS = 5
 TRUSTED_FROM = 20e3  # Hz; sampling that ends below it gets a warning
-DASHES = ((0, (4, 4)), (0, (1, 3)))  # of the orders of one mesh and the next
+LOOKS = ("dashed", "dotted")  # of the orders of one mesh and the next
+MOST_ROWS, MOST_COLUMNS = 400, 700  # of a map in the page
 MEANS = "Channels …_mean are means over the communication step, their averaging taken out. "
 SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
@@ -52,18 +51,11 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
     part = trace.window(window.start, window.end)
     step = metrics.sample_step(part.time)
     spectra = {name: spectrum_of(part, name, segment(part.time.size)) for name in names}
-    groups = _by_part(names)
-    with styled():
-        figure, axes = panels((1.7,) * len(groups) if len(groups) > 1 else (2.6,))
-        for axis, group in zip(axes, groups, strict=True):
-            for name in group:
-                spectrum = spectra[name]
-                axis.plot(spectrum.frequency[1:] / 1e3, metrics.level(spectrum.amplitude[1:]), label=name, lw=0.9)
-            level_axis(axis, "dB re 1 N")
-            axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
-            marked = [mesh for mesh, angle in angles.items() if _mark_orders(axis, part.time, trace, (mesh, angle))]
-        axes[-1].set_xlabel("frequency in kHz")
-        picture = svg(figure, "spectrum")
+    top = min(SHOWN_TO, 0.5 / step)
+    found = {mesh: _order_marks(part.time, trace, (mesh, angle), top) for mesh, angle in angles.items()}
+    marked, marks = [mesh for mesh in found if found[mesh]], tuple(mark for own in found.values() for mark in own)
+    panels = [_levels({name: spectra[name] for name in group}, top, marks) for group in _by_part(names)]
+    chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
     first = next(iter(spectra.values()))
     caption = (
         f"Rms amplitude of each line, Hann, {first.segments} windows, resolution {first.resolution:.3g} Hz, "
@@ -75,7 +67,7 @@ def force_spectrum(trace: Trace, window: Window, angles: Mapping[str, np.ndarray
             else "Mesh orders are not marked: the speed is not known or not steady, or they lie above the spectrum."
         )
     )
-    return Plot("spectrum", "Spectra of the forces", caption, picture, _spectrum_columns(spectra))
+    return Plot("spectrum", "Spectra of the forces", caption, chart, _spectrum_columns(spectra))
 
 
 def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
@@ -92,17 +84,11 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
         for name in names
     }
     _require_order(next(iter(cuts.values())), mesh, metrics.sample_step(trace.time))
-    with styled():
-        figure, axes = panels((1.6,) * len(cuts))
-        for axis, (name, cut) in zip(axes, cuts.items(), strict=True):
-            for row, order in enumerate(cut.orders):
-                if np.any(np.isfinite(cut.amplitude[row])):
-                    axis.plot(cut.time, metrics.level(cut.amplitude[row]), label=f"order {order}")
-            level_axis(axis, "dB re 1 N", trace.time[-1])
-            axis.set_title(name, loc="left", color=INK)
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=ORDERS, borderaxespad=0.1)
-        axes[-1].set_xlabel("time in s")
-        picture = svg(figure, file)
+    panels = []
+    for name, cut in cuts.items():
+        rows = [(k, row) for k, row in zip(cut.orders, cut.amplitude, strict=True) if np.any(np.isfinite(row))]
+        curves = tuple(Curve(cut.time, metrics.level(row), f"order {k}", "dB re 1 N") for k, row in rows)
+        panels.append(Panel(f"{shown(name)}, dB re 1 N", curves, limits=level_limits(curves)))
     first = next(iter(cuts.values()))
     low, high = first.mesh_frequency.min(), first.mesh_frequency.max()
     caption = (
@@ -112,7 +98,7 @@ def order_cuts(trace: Trace, mesh: str, mesh_angle: np.ndarray) -> Plot | None:
         "left out."
     )
     title = of_mesh(trace, mesh, "Mesh orders along the run")
-    return Plot(file, title, caption, picture, _order_columns(cuts))
+    return Plot(file, title, caption, over_time(panels), _order_columns(cuts))
 
 
 def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | None:
@@ -129,25 +115,19 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
     picture_data = metrics.spectrogram(trace[name], step, window_size, hop, averaging(trace, name))
     if picture_data.time.size < 4:
         raise metrics.MetricsError(f"{trace.time.size} samples are too few for a spectrogram; record a longer run")
-    values = metrics.level(picture_data.amplitude)
-    top = float(np.ceil(values.max() / 5) * 5)
-    with styled():
-        figure, (axis,) = panels((3.3,))
-        time = picture_data.time + trace.time[0]
-        image = axis.pcolormesh(
-            time, picture_data.frequency / 1e3, values.T, vmin=top - RANGE_DB, vmax=top, shading="nearest"
-        )
-        figure.colorbar(image, ax=axis, label="level in dB re 1 N", pad=0.01, aspect=30)
-        axis.grid(False)
-        axis.set(
-            xlabel="time in s",
-            ylabel="frequency in kHz",
-            xlim=(time[0], time[-1]),
-            ylim=(0, 1e-3 * min(SHOWN_TO, 0.5 / step)),
-        )
-        for style, angle in zip(cycle(DASHES), angles.values()):  # noqa: B905 – as many as there are meshes
-            _overlay_orders(axis, trace, (angle, style), min(SHOWN_TO, 0.5 / step))
-        picture = png(figure)
+    values, limit = metrics.level(picture_data.amplitude), min(SHOWN_TO, 0.5 / step)
+    top, time = float(np.ceil(values.max() / 5) * 5), picture_data.time + trace.time[0]
+    shown_to = picture_data.frequency <= limit
+    heat = heat_of(time, picture_data.frequency[shown_to] / 1e3, values[:, shown_to].T, (top - RANGE_DB, top))
+    looks = [LOOKS[k % len(LOOKS)] for k in range(len(angles))]
+    rays = [
+        curve
+        for look, own in zip(looks, angles.items(), strict=True)
+        for curve in _order_curves(trace, own, look, limit)
+    ]
+    limits = (float(time[0]), float(time[-1]))
+    panel = Panel(f"{shown(name)}: frequency in kHz", tuple(rays), heat, height=300, limits=(0.0, limit / 1e3))
+    chart = Chart((panel,), group="time", x_limits=limits)
     caption = (
         f"{name}; Hann windows of {window_size * step * 1e3:.1f} ms, resolution {picture_data.frequency[1]:.0f} Hz. "
         f"Dashed: orders {' and, dotted, '.join(f'of {mesh}' for mesh in angles) or 'of the mesh'} from the speed."
@@ -157,7 +137,7 @@ def force_spectrogram(trace: Trace, angles: Mapping[str, np.ndarray]) -> Plot | 
         "frequency_[Hz]": np.tile(picture_data.frequency, time.size),
         "level_[dB re 1 N]": values.ravel(),
     }
-    return Plot("spectrogram", "Spectrogram", caption, picture, data)
+    return Plot("spectrogram", "Spectrogram", caption, chart, data)
 
 
 def octave_table(trace: Trace, window: Window) -> dict[str, dict[float, float]]:
@@ -210,57 +190,64 @@ def _require_order(cuts: metrics.OrderCuts, mesh: str, step: float) -> None:
         )
 
 
-def level_axis(axis: Axes, label: str, end: float | None = None) -> None:
-    """Limit the level axis to RANGE_DB below the highest line, so that a silent line does not squeeze the rest."""
-    shown = [line.get_ydata() for line in axis.lines if np.any(np.isfinite(line.get_ydata()))]
-    if shown:
-        top = np.ceil((max(map(np.nanmax, shown)) + 3) / 10) * 10
-        axis.set_ylim(max(np.floor((min(map(np.nanmin, shown)) - 3) / 10) * 10, top - RANGE_DB), top)
-    axis.set_ylabel(label)
-    axis.margins(x=0)
-    if end is not None:
-        axis.set_xlim(0, end)
-    elif axis.lines:
-        axis.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=5, borderaxespad=0.1)
+def heat_of(
+    x: np.ndarray, y: np.ndarray, levels: np.ndarray, limits: tuple[float, float], unit: str = "dB re 1 N"
+) -> Heat:
+    """A map of levels (Y, X) dB over ascending or descending x (X,) and y (Y,): of neighbours beyond MOST_COLUMNS and
+    MOST_ROWS the largest, so that no line is lost."""
+    levels, x = _largest_of(levels.T, x, MOST_COLUMNS)
+    levels, y = _largest_of(levels.T, y, MOST_ROWS)
+    return Heat(x, y, levels, *limits, unit)
 
 
-def _mark_orders(axis: Axes, time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray]) -> bool:
-    """Mark the orders of an engagement (name, mesh angle) at the median speed, if nine tenths of the window stay within
-    10 %; whether there was one to mark."""
+def _largest_of(levels: np.ndarray, at: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of levels (n, m) at (n,), in groups where there are more than `most`: the largest of each, its middle."""
+    if at.size <= most:
+        return levels, at
+    starts = np.arange(0, at.size, -(-at.size // most))
+    counts = np.diff(np.append(starts, at.size))
+    return np.fmax.reduceat(levels, starts, axis=0), np.add.reduceat(at, starts) / counts
+
+
+def _levels(spectra: Mapping[str, metrics.Spectrum], top: float, marks: tuple[Mark, ...]) -> Panel:
+    """A panel of levels over frequency (kHz) up to `top` (Hz)."""
+    curves = tuple(spectrum_curve(name, own, top) for name, own in spectra.items())
+    return Panel("level in dB re 1 N", curves, marks=marks, limits=level_limits(curves))
+
+
+def spectrum_curve(name: str, spectrum: metrics.Spectrum, top: float) -> Curve:
+    """Level of a spectrum over frequency (kHz) up to `top` (Hz), without its mean."""
+    inside = (spectrum.frequency > 0) & (spectrum.frequency <= top)
+    level = metrics.level(spectrum.amplitude[inside])
+    return Curve(spectrum.frequency[inside] / 1e3, level, name, "dB re 1 N")
+
+
+def _order_marks(time: np.ndarray, trace: Trace, mesh: tuple[str, np.ndarray], top: float) -> tuple[Mark, ...]:
+    """Marks of the orders of an engagement (name, mesh angle) at the median speed below `top` (Hz), if nine tenths of
+    the window stay within 10 %; else none."""
     name, angle = mesh
     frequency = np.interp(time, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
     low, middle, high = np.percentile(frequency, [5, 50, 95])
     if middle <= 0 or high - low > 0.1 * middle:
-        return False
+        return ()
     several = len(meshes(trace)) > 1
-    highest = min(int(axis.get_xlim()[1] * 1e3 / middle), 3 if several else 24)
-    for order in range(1, highest + 1):
-        axis.axvline(order * middle / 1e3, color=MUTED, lw=0.7, ls=":", zorder=0)
-        axis.annotate(
-            f"{name} {order}" if several else str(order),
-            (order * middle / 1e3, 1),
-            (3, -9),
-            xycoords=("data", "axes fraction"),
-            textcoords="offset points",
-            fontsize=8,
-            color=MUTED,
-        )
-    return highest > 0
+    highest = min(int(top / middle), 3 if several else 24)
+    orders = range(1, highest + 1)
+    return tuple(Mark(k * middle / 1e3, f"{name} {k}" if several else str(k)) for k in orders)
 
 
-def _overlay_orders(axis: Axes, trace: Trace, mesh: tuple[np.ndarray, Any], limit: float) -> None:
-    """Curves of the first orders below `limit` (Hz). mesh: mesh angle (n,) rad, line style."""
-    angle, style = mesh
+def _order_curves(trace: Trace, mesh: tuple[str, np.ndarray], look: str, limit: float) -> list[Curve]:
+    """Frequency (kHz) of the first orders of an engagement (name, mesh angle) below `limit` (Hz)."""
+    name, angle = mesh
     frequency = np.gradient(angle, trace.time) / (2 * np.pi)
+    thin = slice(None, None, max(1, trace.time.size // MOST_COLUMNS))
+    found = []
     for order in range(1, ORDERS + 1):
         curve = np.where(order * frequency < limit, order * frequency, np.nan)
         if np.any(np.isfinite(curve)):
-            axis.plot(trace.time, curve / 1e3, color="white", lw=0.8, ls=style, alpha=0.75)
-            last = np.flatnonzero(np.isfinite(curve))[-1]
-            x = min(trace.time[last], axis.get_xlim()[1])
-            axis.annotate(
-                f"{order}", (x, curve[last] / 1e3), (-9, 3), textcoords="offset points", color="white", fontsize=8.5
-            )
+            words = f"order {order}" if len(meshes(trace)) < 2 else f"{name} order {order}"
+            found.append(Curve(trace.time[thin], curve[thin] / 1e3, words, "kHz", look))
+    return found
 
 
 def _spectrum_columns(spectra: Mapping[str, metrics.Spectrum]) -> dict[str, np.ndarray]:

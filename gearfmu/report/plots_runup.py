@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from gearfmu.report import metrics
-from gearfmu.report.plots import RPM, Plot
-from gearfmu.report.plots_nvh import level_axis
+from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits
+from gearfmu.report.names import shown
+from gearfmu.report.plots import RPM
+from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.runup import PICKUP, RunUp, Signal
 from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED
-from gearfmu.report.style import COLOURS, MUTED, panels, png, styled, svg
 
 SHOWN_DB = 60
 BINS = 160  # windows of the frequency map over the run
@@ -18,7 +18,7 @@ CROSSED = " Circles: where an order meets a natural frequency of the stage, line
 CROSSED += "transmission error drives."
 MARKED = " Ticks at the top, in the colour of the order: where it meets a natural frequency of the linearised stage."
 BESIDE = "; dotted the orders beside it that are marked in the order map, together"
-PASSING = " and, thin, what the passing of the planets makes beside them"
+PASSING = " and, light, what the passing of the planets makes beside them"
 
 
 def frequency_maps(run: RunUp) -> Plot:
@@ -30,15 +30,17 @@ def frequency_maps(run: RunUp) -> Plot:
     top = min((run.orders_shown + 0.3) * run.each * _fastest(run), 0.5 / step)
     first = next(iter(maps.values()))
     speed, kept = _speed_at(run, first.time, size * step) * RPM, first.frequency <= top
-    with styled():
-        figure, axes = panels((2.7,) * len(maps))
-        for axis, (name, found) in zip(axes, maps.items(), strict=True):
-            _image(axis, (speed, found.frequency[kept] / 1e3, found.amplitude[:, kept].T), (name, run.signals[name]))
-            axis.set(xlim=(speed.min(), speed.max()), ylim=(0, top / 1e3), ylabel="frequency in kHz")
-            _rays(axis, run)
-            _circles(axis, run)
-        axes[-1].set_xlabel(f"speed of the {run.shaft} in rpm")
-        picture = png(figure)
+    ends = np.array([speed.min(), speed.max()])
+    rays = tuple(
+        Curve(ends, k * run.each * ends / 60e3, f"order {k}", "kHz", "dashed") for k in range(1, run.orders_shown + 1)
+    )
+    panels = []
+    for name, found in maps.items():
+        heat = _heat(speed, found.frequency[kept] / 1e3, found.amplitude[:, kept].T, run.signals[name])
+        label, limits = f"{shown(name)}: frequency in kHz", (0.0, top / 1e3)
+        panels.append(Panel(label, rays, heat, dots=_circles(run, ends, top), height=250, limits=limits))
+    along = f"speed of the {run.shaft} in rpm"
+    chart = Chart(tuple(panels), along, "speed", x_limits=(float(ends[0]), float(ends[1])))
     caption = (
         f"Hann windows of {size * step * 1e3:.0f} ms, resolution {first.frequency[1]:.0f} Hz. Dashed: mesh orders "
         f"k·f_m, f_m = {run.each:.6g} f of the {run.shaft}. What lies level is a resonance."
@@ -46,30 +48,29 @@ def frequency_maps(run: RunUp) -> Plot:
     )
     data = {"speed_[rpm]": np.repeat(speed, kept.sum()), "frequency_[Hz]": np.tile(first.frequency[kept], speed.size)}
     data |= {_column(run, name): found.amplitude[:, kept].ravel() for name, found in maps.items()}
-    return Plot("spectrogram_speed", "Campbell diagram of the run-up", caption, picture, data)
+    return Plot("spectrogram_speed", "Campbell diagram of the run-up", caption, chart, data)
 
 
 def order_maps(run: RunUp) -> Plot:
     """Level of every signal over order and speed of the shaft."""
-    with styled():
-        figure, axes = panels((2.7,) * len(run.orders))
-        for axis, (name, found) in zip(axes, run.orders.items(), strict=True):
-            _image(axis, (found.order, found.speed * RPM, found.amplitude), (name, run.signals[name]))
-            axis.set(xlim=(0, (run.orders_shown + 0.3) * run.each), ylabel=f"speed of the {run.shaft} in rpm")
-            _mark_orders(axis, run, run.signals[name])
-        axes[-1].set_xlabel(f"order of the {run.shaft}")
-        picture = png(figure)
+    panels = []
+    for name, found in run.orders.items():
+        heat = _heat(found.order, found.speed * RPM, found.amplitude, run.signals[name])
+        marks = tuple(_order_marks(run, run.signals[name]))
+        panels.append(Panel(f"{shown(name)}: speed of the {run.shaft} in rpm", (), heat, marks, height=250))
+    highest = (run.orders_shown + 0.3) * run.each
+    chart = Chart(tuple(panels), f"order of the {run.shaft}", "order", x_limits=(0.0, highest))
     first = next(iter(run.orders.values()))
     passing = PASSING if any(own.sides for own in run.signals.values()) else ""
     caption = (
-        f"Orders per revolution of the {run.shaft}, Hann windows of {1 / first.order[1]:.0f} revolutions. Marked at "
-        f"the top: mesh orders k × {run.each:.6g}{passing}. What stands upright goes with the speed; a resonance lies "
-        "on a hyperbola, frequency over speed."
+        f"Orders per revolution of the {run.shaft}, Hann windows of {1 / first.order[1]:.0f} revolutions. Marked "
+        f"by dotted lines: mesh orders k × {run.each:.6g}{passing}. What stands upright goes with the speed; a "
+        "resonance lies on a hyperbola, frequency over speed."
     )
     data = {"speed_[rpm]": np.repeat(first.speed * RPM, first.order.size)}
     data |= {"order": np.tile(first.order, first.speed.size)}
     data |= {_column(run, name): found.amplitude.ravel() for name, found in run.orders.items()}
-    return Plot("orders_map", "Order map", caption, picture, data)
+    return Plot("orders_map", "Order map", caption, chart, data)
 
 
 def order_levels(run: RunUp) -> Plot:
@@ -77,25 +78,20 @@ def order_levels(run: RunUp) -> Plot:
     speed = next(iter(run.orders.values())).speed * RPM
     found = {name: _bands(run, name) for name in run.signals}
     beside = any(own.sides for own in run.signals.values())
-    with styled():
-        figure, axes = panels((1.9,) * len(found))
-        for axis, (name, bands) in zip(axes, found.items(), strict=True):
-            for label, amplitude in bands.items():
-                order = int(label.split()[-1])
-                look = {"ls": ":", "lw": 1.3} if label.startswith("beside") else {"lw": 1.1}
-                axis.plot(speed, run.signals[name].level(amplitude), label=label, color=COLOURS[order - 1], **look)
-            level_axis(axis, run.signals[name].label)
-            _ticks(axis, run, speed)
-            axis.set_title(name, loc="right", color=MUTED)
-        axes[-1].set_xlabel(f"speed of the {run.shaft} in rpm")
-        picture = svg(figure, "orders_speed")
+    panels = []
+    for name, bands in found.items():
+        own = run.signals[name]
+        curves = tuple(_band_curve(speed, label, own.level(amplitude), own) for label, amplitude in bands.items())
+        marks = tuple(_ticks(run, speed))
+        panels.append(Panel(f"{shown(name)}, {own.label}", curves, marks=marks, limits=level_limits(curves)))
+    chart = Chart(tuple(panels), f"speed of the {run.shaft} in rpm", "speed")
     caption = (
         f"Level within half an order of k × {run.each:.6g} orders of the {run.shaft}{BESIDE if beside else ''}. "
         f"A peak is a resonance that the order meets.{MARKED if run.resonances else ''}"
     )
     data = {"speed_[rpm]": speed}
     data |= {f"{label} of {_column(run, name)}": a for name, bands in found.items() for label, a in bands.items()}
-    return Plot("orders_speed", "Mesh orders over the speed", caption, picture, data)
+    return Plot("orders_speed", "Mesh orders over the speed", caption, chart, data)
 
 
 def _bands(run: RunUp, name: str) -> dict[str, np.ndarray]:
@@ -120,28 +116,21 @@ def _about_pickup(run: RunUp) -> str:
     return about if PICKUP in run.signals else ""
 
 
-def _image(axis: Axes, cells: tuple[np.ndarray, np.ndarray, np.ndarray], named: tuple[str, Signal]) -> None:
-    """cells: x (X,), y (Y,), amplitude (Y, X) rms."""
-    (x, y, amplitude), (name, own) = cells, named
+def _heat(x: np.ndarray, y: np.ndarray, amplitude: np.ndarray, own: Signal) -> Heat:
+    """A map of amplitude (Y, X) rms, from the highest level SHOWN_DB down."""
     values = own.level(amplitude)
     top = float(np.ceil(np.nanpercentile(values, 99.9) / 5) * 5)
-    image = axis.pcolormesh(x, y, values, vmin=top - SHOWN_DB, vmax=top, shading="nearest")
-    axis.figure.colorbar(image, ax=axis, label=own.label, pad=0.01, aspect=22)
-    axis.set_title(name, loc="left")
-    axis.grid(False)
+    return heat_of(x, y, values, (top - SHOWN_DB, top), own.label)
 
 
-def _mark_orders(axis: Axes, run: RunUp, own: Signal) -> None:
-    marks = [(k * run.each, 1.6) for k in range(1, run.orders_shown + 1)]
-    marks += [(order, 0.8) for orders in own.sides.values() for order in orders]
-    for at, width in marks:
-        axis.plot([at, at], [1.0, 1.05], transform=axis.get_xaxis_transform(), color=MUTED, lw=width, clip_on=False)
+def _band_curve(speed: np.ndarray, label: str, level: np.ndarray, own: Signal) -> Curve:
+    look = "dotted" if label.startswith("beside") else ""
+    return Curve(speed, level, label, own.label, look, int(label.split()[-1]) - 1)
 
 
-def _rays(axis: Axes, run: RunUp) -> None:
-    ends = np.array(axis.get_xlim())
-    for k in range(1, run.orders_shown + 1):
-        axis.plot(ends, k * run.each * ends / 60e3, color="white", lw=0.8, ls=(0, (2, 6)), alpha=0.6)
+def _order_marks(run: RunUp, own: Signal) -> list[Mark]:
+    marks = [Mark(k * run.each, str(k)) for k in range(1, run.orders_shown + 1)]
+    return marks + [Mark(order, "", "side") for orders in own.sides.values() for order in orders]
 
 
 def crossings(run: RunUp) -> list[tuple[int, float, float]]:
@@ -150,17 +139,15 @@ def crossings(run: RunUp) -> list[tuple[int, float, float]]:
     return [(k, f, 60 * f / (k * run.each)) for f in run.resonances for k in orders]
 
 
-def _circles(axis: Axes, run: RunUp) -> None:
-    (low, high), (_, top) = axis.get_xlim(), axis.get_ylim()
-    for _, frequency, rpm in crossings(run):
-        if low <= rpm <= high and frequency <= 1e3 * top:
-            axis.plot(rpm, frequency / 1e3, "o", ms=5, mfc="none", mec="white", mew=0.9)
+def _circles(run: RunUp, ends: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Speed (rpm) and frequency (kHz) of the crossings within the diagram; None without any."""
+    found = [(rpm, f / 1e3) for _, f, rpm in crossings(run) if ends[0] <= rpm <= ends[1] and f <= top]
+    return (np.array([rpm for rpm, _ in found]), np.array([f for _, f in found])) if found else None
 
 
-def _ticks(axis: Axes, run: RunUp, speed: np.ndarray) -> None:
-    for order, _, rpm in crossings(run):
-        if speed.min() <= rpm <= speed.max():
-            axis.plot([rpm, rpm], [0.94, 1.0], transform=axis.get_xaxis_transform(), color=COLOURS[order - 1], lw=1.4)
+def _ticks(run: RunUp, speed: np.ndarray) -> list[Mark]:
+    low, high = speed.min(), speed.max()
+    return [Mark(rpm, "", "tick", order - 1) for order, _, rpm in crossings(run) if low <= rpm <= high]
 
 
 def _speed_at(run: RunUp, centres: np.ndarray, width: float) -> np.ndarray:

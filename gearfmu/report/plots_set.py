@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from gearfmu.report import metrics
-from gearfmu.report.plots import Plot, columns, finish
-from gearfmu.report.plots_nvh import SHOWN_TO, level_axis, segment
+from gearfmu.report.chart import Chart, Curve, Mark, Panel, Plot, level_limits, over_time
+from gearfmu.report.plots import channels, columns
+from gearfmu.report.plots_nvh import SHOWN_TO, segment, spectrum_curve
 from gearfmu.report.signals import GEAR_SPEED, Window
-from gearfmu.report.style import COLOURS, MUTED, WIDTH, panels, styled, svg
 from gearfmu.spec.turning import Meshing
 from gearfmu.stage.trace import Trace
 
@@ -57,35 +55,24 @@ def speeds(trace: Trace, own: PlanetSet) -> Plot | None:
     rows = [group for group in shown if group]
     if not rows:
         return None
-    with styled():
-        figure, axes = panels((1.5,) * len(rows))
-        for axis, names in zip(axes, rows, strict=True):
-            for name in names:
-                axis.plot(trace.time, trace[name], label=name.removesuffix(GEAR_SPEED), lw=0.8)
-            finish(axis, "speed in rad/s")
-        axes[-1].set_xlabel("time in s")
-        picture = svg(figure, "set_speed")
+    panels = [Panel("speed in rad/s", channels(trace, names), height=150) for names in rows]
     means = ", ".join(f"{n.removesuffix(GEAR_SPEED)} {np.mean(trace[n]):.2f}" for group in rows for n in group)
     names = [name for group in rows for name in group]
-    return Plot("set_speed", "Speeds", f"Mean in rad/s: {means}.", picture, columns(trace, names))
+    return Plot("set_speed", "Speeds", f"Mean in rad/s: {means}.", over_time(panels), columns(trace, names))
 
 
 def forces(trace: Trace, own: PlanetSet, window: tuple[float, float] | None = None) -> Plot:
     """Magnitude of the mesh force of every planet, one panel for each central gear, over the run or a window (s)."""
     part = trace if window is None else trace.window(*window)
     file = "set_force" if window is None else "set_force_detail"
-    with styled():
-        figure, axes = panels((2.0,) * len(own.meshes))
-        for axis, (central, meshes) in zip(axes, own.meshes.items(), strict=True):
-            for planet, mesh in meshes.items():
-                force = 1e-3 * np.abs(part[f"{mesh}.force"])
-                axis.plot(part.time, force, label=planet, lw=0.7 if window is None else 1.1)
-            finish(axis, f"at the {central}, kN")
-        axes[-1].set_xlabel("time in s")
-        picture = svg(figure, file)
+    panels = []
+    for central, meshes in own.meshes.items():
+        curves = [Curve(part.time, 1e-3 * np.abs(part[f"{m}.force"]), f"{m}.force", "kN") for m in meshes.values()]
+        panels.append(Panel(f"mesh force at the {central} in kN", tuple(curves)))
     names = [f"{mesh}.force" for meshes in own.meshes.values() for mesh in meshes.values()]
     title = "Mesh forces of the planets" + ("" if window is None else ", detail")
-    return Plot(file, title, _opened(part, own), picture, columns(part, names))
+    chart = over_time(panels, "time" if window is None else file)
+    return Plot(file, title, _opened(part, own), chart, columns(part, names))
 
 
 def _opened(part: Trace, own: PlanetSet) -> str:
@@ -113,49 +100,30 @@ def shares(trace: Trace, own: PlanetSet, window: Window) -> tuple[dict[str, np.n
 
 def sharing(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     """Share of every planet in the load of sun and ring."""
-    over_time, means = shares(trace, own, window)
-    with styled():
-        figure, axes = panels((1.6,) * len(own.meshes))
-        for axis, (central, meshes) in zip(axes, own.meshes.items(), strict=True):
-            for planet, mesh in meshes.items():
-                axis.plot(trace.time, over_time[mesh], label=f"{planet}: {means[mesh]:.3f}", lw=0.9)
-            finish(axis, f"share at the {central}")
-        axes[-1].set_xlabel("time in s")
-        picture = svg(figure, "sharing")
+    over_time_, means = shares(trace, own, window)
+    panels = []
+    for central, meshes in own.meshes.items():
+        curves = [Curve(trace.time, over_time_[m], f"{planet}: {means[m]:.3f}") for planet, m in meshes.items()]
+        panels.append(Panel(f"share at the {central}", tuple(curves), height=160))
     caption = (
         "Mesh force over the mean of all planets, running mean over one mesh period; in the legend the mean from "
         f"{window.start:.3g} s to {window.end:.3g} s ({window.reason})."
     )
-    data = {"time_[s]": trace.time} | {f"{mesh}_share": values for mesh, values in over_time.items()}
-    return Plot("sharing", "Load sharing", caption, picture, data)
+    data = {"time_[s]": trace.time} | {f"{mesh}_share": values for mesh, values in over_time_.items()}
+    return Plot("sharing", "Load sharing", caption, over_time(panels), data)
 
 
 def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     """One row a planet: its mesh forces over the last mesh periods, its shares and the force on its pin over the
     run."""
-    over_time, means = shares(trace, own, window)
-    start, end = detail_window(trace, own, window)
-    late = (trace.time >= start) & (trace.time <= end)
-    with styled():
-        figure = Figure(figsize=(WIDTH, 1.35 * len(own.planets) + 0.6), layout="constrained")
-        axes = figure.subplots(len(own.planets), 3, squeeze=False, sharex="col", sharey="col")
-        for planet, (force, share, pin) in zip(own.planets, axes, strict=True):
-            for order, (central, mesh) in enumerate(_meshes_of(own, planet).items()):
-                look = {"zorder": 2.5 - 0.1 * order}  # the sun's, which vary less, in front
-                force.plot(trace.time[late], 1e-3 * np.abs(trace[f"{mesh}.force"][late]), lw=0.9, label=central, **look)
-                share.plot(trace.time, over_time[mesh], lw=0.6, label=f"{central} {means[mesh]:.3f}", **look)
-            if (pressed := _pin_force(trace, planet)) is not None:
-                pin.plot(trace.time, 1e-3 * pressed, lw=0.6, color=COLOURS[2], label=f"{np.mean(pressed):.4g} N")
-                pin.legend(loc="upper right", frameon=True, framealpha=0.8, edgecolor="none")
-            share.legend(loc="upper right", ncols=2, frameon=True, framealpha=0.8, edgecolor="none")
-            share.ticklabel_format(useOffset=False)
-            force.set_ylabel(planet)
-        axes[0, 0].legend(loc="upper right", ncols=2, frameon=True, framealpha=0.8, edgecolor="none")
-        for axis, title in zip(axes[0], ("mesh forces in kN", "share", "force on the pin in kN"), strict=True):
-            axis.set_title(title, loc="left")
-        for axis in axes[-1]:
-            axis.set_xlabel("time in s")
-        picture = svg(figure, "planets")
+    shared, means = shares(trace, own, window)
+    late = trace.window(*detail_window(trace, own, window))
+    panels: list[Panel] = []
+    for planet in own.planets:
+        panels += _of_planet(
+            trace, late, planet, {c: (m, shared[m], means[m]) for c, m in _meshes_of(own, planet).items()}
+        )
+    panels = _same_limits(panels)
     caption = (
         "Magnitudes of the mesh forces over the last mesh periods; share in the load of sun and ring, running mean "
         f"over one mesh period, with its mean from {window.start:.3g} s to {window.end:.3g} s; magnitude of the force "
@@ -164,10 +132,47 @@ def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     data = {"time_[s]": trace.time}
     for planet in own.planets:
         for central, mesh in _meshes_of(own, planet).items():
-            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": over_time[mesh]}
+            data |= {f"{planet}_{central}_[N]": trace[f"{mesh}.force"], f"{planet}_{central}_share": shared[mesh]}
         if (pressed := _pin_force(trace, planet)) is not None:
             data[f"{planet}_pin_[N]"] = pressed
-    return Plot("planets", "Planet by planet", caption, picture, data)
+    return Plot("planets", "Planet by planet", caption, Chart(tuple(panels), across=len(COLUMNS_OF_PLANETS)), data)
+
+
+COLUMNS_OF_PLANETS = ("mesh forces in kN", "share", "force on the pin in kN")
+
+
+def _of_planet(
+    trace: Trace, late: Trace, planet: str, meshes: Mapping[str, tuple[str, np.ndarray, float]]
+) -> list[Panel]:
+    """The row of a planet: mesh forces over the last mesh periods `late`; shares and pin force over the run. meshes: by
+    central gear its engagement, share (n,) and mean share."""
+    forces, parts = [], []
+    for central, (mesh, share, mean) in meshes.items():
+        forces.append(Curve(late.time, 1e-3 * np.abs(late[f"{mesh}.force"]), central, "kN"))
+        parts.append(Curve(trace.time, share, f"{central} {mean:.3f}"))
+    pressed = _pin_force(trace, planet)
+    pin: tuple[Curve, ...] = ()
+    if pressed is not None:
+        pin = (Curve(trace.time, 1e-3 * pressed, f"mean {np.mean(pressed):.4g} N", "kN", colour=2),)
+    return [
+        Panel(f"{planet}: {label}", tuple(curves), height=130)
+        for label, curves in zip(COLUMNS_OF_PLANETS, (forces, parts, pin), strict=True)
+    ]
+
+
+def _same_limits(panels: list[Panel]) -> list[Panel]:
+    """The panels of a column with one scale."""
+    found = []
+    for number, panel in enumerate(panels):
+        column = panels[number % len(COLUMNS_OF_PLANETS) :: len(COLUMNS_OF_PLANETS)]
+        values = np.concatenate([np.zeros(0), *(curve.y for other in column for curve in other.curves)])
+        values = values[np.isfinite(values)]
+        if values.size:
+            low, high = float(values.min()), float(values.max())
+            edge = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
+            panel = replace(panel, limits=(low - edge, high + edge))
+        found.append(panel)
+    return found
 
 
 def _meshes_of(own: PlanetSet, planet: str) -> dict[str, str]:
@@ -186,19 +191,14 @@ def pin_forces(trace: Trace, own: PlanetSet) -> Plot | None:
     known = {planet: force for planet in own.planets if (force := _pin_force(trace, planet)) is not None}
     if not known:
         return None
-    with styled():
-        figure, (axis,) = panels((2.2,))
-        for planet, force in known.items():
-            axis.plot(trace.time, 1e-3 * force, label=planet, lw=0.8)
-        finish(axis, "force in kN")
-        axis.set_xlabel("time in s")
-        picture = svg(figure, "pin")
+    curves = tuple(Curve(trace.time, 1e-3 * force, planet, "kN") for planet, force in known.items())
+    chart = over_time([Panel("force in kN", curves, height=200)])
     names = [f"pin.{planet}.{d}" for planet in known for d in ("fx", "fy")]
     caption = (
         "Force of every planet on its pin, magnitude across the axis; the data hold both components, in axes that "
         "turn with the carrier."
     )
-    return Plot("pin", "Pin forces", caption, picture, columns(trace, names))
+    return Plot("pin", "Pin forces", caption, chart, columns(trace, names))
 
 
 def energy(trace: Trace) -> Plot | None:
@@ -207,21 +207,17 @@ def energy(trace: Trace) -> Plot | None:
     works = [name for name in works if name != "drive.energy.work"] or ["energy.work"]
     if any(name not in trace for name in (*works, *ENERGIES)):
         return None
-    with styled():
-        figure, axes = panels((2.0, 1.3))
-        for name in (*works, "energy.stored", "energy.dissipated"):
-            axes[0].plot(trace.time, trace[name], label=name)
-        finish(axes[0], "energy in J")
-        axes[1].plot(trace.time, trace["energy.residual"], lw=0.9, label="stored − work + dissipated since the start")
-        finish(axes[1], "energy in J")
-        axes[1].set_xlabel("time in s")
-        picture = svg(figure, "energy")
+    left_over = Curve(trace.time, trace["energy.residual"], "stored − work + dissipated since the start", "J")
+    panels = (
+        Panel("energy in J", channels(trace, (*works, "energy.stored", "energy.dissipated")), height=190),
+        Panel("what the balance leaves in J", (left_over,), height=120),
+    )
     through = sum(float(np.ptp(trace[name])) for name in works)
     if works == ["energy.work"]:  # of all ports together: what came in and what went out is told by the run
         through = float(trace.meta.get("exchanged_work_J") or through)
     left = float(np.ptp(trace["energy.residual"])) / through if through else 0.0
     caption = f"The balance leaves {left:.1e} of the energy that passed through the shafts (sum of magnitudes)."
-    return Plot("energy", "Energy", caption, picture, columns(trace, [*works, *ENERGIES]))
+    return Plot("energy", "Energy", caption, over_time(panels), columns(trace, [*works, *ENERGIES]))
 
 
 def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
@@ -243,18 +239,13 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
     carrier = float(np.median(speed)) / (2 * np.pi)
     steady = np.ptp(np.percentile(speed, [5, 95])) < STEADY * np.median(speed)
-    with styled():
-        figure, axes = panels((1.9,) * len(groups))
-        for axis, group in zip(axes, groups.values(), strict=True):
-            for name in group:
-                lines = spectra[name]
-                axis.plot(lines.frequency[1:] / 1e3, metrics.level(lines.amplitude[1:]), label=name, lw=0.8)
-            level_axis(axis, "dB re 1 N")
-            axis.set_xlim(0, min(SHOWN_TO, 0.5 / step) / 1e3)
-            if steady:
-                _mark(axis, mesh_frequency, len(own.planets) * carrier)
-        axes[-1].set_xlabel("frequency in kHz")
-        picture = svg(figure, "spectrum")
+    top = min(SHOWN_TO, 0.5 / step)
+    marks = tuple(_marks(mesh_frequency, len(own.planets) * carrier, top)) if steady else ()
+    panels = []
+    for title, group in groups.items():
+        curves = tuple(spectrum_curve(name, spectra[name], top) for name in group)
+        panels.append(Panel(f"{title}: level in dB re 1 N", curves, marks=marks, limits=level_limits(curves)))
+    chart = Chart(tuple(panels), "frequency in kHz", "frequency", x_limits=(0.0, top / 1e3))
     first = next(iter(spectra.values()))
     caption = (
         f"Rms amplitude of each line, Hann, resolution {first.resolution:.3g} Hz, {window.start:.3g} s to "
@@ -267,21 +258,16 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
         else "Mesh orders are not marked: the speed is not steady."
     )
     data = {"frequency_[Hz]": first.frequency} | {f"{n}_rms_[N]": s.amplitude for n, s in spectra.items()}
-    return Plot("spectrum", "Spectra of the forces", caption, picture, data)
+    return Plot("spectrum", "Spectra of the forces", caption, chart, data)
 
 
-def _mark(axis: Axes, mesh_frequency: float, passing: float) -> None:
-    for order in range(1, MARKED_ORDERS + 1):
-        at = order * mesh_frequency / 1e3
-        if at > axis.get_xlim()[1]:
-            return
-        axis.axvline(at, color=MUTED, lw=0.7, ls=":", zorder=0)
-        for side in (-1, 1):
-            axis.axvline(at + side * passing / 1e3, color=MUTED, lw=0.5, alpha=0.3, zorder=0)
-        axis.annotate(
-            str(order), (at, 1), (3, -9), xycoords=("data", "axes fraction"), textcoords="offset points",
-            fontsize=8, color=MUTED,
-        )  # fmt: skip
+def _marks(mesh_frequency: float, passing: float, top: float) -> list[Mark]:
+    """Marks of the mesh orders and their sidebands below `top`; all in Hz."""
+    found = []
+    for order in range(1, min(MARKED_ORDERS, int(top / mesh_frequency)) + 1):
+        at = order * mesh_frequency
+        found += [Mark(at / 1e3, str(order)), *(Mark((at + side * passing) / 1e3, "", "side") for side in (-1, 1))]
+    return found
 
 
 def results(trace: Trace, own: PlanetSet, window: Window) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -13,6 +13,7 @@ from gearfmu.report.signals import SETTLED, bearings, lock_time, meshes, window_
 from gearfmu.stage.trace import Trace
 
 REACHED_THE_END = ("completed", "ok")  # outcomes of a run
+LOADED = 0.1  # of the largest static force: below it there is hardly a load to refer to
 
 
 def key_results(trace: Trace) -> dict[str, float]:
@@ -60,6 +61,31 @@ def _mesh_results(trace: Trace, part: Trace, mesh: str, steady: bool) -> dict[st
 def _rms_ac(trace: Trace, name: str, steady: bool) -> float:
     interval = float(trace.time[-1] - trace.time[0]) / max(trace.time.size - 1, 1)
     return rms(alternating(trace[name], interval, steady or interval <= 0))
+
+
+def dynamic_factors(trace: Trace) -> dict[str, float]:
+    """Largest mesh force over the static one within the window of interest, by name ("dynamic_factor", of several
+    meshes behind that of the mesh).
+
+    Static is the mean where the scene has a settling time, else the 10 ms moving average, looked at where it is at
+    least LOADED of its largest. The largest force of a step stands for its sample where it was recorded (X.force_max).
+    K_v of ISO 6336-1 is meant, as far as a simulation has it: of the normal force, its largest value in this run.
+    """
+    window = window_of_interest(trace)
+    part, names = trace.window(window.start, window.end), meshes(trace)
+    found = {}
+    for mesh in names:
+        if f"{mesh}.force" not in part or part.time.size < 2:
+            continue
+        force = np.asarray(part[f"{mesh}.force"], dtype=float)
+        interval = float(part.time[-1] - part.time[0]) / (part.time.size - 1)
+        static = np.abs(force - alternating(force, interval, window.reason == SETTLED))
+        peak = np.abs(part[f"{mesh}.force_max"] if f"{mesh}.force_max" in part else force)
+        loaded = static >= LOADED * static.max()
+        if static.max() > LOADED * peak.max():
+            name = f"{mesh}_dynamic_factor" if len(names) > 1 else "dynamic_factor"
+            found[name] = float(np.max(peak[loaded] / static[loaded]))
+    return found
 
 
 def strict(value: Any) -> Any:

@@ -3,6 +3,7 @@ planetary set also how its planets share the load."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ def write_plot(result: Any, path: Path) -> None:
         upper.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1)
         upper.set_ylabel("transmission error in µm")
         lower.set_ylabel("mesh stiffness in N/µm")
-        lower.set(xlabel="position in pitches", xlim=(0, 1))
+        lower.set(xlabel="position in pitches", xlim=(0, math.ceil(result.position[-1])))
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150)
 
@@ -42,6 +43,6 @@ def write_set_plot(result: Any, path: Path) -> None:
             axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1)
         upper.set_ylabel("transmission error in µm")
         lower.set_ylabel(f"force over mean, {result.torque[most]:.4g} N·m\nsun —  ring - -")
-        lower.set(xlabel="position in mesh periods", xlim=(0, 1))
+        lower.set(xlabel="position in mesh periods", xlim=(0, math.ceil(result.position[-1])))
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150)

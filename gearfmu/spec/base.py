@@ -221,8 +221,15 @@ def _kinds(kind: type[BaseModel]) -> tuple[Any, ...]:
 
 
 def fields_by_key(kind: type[BaseModel]) -> dict[Any, Any]:
-    """The fields by their keys in a file."""
-    return {field.alias or name: field for name, field in kind.model_fields.items()}
+    """The fields by their keys in a file, those of a class before those of its bases."""
+    return {(field := kind.model_fields[name]).alias or name: field for name in _own_first(kind)}
+
+
+def _own_first(kind: type[BaseModel]) -> list[str]:
+    """Names of the fields, what the bases have last."""
+    bases = [base for base in kind.__bases__ if issubclass(base, BaseModel)]
+    inherited = [name for base in bases for name in _own_first(base)]
+    return [name for name in kind.model_fields if name not in inherited] + inherited
 
 
 def metadata_of(field: FieldInfo) -> Iterator[Any]:

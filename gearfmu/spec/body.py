@@ -6,6 +6,7 @@ import hashlib
 import json
 from typing import Any
 
+from gearfmu.spec.flanks import TOOTHING
 from gearfmu.spec.imported import import_inputs
 from gearfmu.spec.planetary import RingSpec
 from gearfmu.spec.stage import StageSpec
@@ -14,8 +15,8 @@ from gearfmu.spec.stage import StageSpec
 def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
     """Everything that shapes the body of a gear, in SI, and nothing else.
 
-    Backlash, tip relief, lead modifications, misalignment, contact, ports, levels, names and bearings do not. The helix
-    angle is the gear's own, positive for a right-handed one: that of the wheel is minus the pair's.
+    Backlash, what is said of the flanks (`flanks.Toothing`), misalignment, contact, ports, levels, names and bearings
+    do not. The helix angle is the gear's own, positive for a right-handed one: that of the wheel is minus the pair's.
 
     The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
     contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
@@ -54,7 +55,8 @@ def gear_table(spec: Any, name: str) -> str:
 
 def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:
     """`body_inputs` of the ring of a general stage."""
-    inputs = {"kind": "ring"} | ring.model_dump(exclude={"name", "kind", "mounts", "imported", "rim_coupling"})
+    others = {"name", "kind", "mounts", "imported", "rim_coupling"} | TOOTHING
+    inputs = {"kind": "ring"} | ring.model_dump(exclude=others)
     if not inputs["helix_angle"]:
         inputs.pop("helix_angle")  # files of spur rings are older than helical ones
     if getattr(ring, "rigid_bore", False):  # a ring of a general stage

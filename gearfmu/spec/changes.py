@@ -38,7 +38,7 @@ def _written(kind: type[Spec], key: str, value: Any) -> Any:
     quantity, plain = quantity_at(kind, key), value.item() if isinstance(value, np.generic) else value
     number = isinstance(plain, (int, float)) and not isinstance(plain, bool)
     if quantity is None or not number:
-        return plain
+        return int(plain) if isinstance(plain, float) and plain.is_integer() else plain  # counts of a range: 1.0, 2.0
     return f"{plain!r} {quantity.unit}" if quantity.unit else float(plain)
 
 

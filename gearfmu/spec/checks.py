@@ -13,13 +13,13 @@ from gearfmu.errors import Problem
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
 from gearfmu.geometry.hertz import contact_modulus, half_width, largest_relative_radius
 from gearfmu.geometry.reference import ReferenceGear
+from gearfmu.spec.flank_checks import flank_problems
+from gearfmu.spec.flanks import TOOTHING
 from gearfmu.spec.gear import GearSpec, PairSpec
 
 STRIP_PER_HERTZ = 1.5  # the local law needs w > 1.12 b; at 1.5 b its tangent still has a margin
 _LARGEST_ALLOWANCE = 0.1  # of the module: more is a wrong centre distance or profile shift
 _LARGEST_THICKENING = 0.005  # of the module
-_LARGEST_RELIEF = 0.1  # of the module
-_LARGEST_INDEX_DEVIATION = 0.05  # of the module: coarser than every tolerance class of ISO 1328-1
 _RIM_PER_TOOTH_HEIGHT = 0.5  # thinner rims are outside the rim thickness factor of ISO 6336-3
 
 Found = Iterator[tuple[str, float | str, str]]
@@ -46,7 +46,6 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
     elif sound:
         geometry = PairGeometry((shapes[0], shapes[1]), pair.center_distance, pair.backlash)
         found += _pair(pair, gears, geometry)
-        found += _reliefs(gears, geometry)
         found += _strips(gears, geometry, torque_max)
     return [
         Problem(file, field, value if isinstance(value, str) else millimetres(value), remedy)
@@ -56,7 +55,8 @@ def geometry_problems(file: str, pair: PairSpec, gears: Sequence[GearSpec], torq
 
 def _shapes_flanks(field: str) -> bool:
     """Do checks of the mesh depend on this field of a gear?"""
-    return not field.endswith((".bore_diameter", ".import")) and ".index_deviation." not in field
+    name = field.split(".")[2]
+    return name not in TOOTHING and name not in ("bore_diameter", "import")
 
 
 def gear_problems(gear: GearSpec, shape: GearGeometry) -> Found:
@@ -64,10 +64,11 @@ def gear_problems(gear: GearSpec, shape: GearGeometry) -> Found:
     rack = _rack_problems(gear, shape)
     yield from rack
     yield from _rim_problems(gear, shape)
-    yield from _index_problems(gear, shape)
     yield from import_problems(gear, shape)
-    if not rack:
-        yield from _tip_problems(gear, shape)
+    tip = [] if rack else list(_tip_problems(gear, shape))
+    yield from tip
+    if not rack and not tip:
+        yield from flank_problems(gear, shape)
 
 
 def _rack_problems(gear: GearSpec, shape: GearGeometry) -> list[tuple[str, float | str, str]]:
@@ -113,16 +114,6 @@ def import_problems(gear: Any, shape: ReferenceGear) -> Found:
             "finite elements made elsewhere are read for spur gears only: set the helix angle to 0 deg or leave the "
         )
         yield "import", gear.imported.file, remedy + "table away and let the gear be meshed here"
-
-
-def _index_problems(gear: GearSpec, shape: GearGeometry) -> Found:
-    largest = _LARGEST_INDEX_DEVIATION * shape.m
-    for tooth, deviation in gear.index_deviation.items():
-        field = f"index_deviation.{tooth}"
-        if tooth >= gear.teeth:
-            yield field, deviation, f"there is no such tooth: they are numbered 0 to {gear.teeth - 1}"
-        elif abs(deviation) > largest:
-            yield field, deviation, f"more than a twentieth of the module: at most {millimetres(largest)}"
 
 
 def _tip_problems(gear: GearSpec, shape: GearGeometry) -> Found:
@@ -200,26 +191,6 @@ def _interference(gears: Sequence[GearSpec], geometry: PairGeometry, index: int)
         )
 
 
-def _reliefs(gears: Sequence[GearSpec], geometry: PairGeometry) -> Found:
-    for gear, shape in zip(gears, geometry.gears, strict=True):
-        relief = gear.tip_relief
-        if relief is None:
-            continue
-        field = f"gears.{gear.name}.tip_relief"
-        if relief.amount > _LARGEST_RELIEF * shape.m:
-            yield (
-                f"{field}.amount",
-                relief.amount,
-                f"more than a tenth of the module: at most {millimetres(_LARGEST_RELIEF * shape.m)}",
-            )
-        if not isinstance(relief.start_roll, str) and not shape.s_form <= relief.start_roll < shape.s_a:
-            yield (
-                f"{field}.start_roll",
-                relief.start_roll,
-                f"outside the flank: from {millimetres(shape.s_form)} to {millimetres(shape.s_a)}",
-            )
-
-
 def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float | None) -> Found:
     least = STRIP_PER_HERTZ * largest_half_width(gears, geometry, torque_max) if torque_max else 0.0
     for gear, shape in zip(gears, geometry.gears, strict=True):
@@ -261,7 +232,7 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 def rounded_down(value: float, digits: int = 4) -> float:
     """The largest number of so many significant digits that is not above `value`."""
-    step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 1.0
+    step = 10.0 ** max(math.floor(math.log10(abs(value))) - digits + 1, -300) if value else 1.0
     return math.floor(value / step) * step
 
 

@@ -60,6 +60,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
                 torque_max=spec.torque_max,
                 speed_max=spec.speed_max,
                 misalignment=pair.misalignment,
+                friction=spec.contact.friction,
             ),
         ),
         supports=tuple(
@@ -91,7 +92,10 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
     assert spec.contact is not None
     planets = [f"planet{k + 1}" for k in range(spec.set.planets)]
     bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, "sun", _rack(spec, "sun"))}
-    bodies |= {name: _set_gear(spec.planet, name, _rack(spec, "planet")) for name in planets}
+    for k, name in enumerate(planets):
+        eccentricity = spec.set.planet_eccentricity.get(k, spec.planet.eccentricity)
+        planet = spec.planet.model_copy(update={"eccentricity": eccentricity})
+        bodies[name] = _set_gear(planet, name, _rack(spec, "planet"))
     ring = {name: getattr(spec.ring, name) for name in RingSpec.model_fields} | {"mounts": None}
     bodies["ring"] = RingBody(**ring, kind="ring", **_rack(spec, "ring"))
     carrier = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
@@ -184,7 +188,8 @@ def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]
 def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
     assert spec.contact is not None and spec.speed_max is not None
     z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
-    common: dict[str, Any] = {"backlash": spec.set.backlash, "damping": spec.contact.damping}
+    contact = {"damping": spec.contact.damping, "friction": spec.contact.friction}
+    common: dict[str, Any] = {"backlash": spec.set.backlash, **contact}
     torque, relative = mesh_torque(spec), spec.speed_max * z_r  # teeth past a planet in the carrier's axes
     return tuple(
         EngagementSpec(name=f"sun_{p}", gears=("sun", p), torque_max=torque, speed_max=relative / z_s, **common)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, refuse
+from gearfmu.spec.flanks import Toothing
 from gearfmu.spec.imported import ImportSpec
-from gearfmu.spec.lead import LeadSpec, Misalignment
+from gearfmu.spec.lead import Length as Length
+from gearfmu.spec.lead import Misalignment
 
-Length = Annotated[float, Quantity("m", above=0)]
 Size = Annotated[float, Quantity("m", at_least=0)]
 Angle = Annotated[float, Quantity("rad")]
 Factor = Annotated[float, Quantity(above=0)]
-Deviation = Annotated[float, Quantity("m")]
 Ratio = Annotated[float, Quantity(at_least=0, below=1)]
 Grading = Annotated[float, Quantity(at_least=0.2, at_most=5)]
 SurfaceCoupling = Literal["averaging", "rigid"]
@@ -87,17 +87,6 @@ class Bearing(Spec):
     damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
 
 
-class TipRelief(Spec):
-    """Tip relief on both flanks of every tooth."""
-
-    amount: Length = Field(description="relief normal to the involute at the tip diameter")
-    start_roll: Annotated[float, Quantity("m", above=0, words=("outer_single_contact",))] = Field(
-        default=cast(Any, "outer_single_contact"),  # the loader puts the roll in its place
-        description='roll length of its beginning, or "outer_single_contact"',
-    )
-    kind: Literal["quadratic"] = Field(default="quadratic", description="shape over the roll length")
-
-
 class MeshSpec(Spec):
     """Element counts of the sector mesh (20-node hexahedra; half a tooth) and how they are graded.
 
@@ -150,7 +139,7 @@ class BodySpec(Spec):
     mesh: MeshSpec = Field(default_factory=MeshSpec, description="element counts")
 
 
-class GearSpec(Spec):
+class GearSpec(Toothing):
     """One gear; `name` is also its shaft's name."""
 
     model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
@@ -169,15 +158,6 @@ class GearSpec(Spec):
     rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
     material: Material = Field(description="material")
     modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
-    tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
-    lead: LeadSpec | None = Field(
-        default=None, description="modifications across the face width; none when the table is absent"
-    )
-    index_deviation: dict[Annotated[int, Field(ge=0)], Deviation] = Field(
-        default={},
-        description="pitch errors: individual index deviation F_pi (ISO 1328-1) by tooth number, arc on the reference "
-        "circle, both flanks, positive counter-clockwise",
-    )
     bearing: Bearing = Field(description="bearing")
     body: BodySpec = Field(description="mesh and reduction")
     imported: ImportSpec | None = Field(

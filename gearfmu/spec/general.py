@@ -13,9 +13,9 @@ from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size, SurfaceCoupling
-from gearfmu.spec.lead import LeadSpec, Misalignment
+from gearfmu.spec.lead import Misalignment
 from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
-from gearfmu.spec.ports import Frequency, LevelSpec, NodalSpec, PortSpec
+from gearfmu.spec.ports import Frequency, FrictionSpec, LevelSpec, NodalSpec, PortSpec
 
 Place = Annotated[float, Quantity("m")]
 Spring = Annotated[float, Quantity("N/m", above=0, words=("rigid",))]
@@ -83,21 +83,6 @@ class RingBody(RingSpec):
         if value is not None:
             raise refuse("a ring of a general stage has no mounts of its own: write it under [[supports]]")
         return value
-
-    @property
-    def tip_relief(self) -> None:
-        """No tip relief is declared for a ring yet."""
-        return None
-
-    @property
-    def lead(self) -> LeadSpec | None:
-        """No lead modification is declared for a ring yet."""
-        return None
-
-    @property
-    def index_deviation(self) -> dict[int, float]:
-        """No pitch errors are declared for a ring yet."""
-        return {}
 
 
 ToothedBody = GearBody | RingBody
@@ -171,6 +156,7 @@ class EngagementSpec(Spec):
     )
     torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest torque on gear A")
     speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
+    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
     misalignment: Misalignment | None = Field(
         default=None,
         description="parallelism errors of the axes, B's seen from A's; parallel when the table is absent",
@@ -255,10 +241,10 @@ class GeneralStage(Spec):
 
     @property
     def even(self) -> bool:
-        """Whether everything is symmetric about mid-width: planar, without lead modifications and misalignment."""
+        """Whether everything is symmetric about mid-width: planar, flanks even across the width, axes aligned."""
         return (
             self.planar
-            and all(gear.lead is None for gear in self.gears)
+            and not any(gear.uneven for gear in self.gears)
             and all(mesh.misalignment is None for mesh in self.engagements)
         )
 

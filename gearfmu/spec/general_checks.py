@@ -10,10 +10,11 @@ from dataclasses import replace
 
 from gearfmu.errors import Problem
 from gearfmu.spec.checks import geometry_problems, millimetres
+from gearfmu.spec.flank_checks import with_rolls
 from gearfmu.spec.gear import PairSpec
-from gearfmu.spec.general import EngagementSpec, GearBody, GeneralStage, RingBody, ShaftBody, ToothedBody
+from gearfmu.spec.general import EngagementSpec, GeneralStage, RingBody, ShaftBody, ToothedBody
 from gearfmu.spec.planetary_checks import RingPair, ring_pair_problems
-from gearfmu.spec.shapes import centre_distance, mesh_shape
+from gearfmu.spec.shapes import centre_distance, mesh_shape, toothed
 
 Found = Iterator[tuple[str, str, str]]
 _SAME_RACK = ("normal_module", "pressure_angle")
@@ -145,11 +146,11 @@ def _held(stage: GeneralStage) -> Found:
 
 def _joined(stage: GeneralStage, bodies: list[str]) -> set[str]:
     """Those of `bodies` that springs against twist connect to the first."""
-    links = [(s.body, s.to) for s in stage.supports if s.to is not None and s.torsion is not None]
+    joints = [(s.body, s.to) for s in stage.supports if s.to is not None and s.torsion is not None]
     joined, size = {bodies[0]}, 0
     while size != len(joined):
         size = len(joined)
-        joined |= {b for a, b in (*links, *((b, a) for a, b in links)) if a in joined and b in bodies}
+        joined |= {b for a, b in (*joints, *((b, a) for a, b in joints)) if a in joined and b in bodies}
     return joined
 
 
@@ -196,17 +197,11 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
 
 
 def with_relief_rolls(stage: GeneralStage) -> GeneralStage:
-    """The same stage with "outer_single_contact" turned into a roll, that of a gear's first engagement."""
+    """The same stage with points of single contact turned into rolls, those of a gear's first engagement."""
     bodies = dict(stage.bodies)
     for mesh in reversed(stage.engagements):
         for index, name in enumerate(mesh.gears):
-            gear = stage.bodies[name]
-            if not isinstance(gear, GearBody) or gear.tip_relief is None:
-                continue
-            if isinstance(gear.tip_relief.start_roll, str):  # "outer_single_contact"
-                start = mesh_shape(stage, mesh).outer_single_contact(index)
-                relief = gear.tip_relief.model_copy(update={"start_roll": start})
-                bodies[name] = gear.model_copy(update={"tip_relief": relief})
+            bodies[name] = with_rolls(toothed(stage, name), mesh_shape(stage, mesh), index)
     return stage.model_copy(update={"bodies": bodies})
 
 

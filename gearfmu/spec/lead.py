@@ -6,22 +6,27 @@ to the transverse involute, like those of a tip relief.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from gearfmu.spec.base import Quantity, Spec
 
 Depth = Annotated[float, Quantity("m", at_least=0)]
 Length = Annotated[float, Quantity("m", above=0)]
 Deviation = Annotated[float, Quantity("m")]
+# "quadratic" is what files of before 0.2 call a parabola
+ReliefKind = Annotated[
+    Literal["linear", "parabolic", "arc"], BeforeValidator(lambda kind: "parabolic" if kind == "quadratic" else kind)
+]
 
 
 class EndRelief(Spec):
-    """Material taken off towards both ends of the face width, quadratic over the length."""
+    """Material taken off towards both ends of the face width."""
 
     amount: Depth = Field(description="end relief at either end of the face width, normal to the involute")
     length: Length = Field(description="length from either end over which it fades to nothing")
+    kind: ReliefKind = Field(default="parabolic", description="shape over that length")
 
 
 class LeadSpec(Spec):

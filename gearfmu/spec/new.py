@@ -6,14 +6,16 @@ import json
 import os
 import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Quantity, Spec, fields_by_key, inner_model, metadata_of
+from gearfmu.spec.base import Quantity, fields_by_key, inner_model, metadata_of
 from gearfmu.spec.layers import read_layers
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
@@ -21,7 +23,7 @@ from gearfmu.spec.stage import StageSpec, load_stage
 
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}$")
 _DESCRIPTION = "made like {like}; say here in one line what it is"
-_HEAD = """# Gear stage "{name}", made like "{like}". Lengths, torques … are text with a unit.
+_HEAD = """# Gear stage "{name}", {origin}. Lengths, torques … are text with a unit.
 # A line such as "# slices = 5" shows a default.
 # Bodies (<gear>.h5) are made beside this file by `gearfmu reduce` and remade when anything that shapes them changes.
 """
@@ -33,30 +35,41 @@ def new_stage(name: str, like: str | os.PathLike[str] = "fzg_c", folder: str | o
     The file is written under a temporary name and appears whole; an existing one is never touched. SpecError when
     `name` is no name, `like` is no valid stage, or the file exists.
     """
-    target = Path(folder) / name / "stage.toml"
-    if not _NAME.match(name):
-        remedy = "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
-        raise SpecError([Problem("", "name", f'"{name}"', remedy)])
+    target = _target(name, folder)
     source = find_stage(like)
     if load_stage(source).kind == "general":
         text = _renamed(source.read_text(encoding="utf-8"), name, str(like))
     else:
         own = {"name": name, "description": _DESCRIPTION.format(like=like)}
-        text = stage_text(read_layers(source).tables | own, name, str(like))
-    try:
-        _write_new(target, text)
-    except FileExistsError:
-        raise SpecError(
-            [Problem(str(target), "", "", "this file exists already: choose another name, or edit it")]
-        ) from None
-    return target
+        text = stage_text(read_layers(source).tables | own, _HEAD.format(name=name, origin=f'made like "{like}"'))
+    return _write_new(target, text)
 
 
-def stage_text(raw: dict[str, Any], name: str, like: str) -> str:
+def write_drafted(
+    name: str, tables: dict[str, Any], marks: Mapping[str, str], origin: str, folder: str | os.PathLike[str] = "."
+) -> Path:
+    """Write `folder`/`name`/stage.toml with these tables, like `new_stage`, every value followed by its mark.
+
+    marks: place ("gears.pinion.teeth") → where the value is from; origin: the same of the whole file, in one line.
+    """
+    target = _target(name, folder)
+    own = {"name": name, "description": origin}
+    shown = {place: mark for place, mark in marks.items() if place not in ("name", "description", "kind")}
+    return _write_new(target, stage_text(tables | own, _HEAD.format(name=name, origin=origin), shown))
+
+
+def stage_text(raw: dict[str, Any], head: str, marks: Mapping[str, str] = MappingProxyType({})) -> str:
     """The commented file for these tables."""
     tables = {key: value for key, value in raw.items() if key != "source"}
     kind = PlanetarySpec if tables.get("kind") == "planetary_set" else StageSpec
-    return _HEAD.format(name=name, like=like) + "\n".join(_table(kind, tables, ())) + "\n"
+    return head + "\n".join(_table(kind, tables, (), marks)) + "\n"
+
+
+def _target(name: str, folder: str | os.PathLike[str]) -> Path:
+    if not _NAME.match(name):
+        remedy = "a name has small letters, digits and underscores, begins with a letter and has at most 40 characters"
+        raise SpecError([Problem("", "name", f'"{name}"', remedy)])
+    return Path(folder) / name / "stage.toml"
 
 
 def _renamed(text: str, name: str, like: str) -> str:
@@ -66,8 +79,8 @@ def _renamed(text: str, name: str, like: str) -> str:
     return text
 
 
-def _write_new(target: Path, text: str) -> None:
-    """Like files.write_text, but fails with FileExistsError instead of replacing a file."""
+def _write_new(target: Path, text: str) -> Path:
+    """Like files.write_text, but refuses to replace a file."""
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.name}-{os.getpid()}-{secrets.token_hex(4)}")
     try:
@@ -78,35 +91,44 @@ def _write_new(target: Path, text: str) -> None:
             if target.exists():
                 raise FileExistsError(target) from None
             os.rename(temporary, target)
+    except FileExistsError:
+        raise SpecError(
+            [Problem(str(target), "", "", "this file exists already: choose another name, or edit it")]
+        ) from None
     finally:
         temporary.unlink(missing_ok=True)
+    return target
 
 
-def _table(kind: type[Spec], raw: dict[str, Any], place: tuple[str, ...]) -> Iterator[str]:
+def _table(
+    kind: type[BaseModel], raw: dict[str, Any], place: tuple[str, ...], marks: Mapping[str, str]
+) -> Iterator[str]:
     """Lines of one table: its own fields first, then its sub-tables."""
     fields = {
         key: field for key, field in fields_by_key(kind).items() if key != "source" and not (key == "name" and place)
     }
     for key, field in fields.items():
-        if inner_model(field.annotation) is None and (line := _line(key, field, raw)):
-            yield line
+        if inner_model(field.annotation) is None:
+            mark = marks.get(".".join((*place, key)), "")
+            yield _line(key, field, raw) + (f"; {mark}" if mark else "")
     for key, field in fields.items():
         inner = inner_model(field.annotation)
         if inner is None:
             continue
         named = get_origin(field.annotation) in (tuple, dict)
         for name, table in raw.get(key, {}).items() if named else [(None, raw.get(key))]:
-            yield from _sub_table(inner, table, (*place, key) if name is None else (*place, key, name), field)
+            own = (*place, key) if name is None else (*place, key, name)
+            if table is None and type(None) in get_args(field.annotation):
+                yield from _absent(inner, own, field)
+            else:
+                yield f"\n[{'.'.join(own)}]  # {field.description}"
+                yield from _table(inner, table or {}, own, marks)
 
 
-def _sub_table(kind: Any, raw: dict[str, Any] | None, place: tuple[str, ...], field: FieldInfo) -> Iterator[str]:
-    header = f"[{'.'.join(place)}]"
-    if raw is None and type(None) in get_args(field.annotation):
-        yield f"\n# {header}  # {field.description}"
-        yield from (f"# {line}" for line in _table(kind, {}, place) if not line.startswith("\n"))
-        return
-    yield f"\n{header}  # {field.description}"
-    yield from _table(kind, raw or {}, place)
+def _absent(kind: Any, place: tuple[str, ...], field: FieldInfo) -> Iterator[str]:
+    """An optional table that is not there, as comments."""
+    yield f"\n# [{'.'.join(place)}]  # {field.description}"
+    yield from (f"# {line}" for line in _table(kind, {}, place, {}) if not line.startswith("\n"))
 
 
 def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:

@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
-from gearfmu.spec.gear import Bearing, BodySpec, Factor, HelixAngle, Length, Material, RackSpec, Ratio, Size, TipRelief
+from gearfmu.spec.flanks import Eccentricity, Toothing
+from gearfmu.spec.gear import Bearing, BodySpec, Factor, HelixAngle, Length, Material, RackSpec, Ratio, Size
 from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
 
@@ -47,9 +48,13 @@ class SetSpec(Spec):
         description="deviation of single pins from their places: number of the bolt (planet1 is on bolt 0) → radial, "
         "tangential",
     )
+    planet_eccentricity: dict[Annotated[int, Field(ge=0, le=11)], Eccentricity] = Field(
+        default={},
+        description="eccentric toothings of single planets: number of the bolt → amount, angle; before that of all",
+    )
 
 
-class SetGearSpec(Spec):
+class SetGearSpec(Toothing):
     """Sun or planet: an external gear."""
 
     model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
@@ -71,15 +76,9 @@ class SetGearSpec(Spec):
         default=None,
         description="of the sun: on the ground, however soft where it floats; of a planet: its pin; for motion",
     )
-    tip_relief: TipRelief | None = Field(default=None, description="tip relief; none when the table is absent")
     imported: ImportSpec | None = Field(
         default=None, alias="import", description="finite elements made elsewhere; meshed here when the table is absent"
     )
-
-    @property
-    def index_deviation(self) -> dict[int, float]:
-        """No pitch errors are declared for a set yet."""
-        return {}
 
 
 class MountsSpec(Spec):
@@ -94,7 +93,7 @@ class MountsSpec(Spec):
     damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m), of all mounts together")
 
 
-class RingSpec(Spec):
+class RingSpec(Toothing):
     """The internal gear. Its profile shift is positive outwards, as for the external gear that fills its spaces."""
 
     model_config = ConfigDict(populate_by_name=True)
@@ -128,17 +127,24 @@ class CarrierMeshSpec(Spec):
         default=4, description="elements around the bolt towards bore and rim, each half side"
     )
     sides: Annotated[Count, Field(ge=2, le=60)] = Field(
-        default=6, description="elements around the bolt towards the next bolt"
+        default=4, description="elements around the bolt towards the next bolt"
     )
-    bolt: Annotated[Count, Field(ge=1, le=30)] = Field(default=2, description="elements from the bolt's core outwards")
-    disc: Annotated[Count, Field(ge=1, le=60)] = Field(default=5, description="elements from the bolt to the edges")
-    plate: Annotated[Count, Field(ge=1, le=60)] = Field(default=3, description="elements through the plate")
+    bolt: Annotated[Count, Field(ge=1, le=30)] = Field(default=4, description="elements from the bolt's core outwards")
+    disc: Annotated[Count, Field(ge=1, le=60)] = Field(default=8, description="elements from the bolt to the edges")
+    plate: Annotated[Count, Field(ge=1, le=60)] = Field(default=6, description="elements through the plate")
+    neck: Annotated[Count, Field(ge=1, le=30)] = Field(
+        default=4, description="elements in the gap between plate and seat"
+    )
     length: Annotated[Count, Field(ge=1, le=60)] = Field(default=4, description="elements along the planet's seat")
     scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(default=1.0, description="factor on all counts")
 
     def scaled(self, count: int, least: int = 1) -> int:
         """`count` times the scale, rounded."""
         return max(least, round(self.scale * count))
+
+    def growth(self, factor: float) -> float:
+        """Growth of neighbouring elements, so that a scaled mesh is graded over the same length."""
+        return factor ** (1 / self.scale)
 
 
 class CarrierSpec(Spec):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.geometry.planetary import HANDS
+from gearfmu.spec.flanks import TOOTHING
 from gearfmu.spec.imported import import_inputs
 from gearfmu.spec.planetary import PlanetarySpec
 
@@ -13,7 +14,7 @@ SET_BODIES = ("sun", "planet", "ring", "carrier")
 
 def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
     """Everything that shapes the body `name` of a set, in SI, and nothing else: not torque, backlash, load sharing,
-    bearings, relief, contact, ports, levels.
+    bearings, what is said of the flanks (`flanks.Toothing`), contact, ports, levels.
 
     An imported body depends on the contents of its files, not on our element counts; SpecError when a file is missing.
     """
@@ -38,7 +39,7 @@ def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
             carrier.pop("mesh")
             carrier["import"] = import_inputs(spec.carrier.imported, spec.source, "carrier.import")
         return common | place | carrier | {"coupling": {c: spec.carrier.coupling_of(c) for c in couplings}}
-    gear = spec.gears[SET_BODIES.index(name)].model_dump(exclude={"name", "imported", "bearing", "tip_relief"})
+    gear = spec.gears[SET_BODIES.index(name)].model_dump(exclude={"name", "imported", "bearing"} | TOOTHING)
     if gear.get("mounts"):
         gear["mounts"].pop("damping_ratio")
     if name != "ring":

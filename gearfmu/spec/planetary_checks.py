@@ -28,6 +28,7 @@ from gearfmu.spec.checks import (
     rounded_down,
     rounded_up,
 )
+from gearfmu.spec.flank_checks import flank_problems
 from gearfmu.spec.gear import PairSpec
 from gearfmu.spec.planetary import PlanetarySpec
 
@@ -127,6 +128,9 @@ def _ring(spec: PlanetarySpec | RingPair, shape: InternalGearGeometry) -> Found:
     elif shape.tip_land_half_angle < 0:
         land = millimetres(2 * shape.r_a * shape.tip_half_angle)
         yield "ring.tip_edge_radius", spec.ring.tip_edge_radius, f"the two roundings overlap on a tip of {land}"
+    else:
+        for field, value, remedy in flank_problems(spec.ring, shape):
+            yield f"ring.{field}", value, remedy
     height = shape.r_f - shape.r_a
     if shape.r_rim < shape.r_f + _THINNEST_RIM * height:
         least = 2 * (shape.r_f + _THINNEST_RIM * height)
@@ -216,9 +220,10 @@ def _assembly(spec: PlanetarySpec, planet: GearGeometry) -> Found:
     if room <= 2 * planet.r_a:
         remedy = f"neighbouring planets touch: their axes are {millimetres(room)} apart, the tip diameter is "
         yield "set.planets", str(planets), f"{remedy}{millimetres(2 * planet.r_a)}; fewer or smaller planets"
-    for pin in spec.set.pin_errors:
-        if pin >= planets:
-            yield f"set.pin_errors.{pin}", str(pin), f"no such pin: the {planets} are 0 to {planets - 1}"
+    for field in ("pin_errors", "planet_eccentricity"):
+        for pin in getattr(spec.set, field):
+            if pin >= planets:
+                yield f"set.{field}.{pin}", str(pin), f"no such pin: the {planets} are 0 to {planets - 1}"
 
 
 def _are_places(positions: Sequence[int], planets: int, teeth: int) -> bool:

@@ -34,6 +34,23 @@ class NodalSpec(Spec):
     )
 
 
+class FrictionSpec(Spec):
+    """Friction of the flanks along the profile."""
+
+    law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = Field(
+        default="constant", description="what the coefficient of friction follows"
+    )
+    coefficient: Annotated[float, Quantity(at_least=0, at_most=0.5)] = Field(
+        default=0.05, description="coefficient of friction of law constant"
+    )
+    viscosity: Annotated[float, Quantity("Pa*s", above=0, at_most=10)] = Field(
+        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth, of the other laws"
+    )
+    roughness: Annotated[float, Quantity("m", above=0, at_most=1e-5)] = Field(
+        default=0.4e-6, description="mean roughness Ra of both flanks, of the other laws"
+    )
+
+
 class ContactSpec(Spec):
     """Tooth contact."""
 
@@ -43,6 +60,7 @@ class ContactSpec(Spec):
     )
     law: Literal["line"] = Field(default="line", description="contact law")
     nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
+    friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
 
 
 class ChainSpec(Spec):

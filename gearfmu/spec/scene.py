@@ -45,6 +45,9 @@ class Effects(Spec):
     coriolis: Switch = True
     centrifugal: Switch = True
     gyroscopic: Switch = True
+    flank_deviations: Switch = True
+    runout: Switch = True
+    friction: Switch = True
 
     @property
     def off(self) -> tuple[str, ...]:

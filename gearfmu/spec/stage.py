@@ -6,15 +6,17 @@ import os
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, field_validator, model_validator
 
 from gearfmu.errors import Problem, SpecError, UnitError
-from gearfmu.geometry import PairGeometry
+from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry.planetary import set_geometry
 from gearfmu.spec.base import Name, Quantity, Spec, Text, refuse, validate
 from gearfmu.spec.changes import Changes, changed_tables
 from gearfmu.spec.checks import geometry_problems
+from gearfmu.spec.flank_checks import located, topography_problems, with_rolls
 from gearfmu.spec.gear import GearSpec, PairSpec
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.general_checks import general_problems, with_relief_rolls
@@ -25,6 +27,7 @@ from gearfmu.spec.library import find_stage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.planetary_checks import set_problems
 from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
+from gearfmu.spec.shapes import gear_shape
 from gearfmu.units import to_si
 
 
@@ -111,9 +114,8 @@ def _load_pair(layers: Layers) -> StageSpec:
         problems += _geometry_of_what_can_be_read(layers)
     problems += found.problems
     problems += missing_files(layers)
-    if problems or spec is None:
-        raise SpecError(layers.attributed(problem) for problem in problems)
-    return _with_relief_rolls(_with_import_paths(spec, layers))
+    spec = _judged(spec and _with_paths(spec, layers), layers, problems)
+    return _with_relief_rolls(spec)
 
 
 def _pair_problems(spec: StageSpec) -> list[Problem]:
@@ -146,15 +148,7 @@ def _load_set(layers: Layers) -> PlanetarySpec:
     spec, found = read_and_judge(PlanetarySpec, raw | named | {"source": path}, str(path), judge)
     problems += found.problems
     problems += missing_files(layers)
-    if problems or spec is None:
-        raise SpecError(layers.attributed(problem) for problem in problems)
-    parts = {name: getattr(spec, name) for name in ("sun", "planet", "ring", "carrier")}
-    located = {
-        name: part.model_copy(update={"imported": part.imported.located(layers, f"{name}.import")})
-        for name, part in parts.items()
-        if part.imported is not None
-    }
-    return spec.model_copy(update=located)
+    return _judged(spec and _set_with_paths(spec, layers), layers, problems)
 
 
 def _load_general(layers: Layers) -> GeneralStage:
@@ -163,14 +157,37 @@ def _load_general(layers: Layers) -> GeneralStage:
     spec, found = read_and_judge(GeneralStage, raw | {"source": path}, str(path), partial(general_problems, str(path)))
     problems += found.problems
     problems += missing_files(layers)
+    if spec is not None:
+        bodies = {gear.name: located(gear, layers, f"bodies.{gear.name}") for gear in spec.gears}
+        spec = spec.model_copy(update={"bodies": spec.bodies | bodies})
+    return with_relief_rolls(_judged(spec, layers, problems))
+
+
+Loaded = TypeVar("Loaded", bound=Spec)
+
+
+def _judged(spec: Loaded | None, layers: Layers, problems: list[Problem]) -> Loaded:
+    """The stage, files as seen from here, where nothing is wrong with it; topographies are read here."""
+    if spec is not None and not problems:
+        problems = _topography_problems(spec, layers)
     if problems or spec is None:
         raise SpecError(layers.attributed(problem) for problem in problems)
-    bodies = {
-        name: body.model_copy(update={"imported": body.imported.located(layers, f"bodies.{name}.import")})
-        for name, body in ((gear.name, gear) for gear in spec.gears)
-        if body.imported is not None
-    }
-    return with_relief_rolls(spec.model_copy(update={"bodies": spec.bodies | bodies}))
+    return spec
+
+
+def _topography_problems(spec: Any, layers: Layers) -> list[Problem]:
+    """What is wrong with the topographies of all gears."""
+    members: list[tuple[str, Any, Any]]
+    if isinstance(spec, PlanetarySpec):
+        members = [(gear.name, gear, set_geometry(spec, gear.name)) for gear in spec.gears]
+    elif isinstance(spec, GeneralStage):
+        members = [(f"bodies.{gear.name}", gear, gear_shape(gear)) for gear in spec.gears]
+    else:
+        members = [
+            (f"gears.{gear.name}", gear, GearGeometry.of(gear, spec.pair, hand))
+            for gear, hand in zip(spec.gears, (1, -1), strict=True)
+        ]
+    return [problem for place, gear, shape in members for problem in topography_problems(gear, shape, layers, place)]
 
 
 def _unknown(key: str, raw: dict[str, Any]) -> Problem:
@@ -199,23 +216,21 @@ def _geometry_of_what_can_be_read(layers: Layers) -> list[Problem]:
     return geometry_problems(file, pair, gears, torque)
 
 
-def _with_import_paths(spec: StageSpec, layers: Layers) -> StageSpec:
-    """The same stage with the files of imported bodies named as seen from here."""
-    gears = tuple(
-        gear
-        if gear.imported is None
-        else gear.model_copy(update={"imported": gear.imported.located(layers, f"gears.{gear.name}.import")})
-        for gear in spec.gears
-    )
-    return spec.model_copy(update={"gears": gears})
+def _with_paths(spec: StageSpec, layers: Layers) -> StageSpec:
+    """The same stage with the files of its gears named as seen from here."""
+    return spec.model_copy(update={"gears": tuple(located(g, layers, f"gears.{g.name}") for g in spec.gears)})
+
+
+def _set_with_paths(spec: PlanetarySpec, layers: Layers) -> PlanetarySpec:
+    """The same set with the files of its bodies named as seen from here."""
+    parts: dict[str, Any] = {gear.name: located(gear, layers, gear.name) for gear in spec.gears}
+    if spec.carrier.imported is not None:
+        imported = spec.carrier.imported.located(layers, "carrier.import")
+        parts["carrier"] = spec.carrier.model_copy(update={"imported": imported})
+    return spec.model_copy(update=parts)
 
 
 def _with_relief_rolls(spec: StageSpec) -> StageSpec:
-    """The same stage with "outer_single_contact" turned into a roll."""
-    pair, gears = PairGeometry.of(spec), []
-    for index, gear in enumerate(spec.gears):
-        if gear.tip_relief is not None and isinstance(gear.tip_relief.start_roll, str):
-            relief = gear.tip_relief.model_copy(update={"start_roll": pair.outer_single_contact(index)})
-            gear = gear.model_copy(update={"tip_relief": relief})
-        gears.append(gear)
-    return spec.model_copy(update={"gears": tuple(gears)})
+    """The same stage with points of single contact turned into rolls."""
+    pair = PairGeometry.of(spec)
+    return spec.model_copy(update={"gears": tuple(with_rolls(gear, pair, i) for i, gear in enumerate(spec.gears))})

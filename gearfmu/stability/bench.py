@@ -12,6 +12,8 @@ import numpy as np
 from gearfmu.body import ReducedBody, load_stage_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
+from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
+from gearfmu.spec.lead import LeadSpec
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stability.case import STEPS, Case
@@ -23,6 +25,15 @@ POSITIONS = 16
 PROBE = 1e-3  # s
 
 
+DEVIATIONS: dict[str, Any] = {  # of both gears, each its own draw; a coarse gear
+    "deviations": DeviationClass.model_validate({"class": 9, "seed": 1}),
+    "profile": ProfileSpec(slope=5e-6, crowning=5e-6),
+    "lead": LeadSpec(slope=10e-6, crowning=8e-6),
+    "eccentricity": Eccentricity(amount=40e-6, angle=0.5),
+    "wobble": Wobble(amount=2e-4),
+}
+
+
 @lru_cache(maxsize=1)
 def _bodies() -> list[ReducedBody]:
     return load_stage_bodies(load_stage(PLAIN))
@@ -31,11 +42,13 @@ def _bodies() -> list[ReducedBody]:
 @dataclass(frozen=True)
 class Variant:
     """A shipped stage with changes. bearing: stiffness of both bearings, N/m. pitch_error: index deviation of the
-    pinion's tooth 0, m. ports: of pinion and wheel; None keeps those of the stage."""
+    pinion's tooth 0, m. deviating: every kind of deviation at once, DEVIATIONS. ports: of pinion and wheel; None keeps
+    those of the stage."""
 
     stage: str = RELIEVED
     bearing: float | None = None
     pitch_error: float = 0.0
+    deviating: bool = False
     ports: tuple[PortSpec, PortSpec] | None = None
 
 
@@ -54,7 +67,7 @@ def _spec(variant: Variant) -> StageSpec:
             changes["bearing"] = gear.bearing.model_copy(update={"stiffness": variant.bearing})
         if variant.pitch_error and gear is spec.gears[0]:
             changes["index_deviation"] = {0: variant.pitch_error}
-        gears.append(gear.model_copy(update=changes))
+        gears.append(gear.model_copy(update=changes | (DEVIATIONS if variant.deviating else {})))
     ports = spec.ports if variant.ports is None else dict(zip(SHAFTS, variant.ports, strict=True))
     return spec.model_copy(update={"gears": tuple(gears), "ports": ports})
 

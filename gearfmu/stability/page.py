@@ -54,8 +54,8 @@ The kernel's default is the largest step that needs no lowered γ (theory, 3.5);
 
 Scenes that begin with `set_` run on `planetary54` with three of its pins out of place (12 µm ahead, 6 µm outward, 8 µm
 behind): equal planets on ideal pins hide the modes of sun and carrier. A step of them takes 0.2 to 0.5 ms, so that they
-last hundredths of a second: **10 s at standstill and 1e7 steps are not done on a set**, 0.1 s and 2e4 steps are. Sets
-have no pitch errors; their pins take that place.
+last hundredths of a second, 0.1 s at standstill, 2e4 steps and 400 rollbacks; 10 s, 1e7 and 10⁴ are runs of their own
+at level `fast`: `benchmarks/set_endurance.py`. No scene gives sets pitch errors; their pins take that place.
 
 ## Scenes
 

@@ -67,6 +67,7 @@ SCENES: dict[str, Callable[[Case], Finding]] = {
         loads.high_speed,
         loads.tip_contact,
         loads.pitch_error,
+        loads.flank_deviations,
         loads.soft_bearings,
         loads.stiff_bearings,
         loads.jammed,

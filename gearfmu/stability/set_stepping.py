@@ -35,8 +35,14 @@ SHORTEST, LONGEST, EQUAL = 1e-6, 3e-4, 2e-5  # s, communication steps
 
 
 def set_standstill(case: Case) -> Finding:
-    """600 N·m at rest for 0.1 s (not 10 s): forces and transmission errors may not creep by more than 1e-4."""
-    made = set_run(PLAIN_SET, case, Carried(Constant(0.0), steady(NOMINAL)), 0.1, step=1e-4)
+    """600 N·m at rest for 0.1 s (10 s: benchmarks/set_endurance.py): forces and transmission errors may not creep by
+    more than 1e-4."""
+    return standing_for(0.1, case)
+
+
+def standing_for(duration: float, case: Case) -> Finding:
+    """`set_standstill` over `duration` (s)."""
+    made = set_run(PLAIN_SET, case, Carried(Constant(0.0), steady(NOMINAL)), duration, step=duration / 1000)
     said, facts = [], {"creep": 0.0}
     for mesh in ALL_MESHES:
         for name in (f"{mesh}.force_mean", f"{mesh}.te"):
@@ -47,15 +53,20 @@ def set_standstill(case: Case) -> Finding:
 
 
 def set_many_steps(case: Case) -> Finding:
-    """600 N·m at 85 rad/s for 2e4 internal steps (not 1e7, which are an hour): once the start has died away forces and
-    transmission errors of all meshes, over whole mesh periods, drift by no more than 1e-3."""
-    step = MESH_PERIOD / PER_PERIOD
+    """600 N·m at 85 rad/s for 2e4 internal steps (1e7: benchmarks/set_endurance.py): once the start has died away
+    forces and transmission errors of all meshes, over whole mesh periods, drift by no more than 1e-3."""
+    return turning_for(INTERNAL_STEPS, case)
+
+
+def turning_for(steps: int, case: Case, per_period: int = PER_PERIOD) -> Finding:
+    """`set_many_steps` over a number of internal steps, sampled so many times in a mesh period."""
+    step = MESH_PERIOD / per_period
     inner = set_run(PLAIN_SET, case, TURNING, step, step=step).h
-    periods = math.ceil(INTERNAL_STEPS * inner / MESH_PERIOD)
+    periods = math.ceil(steps * inner / MESH_PERIOD)
     made = set_run(PLAIN_SET, case, TURNING, periods * MESH_PERIOD, step=step)
     said, facts = carries(made, NOMINAL, 0.5 * made.time[-1])
     facts["internal_steps"] = float(made["solver.steps"][-1])
-    third = periods // 3 * PER_PERIOD
+    third = periods // 3 * per_period
     if made.time.size > 3 * third:
         facts["drift"] = 0.0
         for mesh in ALL_MESHES:
@@ -95,7 +106,13 @@ def _apart(made: Record, equal: Record, name: str) -> float:
 
 def set_rollbacks(case: Case) -> Finding:
     """600 N·m at 85 rad/s; at every step the state is saved, the run goes astray for 1 to 3 steps under other torques
-    through the backlash and returns: 400 times, and the end is bit for bit that of the straight run."""
+    through the backlash and returns: 400 times (10⁴: benchmarks/set_endurance.py), and the end is bit for bit that of
+    the straight run."""
+    return astray_for(ROLLBACKS, case)
+
+
+def astray_for(times: int, case: Case) -> Finding:
+    """`set_rollbacks` over a number of rollbacks."""
 
     def wander(random: np.random.Generator) -> dict[str, float]:
         return {"carrier.w": SPEED + random.normal(0.0, 5.0), "sun.tau": random.normal(0.0, 300.0)}
@@ -103,5 +120,5 @@ def set_rollbacks(case: Case) -> Finding:
     def fresh() -> Kernel:
         return set_kernel(PLAIN_SET, case, {"sun.w_start": RATIO * SPEED})
 
-    made, said = run_astray(fresh, TURNING, wander, ROLLBACKS, PLAIN_SET.watched)
-    return set_finding(PLAIN_SET, made, said, {"rollbacks": float(ROLLBACKS)})
+    made, said = run_astray(fresh, TURNING, wander, times, PLAIN_SET.watched)
+    return set_finding(PLAIN_SET, made, said, {"rollbacks": float(times)})

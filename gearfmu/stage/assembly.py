@@ -21,6 +21,8 @@ from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.fields import order_sections
+from gearfmu.stage.flanks import deviation_sections
+from gearfmu.stage.friction import along_rows, friction_starts
 from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases
@@ -29,7 +31,7 @@ from gearfmu.stage.nodal import nodal_sections
 from gearfmu.stage.observed import observed_number, observed_sections
 from gearfmu.stage.spinning import turn_rates
 from gearfmu.stage.tables import ROLLS
-from gearfmu.stage.teeth import gear_section, index_section, lead_section, mismatches
+from gearfmu.stage.teeth import gear_section, mismatches
 from gearfmu.stage.whirls import whirl_rows
 
 MODEL_VERSION = 2
@@ -51,7 +53,9 @@ def assemble(
     """
     sections = order_sections(general_sections(spec, bodies, rolls, observe))
     hashes = tuple(body.input_hash for body in bodies)
-    return StageModel(spec, write_blob(sections), hashes)
+    model = StageModel(spec, write_blob(sections), hashes)
+    starts = friction_starts(model.stage)
+    return model.with_starts(starts) if starts else model
 
 
 def general_sections(
@@ -87,7 +91,7 @@ def general_sections(
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         place = stage.place(gear.name, None)
         sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
-        sections |= index_section(i, gear, shape) | lead_section(i, gear)
+        sections |= deviation_sections(i, gear, shape)
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes)
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)
@@ -222,7 +226,15 @@ def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[in
         f"support_residual{index}": groups[0].flank_supports(index),
         f"port_residual{index}": port,
     }
+    if flank.along is not None:
+        found |= {
+            f"along_rows{index}": flank.along.turning,
+            f"along_normal{index}": flank.along.normal,
+            f"along_own{index}": flank.along.own,
+        }
     for s, (group, read) in enumerate(zip(groups, reads, strict=True)):
+        if flank.along is not None:
+            found |= {f"along_ground{index}_{s}": along_rows(group, index)[..., read]}
         found |= {
             f"ground_list{index}_{s}": read.astype(np.int32),
             f"centre{index}_{s}": group.rigid(index)[:, read],

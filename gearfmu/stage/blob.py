@@ -22,6 +22,7 @@ ALIGNMENT = 64
 HASHED_FROM = 40
 MOST_SECTIONS = 1024
 LONGEST_NAME = 23
+REPEATED_FROM = 4096  # bytes: a section at least as long that is there already is stored once
 F64, I32, TEXT = 1, 2, 3
 DTYPE: dict[int, np.dtype] = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1")}
 
@@ -33,6 +34,7 @@ def write_blob(sections: Sections) -> bytes:
 
     Values: arrays of floats (stored as f64, any shape, C order, all finite),
     arrays of integers or booleans (stored as i32), or text without NUL.
+    What equal bodies have in common, the tables of equal planets, is stored once.
     Raises ModelError that lists every section that cannot be stored.
     """
     problems: list[str] = []
@@ -43,8 +45,15 @@ def write_blob(sections: Sections) -> bytes:
         raise ModelError("model blob cannot be written: " + "; ".join(problems))
     table, contents = bytearray(), bytearray()
     start = HEADER.size + len(encoded) * ENTRY.size
-    for name, kind, values in encoded:
+    stored: dict[tuple[int, int, bytes], tuple[int, int]] = {}  # what → number of its section, offset
+    for i, (name, kind, values) in enumerate(encoded):
+        what = (kind, values.size, hashlib.sha256(values.tobytes()).digest())
+        if values.nbytes >= REPEATED_FROM and what in stored:
+            first, offset = stored[what]
+            table += ENTRY.pack(name.encode(), kind, 1 + first, values.size, offset)
+            continue
         _pad(contents, start)
+        stored[what] = (i, start + len(contents))
         table += ENTRY.pack(name.encode(), kind, 0, values.size, start + len(contents))
         contents += values.tobytes()
     _pad(contents, start)
@@ -69,15 +78,20 @@ def read_blob(blob: bytes) -> dict[str, np.ndarray | str]:
     count = _check_header(blob)
     sections: dict[str, np.ndarray | str] = {}
     end = HEADER.size + count * ENTRY.size
-    for i in range(count):
-        name, kind, size, offset = _entry(blob, i)
-        if offset != _aligned(end):
-            raise ModelError(f"model blob: section '{name}' does not begin where the one before it ends")
-        end = offset + size * DTYPE[kind].itemsize
-        if end > len(blob):
-            raise ModelError(f"model blob: section '{name}' reaches beyond the end")
+    entries = [_entry(blob, i) for i in range(count)]
+    for i, (name, kind, repeated, size, offset) in enumerate(entries):
         if name in sections:
             raise ModelError(f"model blob: section '{name}' is there twice")
+        if repeated:
+            first = entries[repeated - 1] if repeated <= i else None
+            if first is None or first[1:] != (kind, 0, size, offset):
+                raise ModelError(f"model blob: section '{name}' does not repeat an earlier one")
+        else:
+            if offset != _aligned(end):
+                raise ModelError(f"model blob: section '{name}' does not begin where the one before it ends")
+            end = offset + size * DTYPE[kind].itemsize
+            if end > len(blob):
+                raise ModelError(f"model blob: section '{name}' reaches beyond the end")
         sections[name] = _decode(name, kind, np.frombuffer(blob, DTYPE[kind], size, offset))
     if _aligned(end) != len(blob):
         raise ModelError(f"model blob: sections end at {end}, the blob at {len(blob)}")
@@ -156,15 +170,15 @@ def _check_header(blob: bytes) -> int:
     return count
 
 
-def _entry(blob: bytes, i: int) -> tuple[str, int, int, int]:
-    """Name, type, number of elements and offset of section i."""
-    raw, kind, reserved, size, offset = ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)
+def _entry(blob: bytes, i: int) -> tuple[str, int, int, int, int]:
+    """Name, type, 1 + number of the section it repeats or 0, number of elements and offset of section i."""
+    raw, kind, repeated, size, offset = ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)
     name = raw.rstrip(b"\0").decode("latin-1")
     if not _name_is_good(name):
         raise ModelError(f"model blob: the name of section {i} is not 1 to {LONGEST_NAME} printable characters")
-    if kind not in DTYPE or reserved:
+    if kind not in DTYPE:
         raise ModelError(f"model blob: section '{name}' is of unknown type {kind}")
-    return name, kind, size, offset
+    return name, kind, repeated, size, offset
 
 
 def _name_is_good(name: str) -> bool:

@@ -24,7 +24,10 @@ class Effect:
     matters: when a scene needs it; off: what the model is without it; code: where it enters the kernel; switch: how to
     turn it off; off_setting, on_setting: kernel parameters of the two cases that are compared, empty where the data of
     the stage decide; build: name in -DGK_WITHOUT of a kernel that has no code for it, "" where there is none; test: the
-    test by hand calculation; carried: a planetary set has it, a spur pair does not.
+    test by hand calculation; carried: a planetary set has it, a spur pair does not; of_data: its parameter is there
+    where the stage file gives it something to do; kept: why a plan (gearfmu/planning) never leaves it out, "" where the
+    error budget decides; indicator: formula in gearfmu/planning/formulas.py for the relative error without it, "" for
+    the quasi-static one that serves any effect.
     """
 
     name: str
@@ -40,6 +43,9 @@ class Effect:
     on_setting: Mapping[str, float]
     build: str = ""
     carried: bool = False
+    of_data: bool = False
+    kept: str = ""
+    indicator: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,10 @@ class Cost:
         return self.off / self.without - 1.0
 
 
-def _switched(name: str, test: str = "", carried: bool = False, **words: str) -> Effect:
+DISSIPATION = "it dissipates: what grows slowly without it no short window shows"
+
+
+def _switched(name: str, test: str = "", carried: bool = False, of_data: bool = False, **words: str) -> Effect:
     """An effect with a boolean parameter of its own, effect.<name>."""
     variable = f"effect.{name}"
     return Effect(
@@ -73,6 +82,7 @@ def _switched(name: str, test: str = "", carried: bool = False, **words: str) ->
         build=name,
         test=test or f"tests/stage/test_effects.py::test_{name}",
         carried=carried,
+        of_data=of_data,
         **words,
     )
 
@@ -89,6 +99,7 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         off="rigid gears; a contact yields by its local law alone, bearings and ports as before",
         code="gk_choose.c (gk_choose): no modes, no tables of compliance",
+        kept="the bodies are what a stage is made of",
     ),
     Effect(
         name="modes",
@@ -109,6 +120,7 @@ EFFECTS: tuple[Effect, ...] = (
         on_setting={"level": 1.0},
         build="modes",
         test="tests/stage/test_effects.py::test_modes",
+        indicator="modes",
     ),
     Effect(
         name="residual",
@@ -123,6 +135,7 @@ EFFECTS: tuple[Effect, ...] = (
         on_setting={"level": 3.0, "integrator": 2.0},
         build="residual",
         test="tests/stage/test_effects.py::test_residual",
+        kept="it is a static part of the stiffness",
     ),
     _switched(
         "hertz",
@@ -162,6 +175,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="rattle, load reversal, engagement and every start; not where the drive flanks stay closed",
         off="teeth pass through the backlash",
         code="gk_flank.c (gk_flank_find), gk_kinematics.c (gk_kinematics_carrying)",
+        indicator="coast_flank",
     ),
     _switched(
         "contact_damping",
@@ -171,6 +185,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="level of the mesh resonance and its side bands; dissipation: never leave it out to save time",
         off="the mesh mode is damped by modal damping, bearings and ports alone",
         code="gk_compliance.c (take_paths), gk_solve.c (limit_dashpots), gk_tangent.c",
+        kept=DISSIPATION,
     ),
     _switched(
         "tip_relief",
@@ -180,6 +195,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="wherever the stage has it: it is the size of the transmission error",
         off="unmodified involutes",
         code="gk_flank.c (relief)",
+        kept="it is the shape of the teeth",
     ),
     _switched(
         "tip_contact",
@@ -201,6 +217,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="bearing forces, and the mesh mode itself: on fzg_c more than half of the static compliance",
         off="bores held on their axes; bearing forces are the reactions there",
         code="gk_setup.c (fill_base), gk_step.c (damp_supports)",
+        kept="without it bearing forces are reactions, another output",
     ),
     _switched(
         "modal_damping",
@@ -210,6 +227,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="always; a switch for conservation tests",
         off="ζ = 0 for every elastic mode",
         code="gk_flow.c (oscillator_of)",
+        kept=DISSIPATION,
     ),
     _switched(
         "roll_motion",
@@ -221,6 +239,7 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         off="all of it stays that of the start, gaps are linear in the coordinates",
         code="gk_still.c, gk_step.c (gk_step_once)",
+        kept="a switch for conservation tests",
     ),
     Effect(
         name="pitch_errors",
@@ -237,6 +256,34 @@ EFFECTS: tuple[Effect, ...] = (
         test="tests/stage/test_pitch_errors.py::test_a_protruding_tooth_holds_the_pinion_back_while_it_is_in_mesh",
     ),
     _switched(
+        "flank_deviations",
+        title="flank modifications and deviations",
+        formula="g → g + d_A(tooth, z, s_A) + d_B(tooth, z, s_B): cubics through tables, slope in the gradient",
+        equation="2.2 (eqs. 5a to 5f)",
+        matters=(
+            "wherever flanks are corrected or measured: slopes and crownings of a few micrometres are the size of the "
+            "transmission error; deviations that differ from tooth to tooth give shaft orders and side bands"
+        ),
+        off="involutes with parabolic tip relief; leads too are left out",
+        code="gk_deviation.c (gk_deviation_at), gk_flank.c (depth_of), gk_strips.c (fill_deviations)",
+        test="tests/stage/test_flanks.py::test_unloaded_te_is_the_gap_of_the_modified_profile",
+        of_data=True,
+    ),
+    _switched(
+        "runout",
+        title="eccentricity and wobble",
+        formula="axis of the toothing at C + e (cos, sin)(φ + ψ), tilted by θ about (−sin, cos)(φ + χ)",
+        equation="2.1 (eqs. 4c, 4d)",
+        matters=(
+            "shaft orders: transmission error of the amplitude e once a turn; side bands of the mesh; with wobble the "
+            "load runs from one end of the face width to the other"
+        ),
+        off="toothings run true",
+        code="gk_deviation.c (gk_runout_move, gk_runout_turn)",
+        test="tests/stage/test_flanks.py::test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn",
+        of_data=True,
+    ),
+    _switched(
         "coriolis",
         title="Coriolis forces in a carrier's axes",
         formula="v̇ = −2Ω Pᵀ J P v on the rigid masses that a carrier carries, and its own",
@@ -249,6 +296,7 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_frame.c (gk_frame_turn)",
         test="tests/stage/test_planetary_theory.py::test_a_sun_in_free_flight_moves_straight_on",
         carried=True,
+        indicator="coriolis",
     ),
     _switched(
         "centrifugal",
@@ -263,6 +311,7 @@ EFFECTS: tuple[Effect, ...] = (
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
         test="tests/stage/test_planetary_motion.py::test_pins_hold_the_planets_against_their_centrifugal_load",
         carried=True,
+        indicator="centrifugal",
     ),
     _switched(
         "gyroscopic",
@@ -277,7 +326,20 @@ EFFECTS: tuple[Effect, ...] = (
         off="bodies tilt and vibrate as at rest",
         code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",
         test="tests/kernel/test_gyroscopic.py::test_a_kicked_pair_whirls_as_its_linear_system",
-        carried=True,
+        indicator="gyroscopic",
+    ),
+    _switched(
+        "friction",
+        title="friction of the flanks",
+        formula="p = −µ λ sgn v along the profile, fading below 2 % of the largest sliding speed; sticks at standstill",
+        equation="2.8, 3.12 (eqs. 8k to 8n, 17m to 17o)",
+        matters=(
+            "forces across the line of action: they jump by 2 µ F at the pitch point; losses; damping of rattle. "
+            "Off unless the stage says `[contact] friction = {…}`"
+        ),
+        off="flanks slide without resistance",
+        code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_side.c (store_along)",
+        test="tests/stage/test_friction.py::test_force_across_the_line_of_action_jumps_at_the_pitch_point",
     ),
 )
 

@@ -27,6 +27,7 @@ COUNTS = (
     "sets",
 )
 SIZES = ("rotor", "z", "modes", "reads", "both_flanks")
+FLANK_SIZES = ("flank_teeth", "flank_places", "flank_rolls")
 GEAR_NUMBERS = (
     "r_b",
     "s_form",
@@ -119,6 +120,7 @@ def _instances(sections: Mapping[str, Any], sizes: dict[str, int]) -> Iterator[t
         g: sizes
         | dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True))
         | {"own": len(sections.get(f"own_number{g}", ()))}
+        | dict(zip(FLANK_SIZES, map(int, sections.get(f"flank_size{g}", (0, 0, 0))), strict=True))
         for g in range(sizes["gears"])
     }
     of_set = {s: sizes | {"ground": len(sections[f"omega_ground{s}"])} for s in range(sizes["sets"])}

@@ -30,6 +30,18 @@ SILENT = 1e-6  # bore rows of patterns of nodal diameter 2 and more, relative: m
 
 
 @dataclass(frozen=True)
+class Along:
+    """What flanks read along the profile, towards growing roll, as `Flank` has it along the normal: turning, patterns,
+    and compliances of one tooth beyond the ground modes: normal (2, 2, P, P, A, A), m/N, along the normal, own, along
+    the profile, per force along the profile. What a force there does to the bore beyond the modes is not known."""
+
+    turning: np.ndarray
+    patterns: np.ndarray
+    normal: np.ndarray
+    own: np.ndarray
+
+
+@dataclass(frozen=True)
 class Flank:
     """What the flanks of a gear read, on the even grid of P rolls, for A width functions.
 
@@ -46,6 +58,7 @@ class Flank:
     patterns: np.ndarray
     node: np.ndarray
     residual: np.ndarray
+    along: Along | None = None
 
 
 @dataclass(frozen=True)
@@ -108,6 +121,7 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
             patterns=patterns,
             node=node,
             residual=_flank_residual(body, degrees, to_grid, patterns, omega),
+            along=_along(body, chosen, degrees, to_grid, patterns),
         ),
         spinning=gear_spinning(body, mass, low),
     )
@@ -157,6 +171,26 @@ def turn_tables(values: np.ndarray, member: np.ndarray) -> np.ndarray:
 def read_tables(tables: np.ndarray, psi: float) -> np.ndarray:
     """(…): c₀ + c_c cos ψ + c_s sin ψ of `tables` (3, …)."""
     return tables[0] + tables[1] * np.cos(psi) + tables[2] * np.sin(psi)
+
+
+def _along(
+    body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.ndarray, patterns: np.ndarray
+) -> Along | None:
+    """None for a body without displacement along the profile. patterns: along the normal."""
+    tangent = getattr(body, "tangent", None)
+    if tangent is None:
+        return None
+    low = body.nodal_diameter[chosen] <= 1
+    omega = 2 * np.pi * body.frequency[chosen[low]]
+    rows = blend(to_grid, tangent.rows[:, :, degrees], 1)
+    own_patterns = turn_tables(rows[..., chosen[low]], body.part[chosen[low]])
+    normal, own = (read_tables(tables, 0.0) for tables in (patterns, own_patterns))
+    tables = []
+    for static, read in ((tangent.static_nt, normal), (tangent.static_tt, own)):
+        static = static[..., degrees, :][..., degrees]
+        static = blend(to_grid, blend(to_grid, static, 2), 3)
+        tables.append(static - _between_flanks(read / omega**2, own))
+    return Along(rows[..., chosen[~low]], own_patterns, *tables)
 
 
 def _flank_residual(

@@ -54,7 +54,7 @@ def _placed(stage: GeneralStage) -> tuple[dict[str, float], list[int]]:
     shifts = []
     for mesh in stage.engagements:
         pair = mesh_geometry(stage, mesh)
-        gamma = _direction(pair, *mesh_axes(stage, mesh))
+        gamma = direction_of(pair, *mesh_axes(stage, mesh))
         a, b = mesh.gears
         if b in phases and a not in phases:
             phases[a] = _phase_of_a(pair, phases[b], gamma)
@@ -72,14 +72,14 @@ def _placed(stage: GeneralStage) -> tuple[dict[str, float], list[int]]:
     return {gear.name: phases.get(gear.name, 0.0) for gear in stage.gears}, shifts
 
 
-def _direction(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
+def direction_of(pair: MeshShape, a: Sequence[float], b: Sequence[float]) -> float:
     """Angle (rad, in (−π, π]) from A's axis to B's; of a ring from its own to A's: the branch that the kernel takes."""
     sense = -1 if isinstance(pair, RingMesh) else 1
     return math.atan2(sense * (b[1] - a[1]), sense * (b[0] - a[0]))
 
 
 def _phase_of_b(pair: MeshShape, first: float, gamma: float) -> float:
-    """Angle (rad) of B that fits the angle `first` of A; gamma: `_direction`."""
+    """Angle (rad) of B that fits the angle `first` of A; gamma: `direction_of`."""
     if isinstance(pair, RingMesh):
         return pair.ring_phase(first, gamma)
     return gamma + pair.wheel_phase - (first - gamma) * pair.gears[0].r_b / pair.gears[1].r_b

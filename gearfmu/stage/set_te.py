@@ -46,7 +46,7 @@ class SetTeResult:
 
     def harmonics(self, count: int = 5) -> np.ndarray:
         """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
-        return mesh_harmonics(self.te, count)
+        return mesh_harmonics(self.te, count, int(self.position[-1]) + 1)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The table of the result, torques one below the other: torque_Nm, position, te_um, stiffness_N_per_um,
@@ -58,9 +58,12 @@ class SetTeResult:
         return found
 
 
-def set_te(model: StageModel, torques: Sequence[float], positions: int = 41, **parameters: float) -> SetTeResult:
+def set_te(
+    model: StageModel, torques: Sequence[float], positions: int = 41, periods: int = 1, **parameters: float
+) -> SetTeResult:
     """te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), angles of the bores of sun and carrier, at positions i/N of one mesh period
-    (no end point), the output held. Without load it is ± the mean backlash of the two meshes along the line of action.
+    or of more (no end point), the output held. Without load it is ± the mean backlash of the two meshes along the line
+    of action.
 
     torques: N·m on the input, the first port; 0 is the limit of a vanishing positive torque. parameters: of the kernel,
     e.g. slices=10. ModelError where the stage is no planetary set; SimulationError(no_equilibrium) where there is none.
@@ -68,10 +71,10 @@ def set_te(model: StageModel, torques: Sequence[float], positions: int = 41, **p
     if not isinstance(model.spec, PlanetarySpec):
         raise ModelError(f"{model.name} is no planetary set: its meshes have transmission errors of their own")
     kernel, place = statics_of(model, **parameters), place_of(model, f"{GEARS[0]}_planet1")
-    least, position = LEAST * place.most, np.arange(positions) / positions
+    least, position = LEAST * place.most, np.arange(periods * positions) / positions
     planets = model.spec.set.planets
-    te, stiffness = np.empty((2, len(torques), positions))
-    force = np.empty((len(torques), positions, len(GEARS), planets))
+    te, stiffness = np.empty((2, len(torques), position.size))
+    force = np.empty((len(torques), position.size, len(GEARS), planets))
     for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         at = -part * place.pitch

@@ -37,7 +37,12 @@ class TeResult:
 
     def harmonics(self, count: int = 5) -> np.ndarray:
         """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
-        return mesh_harmonics(self.te, count)
+        return mesh_harmonics(self.te, count, self.pitches)
+
+    @property
+    def pitches(self) -> int:
+        """Pitches that the positions cover."""
+        return int(self.position[-1]) + 1
 
     def columns(self) -> dict[str, np.ndarray]:
         """The table of the result, torques one below the other: torque_Nm, position, te_um, mesh_stiffness_N_per_um,
@@ -46,11 +51,11 @@ class TeResult:
         return found | {f"share_{k + 1}": self.shares[:, :, k].ravel() for k in range(self.shares.shape[2])}
 
 
-def mesh_harmonics(te: np.ndarray, count: int) -> np.ndarray:
-    """(T, count), rms in the unit of te (T, P), whose P positions are even over one pitch: harmonics of the mesh, NaN
-    from half the number of positions on, where they are not told from lower ones."""
-    lines = np.abs(np.fft.rfft(te, axis=1))[:, 1 : count + 1] * math.sqrt(2) / te.shape[1]
-    lines[:, (te.shape[1] + 1) // 2 - 1 :] = np.nan
+def mesh_harmonics(te: np.ndarray, count: int, pitches: int = 1) -> np.ndarray:
+    """(T, count), rms in the unit of te (T, P), whose P positions are even over so many pitches: harmonics of the mesh,
+    NaN from half the number of positions on, where they are not told from lower ones."""
+    lines = np.abs(np.fft.rfft(te, axis=1))[:, pitches : pitches * count + 1 : pitches] * math.sqrt(2) / te.shape[1]
+    lines[:, (te.shape[1] // pitches + 1) // 2 - 1 :] = np.nan
     return np.pad(lines, ((0, 0), (0, count - lines.shape[1])), constant_values=np.nan)
 
 
@@ -70,23 +75,25 @@ def loaded_te(
     positions: int = 41,
     rigid_bearings: bool = False,
     mesh: str | None = None,
+    pitches: int = 1,
     **parameters: float,
 ) -> TeResult:
-    """te = r_bA φ_A + r_bB φ_B of an engagement at positions i/N of one of its pitches (no end point): the output held
-    so that gear A, without load, would stand at position · 2π/z_A. In a ring te = r_bA φ_A − r_bB φ_B.
+    """te = r_bA φ_A + r_bB φ_B of an engagement at positions i/N of one of its pitches, or of more (no end point): the
+    output held so that gear A, without load, would stand at position · 2π/z_A. In a ring te = r_bA φ_A − r_bB φ_B.
 
-    torques: N·m on the input (the first port; `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
+    pitches: teeth of gear A for all that differs from tooth to tooth. torques: N·m on the input (the first port;
+    `StageModel.shafts`); positive drives, 0 is the limit of a vanishing
     driving torque: the unloaded (kinematic) transmission error. rigid_bearings: the nodes on the axes are held. mesh:
     name of the engagement, the first when None. parameters: of the kernel, e.g. slices=10.
     SimulationError(no_equilibrium), which names the limit of the torque, where there is none.
     """
     held = {"effect.bearings": 0.0} if rigid_bearings else {}
     kernel, place = statics_of(model, **held, **parameters), place_of(model, mesh)
-    position, least = np.arange(positions) / positions, LEAST * place.most
+    position, least = np.arange(pitches * positions) / positions, LEAST * place.most
     te, stiffness, shares = (
-        np.empty((len(torques), positions)),
-        np.empty((len(torques), positions)),
-        np.zeros((len(torques), positions, SHARES)),
+        np.empty((len(torques), position.size)),
+        np.empty((len(torques), position.size)),
+        np.zeros((len(torques), position.size, SHARES)),
     )
     for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
@@ -96,7 +103,7 @@ def loaded_te(
             tangent = _tangent(kernel, at, carried, place.number)
         te[i, j] = state.te + (torque - carried) / tangent
         stiffness[i, j] = tangent / place.lever
-        shares[i, j] = _shares(state)
+        shares[i, j] = _shares(state, int(part))
     return TeResult(np.asarray(torques, float), position, te, stiffness, shares)
 
 
@@ -114,12 +121,13 @@ def _tangent(kernel: Kernel, phi: float, torque: float, mesh: int) -> float:
     return 2 * TANGENT * torque / (ends[1] - ends[0])
 
 
-def _shares(state: TeState) -> np.ndarray:
+def _shares(state: TeState, turned: int) -> np.ndarray:
     """Shares by tooth number of gear A: pair k of the path is tooth k − 2 …, counted from the tooth that leaves
-    the mesh."""
+    the mesh, which is one before for every whole pitch that it has turned."""
     total = sum(sum(forces) for forces in state.forces.values()) or 1.0
     shares = np.zeros(SHARES)
     for (_, tooth), forces in state.forces.items():
-        if -(SHARES // 2) <= tooth < SHARES - SHARES // 2:
-            shares[tooth + SHARES // 2] += sum(forces) / total
+        place = tooth + turned + SHARES // 2
+        if 0 <= place < SHARES:
+            shares[place] += sum(forces) / total
     return shares

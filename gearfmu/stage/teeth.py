@@ -13,12 +13,12 @@ from gearfmu.spec.shapes import GearShape
 from gearfmu.stage.fields import gear_numbers
 
 SHARPEST_EDGE = 1e-6
-LEADS = 33  # places across the face width where a lead is given
 
 
 def gear_section(gear: GearSpec | RingBody, shape: GearShape, phase: float, place: float) -> np.ndarray:
     """The section "gear" of a gear."""
-    material, relief, edge = gear.material, gear.tip_relief, max(gear.tip_edge_radius, SHARPEST_EDGE)
+    material, edge = gear.material, max(gear.tip_edge_radius, SHARPEST_EDGE)
+    relief = gear.tip_relief if gear.tip_relief and gear.tip_relief.kind == "parabolic" else None
     start = float(relief.start_roll) if relief else shape.s_a
     curve = relief.amount / (shape.s_a - start) ** 2 if relief else 0.0
     inner = shape.s_tip - math.copysign(edge, shape.s_tip - shape.s_form)  # the edge's centre, inside the tooth
@@ -42,29 +42,6 @@ def gear_section(gear: GearSpec | RingBody, shape: GearShape, phase: float, plac
             "helix": shape.beta_b,
         }
     )
-
-
-def index_section(index: int, gear: GearSpec | RingBody, shape: GearShape) -> dict[str, np.ndarray]:
-    """Angles (2 flanks, z) rad by which the teeth are out of their places; no section when all are in place."""
-    if not any(gear.index_deviation.values()):
-        return {}
-    angles = np.zeros((2, gear.teeth))
-    angles[:, list(gear.index_deviation)] = np.array(list(gear.index_deviation.values())) / shape.r
-    return {f"index{index}": angles}
-
-
-def lead_section(index: int, gear: GearSpec | RingBody) -> dict[str, np.ndarray]:
-    """Depth (2 flanks, LEADS) m across the face width, in the transverse section; no section without modifications."""
-    if gear.lead is None:
-        return {}
-    x = np.linspace(-1, 1, LEADS)
-    depth = gear.lead.crowning * x**2
-    if gear.lead.end_relief is not None:
-        relief = gear.lead.end_relief
-        into = np.clip(1 - (1 - np.abs(x)) * gear.face_width / 2 / relief.length, 0, None)
-        depth = depth + relief.amount * into**2
-    turned = gear.lead.slope * x / 2
-    return {f"lead{index}": np.stack([depth - turned, depth + turned])}
 
 
 def mismatches(gear: GearSpec | RingBody, shape: GearShape, body: Any) -> list[str]:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body import load_stage_bodies
-from gearfmu.cosim.coupled import OK
+from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
+from gearfmu.kernel import Kernel
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
@@ -45,17 +46,18 @@ class Point:
 
 @dataclass(frozen=True)
 class Recording:
-    """What is needed to play a stage back: blob, start values, names and values (steps, k) of the inputs of every
-    communication step, the saved state at step `first`."""
+    """What is needed to play a stage back: blob, parameters, names and values (steps, k) of the inputs of every
+    communication step, the saved state at step `first`; before: communication steps of the scene before the first
+    row."""
 
     blob: bytes
     parameters: Mapping[str, float | bool | str]
     names: tuple[str, ...]
-    start: np.ndarray
     values: np.ndarray
     step: float
     first: int
     state: bytes
+    before: int = 0
 
 
 @dataclass(frozen=True)
@@ -82,44 +84,44 @@ class Price:
     cpu_ratio: float
 
 
-class _Kept(KernelUnit):
+class Kept(KernelUnit):
     """A kernel unit that keeps its inputs, and its state at the first step at or after `settle`."""
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
         super().__init__(blob, parameters)
-        self.settle = settle
+        self.parameters, self.settle = dict(parameters), settle
         self.now: dict[str, float] = {}
-        self.start: list[float] = []
         self.rows: list[list[float]] = []
-        self.first, self.state = -1, b""
+        self.before, self.first, self.state = 0, -1, b""
 
     def set(self, handle: KernelHandle, values: Sequence[float] | np.ndarray) -> None:
         self.now.update(zip(handle.names, map(float, values), strict=True))
         super().set(handle, values)
 
-    def initialize(self, time: float) -> None:
-        self.start = list(self.now.values())
-        super().initialize(time)
-
     def step(self, time: float, h: float) -> None:
+        if not self.rows:
+            self.before = round(time / h)
         if self.first < 0 and time >= self.settle * (1.0 - 1e-12):
             self.first, self.state = len(self.rows), self.save()
         self.rows.append(list(self.now.values()))
         super().step(time, h)
 
+    def recording(self, blob: bytes, step: float) -> Recording:
+        """What plays this unit back."""
+        known = (blob, self.parameters, tuple(self.now), np.array(self.rows), step)
+        return Recording(*known, max(self.first, 0), self.state, self.before)
+
 
 @dataclass
-class _KeptSource:
-    """A Source whose unit is kept."""
+class KeptSource:
+    """A Source whose unit is kept, with what it was given."""
 
     model: StageModel
     settle: float
-    unit_made: _Kept | None = None
-    parameters: Mapping[str, float | bool | str] = field(default_factory=dict)
+    unit_made: Kept | None = None
 
-    def unit(self, parameters: Mapping[str, float | bool | str]) -> _Kept:
-        self.parameters = dict(parameters)
-        self.unit_made = _Kept(self.model.blob, parameters, self.settle)
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> Kept:
+        self.unit_made = Kept(self.model.blob, parameters, self.settle)
         return self.unit_made
 
 
@@ -130,27 +132,34 @@ def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int
     return assemble(in_drivetrain(scene, spec), bodies or load_stage_bodies(spec), rolls)
 
 
+@dataclass(frozen=True)
+class Recorded:
+    """A coupled run, with what plays its stage back, and the kernel that integrated it."""
+
+    result: Result
+    recording: Recording
+    kernel: Kernel
+
+
+def recorded_run(scene: SceneSpec, model: StageModel) -> Recorded:
+    """A coupled run of the scene as it is, by the kernel, with its inputs kept; the state that a replay begins at is
+    that after the scene's settling time. ModelError when the kernel refuses it, with the kernel's reason."""
+    source = KeptSource(model, scene.settle)
+    result = run_once(scene, source)
+    kept = source.unit_made
+    assert kept is not None, "the run made its unit"
+    return Recorded(result, kept.recording(model.blob, scene.coupling.step), kept.kernel)
+
+
 def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     """A coupled run of the scene at `point`. ModelError when the kernel refuses it, with the kernel's reason."""
     effects = scene.stage.effects.model_copy(update=dict.fromkeys(point.off, False))
     choice: dict[str, Any] = {"level": point.level, "integrator": point.integrator, "h": point.h}
     choice |= {"slices": point.slices, "effects": effects}
     changed = scene.model_copy(update={"stage": scene.stage.model_copy(update=choice), "record": ("*",)})
-    source = _KeptSource(model, scene.settle)
-    result = run_once(changed, source)
-    kept, facts, end = source.unit_made, result.facts, float(result.trace.time[-1])
-    assert kept is not None, "the run made its unit"
-    integrator = _integrator(kept, point)
-    recording = Recording(
-        model.blob,
-        source.parameters,
-        tuple(kept.now),
-        np.array(kept.start),
-        np.array(kept.rows),
-        scene.coupling.step,
-        max(kept.first, 0),
-        kept.state,
-    )
+    done = recorded_run(changed, model)
+    result, facts, end = done.result, done.result.facts, float(done.result.trace.time[-1])
+    integrator = _integrator(done.kernel, point)
     return Run(
         point,
         integrator,
@@ -159,8 +168,8 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
         int(facts["solver.n_dyn"]),
         result.outcome,
         int(result.trace["solver.status"][-1]),
-        kept.kernel.warning,
-        recording,
+        done.kernel.warning,
+        done.recording,
     )
 
 
@@ -172,9 +181,9 @@ def _signals(trace: Trace, model: StageModel, settle: float) -> Signals:
     return signals_of(trace, (pinion, wheel), settle)
 
 
-def _integrator(unit: _Kept, point: Point) -> str:
+def _integrator(kernel: Kernel, point: Point) -> str:
     """What integrates: level paper is rk45 unless a clutch hangs on a port."""
-    clutch = any(name.endswith(".clutch.capacity") for name in unit.kernel.variables)
+    clutch = any(name.endswith(".clutch.capacity") for name in kernel.variables)
     return "rk45" if point.level == "paper" and not clutch else point.integrator
 
 
@@ -190,15 +199,10 @@ class Replay:
         unit = KernelUnit(recording.blob, recording.parameters)
         self.kernel, self.recording = unit.kernel, recording
         self.references = [self.kernel.variables[name].reference for name in recording.names]
-        self._set(recording.start)
-        unit.initialize(0.0)
+        self.kernel.prepare()
         self.rewind()
         self.chunk(1)  # makes the tables of the step, once a run
         self.rewind()
-
-    def _set(self, values: np.ndarray) -> None:
-        for reference, value in zip(self.references, values.tolist(), strict=True):
-            self.kernel.set_reference(reference, value)
 
     def rewind(self) -> None:
         """Back to the settled state."""
@@ -220,7 +224,7 @@ class Replay:
 
     def _timed(self, rows: list[list[float]], step: float) -> float:
         set_one, take = self.kernel.set_reference, self.kernel.try_step
-        references, h, at = self.references, self.recording.step, self.at
+        references, h, at = self.references, self.recording.step, self.recording.before + self.at
         started = clock.thread_time()
         for k, row in enumerate(rows):
             for reference, value in zip(references, row, strict=True):

@@ -124,8 +124,9 @@ def with_planets(spec: PlanetarySpec, planets: int) -> PlanetarySpec:
     teeth = spec.sun.teeth + spec.ring.teeth
     places = None if teeth % planets == 0 else tuple(round(k * teeth / planets) for k in range(planets))
     mesh = spec.carrier.mesh.model_copy(update={"scale": COARSE * spec.carrier.mesh.scale})
+    of_pins: dict[str, Any] = {"pin_errors": {}, "planet_eccentricity": {}}
     update = {
-        "set": spec.set.model_copy(update={"planets": planets, "positions": places, "pin_errors": {}}),
+        "set": spec.set.model_copy(update={"planets": planets, "positions": places} | of_pins),
         "carrier": spec.carrier.model_copy(update={"mesh": mesh, "coupling": {}, "modes": 30 * planets}),
     }
     return spec.model_copy(update=update)

@@ -5,7 +5,7 @@ error is taken. Keys:
 
     torque, speed             of the scene's drive and start; of the input of a stage
     stage.<field>             of the stage file: stage.gears.pinion.tip_relief.amount
-    duration, step, settle    of a stage that is run alone; `positions` of a transmission error
+    duration, step, settle    of a stage that is run alone; `positions`, `pitches` of a transmission error
     anything else             a field of the scene (coupling.step, stage.level), or of a stage alone a parameter of the
                               kernel (level, effect.hertz: docs/variables.md)
 """
@@ -31,7 +31,7 @@ from gearfmu.units import to_si
 RUN, SIMULATE, TE = "run", "simulate", "te"
 OWN = {  # keys of a stage that is computed alone, with their units
     SIMULATE: {"torque": "N*m", "speed": "rad/s", "duration": "s", "step": "s", "settle": "s", "end_speed": "rad/s"},
-    TE: {"torque": "N*m", "positions": ""},
+    TE: {"torque": "N*m", "positions": "", "pitches": ""},
 }
 NEEDED = {RUN: (), SIMULATE: ("torque", "speed"), TE: ("torque",)}
 STAGE = "stage."

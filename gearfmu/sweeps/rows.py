@@ -30,15 +30,17 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
     own = _own(TE, values)
     settings: dict[str, Any] = _settings(TE, model, values)
     torque, positions = own["torque"], int(own.get("positions", POSITIONS))
+    pitches = int(own.get("pitches", 1))
     if isinstance(model.spec, PlanetarySpec):
-        result = set_te(model, [torque], positions, **settings)
+        result = set_te(model, [torque], positions, pitches, **settings)
         factors = {f"K_gamma_{gear}": float(k) for gear, k in zip(GEARS, result.load_factor[0], strict=True)}
         return _te_numbers(result, "") | factors, _curve(result, "")
     names = [mesh.name for mesh in model.stage.engagements]
     row: dict[str, float] = {}
     curve: dict[str, list[float]] = {}
     for mesh in names:
-        found, before = loaded_te(model, [torque], positions, mesh=mesh, **settings), f"{mesh}_" * (len(names) > 1)
+        found = loaded_te(model, [torque], positions, mesh=mesh, pitches=pitches, **settings)
+        before = f"{mesh}_" * (len(names) > 1)
         row |= _te_numbers(found, before)
         curve |= _curve(found, before)
     return row, curve

@@ -1,5 +1,5 @@
-"""Who computes: processes of this machine, or a dask cluster. Both call a function for every argument and yield (number
-of the argument, result) as they come; a result that no worker lived to give is a Lost."""
+"""Who computes: this process, processes of this machine, or a dask cluster. All call a function for every argument and
+yield (number of the argument, result) as they come; a result that no worker lived to give is a Lost."""
 
 from __future__ import annotations
 
@@ -34,6 +34,12 @@ class Lost:
 def cores() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_this_process(function: Callable[[Any], Any], arguments: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    """A Runner: one argument after the other, here."""
+    for number, argument in enumerate(arguments):
+        yield number, function(argument)
 
 
 def on_this_machine(workers: int | None = None) -> Runner:

@@ -98,9 +98,10 @@ def test_a_body_with_few_offsets_reads_back_by_its_offset(made: SimpleNamespace,
         replace(body, static_ff=body.static_ff[:, :, :6])
 
 
-def test_files_of_spur_gears_made_before_are_read_and_not_stale() -> None:
+def test_shipped_spur_gears_know_their_profile_and_what_turning_does() -> None:
     for body in load_stage_bodies(load_stage("fzg_c")):
-        assert (body.groups, body.tangent, body.base_helix_angle) == ((), None, 0.0)
+        assert body.groups == ("tangent", "shapes", "spin") and body.base_helix_angle == 0.0
+        assert body.knows_profile
     assert set(GROUPS) == {"rim", "helix", "tangent", "shapes", "spin"}
 
 

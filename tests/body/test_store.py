@@ -72,11 +72,19 @@ def test_a_stored_body_is_taken_when_its_hash_matches_and_made_again_when_not(ma
     assert [b.name for b in load_stage_bodies(spec)] == ["pinion", "wheel"]
     softer = spec.gears[0].material.model_copy(update={"youngs_modulus": 103e9})
     other = spec.model_copy(update={"gears": (spec.gears[0].model_copy(update={"material": softer}), spec.gears[1])})
-    with pytest.raises(BodyError, match="pinion.h5: stale.*gearfmu reduce"):
+    with pytest.raises(BodyError, match="pinion.h5: stale: made from other numbers.*gearfmu reduce"):
         load_stage_bodies(other)
     remade = reduce_stage(other, folder / "other")[0]
     assert np.allclose(remade.frequency, bodies[0].frequency / np.sqrt(2), rtol=1e-7)
     assert np.allclose(remade.static_ff, 2 * bodies[0].static_ff, rtol=0, atol=1e-9 * bodies[0].static_ff.max())
+
+
+def test_a_body_of_an_older_reduction_is_refused_by_its_version(made, tmp_path):
+    spec, bodies, _ = made
+    for index, body in enumerate(bodies):
+        save_body(replace(body, algorithm_version=1, input_hash="0" * 64), body_path(spec, index, tmp_path))
+    with pytest.raises(BodyError, match="pinion.h5: stale: made by version 1 of the reduction, this program has"):
+        load_stage_bodies(spec, tmp_path)
 
 
 def test_contact_ports_and_backlash_leave_the_body_alone(made):

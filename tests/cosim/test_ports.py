@@ -1,4 +1,4 @@
-"""Ports and logs of drivetrains: two roads, one answer."""
+"""Ports and logs of drivetrains: two methods, one answer."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def test_a_run_leaves_trace_and_summary_with_the_promised_fields(tmp_path):
 
 
 def test_chain_in_the_stage_and_exact_clutch_outside_are_the_same_drivetrain():
-    """Two roads: the kernel's clutch in C against PyUnit's event-exact one, up to and past lock-up, rigid bodies.
+    """Two methods: the kernel's clutch in C against PyUnit's event-exact one, up to and past lock-up, rigid bodies.
 
     Lock-up falls into the same communication step; shaft torque, pinion and engine speeds agree within their margins.
     """

@@ -1,4 +1,4 @@
-"""FMUs that all tests of this room share, made once per session from a small stage, and a helper to unpack them."""
+"""FMUs that all tests of this folder share, made once per session from a small stage, and a helper to unpack them."""
 
 from __future__ import annotations
 

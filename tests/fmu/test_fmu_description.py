@@ -17,7 +17,7 @@ from small_stage import small_model
 from gearfmu.errors import FmuError
 from gearfmu.fmu import export
 from gearfmu.fmu.package import content_identifier, write_archive
-from gearfmu.fmu.units import ATOMS, base_exponents
+from gearfmu.fmu.units import ATOMS, base_exponents, unit_of
 from gearfmu.kernel import library_path
 
 
@@ -63,7 +63,7 @@ def test_description_is_the_kernels_table(model, native):
     listed = description.modelVariables
     assert [v.name for v in listed] == [v.name for v in model.kernel_variables()]
     for ours, theirs in zip(model.kernel_variables(), listed, strict=True):
-        assert (ours.reference, ours.type, ours.causality, ours.unit or None) == (
+        assert (ours.reference, ours.type, ours.causality, unit_of(ours)) == (
             theirs.valueReference,
             theirs.type,
             theirs.causality,

@@ -1,4 +1,4 @@
-"""Two roads, one answer: FMU and kernel, native and pythonfmu, one stage beside another, fmpy and other importers."""
+"""Two methods, one answer: FMU and kernel, native and pythonfmu, one stage or thread beside another."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import os
 import re
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy import read_model_description
 
 from gearfmu.fmu.probes import Subject
 
@@ -126,74 +127,23 @@ def crossing(log: str, folders: list[str]) -> list[str]:
     return [pair for pair in pairs if all(map(owners.get, pair)) and owners[pair[0]] != owners[pair[1]]]
 
 
-@pytest.mark.needs("libcosimpy")
-def test_libcosim_gives_the_numbers_of_fmpy(native, unpacked):
-    from libcosimpy.CosimExecution import CosimExecution
-    from libcosimpy.CosimManipulator import CosimManipulator
-    from libcosimpy.CosimObserver import CosimObserver
-    from libcosimpy.CosimSlave import CosimLocalSlave
+def test_instances_in_two_threads_do_not_meet(unpacked, unpacked_other):
+    """Two FMUs, and two instances of one, stepped at the same time: the bits of each alone."""
+    folders = (unpacked, unpacked_other, unpacked)
+    alone = []
+    for folder in folders[:2]:
+        subject = Subject(folder).initialized()
+        alone.append(subject.run(STEPS))
+        subject.close()
+    subjects = [Subject(folder).initialized() for folder in folders]
+    gate = threading.Barrier(len(folders))
 
-    variables = {v.name: v.valueReference for v in read_model_description(unpacked).modelVariables}
-    names = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
-    execution = CosimExecution.from_step_size(int(H * 1e9))
-    slave = execution.add_local_slave(CosimLocalSlave(fmu_path=str(native), instance_name="stage"))
-    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
-    execution.add_observer(observer)
-    execution.add_manipulator(manipulator)
-    values = [2e-3, 1.0]
-    manipulator.slave_real_values(slave, [variables["pinion.phi"], variables["pinion.w"]], values)
-    rows = []
-    for _ in range(STEPS):
-        execution.step()
-        rows.append(observer.last_real_values(slave, [variables[name] for name in names]))
-    expected = held_run(unpacked, dict(zip(("pinion.phi", "pinion.w"), values, strict=True)), names)
-    scale = np.abs(expected).max(axis=0)
-    assert (np.abs(np.array(rows) - expected) / scale).max() <= 1e-12
+    def run(subject: Subject) -> bytes:
+        gate.wait()
+        return subject.run(STEPS)
 
-
-def held_run(folder: str, inputs: dict[str, float], outputs: list[str]) -> np.ndarray:
-    """Outputs after each of STEPS steps with inputs that are set after the initialisation and then held."""
-    subject = Subject(folder)
-    by_name = {v.name: v.valueReference for v in subject.variables}
-    subject.fmu.setupExperiment(startTime=0.0)
-    subject.fmu.enterInitializationMode()
-    subject.fmu.exitInitializationMode()
-    subject.fmu.setReal([by_name[name] for name in inputs], list(inputs.values()))
-    rows = []
-    for k in range(STEPS):
-        subject.fmu.doStep(k * H, H)
-        rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
-    subject.close()
-    return np.array(rows)
-
-
-ECOS = """
-import json, sys
-from ecospy import EcosSimulation, EcosSimulationStructure
-fmu, steps, h, inputs, outputs = json.loads(sys.argv[1])
-with EcosSimulationStructure() as structure:
-    structure.add_model("stage", fmu)
-    with EcosSimulation(structure=structure, step_size=h) as simulation:
-        simulation.init()
-        for name, value in inputs.items():
-            simulation.set_real("stage::" + name, value)
-        rows = []
-        for _ in range(steps):
-            simulation.step()
-            rows.append([simulation.get_real("stage::" + name) for name in outputs])
-        simulation.terminate()
-print(json.dumps(rows))
-"""
-
-
-@pytest.mark.needs("ecospy")
-def test_ecos_gives_the_numbers_of_fmpy(native, unpacked):
-    inputs, names = {"pinion.phi": 2e-3, "pinion.w": 1.0}, ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
-    setting = json.dumps([str(native), STEPS, H, inputs, names])
-    done = subprocess.run([sys.executable, "-c", ECOS, setting], capture_output=True, text=True)
-    if "libtbb" in done.stderr:
-        pytest.skip("needs the library libtbb: apt-get install libtbb12")
-    assert done.returncode == 0, done.stderr[-2000:]
-    expected = held_run(unpacked, inputs, names)
-    rows = np.array(json.loads(done.stdout.splitlines()[-1]))
-    assert (np.abs(rows - expected) / np.abs(expected).max(axis=0)).max() <= 1e-12
+    with ThreadPoolExecutor(len(folders)) as pool:
+        together = list(pool.map(run, subjects))
+    for subject in subjects:
+        subject.close()
+    assert together == [alone[0], alone[1], alone[0]]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from builds import sanitized_host, sanitized_library
 from fmpy import read_model_description
 from small_stage import unpack
 
@@ -37,11 +38,9 @@ class Host:
 
 
 @pytest.fixture(scope="module")
-def sanitized(tmp_path_factory) -> Host:
+def sanitized() -> Host:
     """Host and library with AddressSanitizer and UBSan; leaks are findings too."""
-    work = tmp_path_factory.mktemp("sanitized")
-    library = build_library(sanitize=True, out=work / "kernel.so")
-    return Host(compile_program(SOURCE, work / "host", sanitize=True), library)
+    return Host(sanitized_host(SOURCE), sanitized_library())
 
 
 @pytest.fixture(scope="module")

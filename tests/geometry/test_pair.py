@@ -112,14 +112,17 @@ def test_a_centre_distance_below_the_base_circles_is_refused() -> None:
         PairGeometry((PINION, WHEEL), PINION.r_b + WHEEL.r_b, 0.0)
 
 
-def test_relief_is_smooth_and_reaches_its_amount_at_the_tip() -> None:
-    curve = ReliefCurve(15e-6, PAIR.outer_single_contact(0), PINION.s_a)
-    assert curve.depth(PINION.s_a) == pytest.approx(15e-6, rel=1e-15)
-    assert (curve.depth(curve.start), curve.slope(curve.start), curve.depth(1e-3)) == (0, 0, 0)
-    roll = np.linspace(curve.start - 1e-3, PINION.s_a, 50)
-    step = 1e-8
-    slope = (curve.depth(roll + step) - curve.depth(roll - step)) / (2 * step)
-    assert curve.slope(roll) == pytest.approx(slope, abs=2e-9)
+def test_reliefs_of_all_kinds_reach_their_amount_at_the_tip() -> None:
+    start, kinds = PAIR.outer_single_contact(0), ("linear", "parabolic", "arc")
+    linear, parabolic, arc = (ReliefCurve(15e-6, start, PINION.s_a, kind) for kind in kinds)
+    for curve in (linear, parabolic, arc):
+        assert curve.depth(PINION.s_a) == pytest.approx(15e-6, rel=1e-12)
+        assert (curve.depth(start), curve.depth(1e-3)) == (0, 0)
+    roll = np.linspace(start, PINION.s_a, 50)
+    assert linear.depth(roll) ** 2 == pytest.approx(15e-6 * parabolic.depth(roll), abs=1e-24)
+    radius = ((PINION.s_a - start) ** 2 + 15e-6**2) / (2 * 15e-6)  # tangent where it begins, its centre below
+    assert (roll - start) ** 2 + (radius - arc.depth(roll)) ** 2 == pytest.approx(np.full(50, radius**2), rel=1e-15)
+    assert arc.depth(roll) == pytest.approx(parabolic.depth(roll), abs=1e-9)
 
 
 def test_hertz_half_width_is_consistent_with_its_peak_pressure() -> None:

@@ -58,7 +58,7 @@ def test_import_prints_the_section(tmp_path: Path) -> None:
         run, check=True, capture_output=True, text=True, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}
     )
     assert '[gears.pinion.import]\nfile = "pinion.inp"\nlength = "1 mm"\nbore = "BORE"' in done.stdout
-    assert re.search(r"base_radius_m +0\.0338289", done.stdout) and re.search(r"road +cyclic", done.stdout)
+    assert re.search(r"base_radius_m +0\.0338289", done.stdout) and re.search(r"method +cyclic", done.stdout)
     assert not list(tmp_path.iterdir())
 
 
@@ -76,7 +76,7 @@ def test_the_page_runs_as_it_stands(tmp_path: Path) -> None:
         load_body(tmp_path / "mine" / "pinion.h5"),
         load_body(ROOT / "reduced_models" / "fzg_c" / "pinion.h5"),
     )
-    assert body.mesh["road"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
+    assert body.mesh["method"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
     assert np.abs(body.frequency[:60] / shipped.frequency[:60] - 1).max() < 0.015  # a coarse mesh
     te = re.search(r"302\.0 N·m: mean ([\d.]+) µm, peak to peak ([\d.]+) µm", done.stdout)
     assert te, done.stdout

@@ -1,4 +1,4 @@
-"""An imported gear is the gear: whole or one sector, hexahedra or tetrahedra, cyclic road or mean tooth."""
+"""An imported gear is the gear: whole or one sector, hexahedra or tetrahedra, cyclic method or mean tooth."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_our_own_mesh_comes_back_as_the_same_body(tmp_path: Path, native: Reduce
     """Cut into sectors again, or one sector as such."""
     hex20_deck(tmp_path / "pinion.inp", whole=whole)
     body = imported(tmp_path, SECTION + 'bore = "bore"')
-    assert body.mesh["road"] == "cyclic"
+    assert body.mesh["method"] == "cyclic"
     assert_same(body, native, 1e-9)
 
 
@@ -53,7 +53,7 @@ def test_a_gear_that_lies_elsewhere_is_found(tmp_path: Path, native: ReducedBody
     points = pinion().nodes @ turn(2, 0.7) @ turn(0, np.radians(0.2)) + np.array([3e-4, -2e-4, 0.1])
     hex20_deck(tmp_path / "pinion.inp", points[:, [2, 0, 1]])
     body = imported(tmp_path, SECTION + 'bore = "BORE"\naxis = "x"')
-    assert body.mesh["road"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
+    assert body.mesh["method"] == "cyclic" and body.mesh["fit"]["residual_max_um"] < 1e-3
     assert_same(body, native, 1e-7)
 
 
@@ -71,14 +71,14 @@ def test_exported_vtu_comes_back(tmp_path: Path, native: ReducedBody) -> None:
 
 @pytest.mark.full
 def test_ready_made_matrices_give_the_same_body_by_the_mean_tooth(tmp_path: Path, native: ReducedBody) -> None:
-    """The whole gear without any symmetry, its 60 lowest modes sorted by nodal diameter: two roads, one answer."""
+    """The whole gear without any symmetry, its 60 lowest modes sorted by nodal diameter: two methods, one answer."""
     hex20_deck(tmp_path / "pinion.inp")
     material = stage(tmp_path).gears[0].material
     stiffness, mass = solids.assemble(pinion().nodes, {"hexahedron20": pinion().elements}, material)
     sp.save_npz(tmp_path / "k.npz", sp.csr_matrix(1e-3 * stiffness))
     sp.save_npz(tmp_path / "m.npz", sp.csr_matrix(1e-3 * mass))
     body = imported(tmp_path, SECTION + 'stiffness = "k.npz"\nmass = "m.npz"\nmass_unit = "1 t"')
-    assert body.mesh["road"] == "mean tooth" and body.mesh["teeth_deviation"] < 1e-9
+    assert body.mesh["method"] == "mean tooth" and body.mesh["teeth_deviation"] < 1e-9
     assert_same(body, native, 1e-8)
     assert np.array_equal(body.nodal_diameter, native.nodal_diameter) and np.array_equal(body.parity, native.parity)
 
@@ -89,7 +89,7 @@ def test_tetrahedra_of_one_sector(tmp_path: Path, native: ReducedBody) -> None:
     points, cells = tetrahedra(pinion(whole=False))
     write_deck(tmp_path / "pinion.inp", 1e3 * points, {"tetra10": cells})
     body = imported(tmp_path)
-    assert body.mesh["road"] == "cyclic" and body.mesh["elements"] == {"tetra10": len(cells)}
+    assert body.mesh["method"] == "cyclic" and body.mesh["elements"] == {"tetra10": len(cells)}
     assert np.abs(body.frequency[:40] / native.frequency[:40] - 1).max() < 0.01
     middle = (0, 0, 0, 4, 4, 0, 0)
     assert body.static_ff[middle] == pytest.approx(native.static_ff[middle], rel=0.02)
@@ -115,7 +115,7 @@ def test_a_rigid_bore_moves_as_one_and_is_stiffer(tmp_path: Path, native: Reduce
     """RBE2 in the bore: the whole gear by the mean tooth; a turn of the bore needs no strain, teeth give way less."""
     hex20_deck(tmp_path / "pinion.inp")
     body = imported(tmp_path, SECTION + 'bore = "BORE"\nbore_coupling = "rigid"')
-    assert body.mesh["road"] == "mean tooth" and body.mesh["teeth_deviation"] < 1e-9
+    assert body.mesh["method"] == "mean tooth" and body.mesh["teeth_deviation"] < 1e-9
     assert body.mass == pytest.approx(native.mass, rel=1e-9)
     assert body.inertia == pytest.approx(native.inertia, rel=1e-6, abs=1e-9 * native.inertia[2, 2])
     middle = (0, 0, 0, 4, 4, 0, 0)
@@ -142,7 +142,7 @@ def test_a_keyway_is_the_mean_tooth_and_its_error_is_stated(tmp_path: Path, nati
     new[used] = np.arange(len(used))
     write_deck(tmp_path / "pinion.inp", 1e3 * pinion().nodes[used], {"hexahedron20": new[cells]})
     body = imported(tmp_path)
-    assert body.mesh["road"] == "mean tooth"
+    assert body.mesh["method"] == "mean tooth"
     assert 1e-4 < body.mesh["teeth_deviation"] < 0.2 and body.mesh["compliance_left_to_residual"] < 0.02
     assert native.mass * 0.97 < body.mass < native.mass
     middle = (0, 0, 0, 4, 4, 0, 0)

@@ -119,7 +119,7 @@ def test_an_imported_planet_is_the_planet(tmp_path: Path) -> None:
     spec = stage(tmp_path, PLANET)
     assert np.allclose(set_sector(spec, "planet").nodes, mesh.nodes, atol=1e-9)
     body, native = (reduce_set_body(one, "planet") for one in (spec, own))
-    assert body.mesh["road"] == "cyclic" and body.modes == native.modes
+    assert body.mesh["method"] == "cyclic" and body.modes == native.modes
     assert np.abs(body.frequency / native.frequency - 1).max() < 1e-9
     assert np.abs(body.static_ff - native.static_ff).max() < 1e-9 * np.abs(native.static_ff).max()
 
@@ -145,7 +145,7 @@ def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> 
     sector = set_sector(own, "ring")
     ring_deck(tmp_path, sector.full() if whole else sector, 0.02 if whole else 0.0)
     body, native = (reduce_set_body(spec, "ring") for spec in (stage(tmp_path, RING + rim), own))
-    assert body.internal and body.mesh["road"] == "cyclic" and body.modes == native.modes
+    assert body.internal and body.mesh["method"] == "cyclic" and body.modes == native.modes
     assert np.abs(body.frequency / native.frequency - 1).max() < 1e-8
     for name in ("static_ff", "static_fb", "static_bb", "inertia", "rim.static_fp", "rim.static_pp", "rim.flank_rigid"):
         one, other = (attrgetter(name)(b) for b in (body, native))

@@ -1,4 +1,4 @@
-"""The mean tooth of a whole gear: equal to the cyclic road for a cyclic body, and the exact mean for any other."""
+"""The mean tooth of a whole gear: equal to the cyclic method for a cyclic body, and the exact mean for any other."""
 
 from __future__ import annotations
 

@@ -10,7 +10,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from probes import Probes, build, compile_probes  # noqa: E402  (found through the line above)
+from probes import Probes, compile_probes  # noqa: E402  (found through the line above)
+
+from gearfmu.kernel import library_path  # noqa: E402
 
 
 @pytest.fixture(scope="session")
@@ -21,12 +23,6 @@ def probes(tmp_path_factory: pytest.TempPathFactory) -> Probes:
 
 
 @pytest.fixture(scope="session")
-def system_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The kernel as the system's compiler builds it with the project's flags."""
-    return build(tmp_path_factory.mktemp("system"))
-
-
-@pytest.fixture(scope="session")
-def double_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The kernel with modal states and rows in double, for comparison to the last digits."""
-    return build(tmp_path_factory.mktemp("double"), real="double")
+def system_library() -> Path:
+    """The kernel as it ships: the system's compiler with the project's flags."""
+    return library_path()

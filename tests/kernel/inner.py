@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from probes import FLAGS, HERE, source_folder
 
 from gearfmu.kernel import Kernel
-from gearfmu.kernel.build import fmi_headers
 
 POSE = 6
 
@@ -27,15 +24,6 @@ class Place:
     gradient: np.ndarray
     roll: tuple[float, float]
     curvature: float
-
-
-def compile_inner(out: Path) -> Path:
-    """Kernel and inner_probe.c in one library."""
-    files = [str(p) for p in sorted(source_folder().rglob("*.c"))] + [str(HERE / "inner_probe.c")]
-    line = ["cc", *FLAGS, "-fPIC", "-shared", f"-I{source_folder()}", f"-I{fmi_headers()}", "-o", str(out), *files]
-    done = subprocess.run(line, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return out
 
 
 class Inner:

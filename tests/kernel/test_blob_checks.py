@@ -25,15 +25,17 @@ SAMPLE = {
     "more": np.full(8, -2.5),
 }
 BLOB = write_blob(SAMPLE)
-TYPE, COUNT, OFFSET = 24, 32, 40  # places in a table entry
+LONG = np.arange(600.0)
+REPEATING = write_blob({"long0": LONG, "other": LONG[:7], "long1": LONG, "long2": LONG})
+TYPE, REPEATS, COUNT, OFFSET = 24, 28, 32, 40  # places in a table entry
 
 
 def entry(i: int) -> int:
     return HEADER.size + i * ENTRY.size
 
 
-def patched(place: int, data: bytes) -> bytes:
-    return seal(BLOB[:place] + data + BLOB[place + len(data) :])
+def patched(place: int, data: bytes, blob: bytes = BLOB) -> bytes:
+    return seal(blob[:place] + data + blob[place + len(data) :])
 
 
 def test_opens_anywhere_on_8_bytes(probes: Probes) -> None:
@@ -78,7 +80,7 @@ def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
         (patched(entry(0), b"y" * 24), "name of section 0"),
         (patched(entry(2), b"name\0"), "'name' is there twice"),
         (patched(entry(1) + TYPE, b"\4"), "'roll' is of unknown type 4"),
-        (patched(entry(1) + TYPE + 4, b"\1"), "'roll' is of unknown type"),
+        (patched(entry(1) + TYPE + 4, b"\1"), "'roll' does not repeat an earlier one"),
         (patched(entry(2) + COUNT, struct.pack("<Q", 2**62)), "'teeth' reaches beyond the end"),
         (patched(entry(2) + COUNT, struct.pack("<Q", 2**64 - 1)), "'teeth' reaches beyond the end"),
         (patched(entry(1) + COUNT, struct.pack("<Q", 8)), "'teeth' does not begin where"),
@@ -96,6 +98,33 @@ def test_each_rule(probes: Probes, damage: bytes, words: str) -> None:
     outcome, message, _, sections = probes.blob_open(damage)
     assert outcome == BAD_BLOB and words in message and sections == 0
     with pytest.raises(ModelError, match=words.replace("kernel", "package").replace("(", r"\(")):
+        read_blob(damage)
+
+
+def test_a_section_that_repeats_another_has_its_contents(probes: Probes) -> None:
+    assert probes.blob_open(REPEATING)[0] == 0
+    assert [probes.blob_sum(REPEATING, f"long{i}", F64) for i in range(3)] == 3 * [(LONG.sum(), 600)]
+    assert len(REPEATING) < len(write_blob({"long0": LONG, "long1": LONG + 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("place", "data"),
+    [
+        (entry(0) + REPEATS, b"\1"),  # itself
+        (entry(0) + REPEATS, b"\3"),  # a later one
+        (entry(2) + REPEATS, b"\2"),  # another section
+        (entry(3) + REPEATS, b"\3"),  # one that repeats itself
+        (entry(3) + REPEATS, b"\xff\xff\xff\xff"),
+        (entry(3) + TYPE, b"\2"),
+        (entry(3) + COUNT, struct.pack("<Q", 599)),
+        (entry(3) + OFFSET, struct.pack("<Q", 2**63)),
+    ],
+)
+def test_what_repeats_no_earlier_section_is_refused(probes: Probes, place: int, data: bytes) -> None:
+    damage = patched(place, data, REPEATING)
+    outcome, message, _, _ = probes.blob_open(damage)
+    assert outcome == BAD_BLOB and "does not repeat an earlier one" in message
+    with pytest.raises(ModelError, match="does not repeat an earlier one"):
         read_blob(damage)
 
 
@@ -124,11 +153,12 @@ def test_every_unicode_boundary(probes: Probes) -> None:
         assert probes.blob_open(seal(bytes(blob)))[0] == BAD_BLOB, wrong
 
 
-def test_kernel_and_python_agree_on_random_damage(probes: Probes) -> None:
+@pytest.mark.parametrize("blob", [BLOB, REPEATING])
+def test_kernel_and_python_agree_on_random_damage(probes: Probes, blob: bytes) -> None:
     rng = np.random.default_rng(3)
     accepted = 0
     for _ in range(3000):
-        damage = mutated(BLOB, rng)
+        damage = mutated(blob, rng)
         try:
             read_blob(damage)
             expected = 0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from inner import Inner, Place, compile_inner
+from inner import Inner, Place
 from small_model import BASE, PSI, TEETH, TIP, WORKING, _coast_shift, pair_blob
 
 from gearfmu.stage.blob import read_blob, write_blob
@@ -19,26 +19,21 @@ DRIVE, COAST = 0, 1
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compile_inner(tmp_path_factory.mktemp("inner") / "inner.so")
+def relieved(inner_library: Path) -> Inner:
+    return Inner(inner_library, pair_blob(), {"effect.tip_relief": 1})
 
 
 @pytest.fixture(scope="module")
-def relieved(library: Path) -> Inner:
-    return Inner(library, pair_blob(), {"effect.tip_relief": 1})
+def plain(inner_library: Path) -> Inner:
+    return Inner(inner_library, pair_blob(), {"effect.tip_relief": 0})
 
 
 @pytest.fixture(scope="module")
-def plain(library: Path) -> Inner:
-    return Inner(library, pair_blob(), {"effect.tip_relief": 0})
-
-
-@pytest.fixture(scope="module")
-def misplaced(library: Path) -> Inner:
+def misplaced(inner_library: Path) -> Inner:
     """Every tooth of both gears out of its place by up to 1.4 mrad (50 µm), either flank by an amount of its own."""
     angles = np.random.default_rng(3).uniform(-1.4e-3, 1.4e-3, (2, sum(TEETH)))
     index = {"index0": angles[:, : TEETH[0]], "index1": angles[:, TEETH[0] :]}
-    return Inner(library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 1})
+    return Inner(inner_library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 1})
 
 
 def turned(phi: float, dx: float = 0.0, dy: float = 0.0, lead: float = 0.0) -> np.ndarray:
@@ -64,12 +59,12 @@ def test_unmodified_drive_flanks_touch_at_every_angle_and_the_coast_gap_is_the_b
         assert coast and np.allclose(coast, nominal + 1e-4 * np.cos(WORKING), atol=1e-12)
 
 
-def test_a_tooth_out_of_its_place_closes_its_own_gap_by_base_radius_times_angle(library: Path, plain: Inner):
+def test_a_tooth_out_of_its_place_closes_its_own_gap_by_base_radius_times_angle(inner_library: Path, plain: Inner):
     """Pinion tooth 2 by 1 mrad, and wheel tooth −2 that meets it by −0.4 mrad: the drive gap of this pair shrinks by
     r_b1·1e-3 − r_b2·0.4e-3, the coast gaps of both teeth grow by as much, all others stay."""
     index = {f"index{g}": np.zeros((2, z)) for g, z in enumerate(TEETH)}
     index["index0"][:, 2], index["index1"][:, -2] = 1e-3, -4e-4
-    changed = Inner(library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 0})
+    changed = Inner(inner_library, write_blob(read_blob(pair_blob()) | index), {"effect.tip_relief": 0})
     phi, closer = -2 * 2 * np.pi / TEETH[0] + 0.02, (BASE[0] * 1e-3, -BASE[1] * 4e-4)
     seen = set()
     for place in changed.places(turned(phi), 2e-3):
@@ -178,7 +173,7 @@ def test_local_law_is_continuous_with_its_slope_and_its_energy_is_the_integral(p
     assert plain.law(0.0, 150.0)[0] == 0.0 and plain.law(0.0, 150.0)[2] == 0.0
 
 
-def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(library: Path):
+def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(inner_library: Path):
     """Two cylinders: δ = Σ 2(1 − ν²)/(πEL)·F·[ln(4w/b) − 1], b from Hertz (numbers of
     tests/reference/hertz_line.json)."""
     case = REFERENCE
@@ -188,7 +183,7 @@ def test_local_law_with_a_deep_strip_is_the_line_contact_of_weber_and_banaschek(
         sections[f"gear{g}"] = change_gear(
             sections[f"gear{g}"], local=local, face_width=case["L"], strip_half_width=1e-3
         )
-    inner = Inner(library, write_blob(sections), {"slices": 1})
+    inner = Inner(inner_library, write_blob(sections), {"slices": 1})
     curvature = 1 / case["R1"] + 1 / case["R2"]
     local = 2 * (1 - case["nu"] ** 2) / (np.pi * case["E"] * case["L"])
     expected = 2 * local * case["F"] * (np.log(4 * 1e-3 / case["b"]) - 1)

@@ -12,16 +12,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import builds
 import numpy as np
 import pytest
 from exact_bars import Bar
 from mutations import mutated
-from probes import compile_c, compilers, source_folder
 from small_model import bars_blob, pair_blob, with_nodes
 
-from gearfmu.kernel.build import FLAGS
-
-SANITIZE = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 SEED = 20150712
 REFUSED = ("open", "1")
 
@@ -47,13 +44,9 @@ def damaged(number: int) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def fuzzer(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """fuzz_kernel.c with the kernel's sources, sanitized."""
-    command = next((compilers()[name] for name in ("gcc", "clang") if name in compilers()), None)
-    if command is None:
-        pytest.skip("no gcc or clang with sanitizers: install gcc (Debian: apt-get install gcc)")
-    files = [Path(__file__).with_name("fuzz_kernel.c"), *sorted(source_folder().rglob("gk_*.c"))]
-    return compile_c([*command, *FLAGS, *SANITIZE], files, tmp_path_factory.mktemp("fuzz") / "fuzz")
+def fuzzer() -> Path:
+    """fuzz_kernel.c on the sanitized kernel."""
+    return builds.fuzzer()
 
 
 @dataclass(frozen=True)

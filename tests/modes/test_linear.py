@@ -103,7 +103,7 @@ def test_a_support_and_its_damper() -> None:
     assert damping[0] == pytest.approx(40 * 6e-4**2 / (2 * 900), rel=1e-12)
 
 
-# ---- by other roads -------------------------------------------------------------------------------------------------
+# ---- by other methods -----------------------------------------------------------------------------------------------
 def from_parts(stage: Stage, model: StageModel, torque: float, position: float) -> np.ndarray:
     contacts = loaded_contacts(stage.spec, statics_of(model), torque, position)
     return couple(

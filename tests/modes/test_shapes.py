@@ -110,7 +110,7 @@ def test_stored_frequencies_are_compared() -> None:
 
 
 def test_a_ring_by_sectors_and_as_a_whole() -> None:
-    """Two roads: 54 sectors, and all teeth at once without symmetry."""
+    """Two methods: 54 sectors, and all teeth at once without symmetry."""
     mesh, material = set_body("ring", 0.2)
     sectors = cyclic_modes("ring", mesh, material, 8)
     whole = whole_modes(ring_full_order(load_stage("planetary54"), 0.2, mounted=False), mesh.full(), {}, material, 8)

@@ -81,7 +81,7 @@ def test_a_vanishing_helix_is_the_spur_ring() -> None:
     nearly, spur = coarse(math.radians(1e-6)), coarse()
     assert len(nearly.spaces) == 1 and len(spur.spaces) == 2
     tables, expected = static_tables(nearly, []), static_tables(spur, [])
-    for name in ("static_ff", "static_fb", "static_bb", "static_fp", "static_pp"):
+    for name in ("static_ff", "static_fb", "static_bb", "static_fp", "static_pp", "static_nt", "static_tt"):
         difference = np.abs(getattr(tables, name) - getattr(expected, name)).max()
         assert difference < 1e-6 * np.abs(getattr(expected, name)).max(), name
     assert np.abs(nearly.load_rows - spur.load_rows).max() < 1e-6 * np.abs(spur.load_rows).max()
@@ -96,7 +96,8 @@ def test_a_ring_of_the_other_hand_is_the_mirror_image() -> None:
 
 
 def test_a_planet_of_the_rings_hand_touches_it_along_a_line_with_opposite_normals() -> None:
-    """In every section the points at the local rolls s + sg z tan β_b coincide, on both flanks."""
+    """In every section the points at the local rolls s + sg z tan β_b coincide; the profile directions are the same:
+    both rolls grow outwards."""
     ring = geometry(BETA)
     planet = GearGeometry(
         z=10, m=ring.m, alpha=ring.alpha, x=0.0, beta=BETA, r_a=0.015, r_bore=0.004, tip_edge=1e-4,
@@ -105,7 +106,7 @@ def test_a_planet_of_the_rings_hand_touches_it_along_a_line_with_opposite_normal
     mesh = RingMesh(planet, ring, ring.r - planet.r + 1e-4, 0.0)
     phase = {planet: 0.0, ring: mesh.ring_phase(0.0, 0.0)}
     for z in np.linspace(-WIDTH / 2, WIDTH / 2, 5):
-        rolls, points, normals = [], [], []
+        rolls, points, normals, profiles = [], [], [], []
         for shape in (planet, ring):
             own = ToothFlank(
                 shape.r_b, shape.psi_b, shape.s_form, shape.s_tip, WIDTH, 3e-4, shape is ring, shape.beta_b
@@ -114,10 +115,12 @@ def test_a_planet_of_the_rings_hand_touches_it_along_a_line_with_opposite_normal
             roll = shape.r_b * (phase[shape] + shape.psi_b + mesh.alpha_wt) + z * math.tan(shape.beta_b)
             points.append(turned @ _turns(np.array(shape.twist * z)) @ np.append(shape.flank_point(roll), z))
             normals.append(turned @ own.normal(np.array(roll), 0, z))
+            profiles.append(turned @ own.tangent(np.array(roll), 0, z))
             rolls.append(roll)
         assert rolls[1] - rolls[0] == pytest.approx(mesh.length, rel=1e-12)
         assert points[0] + [mesh.a, 0, 0] == pytest.approx(points[1], abs=1e-15)
         assert normals[0] == pytest.approx(-normals[1], abs=1e-14)
+        assert profiles[0] == pytest.approx(profiles[1], abs=1e-14)
 
 
 def _turns(angle: np.ndarray) -> np.ndarray:

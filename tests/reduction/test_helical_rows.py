@@ -10,6 +10,7 @@ import pytest
 import small_gear
 from small_gear import GEAR, WIDTH
 from small_helical import BETA, COARSE, body, coarse, flank, gear, turned, whole
+from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
@@ -45,19 +46,6 @@ def test_frequencies_of_one_sector_are_those_of_the_whole_gear(modes: Modes) -> 
     assert np.all(modes.parity == 0)
 
 
-def on_tooth(modes: Modes, rows: np.ndarray, tooth: int) -> np.ndarray:
-    """Rows (…, n) on another tooth, by the formula of docs/architecture.md."""
-    theta = 2 * np.pi * modes.nodal_diameter * tooth / GEAR.z
-    result = rows * np.cos(theta)
-    first, second = np.flatnonzero(modes.part == 1), np.flatnonzero(modes.part == 2)
-    c, s = np.cos(theta[first]), np.sin(theta[first])
-    result[:, first], result[:, second] = (
-        rows[:, first] * c - rows[:, second] * s,
-        rows[:, first] * s + rows[:, second] * c,
-    )
-    return result
-
-
 def test_rows_along_normal_and_profile_and_of_the_bore_are_those_of_the_whole_gear(modes: Modes) -> None:
     """Sums of N Nᵀ over each frequency cluster do not depend on how pairs are turned."""
     _, shapes = lowest_modes(whole().free, len(modes.frequency) + 6, block=12)
@@ -67,7 +55,7 @@ def test_rows_along_normal_and_profile_and_of_the_bore_are_those_of_the_whole_ge
     omega = 2 * np.pi * modes.frequency
     ends = np.flatnonzero(np.diff(omega) / omega[:-1] > 1e-6) + 1
     for tooth in (0, 1, 5, 11):
-        reduced = np.vstack([on_tooth(modes, flanks, tooth), modes.bore_rows])
+        reduced = np.vstack([on_tooth(modes, flanks, tooth, GEAR.z), modes.bore_rows])
         full = np.vstack([whole().rows[tooth], whole().bore_rows]) @ shapes
         for cluster in np.split(np.arange(len(omega)), ends)[:-1]:
             mine, theirs = reduced_0[:, cluster] @ reduced[:, cluster].T, full_0[:, cluster] @ full[:, cluster].T

@@ -25,7 +25,7 @@ from gearfmu.reduction.statics import Statics, static_tables
 
 @dataclass(frozen=True)
 class Case:
-    """The two roads: sector with a rigid bore and with an averaged one, whole gear with a rigid coupling; rows (m, n)
+    """The two methods: sector with a rigid bore and with an averaged one, whole gear with a rigid coupling; rows (m, n)
     of the loads of tooth 0 and of the bore on the whole gear."""
 
     rigid: SectorBody

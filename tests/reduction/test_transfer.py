@@ -1,4 +1,4 @@
-"""Transfer matrices: two roads to the full model, ground held by constraint or by elimination, and the error norm."""
+"""Transfer matrices: two methods to the full model, ground held by constraint or by elimination, and the error norm."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def apart(one: Motion, other: Motion) -> float:
 
 
 def test_reduced_with_all_modes_is_unreduced() -> None:
-    """Springs, impact through a gap and loads; every elastic mode is there, so that only the road is another."""
+    """Springs, impact through a gap and loads; every elastic mode is there, so that only the method is another."""
     scene = pushed("sc", start=SPEED, gap=2e-6)
     whole = integrate(scene, WINDOW)
     same = integrate(with_both(scene, reduced("modal", elastic(tiny()).elastic)), WINDOW)

@@ -1,10 +1,11 @@
-"""Two roads, one answer: the reduction on one sector against the whole gear without any symmetry."""
+"""Two methods, one answer: the reduction on one sector against the whole gear without any symmetry."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from small_gear import GEAR, coarse, whole
+from turned_rows import on_tooth
 
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.lanczos import lowest_modes
@@ -25,19 +26,6 @@ def statics() -> Statics:
     return static_tables(coarse(), [0, 5])
 
 
-def rows_on_tooth(modes: Modes, tooth: int) -> np.ndarray:
-    """Flank rows (2·R·A, n) on another tooth, by the formula of docs/architecture.md."""
-    theta = 2 * np.pi * modes.nodal_diameter * tooth / GEAR.z
-    rows = modes.flank_rows.copy()
-    first, second = np.flatnonzero(modes.part == 1), np.flatnonzero(modes.part == 2)
-    a, b = modes.flank_rows[:, first], modes.flank_rows[:, second]
-    c, s = np.cos(theta[first]), np.sin(theta[first])
-    rows[:, first], rows[:, second] = a * c - b * s, a * s + b * c
-    single = modes.part == 0
-    rows[:, single] *= np.cos(theta[single])
-    return rows
-
-
 def test_frequencies_of_one_sector_are_those_of_the_whole_gear(modes):
     squared, _ = lowest_modes(whole().free, len(modes.frequency) + 3, block=12)
     assert np.allclose(modes.frequency, (np.sqrt(squared) / (2 * np.pi))[: len(modes.frequency)], rtol=1e-8)
@@ -52,7 +40,7 @@ def test_rows_of_flanks_and_bore_are_those_of_the_whole_gear(modes):
     omega = 2 * np.pi * modes.frequency
     ends = np.flatnonzero(np.diff(omega) / omega[:-1] > 1e-6) + 1
     for tooth in (0, 1, 5, 11):
-        reduced = np.vstack([rows_on_tooth(modes, tooth), modes.bore_rows])
+        reduced = np.vstack([on_tooth(modes, modes.flank_rows, tooth, GEAR.z), modes.bore_rows])
         full = np.vstack([whole().flank_rows[tooth], whole().bore_rows]) @ shapes
         for cluster in np.split(np.arange(len(omega)), ends)[:-1]:
             mine, theirs = reduced_0[:, cluster] @ reduced[:, cluster].T, full_0[:, cluster] @ full[:, cluster].T
@@ -133,7 +121,7 @@ def test_all_modes_together_are_the_static_compliance(statics):
     points = len(coarse().flank_rows)
     for tooth in (0, 1, 7):
         table = statics.static_ff[:, :, tooth].transpose(0, 2, 4, 1, 3, 5).reshape(points, points)
-        total = (everything.flank_rows / squared) @ rows_on_tooth(everything, tooth).T
+        total = (everything.flank_rows / squared) @ on_tooth(everything, everything.flank_rows, tooth, GEAR.z).T
         assert np.abs(total - table).max() < 1e-8 * np.abs(statics.static_ff).max()
     bore = (everything.bore_rows / squared) @ everything.bore_rows.T
     assert np.abs(bore - statics.static_bb).max() < 1e-8 * np.abs(statics.static_bb).max()

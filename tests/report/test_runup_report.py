@@ -16,7 +16,6 @@ from gearfmu.report.plots_set import planet_set
 from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
 from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_pair, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
-from gearfmu.report.style import COLUMNS, MOST_POINTS, envelope
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
 from gearfmu.stage.trace import Channel, Trace
@@ -129,15 +128,6 @@ def test_a_mode_under_a_ramp_moves_as_the_closed_form_says() -> None:
         1 - np.exp(-zeta * omega * t) * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
     ) / omega**2
     assert np.allclose(_modal_velocity(t, STEP, omega, _Mode, 0), exact, rtol=0.0, atol=1e-12 * np.abs(exact).max())
-
-
-def test_long_curves_are_shown_by_their_envelope() -> None:
-    x = np.linspace(0.0, 1.0, 20 * MOST_POINTS)
-    y = np.sin(1e5 * x) * x
-    shown_x, shown_y = envelope(x, y)
-    assert shown_x.size == shown_y.size == 2 * COLUMNS and np.all(np.diff(shown_x) >= 0.0)
-    assert (shown_y.min(), shown_y.max()) == (y.min(), y.max())
-    assert envelope(x[:100], y[:100])[1].tobytes() == y[:100].tobytes()
 
 
 def pair_sweep() -> Trace:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gearfmu.spec.body import body_hash, body_inputs
+from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, RootRelief, Wobble
 from gearfmu.spec.gear import BodySpec
 from gearfmu.spec.lead import EndRelief, LeadSpec, Misalignment
 from gearfmu.spec.stage import StageSpec, load_stage
@@ -74,6 +75,13 @@ OTHERS = [
     ("gears.0.bearing.stiffness", 1e8),
     ("gears.0.index_deviation", {3: 50e-6}),
     ("gears.0.lead", LeadSpec(slope=5e-6, crowning=3e-6, end_relief=EndRelief(amount=4e-6, length=1e-3))),
+    ("gears.0.root_relief", RootRelief(amount=5e-6)),
+    ("gears.0.profile", ProfileSpec(slope=5e-6, crowning=3e-6)),
+    ("gears.0.topography", "flanks.csv"),
+    ("gears.0.pitch_deviation", (1e-6, -1e-6) * 8),
+    ("gears.0.deviations", DeviationClass(tolerance_class=6)),
+    ("gears.0.eccentricity", Eccentricity(amount=5e-6)),
+    ("gears.0.wobble", Wobble(amount=1e-4)),
     ("pair.misalignment", Misalignment(out_of_plane=5e-6, in_plane=-5e-6, span=0.1)),
     ("contact.slices", 1),
     ("contact.damping", 0.0),

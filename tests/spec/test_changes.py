@@ -22,7 +22,7 @@ def test_a_changed_stage_is_the_one_of_a_changed_file(tmp_path: Path) -> None:
     written = load_stage(path)
     for value in ("20 um", 2e-5, np.float64(2e-5)):
         assert load_stage("fzg_c/stage_relief", {key: value}).gears == written.gears
-    train = load_stage("two_stage", {"bodies.pinion1.face_width": 0.021, "slices": 4})
+    train = load_stage("two_stage", {"bodies.pinion1.face_width": 0.021, "slices": 4.0})  # a count of a range
     assert train.bodies["pinion1"].face_width == 0.021 and train.slices == 4
     moved = load_stage("planetary54", {"set.pin_errors.0": ["0 um", 12e-6]})
     assert moved.set.pin_errors == {0: (0.0, 12e-6)}

@@ -56,6 +56,15 @@ def test_layout() -> None:
         assert ENTRY.unpack_from(blob, HEADER.size + i * ENTRY.size)[4] % 64 == 0
 
 
+def test_what_is_long_and_there_already_is_stored_once() -> None:
+    long, short = np.linspace(0.0, 1.0, 512), np.linspace(0.0, 1.0, 511)
+    one = write_blob({"a": long})
+    assert len(write_blob({"a": long, "b": long})) == len(one) + ENTRY.size + 16  # a table entry, and alignment
+    assert len(write_blob({"a": short, "b": short})) > len(one) + 8 * 511
+    back = read_blob(write_blob({"a": long, "b": 1.0 * long, "c": long.reshape(2, 256)}))
+    assert all(np.array_equal(back[name], long) for name in "abc")
+
+
 def test_arrays_read_are_constant() -> None:
     with pytest.raises(ValueError, match="read-only"):
         read_blob(write_blob(SAMPLE))["roll"][0] = 1.0

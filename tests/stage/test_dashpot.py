@@ -40,7 +40,8 @@ def halved(body: ReducedBody) -> ReducedBody:
     stored = {
         name: getattr(body, name)[:n] for name in ("frequency", "damping_ratio", "nodal_diameter", "part", "parity")
     }
-    return replace(body, **stored, flank_rows=body.flank_rows[..., :n].copy(), bore_rows=body.bore_rows[:, :n].copy())
+    rows = {"flank_rows": body.flank_rows[..., :n].copy(), "bore_rows": body.bore_rows[:, :n].copy()}
+    return replace(body, **stored, **rows, tangent=None, spin=None, shapes=None)
 
 
 def alternating(spec: StageSpec, bodies: list[ReducedBody]) -> np.ndarray:

@@ -304,14 +304,14 @@ def _load_step(ratio: float) -> Callable[[float], dict[str, float]]:
 
 def test_the_table_has_every_switch_of_the_kernel(plain: StageModel) -> None:
     """Every effect.* variable is an effect that a scene can switch, and every one says the same of itself. A pair has
-    not those of a carrier."""
+    not those of a carrier, and one with nominal flanks that run true none of these."""
     variables = {name.removeprefix("effect.") for name in plain.kernel().variables if name.startswith("effect.")}
     names = [effect.name for effect in EFFECTS]
-    of_carriers = {effect.name for effect in EFFECTS if effect.carried}
+    of_others = {effect.name for effect in EFFECTS if effect.carried or effect.of_data}
     assert len(set(names)) == len(names) and variables <= set(names)
-    assert set(Effects.model_fields) - of_carriers == variables and not variables & of_carriers
+    assert set(Effects.model_fields) - of_others == variables and not variables & of_others
     for effect in EFFECTS:
-        if not effect.carried:
+        if effect.name not in of_others:
             plain.kernel(**effect.off_setting).prepare()
 
 
@@ -319,7 +319,8 @@ def test_the_verb_prints_the_table_with_the_numbers_of_a_stage(capsys: pytest.Ca
     assert cli.outcome(["effects", "fzg_c/stage_relief"]) == 0
     out = capsys.readouterr().out
     assert all(f"{effect.name}: {effect.title}\n" in out for effect in EFFECTS)
-    assert out.count("in the stage") == len(EFFECTS) and "15 µm and 15 µm" in out and "5 over 14 mm" in out
+    assert out.count("\n  in the stage  ") == len(EFFECTS) + 2  # and what is left out, of both gears
+    assert "15 µm and 15 µm" in out and "5 over 14 mm" in out
 
 
 def test_the_page_is_that_of_the_table() -> None:

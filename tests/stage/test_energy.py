@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 import energy  # noqa: E402  (found through the line above)
 import light_rattle  # noqa: E402
-from kernel_variants import WITHOUT_ETA, double_states, variant  # noqa: E402
+from kernel_variants import WITHOUT_ETA, variant  # noqa: E402
 
 FAST = 1
 LOAD = 302.0
@@ -29,9 +29,9 @@ SHORT = {"starts": 1, "duration": 0.01, "level": "fast"}
 
 
 @pytest.fixture(scope="module")
-def libraries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path | None]:
+def libraries(double_library: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path | None]:
     folder = tmp_path_factory.mktemp("kernels")
-    return {"shipped": None, "double": double_states(folder), "no eta": variant(folder, "no_eta", WITHOUT_ETA)}
+    return {"shipped": None, "double": double_library, "no eta": variant(folder, "no_eta", WITHOUT_ETA)}
 
 
 @pytest.fixture(scope="module")

@@ -76,7 +76,7 @@ class Direct:
         self.c = np.zeros((n + 3, n + 3))  # flanks, moment, bore x, y
         for i, (j, f, p, a) in enumerate(loads):
             for k, (m, g, q, b) in enumerate(loads):
-                self.c[i, k] = static[f, g, (m - j) % body.teeth, p, q, a, b]
+                self.c[i, k] = static[f, g, (m - j) % static.shape[2], p, q, a, b]
             x, y, about = bore[f, p, a][[0, 1, SPIN]]
             self.c[i, n] = self.c[n, i] = about
             self.c[i, n + 1 :] = self.c[n + 1 :, i] = turn(j * step) @ [x, y]

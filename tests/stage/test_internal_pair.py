@@ -28,7 +28,7 @@ from gearfmu.stage.meshes import tooth_phases
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "kernel"))
 
-from inner import Inner, compile_inner  # noqa: E402  (found through the line above)
+from inner import Inner  # noqa: E402  (found through the line above)
 
 STAGE = ROOT / "benchmarks" / "calculix" / "internal" / "stage.toml"
 COARSE = BodySpec(
@@ -68,8 +68,8 @@ def model(stage: GeneralStage, bodies: list[ReducedBody]) -> StageModel:
 
 
 @pytest.fixture(scope="module")
-def inner(model: StageModel, tmp_path_factory: pytest.TempPathFactory) -> Inner:
-    return Inner(compile_inner(tmp_path_factory.mktemp("inner") / "inner.so"), model.blob)
+def inner(model: StageModel, inner_library: Path) -> Inner:
+    return Inner(inner_library, model.blob)
 
 
 def rolling(mesh: RingMesh, phi: float, lead: float = 0.0) -> np.ndarray:

@@ -52,4 +52,6 @@ def of_few_modes(body: ReducedBody) -> ReducedBody:
         flank_rows=body.flank_rows[..., :count],
         bore_rows=body.bore_rows[:, :count],
         tangent=None,
+        spin=None,
+        shapes=None,
     )

@@ -107,16 +107,16 @@ def test_a_ring_on_a_port_is_the_ring_that_its_mounts_hold(model: StageModel) ->
 def test_two_integrators_see_the_same_set(model: StageModel) -> None:
     """The step with its rotation in half steps, and the explicit peer with the same forces as accelerations, at one
     step: pairs of the ring end with their flanks, and when that is seen depends on the step (0.8 % from 0.5 to
-    0.25 µs on either road). Coriolis forces are 7 % of a pin's ripple at 300 rad/s, the roads differ by 0.2 %."""
+    0.25 µs on either method). Coriolis forces are 7 % of a pin's ripple at 300 rad/s, the methods differ by 0.2 %."""
     names = ("sun_planet1.te", "pin.planet1.fx")
-    roads = {}
+    methods = {}
     for name, settings in {
         "dg4": {"h": 5e-7},
         "central": {"h": 5e-7, "integrator": 4.0},
         "without": {"h": 5e-7, "effect.coriolis": 0.0},
     }.items():
         kernel = started(model, 600.0, 300.0, 1200.0, **{"effect.contact_damping": 0.0, **settings})
-        roads[name] = stepped(kernel, 20, *names)
-    swing = roads["dg4"].std(axis=0)
-    apart = {name: np.sqrt(((road - roads["dg4"]) ** 2).mean(axis=0)) / swing for name, road in roads.items()}
+        methods[name] = stepped(kernel, 20, *names)
+    swing = methods["dg4"].std(axis=0)
+    apart = {name: np.sqrt(((method - methods["dg4"]) ** 2).mean(axis=0)) / swing for name, method in methods.items()}
     assert np.all(apart["central"] < 3e-3) and np.all(apart["without"] > 5e-3)

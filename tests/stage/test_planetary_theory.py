@@ -31,8 +31,6 @@ from gearfmu.stage.set_te import SetTeResult, set_te
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
-from kernel_variants import double_states  # noqa: E402  (found through the line above)
-
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02
 FLOATING = Rigid(0.4, 0.39, 1e4)  # sun: 2e-5 of a mesh's stiffness
@@ -42,11 +40,6 @@ H = 2e-6
 def slow(*values: object, name: str | None = None) -> Any:
     """A case for make test-full."""
     return pytest.param(*values, marks=pytest.mark.full, id=name)
-
-
-@pytest.fixture(scope="module")
-def double(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return double_states(tmp_path_factory.mktemp("double"))
 
 
 def natural(rigid: RigidSet, library: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -118,9 +111,9 @@ def test_a_pure_torque_excites_rotational_modes_only(planets: int, teeth: tuple[
 
 @pytest.mark.full
 @pytest.mark.parametrize(("planets", "teeth"), [(3, (26, 34)), (4, (24, 36)), (5, (26, 34))])
-def test_to_the_last_digits_of_double_precision(double: Path, planets: int, teeth: tuple[int, int]) -> None:
+def test_to_the_last_digits_of_double_precision(double_library: Path, planets: int, teeth: tuple[int, int]) -> None:
     rigid = RigidSet(planets, teeth)
-    assert excitation(rigid, double) < 1e-9 and response(rigid, double) < 1e-9
+    assert excitation(rigid, double_library) < 1e-9 and response(rigid, double_library) < 1e-9
 
 
 def test_a_pin_error_excites_other_modes_too() -> None:

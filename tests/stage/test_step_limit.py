@@ -12,7 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "kernel"))
 
-from inner import Inner, compile_inner  # noqa: E402  (found through the line above)
+from inner import Inner  # noqa: E402  (found through the line above)
 
 from gearfmu.errors import ModelError, SimulationError  # noqa: E402
 from gearfmu.stage import StageModel, Steady  # noqa: E402
@@ -25,15 +25,10 @@ MU = 0.9  # of the default step, and of any other by γ
 STEPS = 1500
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compile_inner(tmp_path_factory.mktemp("inner") / "inner.so")
-
-
-def standing(library: Path, model: StageModel, level: int, h: float) -> tuple[str, np.ndarray]:
+def standing(inner_library: Path, model: StageModel, level: int, h: float) -> tuple[str, np.ndarray]:
     """Outcome and transmission error of a standing pair under load, undamped, γ = 1 whatever the limit says, after a
     millionth of the load is added."""
-    inner, calm = Inner(library, model.blob, {"level": level, "h": h, **UNDAMPED}), Steady(model, 0.0, LOAD)(0.0)
+    inner, calm = Inner(inner_library, model.blob, {"level": level, "h": h, **UNDAMPED}), Steady(model, 0.0, LOAD)(0.0)
     kernel = inner.kernel
     for name, value in calm.items():
         kernel.set(name, value)
@@ -51,24 +46,26 @@ def standing(library: Path, model: StageModel, level: int, h: float) -> tuple[st
 
 
 @pytest.mark.parametrize("level", ["fast", "standard"])
-def test_both_sides_of_the_limit(library: Path, relieved: StageModel, level: str) -> None:
+def test_both_sides_of_the_limit(inner_library: Path, relieved: StageModel, level: str) -> None:
     """μ′ is the worst over the pitch: where the pair stands the limit may lie some way beyond 1. Beyond it a knock that
     dies out below grows a thousandfold: until the run is stopped, or contacts that let go bound the swing."""
     number = LEVELS[level]
-    probe = Inner(library, relieved.blob, {"level": number, **UNDAMPED})
+    probe = Inner(inner_library, relieved.blob, {"level": number, **UNDAMPED})
     steps = np.arange(15e-6, 60e-6, 0.5e-6)
     mu = np.array([probe.mu(h) for h in steps])
     below, above = steps[np.flatnonzero(mu < 0.95)[-1]], steps[np.flatnonzero(mu > 1.5)[0]]
-    outcome, te = standing(library, relieved, number, below)
+    outcome, te = standing(inner_library, relieved, number, below)
     assert outcome == "ok" and np.ptp(te[-200:]) <= np.ptp(te[:200]) < 1e-8
-    outcome, te = standing(library, relieved, number, above)
+    outcome, te = standing(inner_library, relieved, number, above)
     swing = np.ptp(te[-200:]) if len(te) else np.inf
     assert outcome != "ok" or swing > 1e-6, f"μ′ = 1.5 at {1e6 * above:.1f} µs did not grow: {swing:.1e} m"
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_default_step_is_the_largest_that_meets_the_limit(library: Path, relieved: StageModel, level: str) -> None:
-    probe = Inner(library, relieved.blob, {"level": LEVELS[level]})
+def test_default_step_is_the_largest_that_meets_the_limit(
+    inner_library: Path, relieved: StageModel, level: str
+) -> None:
+    probe = Inner(inner_library, relieved.blob, {"level": LEVELS[level]})
     good = np.array([probe.mu(h) <= MU for h in LADDER])
     wanted = LADDER[np.flatnonzero(good)[-1]]
     kernel, calm = relieved.kernel(level=LEVELS[level]), Steady(relieved, 0.0, LOAD)(0.0)
@@ -81,10 +78,12 @@ def test_default_step_is_the_largest_that_meets_the_limit(library: Path, relieve
     assert kernel.get("solver.status") == 0 and not kernel.warning
 
 
-def test_a_larger_step_lowers_gamma_with_a_warning_and_keeps_the_limit(library: Path, relieved: StageModel) -> None:
+def test_a_larger_step_lowers_gamma_with_a_warning_and_keeps_the_limit(
+    inner_library: Path, relieved: StageModel
+) -> None:
     told = []
     for h in (20e-6, 30e-6, 40e-6, 60e-6):
-        inner = Inner(library, relieved.blob, {"level": LEVELS["fast"], "h": h})
+        inner = Inner(inner_library, relieved.blob, {"level": LEVELS["fast"], "h": h})
         found = re.search(r"gamma lowered to (\d\.\d+)", inner.kernel.warning)
         assert found and "smaller h" in inner.kernel.warning
         told.append(float(found[1]))

@@ -1,4 +1,4 @@
-"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two roads to one number, convergence,
+"""Loaded transmission error of the shipped pair: exact limits, equilibrium, two methods to one number, convergence,
 smoothness."""
 
 from __future__ import annotations

@@ -195,7 +195,7 @@ def test_an_elastic_gear_on_an_elastic_shaft_yields_as_the_parts_do(bodies, pair
         c_fs.append(read_tables(to_supports[:, f, p, a], angle + j * step))
         c_ln[i] = turn6(angle + j * step) @ (grid[p] @ body.static_fb[f, :, a])
         for k, (m, g, q, b) in enumerate(LOADS):
-            c_ll[i, k] = grid[p] @ body.static_ff[f, g, (m - j) % 16, :, :, a, b] @ grid[q]
+            c_ll[i, k] = grid[p] @ body.static_ff[f, g, (m - j) % body.static_ff.shape[2], :, :, a, b] @ grid[q]
             residual[i, k] = flank.residual[f, g, OFFSETS.index(m - j), p, q, a, b]
     want, want_force = unreduced(layout, LOADS, rigid, (c_ll, c_ln))
     w, c_fs = rigid @ group.rigid(1) + np.array(e), np.array(c_fs)

@@ -19,7 +19,7 @@
 #define GK_API __attribute__((visibility("default")))
 #endif
 
-#define GK_ABI 3
+#define GK_ABI 4
 #define GK_MESSAGE 512
 
 typedef enum gk_outcome {
@@ -105,6 +105,13 @@ GK_API gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *w
  * meshes allow. After gk_prepare. */
 GK_API gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                           const double *torque, double *phi);
+
+/* Goes on at another level, with other effects, slices or another step: `data`, prepared with `setup` and not yet
+ * initialised, takes over the motion of data that has just made a step with `from`. What was compliance and is dynamic
+ * now starts at rest in its static place; contacts start anew. GK_BAD_CALL where either is explicit, where bearings are
+ * on in one only, and before a step. */
+GK_API gk_outcome gk_adopt(const gk_model *model, const gk_setup *from_setup, const gk_work *from_work,
+                           const gk_data *from, const gk_setup *setup, gk_data *data);
 
 /* Phase profile of the step: name and processor cycles of phase 0, 1, …; 0 past the last. Cycles are counted by builds
  * with -DGK_PROFILE only, else they stay 0. */

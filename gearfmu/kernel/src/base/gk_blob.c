@@ -25,7 +25,7 @@ typedef enum section_type { F64 = 1, I32 = 2, TEXT = 3 } section_type;
 
 typedef struct section {
     const char *name;
-    uint32_t type, reserved;
+    uint32_t type, repeated; /* repeated: 1 + number of an earlier section with the same contents, stored once; or 0 */
     uint64_t count, offset;
 } section;
 
@@ -145,8 +145,16 @@ static gk_outcome check_hash(gk_blob *blob, char message[GK_MESSAGE])
     return GK_OK;
 }
 
+/* section i shares the contents of an earlier one that has its own */
+static int repeats(const gk_blob *blob, uint32_t i, section s)
+{
+    if (s.repeated > i) return 0;
+    const section first = section_at(blob, s.repeated - 1);
+    return first.repeated == 0 && first.type == s.type && first.count == s.count && first.offset == s.offset;
+}
+
 /* Sections follow each other in table order, each at the first multiple of 64 that is free; so they can neither overlap
- * nor leave the blob. `end`: end of the section before. */
+ * nor leave the blob. One that repeats an earlier one has no contents of its own. `end`: end of the section before. */
 static gk_outcome check_section(const gk_blob *blob, uint32_t i, uint64_t *end, char message[GK_MESSAGE])
 {
     section s = section_at(blob, i);
@@ -154,15 +162,19 @@ static gk_outcome check_section(const gk_blob *blob, uint32_t i, uint64_t *end, 
         return refuse(message, "model blob: the name of section %lu is not 1 to 23 printable characters",
                       (unsigned long)i);
     uint64_t size = element_size(s.type);
-    if (size == 0 || s.reserved)
+    if (size == 0)
         return refuse(message, "model blob: section '%s' is of unknown type %lu", s.name, (unsigned long)s.type);
+    for (uint32_t j = 0; j < i; j++)
+        if (!memcmp(section_at(blob, j).name, s.name, NAME))
+            return refuse(message, "model blob: section '%s' is there twice", s.name);
+    if (s.repeated) {
+        if (repeats(blob, i, s)) return GK_OK;
+        return refuse(message, "model blob: section '%s' does not repeat an earlier one", s.name);
+    }
     if (s.offset != aligned(*end))
         return refuse(message, "model blob: section '%s' does not begin where the one before it ends", s.name);
     if (s.offset > blob->size || s.count > (blob->size - s.offset) / size)
         return refuse(message, "model blob: section '%s' reaches beyond the end", s.name);
-    for (uint32_t j = 0; j < i; j++)
-        if (!memcmp(section_at(blob, j).name, s.name, NAME))
-            return refuse(message, "model blob: section '%s' is there twice", s.name);
     const unsigned char *contents = blob->bytes + s.offset;
     if (s.type == F64 && !all_finite(contents, s.count))
         return refuse(message, "model blob: section '%s' holds a value that is not finite", s.name);

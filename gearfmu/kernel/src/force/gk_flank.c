@@ -82,6 +82,26 @@ static double relief(const gk_gear *gear, int on, double s, double *slope)
     return gear->relief * over * over;
 }
 
+typedef struct flank_side flank_side;
+
+/* The flanks of a tooth pair in one transverse section */
+typedef struct tooth_flanks {
+    const flank_side *side;
+    double beta[2], closer; /* base angles; what the gap loses by the places of the teeth */
+    const double *depth[2]; /* along the roll, beside involute and tip relief (eq. 5a); NULL: nothing */
+} tooth_flanks;
+
+/* what a flank has lost to relief and deviations at a length of roll */
+static double depth_of(const pair *q, const tooth_flanks *f, int which, double s, double *slope)
+{
+    const double depth = relief(q->gear[which], GK_ON(q->setup, tip_relief), s, slope);
+    if (!GK_HAS(flank_deviations) || !f->depth[which]) return depth;
+    double own_slope;
+    const double own = gk_deviation_at(q->gear[which], f->depth[which], s, &own_slope);
+    *slope += own_slope;
+    return depth + own;
+}
+
 /* add the derivative of c·s, s = sg r_b (β − t), to a place's gradient; gear 0 or 1 */
 static void add_roll(gk_point *p, const line *l, const gk_gear *gear, int which, double c)
 {
@@ -93,7 +113,7 @@ static void add_roll(gk_point *p, const line *l, const gk_gear *gear, int which,
     p->gradient[YB] -= k * l->dt_y;
 }
 
-static void flank_contact(const pair *q, const line *l, double g, gk_point *p)
+static void flank_contact(const pair *q, const line *l, const tooth_flanks *f, double g, gk_point *p)
 {
     const double sense = internal(q) ? -1.0 : 1.0;
     p->gap = g;
@@ -102,7 +122,7 @@ static void flank_contact(const pair *q, const line *l, double g, gk_point *p)
     p->gradient[XA] = -l->nx, p->gradient[YA] = -l->ny, p->gradient[PHIA] = -l->sg * q->gear[0]->r_b;
     p->gradient[XB] = l->nx, p->gradient[YB] = l->ny, p->gradient[PHIB] = -sense * l->sg * q->gear[1]->r_b;
     for (int i = 0; i < 2; i++) {
-        double slope, depth = relief(q->gear[i], GK_ON(q->setup, tip_relief), p->roll[i], &slope);
+        double slope, depth = depth_of(q, f, i, p->roll[i], &slope);
         p->gap += depth;
         if (slope != 0.0) add_roll(p, l, q->gear[i], i, slope);
     }
@@ -123,9 +143,10 @@ static void flank_touch(const pair *q, const line *l, const gk_point *p, touch *
 /* Eq. 6: tip edge of gear c (c = 0: A) on the involute of the other gear o. base = base angle β of the tooth of c; l =
  * line of action. Returns 0 when the edge's centre lies inside the base circle of o: no involute there. m: along the
  * other's involute normal, away from its base circle, into the teeth of a ring and out of others (side = 1). */
-static int corner_contact(const pair *q, const line *l, int c, const double beta[2], gk_point *p, touch *t)
+static int corner_contact(const pair *q, const line *l, int c, const tooth_flanks *f, gk_point *p, touch *t)
 {
-    const int o = 1 - c, on = GK_ON(q->setup, tip_relief);
+    const int o = 1 - c;
+    const double *beta = f->beta;
     const gk_gear *tip = q->gear[c], *other = q->gear[o];
     const double side = o == 1 && internal(q) ? -1.0 : 1.0, own = c == 1 && internal(q) ? -1.0 : 1.0;
     double d[2];
@@ -146,8 +167,8 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
     double s = other->r_b * l->sg * (beta[o] - nominal - turn);
     double mx = -l->sg * st, my = l->sg * ct;
     const double ux = side * mx, uy = side * my; /* outward normal of the other's flank */
-    double slope_c, slope_o, relief_c = relief(tip, on, tip->s_tip, &slope_c),
-                             relief_o = relief(other, on, s, &slope_o);
+    double slope_c, slope_o, relief_c = depth_of(q, f, c, tip->s_tip, &slope_c),
+                             relief_o = depth_of(q, f, o, s, &slope_o);
     double fade = 1.0 / (1.0 + own * over / tip->edge);
     p->gap = side * (length - s) - tip->edge + relief_c + slope_c * over * fade + relief_o;
     memset(p->gradient, 0, sizeof p->gradient);
@@ -183,6 +204,19 @@ static int corner_contact(const pair *q, const line *l, int c, const double beta
     return 1;
 }
 
+/* What gear A slides past B along the profile of A, per motion of the poses: e = e_p of A, square to n in the section
+ */
+static void glide(const pair *q, double sg, const touch *t, double z, gk_point *p)
+{
+    const double ex = sg * t->n[1], ey = -sg * t->n[0];
+    for (int w = 0; w < 2; w++) {
+        const double sense = w ? -1.0 : 1.0, up = z - q->pose[SPACE * w + ZA], *at = t->at[w];
+        double *slide = p->slide + SPACE * w;
+        slide[XA] = sense * ex, slide[YA] = sense * ey, slide[PHIA] = sense * (at[0] * ey - at[1] * ex);
+        slide[ZA] = 0.0, slide[RXA] = -sense * up * ey, slide[RYA] = sense * up * ex;
+    }
+}
+
 /* Teeth out of their places (index deviation, ISO 1328-1): flank, roll and base angle turn with the tooth. Returns what
  * the gap loses. */
 static double misplace(const pair *q, double sg, const gk_place *p, double beta[2], double rolls[2])
@@ -199,11 +233,11 @@ static double misplace(const pair *q, double sg, const gk_place *p, double beta[
     return closer;
 }
 
-typedef struct flank_side { /* one side of the teeth: base angles and lengths of roll of the teeth 0 */
+struct flank_side {         /* one side of the teeth: base angles and lengths of roll of the teeth 0 */
     int flank, shift, step; /* step: B's tooth is shift + step·k */
     double sg, pitch[2], p_b, base[2], roll[2], gap, beyond, allowance;
     line l;
-} flank_side;
+};
 
 static flank_side side_of(const pair *q, int flank)
 {
@@ -268,17 +302,18 @@ static int in_tables(const gk_mesh *mesh, const gk_position position[2], gk_plac
 
 /* The transverse section of a tooth pair where its base angles are β and its rolls are in p; 0 where the flanks have
  * ended. A loaded pair reaches past the end by its deflection. t: where it touches, NULL: not asked for. */
-static int section(const pair *q, const flank_side *s, const double beta[2], double closer, gk_point *p, touch *t)
+static int section(const pair *q, const tooth_flanks *f, gk_point *p, touch *t)
 {
+    const flank_side *s = f->side;
     const int tip_b = internal(q) ? p->roll[1] < q->gear[1]->s_tip : p->roll[1] > q->gear[1]->s_tip;
     const int corner = p->roll[0] > q->gear[0]->s_tip ? 0 : tip_b ? 1 : -1;
     if (corner >= 0 && !GK_ON(q->setup, tip_contact)) return 0;
     if (corner < 0) {
-        flank_contact(q, &s->l, s->gap - closer, p);
+        flank_contact(q, &s->l, f, s->gap - f->closer, p);
         if (t) flank_touch(q, &s->l, p, t);
         return 1;
     }
-    if (!corner_contact(q, &s->l, corner, beta, p, t)) return 0;
+    if (!corner_contact(q, &s->l, corner, f, p, t)) return 0;
     p->gap += s->allowance;
     return 1;
 }
@@ -310,31 +345,39 @@ static void lean(const pair *q, double sg, const touch *t, double z, gk_point *p
 }
 
 /* one transverse section of a strip, in space */
-static void section_at(const pair *q, const flank_side *s, const double beta[2], const double roll[2], double closer,
-                       double z, gk_point *p)
+static void section_at(const pair *q, const tooth_flanks *f, const double roll[2], double z, gk_point *p)
 {
-    double here[2];
+    const flank_side *s = f->side;
+    tooth_flanks here = *f;
     touch t;
     for (int w = 0; w < 2; w++) {
         p->roll[w] = roll[w] + s->sg * z * q->mesh->helix[w];
-        here[w] = beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
+        here.beta[w] = f->beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
     }
-    if (!section(q, s, here, closer, p, &t)) {
-        flank_contact(q, &s->l, s->gap - closer + OPEN, p);
+    if (!section(q, &here, p, &t)) {
+        flank_contact(q, &s->l, &here, s->gap - f->closer + OPEN, p);
         flank_touch(q, &s->l, p, &t);
     }
     lean(q, s->sg, &t, z, p);
+    if (GK_ON(q->setup, friction)) glide(q, s->sg, &t, z, p);
+}
+
+/* of a strip of both teeth */
+static void take_deviations(const pair *q, const gk_place *p, int strip, tooth_flanks *f)
+{
+    for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
 }
 
 /* every strip by itself, in the middle of its part that carries; 0 when none comes within `reach` */
-static int strips_of(const pair *q, const flank_side *s, const double beta[2], const double roll[2], double closer,
-                     double reach, gk_place *place)
+static int strips_of(const pair *q, tooth_flanks *f, const double roll[2], double reach, gk_place *place)
 {
+    const flank_side *s = f->side;
     place->gap = OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
         const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
-        section_at(q, s, beta, roll, closer, part.middle, p);
+        take_deviations(q, place, i, f);
+        section_at(q, f, roll, part.middle, p);
         p->share = part.share;
         p->gap += q->mesh->cosine * q->mesh->lead[s->flank][i];
         place->gap = gk_min(place->gap, p->gap);
@@ -345,18 +388,22 @@ static int strips_of(const pair *q, const flank_side *s, const double beta[2], c
 /* one tooth pair; 0 when it does not come within `reach` */
 static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, gk_place *p)
 {
-    double beta[2] = {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]};
+    tooth_flanks f = {s, {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]}, 0.0, {NULL, NULL}};
     double roll[2] = {s->roll[0] + s->sg * k * s->p_b, s->roll[1] + s->step * s->sg * k * s->p_b};
     p->key.flank = p->flank = s->flank;
     p->key.tooth = k;
     p->action = s->l.t;
     p->number[0] = k, p->number[1] = s->shift + s->step * k;
     for (int i = 0; i < 2; i++) p->tooth[i] = modulo(p->number[i], q->gear[i]->z);
-    const double closer = q->gear[0]->index || q->gear[1]->index ? misplace(q, s->sg, p, beta, roll) : 0.0;
-    if (q->setup->spatial) return strips_of(q, s, beta, roll, closer, reach, p);
+    if (q->gear[0]->index || q->gear[1]->index) f.closer = misplace(q, s->sg, p, f.beta, roll);
+    if (q->setup->spatial) return strips_of(q, &f, roll, reach, p);
+    take_deviations(q, p, 0, &f);
     p->point[0].share = 1.0;
     p->point[0].roll[0] = roll[0], p->point[0].roll[1] = roll[1];
-    if (!section(q, s, beta, closer, &p->point[0], NULL)) return 0;
+    touch t;
+    const int glides = GK_ON(q->setup, friction);
+    if (!section(q, &f, &p->point[0], glides ? &t : NULL)) return 0;
+    if (glides) glide(q, s->sg, &t, 0.0, &p->point[0]);
     p->gap = p->point[0].gap;
     return p->gap < reach;
 }
@@ -375,11 +422,11 @@ void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[PO
 static int find_side(const pair *q, const gk_mesh *mesh, const flank_side *s, double reach,
                      const gk_position position[2], gk_place *place, int room)
 {
-    const double misplaced = GK_HAS(pitch_errors) ? q->gear[0]->index_most + q->gear[1]->index_most : 0.0;
     double ends[2];
     int found = 0;
     const double leaning = q->setup->spatial ? LEAN : 0.0;
-    if (!(s->gap - misplaced - leaning < reach)) return 0; /* the whole side is open: it costs this one comparison */
+    if (!(s->gap - mesh->protrusion - leaning < reach))
+        return 0; /* the whole side is open: it costs this one comparison */
     if (!teeth(q, s, ends)) return -1;
     for (int k = (int)gk_floor(ends[0]) + 1; k <= (int)gk_floor(ends[1]) && found < room; k++)
         if (tooth_pair(q, s, k, reach, &place[found]) && in_tables(mesh, position, &place[found])) found++;
@@ -433,9 +480,29 @@ void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *m
 static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *drive, double a, double reach)
 {
     const double apart = a - mesh->distance, sum = mesh->clearance + mesh->clearance_slope * apart;
-    const double misplaced = GK_HAS(pitch_errors) ? q->gear[0]->index_most + q->gear[1]->index_most : 0.0;
-    return sum - drive->gap - misplaced - (q->setup->spatial ? LEAN : 0.0) >
+    return sum - drive->gap - mesh->protrusion - (q->setup->spatial ? LEAN : 0.0) >
            reach + SURE + BENDS * apart * apart / mesh->distance;
+}
+
+/* `gk_flank_find` where both toothings stand */
+static int find(const pair *q, double reach, gk_position position[2], gk_place *place)
+{
+    const double *pose = q->pose;
+    if (q->e->kind == MESH_FLAT) return find_flat(q, reach, position, place);
+    const double R = reach_of(q);
+    double d[2];
+    apart(q, d);
+    const double a2 = d[0] * d[0] + d[1] * d[1];
+    if (!(a2 > 1.0001 * R * R) || !(a2 < 1e4) || !(fabs(pose[PHIA]) < 1e9) || !(fabs(pose[PHIB]) < 1e9)) return -1;
+    const flank_side drive = side_of(q, 0);
+    place_sides(q, q->mesh, &drive, position);
+    const int both = GK_ON(q->setup, coast_flank);
+    const int found = both || !q->mesh->coasts ? find_side(q, q->mesh, &drive, reach, position, place, MAX_PAIRS) : 0;
+    if (found < 0 || !(both || q->mesh->coasts)) return found;
+    if (coast_is_open(q, q->mesh, &drive, sqrt(a2), reach)) return found;
+    const flank_side coast = side_of(q, 1);
+    const int back = find_side(q, q->mesh, &coast, reach, position, place + found, MAX_PAIRS - found);
+    return back < 0 ? -1 : found + back;
 }
 
 /* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their
@@ -444,20 +511,17 @@ static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *d
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
                   gk_position position[2], gk_place *place)
 {
-    const pair q = pair_of(model, setup, mesh, pose);
-    if (q.e->kind == MESH_FLAT) return find_flat(&q, reach, position, place);
-    const double R = reach_of(&q);
-    double d[2];
-    apart(&q, d);
-    const double a2 = d[0] * d[0] + d[1] * d[1];
-    if (!(a2 > 1.0001 * R * R) || !(a2 < 1e4) || !(fabs(pose[PHIA]) < 1e9) || !(fabs(pose[PHIB]) < 1e9)) return -1;
-    const flank_side drive = side_of(&q, 0);
-    place_sides(&q, mesh, &drive, position);
-    const int both = GK_ON(setup, coast_flank);
-    const int found = both || !mesh->coasts ? find_side(&q, mesh, &drive, reach, position, place, MAX_PAIRS) : 0;
-    if (found < 0 || !(both || mesh->coasts)) return found;
-    if (coast_is_open(&q, mesh, &drive, sqrt(a2), reach)) return found;
-    const flank_side coast = side_of(&q, 1);
-    const int back = find_side(&q, mesh, &coast, reach, position, place + found, MAX_PAIRS - found);
-    return back < 0 ? -1 : found + back;
+    pair q = pair_of(model, setup, mesh, pose);
+    double moved[POSE], turn[POSE];
+    if (!GK_HAS(runout) || !mesh->runs_out) return find(&q, reach, position, place);
+    memcpy(moved, pose, sizeof moved);
+    gk_runout_move(model, setup, q.e, moved, turn);
+    q.pose = moved;
+    const int found = find(&q, reach, position, place);
+    for (int i = 0; i < found; i++)
+        for (int s = 0; s < (setup->spatial ? GK_STRIPS(setup) : 1); s++) {
+            gk_runout_turn(turn, place[i].point[s].gradient);
+            if (GK_ON(setup, friction)) gk_runout_turn(turn, place[i].point[s].slide);
+        }
+    return found;
 }

@@ -29,10 +29,11 @@ typedef struct nodal_pair { /* a place in hand */
     const gk_engagement *e;
     const gk_mesh *mesh;
     const gk_place *place;
-    const double *ground; /* displacements of the ground group, then speeds */
-    const double *pose;   /* where it is taken */
-    double moved[POSE];   /* from there on, gaps are linear: roll_motion off */
-    double rate[POSE];    /* speeds of the pose */
+    const double *ground;           /* displacements of the ground group, then speeds */
+    const double *pose;             /* where it is taken */
+    double stand[POSE], turn[POSE]; /* where toothings stand that do not run true (gk_deviation.c) */
+    double moved[POSE];             /* from there on, gaps are linear: roll_motion off */
+    double rate[POSE];              /* speeds of the pose */
     int flank;
     double sg, apart[2]; /* apart: from A's axis to B's */
     tooth_in_hand tooth[2];
@@ -43,6 +44,7 @@ typedef struct nodal_pair { /* a place in hand */
 typedef struct nodal_layer { /* nodes of tooth `own` across the width that share a transverse section */
     int own, first, last;    /* from `first` to before `last` */
     double z, lead;          /* of the section; what leads open there */
+    const double *depth[2];  /* of the teeth of A and B beside involute and tip relief, along the roll; NULL: nothing */
     double cosine, sine;     /* of the base angle of the tooth there */
 } nodal_layer;
 
@@ -156,13 +158,15 @@ static void end_tooth(const nodal_pair *p, gk_work *work, const tooth_in_hand *t
 /* ---- gap of a node ----------------------------------------------------------------------------------------------- */
 /* depth that a flank has lost to its relief, and past its tip to the tip edge: an arc tangent to the flank, followed as
  * a parabola of the length of arc */
-static double depth_at(const nodal_pair *p, const gk_gear *gear, double s, double *slope)
+static double depth_at(const nodal_pair *p, const gk_gear *gear, const double *line, double s, double *slope)
 {
+    double own_slope = 0.0;
+    const double own = line ? gk_deviation_at(gear, line, s, &own_slope) : 0.0;
     const double outward = gear->s_tip > gear->s_form ? 1.0 : -1.0;
     const double over = GK_ON(p->setup, tip_relief) ? gk_max(0.0, outward * (s - gear->relief_start)) : 0.0;
     const double past = gk_max(0.0, outward * (s * s - gear->s_tip * gear->s_tip) / (2.0 * gear->r_b));
-    *slope = outward * (2.0 * gear->relief * over + past * s / (gear->r_b * gear->edge));
-    return gear->relief * over * over + past * past / (2.0 * gear->edge);
+    *slope = outward * (2.0 * gear->relief * over + past * s / (gear->r_b * gear->edge)) + own_slope;
+    return gear->relief * over * over + past * past / (2.0 * gear->edge) + own;
 }
 
 /* to the normal section: the gap along the common normal, and what axial motion and tilts do to it (gk_flank.c, lean)
@@ -215,8 +219,10 @@ static int foot_of(const nodal_pair *p, const nodal_layer *layer, int along, nod
     foot->roll = r_b * p->sg * (o->base + layer->z * o->tan_helix / r_b - o->toward - turn);
     if (!(fabs(foot->roll) < 1e3)) return 0;
     const double nx = -o->hollow * p->sg * st, ny = o->hollow * p->sg * ct; /* out of the material of o */
-    foot->gap = o->hollow * (length - foot->roll) + depth_at(p, c->gear, nodes->roll[along], &unused) +
-                depth_at(p, o->gear, foot->roll, &slope) + layer->lead + (p->flank ? p->mesh->allowance : 0.0);
+    foot->gap = o->hollow * (length - foot->roll) +
+                depth_at(p, c->gear, layer->depth[own], nodes->roll[along], &unused) +
+                depth_at(p, o->gear, layer->depth[1 - own], foot->roll, &slope) + layer->lead +
+                (p->flank ? p->mesh->allowance : 0.0);
     roll_gradient(p, own, r, D, length, foot->roll_gradient);
     memset(foot->gradient, 0, sizeof foot->gradient);
     double *of_own = foot->gradient + SPACE * own, *of_other = foot->gradient + SPACE * (1 - own);
@@ -345,6 +351,8 @@ static void press_layer(nodal_pair *p, int own, int first, int last)
     const tooth_in_hand *t = &p->tooth[own];
     nodal_layer layer = {.own = own, .first = first, .last = last, .z = p->setup->spatial ? nodes->z[first] : 0.0};
     layer.lead = nodes->lead[p->flank * t->gear->nodes[1] + first];
+    for (int w = 0; w < 2; w++)
+        layer.depth[w] = gk_deviation_line(&nodes->deviation[w], p->tooth[w].index, p->flank, first);
     gk_sincos(t->base + layer.z * t->tan_helix / t->gear->r_b, &layer.sine, &layer.cosine);
     const int middle = nearest_node(p, &layer);
     for (int i = middle; i < nodes->along; i++)
@@ -408,6 +416,16 @@ static void report(const gk_setup *setup, const nodal_pair *p, int place, gk_sys
     }
 }
 
+/* to where the toothings stand: pose, motion and rate */
+static void take_runout(nodal_pair *p)
+{
+    if (!GK_HAS(runout) || !p->mesh->runs_out) return;
+    memcpy(p->stand, p->pose, sizeof p->stand);
+    gk_runout_move(p->model, p->setup, p->e, p->stand, p->turn);
+    gk_runout_follow(p->turn, p->moved), gk_runout_follow(p->turn, p->rate);
+    p->pose = p->stand;
+}
+
 static void press_engagement(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e,
                              const gk_real *const speed[], double *spin_rate)
 {
@@ -418,6 +436,7 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
     p.pose = still ? data->meshing[e].still : engaged->pose;
     for (int d = 0; d < POSE && still; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
     gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p.rate);
+    take_runout(&p);
     for (int c = 0; c < 2; c++)
         p.apart[c] = p.e->position[1][c] + p.pose[XB + c] - (p.e->position[0][c] + p.pose[XA + c]);
     for (int i = 0; i < engaged->places; i++) {
@@ -428,6 +447,7 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
         for (int w = 0; w < 2; w++) take_tooth(&p, work, w), begin_tooth(&p, work, speed, &p.tooth[w]);
         for (int w = 0; w < 2; w++) press_nodes(&p, w);
         for (int w = 0; w < 2; w++) end_tooth(&p, work, &p.tooth[w]);
+        if (p.mesh->runs_out) gk_runout_turn(p.turn, p.push);
         press_pose(setup, work, p.mesh, p.push, spin_rate);
         report(setup, &p, i, &engaged->system);
     }

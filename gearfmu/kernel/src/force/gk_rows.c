@@ -31,8 +31,9 @@ void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const dou
     }
 }
 
-/* Fills the rows of the contacts on the gear groups */
-static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *work, gk_real *out)
+/* Fills the rows of the contacts on the gear groups, from a table of the side */
+static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_real *table, const gk_engaged *work,
+                         gk_real *out)
 {
     const gk_position *at = &work->position[side->which];
     const int halves = 2 * GK_LANES(setup, side->gear) / LANES, strips = GK_STRIPS(setup),
@@ -42,7 +43,7 @@ static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_en
     for (int p = 0; p < work->places; p++) {
         const size_t first = ((size_t)at->node * points + (size_t)(work->place[p].candidate[side->which] * strips)) *
                              halves;
-        const gk_half *low = (const gk_half *)side->rows + first, *high = low + (size_t)points * halves;
+        const gk_half *low = (const gk_half *)table + first, *high = low + (size_t)points * halves;
         for (int k = 0; k < strips * halves; k += 2) {
             to[k] = low[k] + part * (high[k] - low[k]);
             to[k + 1] = low[k + 1] + part * (high[k + 1] - low[k + 1]);
@@ -56,28 +57,30 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
     gk_engaged *engaged = &work->engaged[e];
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
-        if (GK_LANES(setup, side->gear)) contact_rows(setup, side, engaged, engaged->basis[w]);
+        if (GK_LANES(setup, side->gear)) contact_rows(setup, side, side->rows, engaged, engaged->basis[w]);
     }
 }
 
-/* adds the rows of the contacts on the part of the ground group that one gear reads; strips of a place whose
- * gradient is the same: all, or each has its own */
+/* adds the rows of the contacts (along: of their sliding) on the part of the ground group that one gear reads; strips
+ * of a place whose gradient is the same: all, or each has its own */
 GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
-                              const int motions, const int each, const int strips)
+                              const int motions, const int each, const int strips, const int along)
 {
     const gk_base *base = &setup->base;
     const gk_position *at = &engaged->position[side->which];
     const int quads = base->width[side->gear] / 4, points = side->candidates * strips;
     const int *motion = base->motion[side->gear];
     const size_t local = (size_t)setup->mesh[engaged->index].local / 4;
-    const gk_quad *const node = (const gk_quad *)side->ground + (size_t)(at->node * points) * quads;
+    const gk_quad *const table = (const gk_quad *)(along ? side->along.ground : side->ground);
+    const gk_quad *const node = table + (size_t)(at->node * points) * quads;
     for (int p = 0; p < engaged->places; p++) {
         const gk_place *place = &engaged->place[p];
         const gk_quad *low = node + (size_t)(place->candidate[side->which] * strips) * quads;
         const gk_quad *high = low + (size_t)points * quads;
         gk_quad *to = (gk_quad *)out + (size_t)(p * strips) * local;
         for (int first = 0; first < strips; first += each) {
-            const double *gradient = place->point[first].gradient + SPACE * side->which;
+            const gk_point *point = &place->point[first];
+            const double *gradient = (along ? point->slide : point->gradient) + SPACE * side->which;
             double g[SPACE];
             const gk_quad *moved[SPACE];
             for (int m = 0; m < motions; m++)
@@ -99,11 +102,11 @@ GK_INLINE void ground_rows(const gk_setup *setup, const gk_side *side, const gk_
 {
     const int motions = setup->base.motions[side->gear];
     if (setup->spatial)
-        ground_rows_of(setup, side, engaged, out, motions, 1, strips);
+        ground_rows_of(setup, side, engaged, out, motions, 1, strips, 0);
     else if (motions == 2)
-        ground_rows_of(setup, side, engaged, out, 2, strips, strips);
+        ground_rows_of(setup, side, engaged, out, 2, strips, strips, 0);
     else
-        ground_rows_of(setup, side, engaged, out, motions, strips, strips);
+        ground_rows_of(setup, side, engaged, out, motions, strips, strips, 0);
 }
 
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
@@ -124,6 +127,29 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
             gk_local_gather(mesh, base->port_rows + s->port_of[i] * base->n, row);
         else
             memset(row, 0, (size_t)local * sizeof *row);
+    }
+}
+
+/* Fills the rows of the sliding of all contacts: gear groups, ground group, spins; those of the gaps are there */
+void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_engaged *engaged = &work->engaged[e];
+    gk_glide *glide = engaged->glide;
+    const int strips = GK_STRIPS(setup), contacts = engaged->system.contacts;
+    memset(glide->rigid, 0, sizeof glide->rigid);
+    memset(glide->ground, 0, (size_t)(contacts * mesh->local) * sizeof *glide->ground);
+    for (int w = 0; w < 2; w++) {
+        const gk_side *side = &mesh->side[w];
+        if (GK_LANES(setup, side->gear)) contact_rows(setup, side, side->along.rows, engaged, glide->basis[w]);
+        if (mesh->local)
+            ground_rows_of(setup, side, engaged, glide->ground + mesh->at[w], setup->base.motions[side->gear],
+                           setup->spatial ? 1 : strips, strips, 1);
+    }
+    for (int i = 0; i < contacts; i++) {
+        const double *slide = gk_point_of(setup, &engaged->place[i / strips], i % strips)->slide;
+        glide->rigid[0][i] = slide[PHIA], glide->rigid[1][i] = slide[PHIB];
+        if (mesh->frame >= 0) glide->rigid[2][i] = -slide[PHIA] - slide[PHIB];
     }
 }
 
@@ -179,6 +205,18 @@ void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e
     gk_local_gather(mesh, ground, local);
     for (int i = 0; i < s->stride; i++) read[i] = 0.0;
     read_rows(engaged->ground, s->n, mesh->local, local, read);
+}
+
+/* the same of the sliding of the contacts */
+void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
+                               double *read)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    const gk_system *s = &engaged->system;
+    double local[MAX_GROUND + 4 * MAX_ROTORS];
+    gk_local_gather(mesh, ground, local);
+    for (int i = 0; i < s->stride; i++) read[i] = 0.0;
+    read_rows(engaged->glide->ground, s->contacts, mesh->local, local, read);
 }
 
 /* the same with displacements (or speeds) y of the gear groups */
@@ -293,40 +331,66 @@ GK_INLINE void push_halves(const pushes *p, const gk_half *rows, int width, int 
 }
 
 /* −Σ rows·x and −Σ rows·y of a gear group, in the frame of the reference tooth */
-static void contact_forces(const gk_setup *setup, const gk_engaged *work, const gk_side *side, const pushes *p,
+static void contact_forces(const gk_setup *setup, const gk_real *basis, const gk_side *side, const pushes *p,
                            gk_real *out_x, gk_real *out_y)
 {
     const int width = 2 * GK_LANES(setup, side->gear) / LANES;
-    const gk_half *rows = (const gk_half *)work->basis[side->which];
+    const gk_half *rows = (const gk_half *)basis;
     int first = 0;
     for (; first + 4 <= width; first += 4) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 4);
     for (; first < width; first += 2) push_halves(p, rows, width, first, (gk_half *)out_x, (gk_half *)out_y, 2);
+}
+
+static void push_basis(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *basis, const pushes *p,
+                       gk_real *out_x, gk_real *out_y)
+{
+    const gk_side *side = &setup->mesh[e].side[which];
+    const gk_real *turned[2] = {work->turned, work->turned_next};
+    gk_real *sum[2] = {out_x, out_y};
+    if (!GK_LANES(setup, side->gear) || !p->count) return;
+    contact_forces(setup, basis, side, p, work->turned, work->turned_next);
+    gk_rows_turn_forth(&setup->modal[side->gear], work->engaged[e].position[which].tooth, turned, sum);
 }
 
 /* adds the modal forces of the contacts' forces x and y to those of a gear group */
 void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
                         gk_real *out_x, gk_real *out_y)
 {
-    const gk_engaged *engaged = &work->engaged[e];
-    const gk_side *side = &setup->mesh[e].side[which];
-    const gk_real *turned[2] = {work->turned, work->turned_next};
-    gk_real *sum[2] = {out_x, out_y};
     pushes p;
-    list_pushes(x, y, engaged->system.contacts, &p);
-    if (!GK_LANES(setup, side->gear) || !p.count) return;
-    contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
-    gk_rows_turn_forth(&setup->modal[side->gear], engaged->position[which].tooth, turned, sum);
+    list_pushes(x, y, work->engaged[e].system.contacts, &p);
+    push_basis(setup, work, e, which, work->engaged[e].basis[which], &p, out_x, out_y);
 }
 
-/* adds what the contacts read of displacements y of a gear group */
-void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read)
+/* the same of forces along the profile */
+void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
+                              gk_real *out_x, gk_real *out_y)
+{
+    pushes p;
+    list_pushes(x, y, work->engaged[e].system.contacts, &p);
+    push_basis(setup, work, e, which, work->engaged[e].glide->basis[which], &p, out_x, out_y);
+}
+
+/* adds what the contacts read of displacements y of a gear group by rows `row` */
+static void read_basis(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *row, const gk_real *y,
+                       double *read)
 {
     const gk_engaged *engaged = &work->engaged[e];
     const int g = setup->mesh[e].side[which].gear, n = GK_LANES(setup, g);
-    const gk_real *row = engaged->basis[which];
     if (!n || !engaged->system.contacts) return;
     gk_rows_turn_back(&setup->modal[g], engaged->position[which].tooth, y, work->turned);
     for (int i = 0; i < engaged->system.contacts; i++, row += n) read[i] -= gk_dot(row, work->turned, n);
+}
+
+/* adds what their gaps read */
+void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read)
+{
+    read_basis(setup, work, e, which, work->engaged[e].basis[which], y, read);
+}
+
+/* adds what their sliding reads */
+void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read)
+{
+    read_basis(setup, work, e, which, work->engaged[e].glide->basis[which], y, read);
 }
 
 /* adds Σ rows·x and Σ rows·y over `quads` of the ground group from `first` on */
@@ -343,11 +407,11 @@ GK_INLINE void push_quads(const pushes *p, const gk_quad *rows, int width, int f
     for (int k = 0; k < quads; k++) out_x[k] = sum_x[k], out_y[k] = sum_y[k];
 }
 
-/* adds the forces x and y of the rows on the ground group */
-static void ground_forces(const gk_mesh *mesh, const gk_engaged *engaged, const pushes *p, double *out_x, double *out_y)
+/* adds the forces x and y of rows on the ground group */
+static void ground_forces(const gk_mesh *mesh, const double *ground, const pushes *p, double *out_x, double *out_y)
 {
     const int width = mesh->local / 4;
-    const gk_quad *rows = (const gk_quad *)engaged->ground;
+    const gk_quad *rows = (const gk_quad *)ground;
     for (int w = 0, at = 0; w < 2; w++) {
         const int quads = mesh->part[w].width / 4;
         gk_quad *x = (gk_quad *)(out_x + mesh->part[w].from), *y = (gk_quad *)(out_y + mesh->part[w].from);
@@ -363,7 +427,28 @@ void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e
 {
     pushes p;
     list_pushes(x, y, engaged->system.n, &p);
-    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged, &p, out_x, out_y);
+    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged->ground, &p, out_x, out_y);
+}
+
+/* the same of forces along the profile */
+void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x,
+                               const double *y, double *out_x, double *out_y)
+{
+    pushes p;
+    list_pushes(x, y, engaged->system.contacts, &p);
+    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged->glide->ground, &p, out_x, out_y);
+}
+
+/* friction of an engagement, into the same as gk_rows_scatter */
+static void scatter_along(const gk_setup *setup, gk_work *work, int e)
+{
+    const gk_glide *glide = work->engaged[e].glide;
+    gk_rows_push_ground_along(setup, &work->engaged[e], e, glide->step, glide->last, work->ground_force,
+                              work->ground_next);
+    for (int w = 0; w < 2; w++) {
+        const int g = setup->mesh[e].side[w].gear;
+        gk_rows_push_modes_along(setup, work, e, w, glide->step, glide->last, work->force[g], work->next[g]);
+    }
 }
 
 /* modal forces of the rows' forces x and y of all engagements, into work->force, next, ground_force and ground_next */
@@ -383,15 +468,13 @@ void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
         const gk_system *s = &engaged->system;
         pushes p;
         list_pushes(x(s), y(s), s->n, &p);
-        if (setup->mesh[e].local) ground_forces(&setup->mesh[e], engaged, &p, work->ground_force, work->ground_next);
+        if (setup->mesh[e].local)
+            ground_forces(&setup->mesh[e], engaged->ground, &p, work->ground_force, work->ground_next);
         while (p.count && p.row[p.count - 1] >= s->contacts) p.count--;
         for (int w = 0; w < 2; w++) {
-            const gk_side *side = &setup->mesh[e].side[w];
-            if (!GK_LANES(setup, side->gear) || !p.count) continue;
-            contact_forces(setup, engaged, side, &p, work->turned, work->turned_next);
-            const gk_real *turned[2] = {work->turned, work->turned_next};
-            gk_real *sum[2] = {work->force[side->gear], work->next[side->gear]};
-            gk_rows_turn_forth(&setup->modal[side->gear], engaged->position[w].tooth, turned, sum);
+            const int g = setup->mesh[e].side[w].gear;
+            push_basis(setup, work, e, w, engaged->basis[w], &p, work->force[g], work->next[g]);
         }
+        if (GK_ON(setup, friction)) scatter_along(setup, work, e);
     }
 }

@@ -46,6 +46,8 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
     const gk_engaged *engaged = &work->engaged[e];
     int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
+    s->rubs = GK_ON(setup, friction) && s->contacts > 0;
+    s->rubbing = 0.0;
     recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
@@ -58,7 +60,8 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
         const int memory = engaged->place[s->place_of[i]].memory;
         s->recalled[i] = memory >= 0;
         s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
-                              : s->g0[i] + data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
+                              : (data->meshing[e].adopted ? 0.0 : s->g0[i]) +
+                                    data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }
@@ -97,6 +100,7 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
             m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
             m->dash[strip] = s->dash[i];
             m->end[strip] = s->end[i];
+            if (GK_ON(setup, friction)) m->ratio[strip] = engaged->glide->ratio[i];
             if (GK_ON(setup, hertz) && s->force[i] > s->law[i / 4].high[i % 4] * s->width[i])
                 data->status |= STATUS_LAW;
         }
@@ -104,8 +108,9 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
     for (int i = s->contacts; i < s->n; i++)
         data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){
             s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i], s->dash[i], s->end[i]};
-    meshing->reach = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
-    meshing->owed = s->owed;
+    meshing->reach = 20e-6 + 0.5 * deepest;           /* neighbours of a loaded tooth follow its deflection in part */
+    meshing->owed = meshing->adopted ? 0.0 : s->owed; /* what the change of setup took or gave is no debt */
+    meshing->adopted = 0;
 }
 
 /* an engagement without rows */

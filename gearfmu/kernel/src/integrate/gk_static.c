@@ -248,7 +248,7 @@ static int press(rest *r)
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e) && !form(r, e)) return 0;
-    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, STATIC_SWEEPS, 1.0};
+    gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, 0, STATIC_SWEEPS, 1.0};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
     return 1;
@@ -620,7 +620,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
         r.setup.chained[p] = 0;
         r.setup.joint[p][JOINT_SHAFT].live = r.setup.joint[p][JOINT_CLUTCH].live = 0;
     }
-    r.setup.on.contact_damping = 0;
+    r.setup.on.contact_damping = r.setup.on.friction = 0;
     r.setup.on.roll_motion = 1;
     work->another = 0;
     set_joints(&r);

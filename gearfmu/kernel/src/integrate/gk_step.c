@@ -317,6 +317,12 @@ static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work 
             for (int i = s->n - s->clutches; i < s->n; i++) last -= s->rigid[l][i] * s->force[i];
             z[mesh->spin[l]] += gk_dot_quads(s->rigid[l], s->z, s->stride / 4);
             force[mesh->spin[l]] += last;
+            if (!GK_ON(setup, friction)) continue;
+            const gk_glide *glide = work->engaged[e].glide;
+            for (int i = 0; i < s->contacts; i++) {
+                z[mesh->spin[l]] += glide->rigid[l][i] * glide->step[i];
+                force[mesh->spin[l]] += glide->rigid[l][i] * glide->last[i];
+            }
         }
     }
     for (int d = 0; d < setup->spins; d++) {
@@ -337,6 +343,7 @@ static void correct(const gk_model *model, const gk_setup *setup, gk_work *work,
         gk_system *s = &work->engaged[e].system;
         memcpy(s->last, s->force, (size_t)s->stride * sizeof *s->last);
         for (int i = 0; linear && i < s->stride; i++) s->last[i] += s->end[i];
+        if (GK_ON(setup, friction)) work->engaged[e].glide->taken = gk_friction_settle(work->engaged[e].glide, s);
     }
     gk_rows_scatter(model, setup, work, gk_step_z, force_with_dampers);
     for (int g = 0; g < model->gears; g++) {
@@ -352,6 +359,12 @@ static void correct(const gk_model *model, const gk_setup *setup, gk_work *work,
     }
     data->ledger.dissipated += correct_ground(model, setup, work, data, k);
     correct_spins(model, setup, work, data, k);
+}
+
+static void feed(gk_ledger *ledger, double work)
+{
+    ledger->work += work;
+    ledger->through += fabs(work);
 }
 
 /* What ports brought in and what dampers and clutches took in this step. A damper takes −½ η_d·Δgap; what its force
@@ -371,10 +384,10 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
         held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
         if (s->kind[i] == ROW_TORQUE) {
             const double angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-            data->ledger.work += mean * (angle - data->angle[port]);
+            feed(&data->ledger, mean * (angle - data->angle[port]));
             data->angle[port] = angle;
         } else if (s->joint_of[i] == JOINT_PORT) {
-            data->ledger.work += mean * (work->outer[port] - work->outer_before[port]);
+            feed(&data->ledger, mean * (work->outer[port] - work->outer_before[port]));
         }
     }
     data->ledger.dissipated += taken - (held - s->held0);
@@ -389,9 +402,9 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
 {
     const int balanced = !gk_scheme_of(setup->integrator)->linear_force;
     for (int i = 0; i < setup->islands; i++) {
-        gk_coupled coupled = {model, setup, work, k, i, 0, 1.0};
+        gk_coupled coupled = {model, setup, work, k, i, 0, 0, 1.0};
         const gk_island island = gk_couple_island(&coupled);
-        if (island.sweep) gk_couple_recall(&coupled);
+        if (island.count > 1) gk_couple_recall(&coupled);
         if (balanced)
             gk_balance_solve(&island);
         else
@@ -407,7 +420,17 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
     return GK_OK;
 }
 
-static void settle_accounts(const gk_model *model, const gk_work *work, gk_data *data)
+/* the same of friction */
+static double account_friction(const gk_work *work, gk_data *data, int e)
+{
+    const gk_glide *glide = work->engaged[e].glide;
+    data->ledger.dissipated += glide->taken;
+    data->meshing[e].rubbed += glide->taken;
+    if (work->another) data->ledger.baseline += glide->held0;
+    return gk_friction_held(glide, &work->engaged[e].system);
+}
+
+static void settle_accounts(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     const double before = data->ledger.massless;
     data->ledger.massless = 0.0;
@@ -415,6 +438,7 @@ static void settle_accounts(const gk_model *model, const gk_work *work, gk_data 
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         data->ledger.massless += account(model, work, data, s);
+        if (GK_ON(setup, friction)) data->ledger.massless += account_friction(work, data, e);
         data->rounds += s->rounds;
         if (s->limit_reached) data->trouble++, data->status |= STATUS_LIMIT;
     }
@@ -442,6 +466,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     GK_LAP(work, PHASE_ROWS);
     for (int e = 0; e < model->engagements; e++) {
         gk_form_system(model, setup, data, k, work, e);
+        if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
         gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
     }
     GK_LAP(work, PHASE_SYSTEM);
@@ -450,8 +475,11 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     data->ledger.dissipated += damped;
     correct(model, setup, work, data, k);
     GK_LAP(work, PHASE_CORRECT);
-    settle_accounts(model, work, data);
-    for (int e = 0; e < model->engagements; e++) gk_memory_keep(setup, &work->engaged[e], data, e);
+    settle_accounts(model, setup, work, data);
+    for (int e = 0; e < model->engagements; e++) {
+        gk_memory_keep(setup, &work->engaged[e], data, e);
+        if (GK_ON(setup, friction)) gk_friction_watch(setup, data, h, e);
+    }
     data->expressed_h = h, data->expressed_gamma = gamma;
     data->steps++;
     GK_LAP(work, PHASE_REMEMBER);

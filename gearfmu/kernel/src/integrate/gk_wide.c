@@ -48,6 +48,17 @@
 #define gk_balance_plain gk_balance_plain_avx2
 #define gk_couple_island gk_couple_island_avx2
 #define gk_couple_recall gk_couple_recall_avx2
+#define gk_rows_form_along gk_rows_form_along_avx2
+#define gk_rows_read_ground_along gk_rows_read_ground_along_avx2
+#define gk_rows_push_ground_along gk_rows_push_ground_along_avx2
+#define gk_rows_push_modes_along gk_rows_push_modes_along_avx2
+#define gk_rows_read_modes_along gk_rows_read_modes_along_avx2
+#define gk_friction_form gk_friction_form_avx2
+#define gk_friction_solve gk_friction_solve_avx2
+#define gk_friction_held gk_friction_held_avx2
+#define gk_friction_defect gk_friction_defect_avx2
+#define gk_friction_watch gk_friction_watch_avx2
+#define gk_friction_settle gk_friction_settle_avx2
 #define gk_rows_read_ground gk_rows_read_ground_avx2
 #define gk_rows_push_ground gk_rows_push_ground_avx2
 #define gk_rows_form_bores gk_rows_form_bores_avx2
@@ -104,6 +115,7 @@
 #include "problem/gk_tangent.c"
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"
+#include "problem/gk_friction.c"
 #include "problem/gk_couple.c"
 #include "force/gk_nodal.c"
 #include "integrate/gk_frame.c"

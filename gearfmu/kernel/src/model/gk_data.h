@@ -40,6 +40,7 @@ typedef struct gk_memory { /* what a tooth pair remembers from the last step */
     gk_key key;
     double force[MAX_SLICES], gap[MAX_SLICES]; /* λ0; s0 */
     double dash[MAX_SLICES], end[MAX_SLICES];  /* η_d of the last step, f_d at its end */
+    double ratio[MAX_SLICES];                  /* friction over normal force */
 } gk_memory;
 
 typedef struct gk_meshing { /* an engagement */
@@ -48,11 +49,14 @@ typedef struct gk_meshing { /* an engagement */
                          is off */
     double reach;     /* how far to look for contacts */
     double open_time; /* without any contact */
-    double owed;      /* defect of energy that the balance of contacts tolerated so far */
+    double rubbed;    /* energy lost to friction */
+    double rolling, unsteady; /* speed of gear A and its deviation from that, means over the last millisecond */
+    double owed;              /* defect of energy that the balance of contacts tolerated so far */
     double pitch_angle, pitch_time,
         pitch_impulse; /* of the tooth pitch that passes: where it began, what it gathered */
     int64_t impacts;
     int32_t apart, pairs;
+    int32_t adopted, unused; /* gaps in memory are those at the end of the step: another setup made it */
     gk_memory memory[MAX_PAIRS];
 } gk_meshing;
 
@@ -65,8 +69,9 @@ typedef struct gk_joint_state {
 } gk_joint_state; /* λ0 (clutch: the constant torque of the last step), damper force of the last step and at its end */
 
 typedef struct gk_ledger {
-    double work, dissipated, baseline,
-        massless; /* massless: energy of the quasi-static part at the end of the last step */
+    double work, dissipated, baseline;
+    double massless; /* energy of the quasi-static part at the end of the last step */
+    double through;  /* that passed the ports, in whichever direction */
 } gk_ledger;
 
 struct gk_data {

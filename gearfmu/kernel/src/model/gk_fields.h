@@ -28,6 +28,9 @@ typedef enum gk_symbol {
     SYMBOL_whirls,
     SYMBOL_own,
     SYMBOL_starts,
+    SYMBOL_flank_teeth,
+    SYMBOL_flank_places,
+    SYMBOL_flank_rolls,
     SYMBOLS
 } gk_symbol;
 

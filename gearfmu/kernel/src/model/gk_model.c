@@ -219,6 +219,9 @@ static void read_ground_of(reader *r, gk_model *m, gk_gear *g, int set)
     g->ground[set].list = take(r, F_GEAR_SET_ground_list);
     g->ground[set].centre = bounded(r, F_GEAR_SET_centre, 1e6);
     g->ground[set].rows = bounded(r, F_GEAR_SET_ground_rows, 1e6);
+    g->ground[set].along = bounded(r, F_GEAR_SET_along_ground, 1e6);
+    const int parts = !!g->along_rows + !!g->along_normal + !!g->along_own + !!g->ground[set].along;
+    if (!r->outcome && parts % 4) refuse(r, "displacement along the profile", "is not known in all its parts");
     for (int k = 0; k < g->ground[set].reads && !r->outcome; k++) {
         demand(r, counted(g->ground[set].list + k, 0, m->ground[set].n - 1), "ground oscillators of a gear");
         if (k && g->ground[set].list[k] <= g->ground[set].list[k - 1])
@@ -262,6 +265,22 @@ static void read_lead(reader *r, gk_gear *g)
 {
     g->lead = take(r, F_GEAR_lead);
     for (int k = 0; g->lead && k < 2 * LEADS; k++) demand(r, between(g->lead[k], -1e-3, 1e-3), "leads");
+}
+
+static void read_flanks(reader *r, gk_gear *g)
+{
+    gk_field_of_flanks *f = &g->flanks;
+    const int32_t *size = take(r, F_GEAR_flank_size);
+    demand(r,
+           !size || ((size[0] == 1 || size[0] == g->z) && counted(size + 1, 1, MAX_FLANK_PLACES) &&
+                     counted(size + 2, 4, MAX_FLANK_ROLLS)),
+           "sizes of the deviations of flanks");
+    for (int i = 0; i < 3; i++) r->shape.size[SYMBOL_flank_teeth + i] = size && !r->outcome ? (uint64_t)size[i] : 0;
+    if (size && !r->outcome) f->teeth = size[0], f->places = size[1], f->rolls = size[2];
+    f->depth = bounded(r, F_GEAR_flank, 1e-2);
+    if (!r->outcome && !size != !f->depth) refuse(r, "deviations of flanks", "are not whole");
+    for (int k = 0; f->depth && k < 2 * f->teeth * f->places * f->rolls; k++) f->most = gk_max(f->most, -f->depth[k]);
+    g->runout = bounded(r, F_GEAR_runout, 1e-2);
 }
 
 /* the first of a pair is followed by its second */
@@ -308,7 +327,8 @@ static int is_spatial(const gk_model *m)
         if (m->engagement[e].tilt[0] != 0.0 || m->engagement[e].tilt[1] != 0.0) return 1;
     for (int i = 0; i < m->gears; i++) {
         const gk_gear *g = &m->gear[i];
-        if (g->helix != 0.0 || g->lead) return 1;
+        if (g->helix != 0.0 || g->lead || g->flanks.places > 1) return 1;
+        if (g->runout && (g->runout[2] != 0.0 || g->runout[3] != 0.0)) return 1;
         for (int set = 0; set < m->sets; set++)
             for (int c = 2; c < 5; c++) /* z, rx, ry */
                 for (int k = 0; k < g->ground[set].reads; k++)
@@ -335,12 +355,16 @@ static void read_gear(reader *r, gk_model *m, int i)
     g->turn_rate = bounded(r, F_GEAR_turn_rate, 1.001);
     g->rows = bounded(r, F_GEAR_rows, 1e6);
     g->residual = bounded(r, F_GEAR_residual, 1e3);
+    g->along_rows = bounded(r, F_GEAR_along_rows, 1e6);
+    g->along_normal = bounded(r, F_GEAR_along_normal, 1e3);
+    g->along_own = bounded(r, F_GEAR_along_own, 1e3);
     g->support_residual = bounded(r, F_GEAR_support_residual, 1e3);
     g->port_residual = bounded(r, F_GEAR_port_residual, 1e3);
     if (!r->outcome) check_modes(r, g);
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
     if (!r->outcome) read_lead(r, g);
+    if (!r->outcome) read_flanks(r, g);
     if (!r->outcome) read_observed(r, m, g);
     if (!r->outcome) read_nodes(r, g);
 }
@@ -455,8 +479,14 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
     if (!r.outcome) read_nodal(&r, model);
     if (!r.outcome) model->spatial = is_spatial(model);
     if (!r.outcome) read_starts(&r, model);
+    model->rubbing = 1;
+    for (int g = 0; g < model->gears; g++) model->rubbing &= model->gear[g].along_rows != NULL;
     model->spinning = model->whirls > 0;
-    for (int g = 0; g < model->gears; g++) model->spinning |= model->gear[g].turn_rate != NULL;
+    for (int g = 0; g < model->gears; g++) {
+        model->spinning |= model->gear[g].turn_rate != NULL;
+        model->deviating |= model->gear[g].flanks.depth || model->gear[g].lead;
+        model->running_out |= model->gear[g].runout != NULL;
+    }
     return r.outcome;
 }
 

@@ -23,7 +23,9 @@ enum {
     OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */
     SETS = 2,       /* of ground oscillators: as supported; with the supports held */
     NAME_LENGTH = 32,
-    MAX_NODES = 513 /* of a flank along or across */
+    MAX_NODES = 513, /* of a flank along or across */
+    MAX_FLANK_ROLLS = 1025,
+    MAX_FLANK_PLACES = 129
 };
 
 /* what the outputs tell of a gear's own motion; name NULL: nothing */
@@ -35,6 +37,13 @@ typedef struct gk_observed {
     const double *rows[2]; /* by set: (own, reads) */
 } gk_observed;
 
+/* what the flanks of a gear are beside their involutes */
+typedef struct gk_field_of_flanks {
+    int teeth, places, rolls; /* teeth 1: all alike; places 1: the same all across the width */
+    const double *depth;      /* (teeth, 2 flanks, places, rolls) m, in the transverse section; NULL: nothing */
+    double most;              /* the most that stands out, m */
+} gk_field_of_flanks;
+
 /* a toothed member */
 typedef struct gk_gear {
     double r_b, s_form, s_tip, psi_b, phase;  /* phase: angle of tooth 0 when phi = 0 */
@@ -45,15 +54,18 @@ typedef struct gk_gear {
     int rotor, z, modes;
     int nodes[2]; /* of a flank for nodal contact: along, across; 0: none */
     const double *omega, *zeta, *rows, *residual, *support_residual, *port_residual;
-    const double *turn_rate; /* (modes) Coriolis coupling of a pair; NULL: unknown */
+    const double *along_rows, *along_normal, *along_own; /* along the profile; NULL: unknown */
+    const double *turn_rate;                             /* (modes) Coriolis coupling of a pair; NULL: unknown */
     const int32_t *diameter, *member;
     const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
     double index_most;   /* the largest of them along the flank normal, m */
+    gk_field_of_flanks flanks;
+    const double *runout; /* (4) axis of the toothing beside that of rotation: x, y, tilt about x, y; NULL: none */
     struct {
         int reads; /* ground oscillators that this gear reads */
         const int32_t *list;
-        const double *centre, *rows;
+        const double *centre, *rows, *along;
     } ground[SETS];
     gk_observed observed;
 } gk_gear;
@@ -107,7 +119,9 @@ struct gk_model {
     int carried;       /* bodies that stand in the axes of a turning rotor */
     const int32_t *carried_frame; /* (carried) that rotor */
     const double *carried_place;  /* (carried, 2) place of their axes there times √m */
+    int rubbing;                  /* all gears know displacement along the profile: friction is possible */
     int spinning;                 /* gyroscopic forces are known */
+    int deviating, running_out;   /* some flanks are not nominal; some toothing does not run true */
     int whirls;                   /* pairs of rows of gyroscopic forces */
     const int32_t *whirl;         /* (whirls) rotor whose speed turns them */
     int frame[MAX_ROTORS];        /* rotor in whose axes this one stands and its supports rest, −1: the ground */

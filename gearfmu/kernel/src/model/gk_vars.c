@@ -14,6 +14,9 @@ typedef enum {
     SLICES_DIFFER,
     CARRIED,
     SPINNING,
+    DEVIATING,
+    RUNNING_OUT,
+    RUBBING,
     OBSERVED
 } gk_exists;
 enum {
@@ -71,6 +74,9 @@ static int exists(const gk_model *model, const gk_row *row, int instance)
     case SLICES_DIFFER: return model->spatial && row->place - V_SLICE_1 < model->slices; /* those of the stage file */
     case CARRIED: return model->carried > 0;
     case SPINNING: return model->spinning;
+    case DEVIATING: return model->deviating;
+    case RUNNING_OUT: return model->running_out;
+    case RUBBING: return model->rubbing;
     }
     return 0;
 }
@@ -292,6 +298,15 @@ gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *ref
     return GK_OK;
 }
 
+/* values of all variables but parameters, from other data of the same model */
+void gk_vars_take(const gk_model *model, gk_data *data, const gk_data *from)
+{
+    for (int i = 0; i < ROWS; i++)
+        for (int k = 0; k < instances(model, TABLE[i].scope); k++)
+            if (TABLE[i].causality != GK_PARAMETER)
+                *value_of(data, &TABLE[i], k) = *value_of((gk_data *)(uintptr_t)from, &TABLE[i], k);
+}
+
 gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, double value)
 {
     return gk_set_many(model, data, &reference, 1, &value);
@@ -317,10 +332,10 @@ gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference
 gk_effects gk_effects_of(const gk_data *data)
 {
     const double *v = data->stage;
-    const gk_effects on = {v[V_E_ELASTIC] != 0,     v[V_E_RESIDUAL] != 0, v[V_E_LOCAL] != 0,
-                           v[V_E_COAST] != 0,       v[V_E_DAMPING] != 0,  v[V_E_RELIEF] != 0,
-                           v[V_E_CORNER] != 0,      v[V_E_BEARING] != 0,  v[V_E_MODAL_DAMPING] != 0,
-                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0,
-                           v[V_E_GYROSCOPIC] != 0};
+    const gk_effects on = {
+        v[V_E_ELASTIC] != 0,       v[V_E_RESIDUAL] != 0,    v[V_E_LOCAL] != 0,    v[V_E_COAST] != 0,
+        v[V_E_DAMPING] != 0,       v[V_E_RELIEF] != 0,      v[V_E_CORNER] != 0,   v[V_E_BEARING] != 0,
+        v[V_E_MODAL_DAMPING] != 0, v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0,
+        v[V_E_GYROSCOPIC] != 0,    v[V_E_FLANKS] != 0,      v[V_E_RUNOUT] != 0,   v[V_E_FRICTION] != 0};
     return on;
 }

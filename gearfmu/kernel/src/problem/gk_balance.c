@@ -44,7 +44,7 @@ static int takes_part(const gk_system *s, int i)
  * add up */
 static balance defect(const gk_system *s)
 {
-    balance b = {s->due - s->stored0, 0.0, 0.0, fabs(s->stored0), 0.0};
+    balance b = {s->due - s->stored0 + s->rubbing, 0.0, 0.0, fabs(s->stored0), 0.0};
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
@@ -197,6 +197,7 @@ static int find_alpha(const gk_island *island, balance b)
         }
         const double root = root_of(&b);
         if (!(fabs(root) > 0.0)) return 0;
+        if (GK_HAS(friction) && island->member[0]->rubs && b.c1 * b.c1 < 4.0 * b.defect * b.c2) return 0;
         const double a = kept_within(&ends, island->member[0]->alpha, b.defect, root);
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
@@ -219,12 +220,16 @@ static int find_alpha(const gk_island *island, balance b)
 void gk_balance_solve(const gk_island *island)
 {
     const double steady = island->sweep ? COUPLED_BALANCE : STEADY_BALANCE;
-    int curved = 0;
-    for (int m = 0; m < island->count; m++) curved |= island->member[m]->curved;
+    int curved = 0, rubs = 0;
+    for (int m = 0; m < island->count; m++) {
+        curved |= GK_HAS(hertz) && island->member[m]->curved;
+        rubs |= GK_HAS(friction) && island->member[m]->rubs;
+    }
+    curved |= rubs;
     for (int all_rows = 0; all_rows < 2; all_rows++) {
         gk_balance_plain(island);
         const int changed = any_changed(island);
-        if (!changed && !(GK_HAS(hertz) && curved)) return;
+        if (!changed && !curved) return;
         const balance b = defect_of_all(island);
         if (!open_balance(&b, changed ? BALANCE : steady)) {
             leave(island, &b);
@@ -232,6 +237,7 @@ void gk_balance_solve(const gk_island *island)
         }
         for (int m = 0; m < island->count; m++) choose_direction(island->member[m], all_rows);
         if (find_alpha(island, b)) return;
+        if (rubs && !changed) break; /* contacts that stick hardly move */
     }
     gk_balance_plain(island);
     balance b = defect_of_all(island);

@@ -11,17 +11,31 @@ static const double TOLERANCE = 1e-11;
 static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
 #endif
 
-/* all that forces do to gaps in the step; their deflection at once alone, under those at the end or at the start */
-typedef enum { WHOLE, AT_ONCE, AT_START } effect;
+/* all that forces do to gaps in the step; their deflection at once alone, under those at the end or at the start; at
+ * the start with what dampers and friction do there */
+typedef enum { WHOLE, AT_ONCE, AT_START, WHOLE_START } effect;
 
-/* forces of an engagement by what they meet: D in the step, A at once; a clutch knows no A */
-static void forces_of(const gk_system *s, effect of, double *step, double *once)
+/* forces of an engagement by what they meet: D in the step, A at once; the same along the profile */
+typedef struct gk_forces {
+    double step[MAX_STRIDE], once[MAX_STRIDE], step_along[MAX_STRIDE], once_along[MAX_STRIDE];
+} gk_forces;
+
+/* a clutch knows no A; friction counts with all that forces do */
+static void forces_of(const gk_setup *setup, const gk_engaged *engaged, effect of, gk_forces *f)
 {
+    const gk_system *s = &engaged->system;
+    const int start = of == AT_START || of == WHOLE_START; /* given torques may have changed */
     for (int i = 0; i < s->stride; i++) {
         const int row = i < s->n, clutch = row && s->kind[i] == ROW_CLUTCH;
-        step[i] = row && of == WHOLE ? s->z[i] : 0.0;
-        const double force = of == AT_START ? s->force0[i] : s->force[i]; /* given torques may have changed */
-        once[i] = row && !clutch ? force + (of == WHOLE ? s->end[i] : 0.0) : 0.0;
+        f->step[i] = row && of == WHOLE ? s->z[i] : 0.0;
+        const double force = start ? s->force0[i] : s->force[i];
+        const double damper = of == WHOLE ? s->end[i] : of == WHOLE_START ? s->end0[i] : 0.0;
+        f->once[i] = row && !clutch ? force + damper : 0.0;
+        if (!GK_ON(setup, friction)) continue;
+        const gk_glide *glide = engaged->glide;
+        const int rubs = i < s->contacts;
+        f->step_along[i] = rubs && of == WHOLE ? glide->step[i] : 0.0;
+        f->once_along[i] = !rubs ? 0.0 : of == WHOLE ? glide->end[i] : of == WHOLE_START ? glide->start_end[i] : 0.0;
     }
 }
 
@@ -32,8 +46,7 @@ static void exchange(double *sum, double *before, const double *now, int n)
     for (int i = 0; i < n; i++) sum[i] += now[i] - before[i], before[i] = now[i];
 }
 
-static void give_spins(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const double *step,
-                       const double *once)
+static void give_spins(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const gk_forces *f)
 {
     const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
@@ -41,34 +54,41 @@ static void give_spins(const gk_setup *setup, gk_work *work, const gk_coefficien
     for (int l = 0; l < mesh->spins; l++) {
         const int d = mesh->spin[l];
         const double inverse = setup->inverse_inertia[d];
-        const double moved = k->rigid_mobility * inverse * gk_dot_quads(s->rigid[l], step, s->stride / 4);
-        const double yielded = k->rigid_kappa * inverse * gk_dot_quads(s->rigid[l], once, s->stride / 4);
+        double step = gk_dot_quads(s->rigid[l], f->step, s->stride / 4);
+        double once = gk_dot_quads(s->rigid[l], f->once, s->stride / 4);
+        if (GK_ON(setup, friction)) {
+            step += gk_dot_quads(engaged->glide->rigid[l], f->step_along, s->stride / 4);
+            once += gk_dot_quads(engaged->glide->rigid[l], f->once_along, s->stride / 4);
+        }
+        const double moved = k->rigid_mobility * inverse * step, yielded = k->rigid_kappa * inverse * once;
         exchange(&work->sum_spin[0][d], &engaged->given_spin[0][l], &moved, 1);
         exchange(&work->sum_spin[1][d], &engaged->given_spin[1][l], &yielded, 1);
     }
 }
 
-static void give_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const double *step,
-                        const double *once)
+static void give_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const gk_forces *f)
 {
     const int n = setup->base.n;
     double moved[MAX_GROUND + 4 * MAX_ROTORS], yielded[MAX_GROUND + 4 * MAX_ROTORS];
     memset(moved, 0, (size_t)n * sizeof *moved);
     memset(yielded, 0, (size_t)n * sizeof *yielded);
-    gk_rows_push_ground(setup, &work->engaged[e], e, step, once, moved, yielded);
+    gk_rows_push_ground(setup, &work->engaged[e], e, f->step, f->once, moved, yielded);
+    if (GK_ON(setup, friction))
+        gk_rows_push_ground_along(setup, &work->engaged[e], e, f->step_along, f->once_along, moved, yielded);
     for (int i = 0; i < n; i++) moved[i] = k->ground.mobility[i] * moved[i] - k->ground.kappa[i] * yielded[i];
     exchange(work->sum_ground, work->engaged[e].given_ground, moved, n);
 }
 
 /* displacement of the modes of a gear that other engagements read too */
-static void give_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, int w, const double *step,
-                       const double *once)
+static void give_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, int w, const gk_forces *f)
 {
     const int g = setup->mesh[e].side[w].gear, n = setup->modal[g].n;
     gk_real *given = work->engaged[e].given_modes[w], *yielded = work->scaled;
     memset(given, 0, (size_t)n * sizeof *given);
     memset(yielded, 0, (size_t)n * sizeof *yielded);
-    gk_rows_push_modes(setup, work, e, w, step, once, given, yielded);
+    gk_rows_push_modes(setup, work, e, w, f->step, f->once, given, yielded);
+    if (GK_ON(setup, friction))
+        gk_rows_push_modes_along(setup, work, e, w, f->step_along, f->once_along, given, yielded);
     for (int i = 0; i < n; i++) given[i] = k->flow[g].mobility[i] * given[i] - k->flow[g].kappa[i] * yielded[i];
 }
 
@@ -83,14 +103,13 @@ static void give_bores(const gk_setup *setup, gk_work *work, int e, const double
 /* what an engagement's forces do to spins, ground group, bores and shared gears */
 static void give(const gk_coupled *c, int e, effect of)
 {
-    double step[MAX_STRIDE], once[MAX_STRIDE];
-    forces_of(&c->work->engaged[e].system, of, step, once);
-    give_spins(c->setup, c->work, c->k, e, step, once);
-    give_ground(c->setup, c->work, c->k, e, step, once);
-    give_bores(c->setup, c->work, e, once);
+    gk_forces f;
+    forces_of(c->setup, &c->work->engaged[e], of, &f);
+    give_spins(c->setup, c->work, c->k, e, &f);
+    give_ground(c->setup, c->work, c->k, e, &f);
+    give_bores(c->setup, c->work, e, f.once);
     for (int w = 0; w < 2; w++)
-        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1)
-            give_modes(c->setup, c->work, c->k, e, w, step, once);
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) give_modes(c->setup, c->work, c->k, e, w, &f);
 }
 
 static int within(const gk_coupled *c, int e) { return c->setup->mesh[e].island == c->island; }
@@ -144,8 +163,8 @@ static void take_bores(const gk_coupled *c, int e, double *read)
     gk_rows_read_bores(c->setup, &c->work->engaged[e], e, &others, read);
 }
 
-/* by the modes of a gear that other engagements read too */
-static void take_modes(const gk_coupled *c, int e, int which, double *read)
+/* by the modes of a gear that other engagements read too: gaps, or sliding */
+static void take_modes(const gk_coupled *c, int e, int which, int along, double *read)
 {
     gk_work *work = c->work;
     const int g = c->setup->mesh[e].side[which].gear, n = c->setup->modal[g].n;
@@ -156,7 +175,10 @@ static void take_modes(const gk_coupled *c, int e, int which, double *read)
             const gk_real *given = work->engaged[other].given_modes[w];
             for (int i = 0; i < n && c->setup->mesh[other].side[w].gear == g; i++) sum[i] += given[i];
         }
-    gk_rows_read_modes(c->setup, work, e, which, sum, read);
+    if (along)
+        gk_rows_read_modes_along(c->setup, work, e, which, sum, read);
+    else
+        gk_rows_read_modes(c->setup, work, e, which, sum, read);
 }
 
 /* what the others do to the rows of an engagement */
@@ -166,7 +188,25 @@ static void take(const gk_coupled *c, int e, double *read)
     take_spins(c, e, read);
     take_bores(c, e, read);
     for (int w = 0; w < 2; w++)
-        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, read);
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, 0, read);
+}
+
+/* what the others do to the sliding of its contacts */
+static void take_along(const gk_coupled *c, int e, double *read)
+{
+    gk_work *work = c->work;
+    const gk_mesh *mesh = &c->setup->mesh[e];
+    const gk_engaged *engaged = &work->engaged[e];
+    double others[MAX_GROUND + 4 * MAX_ROTORS];
+    for (int i = 0; i < c->setup->base.n; i++) others[i] = work->sum_ground[i] - engaged->given_ground[i];
+    gk_rows_read_ground_along(c->setup, engaged, e, others, read);
+    for (int l = 0; l < mesh->spins; l++) {
+        const double moved = work->sum_spin[0][mesh->spin[l]] - engaged->given_spin[0][l];
+        const double yielded = work->sum_spin[1][mesh->spin[l]] - engaged->given_spin[1][l];
+        gk_axpy(moved - yielded, engaged->glide->rigid[l], read, 0, engaged->system.stride / 4);
+    }
+    for (int w = 0; w < 2; w++)
+        if (c->setup->engagements_of[mesh->side[w].gear] > 1) take_modes(c, e, w, 1, read);
 }
 
 /* takes all that the others do; returns how much that has changed, against the largest gap and deflection */
@@ -200,6 +240,29 @@ static void part_at_once(const gk_coupled *c, effect of)
     }
 }
 
+/* contacts and friction of an engagement once; returns how much friction has changed. Where it is at its limits is
+ * found without the scalar of the step's energy. */
+static double solve_own(const gk_coupled *c, int e, int round)
+{
+    gk_engaged *engaged = &c->work->engaged[e];
+    engaged->system.dashpots_stand = round >= SETTLED;
+    if (GK_ON(c->setup, friction))
+        return gk_friction_solve(engaged->glide, &engaged->system, round, engaged->system.alpha != 0.0);
+    gk_solve_contacts(&engaged->system);
+    return 0.0;
+}
+
+/* an engagement that is alone: normal forces and friction in turns */
+static void rub(const gk_island *island)
+{
+    gk_coupled *c = island->context;
+    const int e = (int)c->alone;
+    double change = INFINITY;
+    for (int round = 0; round < SWEEPS && !(change < TOLERANCE); round++) change = solve_own(c, e, round);
+    island->member[0]->dashpots_stand = 0;
+    if (!(change < TOLERANCE)) island->member[0]->limit_reached = 1;
+}
+
 /* sweeps until what engagements do to each other no longer changes */
 static void sweep(const gk_island *island)
 {
@@ -213,8 +276,8 @@ static void sweep(const gk_island *island)
         for (int e = 0; e < c->model->engagements; e++) {
             if (!within(c, e)) continue;
             change = gk_max(change, take_whole(c, e));
-            c->work->engaged[e].system.dashpots_stand = round >= SETTLED;
-            gk_solve_contacts(&c->work->engaged[e].system);
+            if (GK_ON(c->setup, friction)) take_along(c, e, c->work->engaged[e].glide->others);
+            change = gk_max(change, solve_own(c, e, round));
             give(c, e, WHOLE);
         }
         if (round) c->rate = gk_min(1.0, change / last);
@@ -229,14 +292,23 @@ gk_island gk_couple_island(gk_coupled *c)
 {
     gk_island island = {.context = c};
     for (int e = 0; e < c->model->engagements; e++)
-        if (c->setup->mesh[e].island == c->island) island.member[island.count++] = &c->work->engaged[e].system;
-    island.sweep = island.count > 1 ? sweep : NULL;
+        if (within(c, e)) island.member[island.count++] = &c->work->engaged[e].system, c->alone = e;
+    island.sweep = island.count > 1 ? sweep : GK_ON(c->setup, friction) ? rub : NULL;
     return island;
+}
+
+/* what others deflect along the profile at the start of the step */
+static void recall_along(const gk_coupled *c)
+{
+    give_all(c, WHOLE_START);
+    for (int e = 0; e < c->model->engagements; e++)
+        if (within(c, e)) take_along(c, e, c->work->engaged[e].glide->others_start);
 }
 
 /* the start of the step: under λ0 the others deflect too */
 void gk_couple_recall(gk_coupled *c)
 {
+    if (GK_ON(c->setup, friction)) recall_along(c);
     part_at_once(c, AT_START);
     for (int e = 0; e < c->model->engagements; e++) {
         gk_system *s = &c->work->engaged[e].system;

@@ -67,8 +67,9 @@ typedef struct gk_system {
     double stored0;   /* energy of the quasi-static part at the start of the step */
     double held0;     /* energy that the dampers' force holds in Q at the start */
     double owed, due; /* defect of energy that the steps before left; what of it this step should make good */
-    int rounds, limit_reached, curved;
-    int dashpots_stand; /* where they are: no search for what limits them */
+    double rubbing;   /* what friction leaves of that energy in the step (gk_friction_defect) */
+    int rounds, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
+    int dashpots_stand;                      /* where they are: no search for what limits them */
     double outer[MAX_STRIDE],
         beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
                                                      deflection at once */

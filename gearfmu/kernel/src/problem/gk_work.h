@@ -8,6 +8,7 @@ enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to q
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
 typedef struct gk_point { /* of a strip */
     double gap, gradient[POSE];
+    double slide[POSE];        /* with friction: what gear A slides past B along the profile of A */
     double roll[2], curvature; /* length of roll on each gear, 1/ρA + 1/ρB in the normal section */
     double share;              /* of the strip's length that lies on both flanks */
 } gk_point;
@@ -57,8 +58,38 @@ typedef struct gk_bores { /* at once: moments on ports, and what contacts turn t
     double moment[MAX_PORTS], turned[MAX_PORTS];
 } gk_bores;
 
+/* Friction of an engagement in a step (gk_friction.c). Matrices are by columns: [j·stride + i] is what friction at
+ * contact j does to row i. */
+typedef struct gk_glide {
+    gk_real *basis[2]; /* (contacts, n), (contacts, local part) rows of the sliding, as those of the gaps */
+    double *ground, rigid[MAX_LOCAL][MAX_STRIDE];
+    double *matrix;
+    double *gap_moves, *gap_yields;             /* (contacts, stride) to the gaps of all rows: in the step; at once */
+    double *moves, *yields;                     /* to the sliding of all contacts */
+    double gap[MAX_STRIDE];                     /* gaps without friction */
+    double free[MAX_STRIDE], begin[MAX_STRIDE]; /* sliding in the step by the forces of the last one alone; by the
+                                                   speed at its start */
+    double others[MAX_STRIDE],                  /* by other engagements; */
+        others_start[MAX_STRIDE];               /* at once at the start of the step */
+    double most[MAX_STRIDE];                    /* coefficient of friction */
+    double most_force[MAX_STRIDE];              /* times the mean normal force */
+    double share[MAX_STRIDE];                   /* of the mean friction that is there at the end */
+    signed char limit[MAX_STRIDE], frozen[MAX_STRIDE], held[MAX_STRIDE]; /* ±1: at that limit; 1: given; 1: neither */
+    double fixed[MAX_STRIDE], *by_z;                    /* mean friction as a function of z, (contacts, stride) */
+    double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE], /* friction at the end as a function of z and its mean */
+        end_by_mean[MAX_STRIDE];
+    double *D;                                       /* D without friction */
+    double creep[MAX_STRIDE];                        /* sliding in the step below which friction is less than that */
+    double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */
+    double mean[MAX_STRIDE], ratio[MAX_STRIDE];      /* in the step; over the mean normal force */
+    double step[MAX_STRIDE], end[MAX_STRIDE], last[MAX_STRIDE]; /* as z, λ + f_d and λ of the normal forces are used */
+    double slid[MAX_STRIDE], late[MAX_STRIDE]; /* sliding in the step; sliding speed at its end times h */
+    double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
+} gk_glide;
+
 typedef struct gk_engaged { /* an engagement in a step */
     int index;
+    gk_glide *glide; /* with friction */
     gk_place place[MAX_PAIRS];
     int places;
     double pose[POSE]; /* predicted */
@@ -175,14 +206,32 @@ void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e
 void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e);
 void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum);
 void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores, double *read);
+/* the same of the sliding of the contacts and of forces along the profile */
+void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e);
+void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
+                               double *read);
+void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x,
+                               const double *y, double *out_x, double *out_y);
+void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
+                              gk_real *out_x, gk_real *out_y);
+void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
+/* gk_friction.c */
+void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
+                      gk_work *work, int e);
+double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
+double gk_friction_held(const gk_glide *glide, const gk_system *s);
+double gk_friction_defect(const gk_glide *glide, const gk_system *s);
+void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
+double gk_friction_settle(gk_glide *glide, const gk_system *s);
 /* gk_couple.c */
 typedef struct gk_coupled { /* an island in a step */
     const gk_model *model;
     const gk_setup *setup;
     gk_work *work;
     const gk_coefficients *k;
-    int island, sweeps; /* sweeps: at most; 0: as many as a step may take */
-    double rate;        /* by which a sweep changed less than the one before */
+    int island, alone; /* alone: the engagement of an island of one */
+    int sweeps;        /* at most; 0: as many as a step may take */
+    double rate;       /* by which a sweep changed less than the one before */
 } gk_coupled;
 gk_island gk_couple_island(gk_coupled *coupled);
 void gk_couple_recall(gk_coupled *coupled);

@@ -21,8 +21,8 @@ static double strip_load(const gk_setup *setup, const gk_engaged *engaged, int p
 
 /* adds the forces of the contacts of one engagement: on modes of the gear above the cut, and on the ground oscillators
  * that it reads and that are not dynamic */
-static void push_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
-                          double *modes, double *ground)
+void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
+                               double *modes, double *ground)
 {
     const gk_engaged *engaged = &work->engaged[e];
     const int g = model->engagement[e].gear[which];
@@ -36,7 +36,7 @@ static void push_contacts(const gk_model *model, const gk_setup *setup, const gk
 }
 
 /* what moments on ports do to ground oscillators that are not dynamic */
-static void push_ports(const gk_model *model, const gk_setup *setup, const gk_work *work, double *ground)
+void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const gk_work *work, double *ground)
 {
     const gk_ground *all = &model->ground[setup->base.set];
     for (int e = 0; e < model->engagements; e++) {
@@ -103,11 +103,11 @@ static void push_static(const gk_model *model, const gk_setup *setup, const gk_w
                         double *ground)
 {
     if (!setup->on.residual) return;
-    push_ports(model, setup, work, ground);
+    gk_amplitudes_of_ports(model, setup, work, ground);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++)
             if (model->engagement[e].gear[w] == g && model->engagement[e].kind != MESH_FLAT)
-                push_contacts(model, setup, work, e, w, modes, ground);
+                gk_amplitudes_of_contacts(model, setup, work, e, w, modes, ground);
 }
 
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)

@@ -2,7 +2,8 @@
 #include "run/gk_run.h"
 
 static const double OVER = 1.01;  /* of torque_max and speed_max: what rounding and ripple may take */
-static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped */
+static const double BROKEN = 0.5; /* of all energy there is: what the balance may leave before a run is stopped … */
+static const double LEAK = 0.01;  /* … beside this of what passed the ports: what is left grows with that in any run */
 
 /* ---- forces ------------------------------------------------------------------------------------------------------ */
 static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
@@ -28,6 +29,21 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
     v[V_CONTACT] = side[0] > 0.0 ? (side[1] > 0.0 ? 2 : 1) : side[1] > 0.0 ? -1 : 0;
     v[V_IMPACTS] = (double)data->meshing[e].impacts;
     v[V_OPEN_TIME] = data->meshing[e].open_time;
+}
+
+/* friction on the flanks of gear A, and over the normal force of all contacts */
+static void friction_outputs(const gk_engaged *engaged, gk_data *data, int e)
+{
+    const gk_system *s = &engaged->system;
+    double force = 0.0, normal = 0.0, most = 0.0, *v = data->mesh[e];
+    for (int i = 0; i < s->contacts; i++) {
+        force += engaged->glide->end[i];
+        normal += gk_reported(s, i);
+        most += engaged->glide->most[i] * gk_reported(s, i);
+    }
+    v[V_FRICTION_FORCE] = force;
+    v[V_FRICTION_RATIO] = normal > 0.0 ? most / normal : 0.0;
+    v[V_FRICTION_LOSS] = data->meshing[e].rubbed;
 }
 
 static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
@@ -114,6 +130,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
         data->rotor[r][V_GEAR_W] = data->v[r], data->rotor[r][V_GEAR_PHI] = data->x[r];
     for (int e = 0; e < model->engagements; e++) {
         mesh_outputs(&work->engaged[e], data, e);
+        if (GK_ON(setup, friction)) friction_outputs(&work->engaged[e], data, e);
         joint_outputs(model, setup, work, data, &work->engaged[e].system);
     }
     for (int p = 0; p < model->ports; p++) port_outputs(model, setup, data, p, h);
@@ -160,7 +177,7 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
     v[V_ENERGY] = energy;
     v[V_RESIDUAL] = energy - data->ledger.baseline - data->ledger.work + data->ledger.dissipated;
     const double there = energy + fabs(data->ledger.work) + data->ledger.dissipated;
-    return gk_finite(energy) && !(fabs(v[V_RESIDUAL]) > BROKEN * there + 1e-6);
+    return gk_finite(energy) && !(fabs(v[V_RESIDUAL]) > BROKEN * there + LEAK * data->ledger.through + 1e-6);
 }
 
 /* ---- over a communication step ----------------------------------------------------------------------------------- */
@@ -217,6 +234,8 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
                     const gk_tally *tally)
 {
     gk_tally_means(model, setup, data, H, tally);
+    for (int e = 0; e < model->engagements && GK_ON(setup, friction); e++)
+        data->mesh[e][V_FRICTION_POWER] = (data->meshing[e].rubbed - data->mesh[e][V_FRICTION_LOSS]) / H;
     for (int e = 0; e < model->engagements; e++) watch_limits(model, data, e, H, tally->mesh[e]);
     outputs(model, setup, work, data, h);
     for (int p = 0; p < model->ports; p++) {

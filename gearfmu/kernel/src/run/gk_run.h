@@ -18,6 +18,9 @@ static inline double gk_reported(const gk_system *s, int i) { return s->force[i]
 
 /* gk_amplitudes.c */
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
+void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
+                               double *modes, double *ground);
+void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const gk_work *work, double *ground);
 /* gk_supports.c: vectors of the ground oscillators, and of the supports */
 void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved, double *speed);
 void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,

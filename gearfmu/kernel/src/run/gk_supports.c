@@ -47,6 +47,21 @@ static void add_pressed(const gk_setup *setup, const gk_engaged *engaged, const 
     }
 }
 
+/* the same of friction */
+static void add_rubbed(const gk_model *model, const gk_engaged *engaged, const gk_side *side, double *out)
+{
+    const gk_position *at = &engaged->position[side->which];
+    const int supports = model->supports, strips = engaged->system.strips;
+    const size_t next = (size_t)(side->candidates * strips * supports);
+    const double *node = side->along.support + (size_t)at->node * next;
+    for (int i = 0; i < engaged->system.contacts; i++) {
+        const gk_place *place = &engaged->place[engaged->system.place_of[i]];
+        const double *low = node + (place->candidate[side->which] * strips + i % strips) * supports;
+        for (int s = 0; s < supports; s++)
+            out[s] -= engaged->glide->end[i] * (low[s] + at->part * (low[next + (size_t)s] - low[s]));
+    }
+}
+
 /* adds the forces on the supports that contacts, joints and turning axes make directly, beside the oscillators */
 void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                             double *out)
@@ -57,6 +72,7 @@ void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const 
         double force[MAX_ROWS];
         for (int i = 0; i < system->n; i++) force[i] = gk_reported(system, i);
         for (int w = 0; w < 2; w++) add_pressed(setup, engaged, &setup->mesh[e].side[w], force, out);
+        for (int w = 0; w < 2 && GK_ON(setup, friction); w++) add_rubbed(model, engaged, &setup->mesh[e].side[w], out);
         for (int i = system->contacts; i < system->n; i++)
             if (gk_rows_at_bore(setup, system, i))
                 for (int s = 0; s < model->supports; s++)

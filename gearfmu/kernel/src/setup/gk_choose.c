@@ -43,6 +43,27 @@ static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_
     return GK_OK;
 }
 
+/* friction is solved within the step, and bodies must know how they yield along the profile */
+static gk_outcome choose_friction(const gk_model *model, const gk_setup *setup, char message[GK_MESSAGE])
+{
+    if (!setup->on.friction) return GK_OK;
+    if (setup->integrator != DG4 && setup->integrator != EM) {
+        snprintf(message, GK_MESSAGE,
+                 "effect.friction is solved within the step: use integrator dg4 or em, at any level but paper and "
+                 "explicit, or effect.friction = false");
+        return GK_BAD_VALUE;
+    }
+    for (int g = 0; g < model->gears && setup->on.elastic; g++)
+        if (!model->gear[g].along_rows) {
+            snprintf(message, GK_MESSAGE,
+                     "effect.friction: gear %d of this model does not know how it yields along the profile; reduce its "
+                     "body again with this version of gearfmu, or set effect.friction = false",
+                     g + 1);
+            return GK_BAD_VALUE;
+        }
+    return GK_OK;
+}
+
 /* level, integrator and effects that go together; `paper` is the paper's way: truncated modes, no residual, nodal
  * contact, rk45 (dg4 and lines of contact where a clutch hangs on a port) */
 gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
@@ -65,7 +86,8 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
         return GK_BAD_VALUE;
     }
     if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
-    const gk_outcome outcome = choose_contact(model, data, setup, message);
+    gk_outcome outcome = choose_contact(model, data, setup, message);
+    if (!outcome) outcome = choose_friction(model, setup, message);
     if (outcome || setup->nodal) return outcome;
     if (setup->level == LEVEL_PAPER) {
         setup->on.residual = 0;

@@ -28,12 +28,18 @@ static gk_grid cubic(double u, int count, double per)
     return at;
 }
 
-/* on the grid of rolls that the model's rows are given on; beyond the ends of the flank the value there */
-gk_grid gk_grid_at(const gk_model *model, const gk_gear *gear, double roll)
+/* on `count` rolls even along the flank; beyond its ends the value there */
+gk_grid gk_grid_flank(const gk_gear *gear, int count, double roll)
 {
     const double low = gk_min(gear->s_form, gear->s_tip), high = gk_max(gear->s_form, gear->s_tip);
     const double share = (gk_clamp(roll, low, high) - gear->s_form) / (gear->s_tip - gear->s_form);
-    return cubic(share * (model->rolls - 1), model->rolls, (model->rolls - 1) / (gear->s_tip - gear->s_form));
+    return cubic(share * (count - 1), count, (count - 1) / (gear->s_tip - gear->s_form));
+}
+
+/* on the grid of rolls that the model's rows are given on */
+gk_grid gk_grid_at(const gk_model *model, const gk_gear *gear, double roll)
+{
+    return gk_grid_flank(gear, model->rolls, roll);
 }
 
 /* on the POINTS of a flank, which are even in arc length; beyond its ends the value there, without slope */

@@ -125,10 +125,17 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->path = doubles(b, points * strips);
     side->port = doubles(b, points);
     side->support = doubles(b, points * (size_t)gk_padded(model->supports));
+    if (!GK_ON(setup, friction)) return;
+    side->along.rows = reals(b, points * (size_t)setup->modal[side->gear].n);
+    side->along.ground = doubles(b, points * (size_t)setup->base.n);
+    side->along.normal = reals(b, points * (size_t)side->columns);
+    side->along.own = reals(b, points * (size_t)side->columns);
+    side->along.support = doubles(b, points * (size_t)model->supports);
 }
 
-static void lay_out_nodes(bump *b, const gk_model *model, const gk_gear *gear, gk_nodes *nodes)
+static void lay_out_nodes(bump *b, const gk_model *model, const gk_gear *const pair[2], int which, gk_nodes *nodes)
 {
+    const gk_gear *gear = pair[which];
     const size_t along = (size_t)gear->nodes[0], across = (size_t)gear->nodes[1];
     double **array[] = {&nodes->roll, &nodes->x, &nodes->y, &nodes->length};
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, along);
@@ -137,6 +144,8 @@ static void lay_out_nodes(bump *b, const gk_model *model, const gk_gear *gear, g
     nodes->width = doubles(b, across);
     for (int w = 0; w < 2; w++) nodes->functions[w] = doubles(b, across * (size_t)model->functions);
     nodes->lead = doubles(b, 2 * across);
+    for (int w = 0; w < 2; w++)
+        nodes->deviation[w].depth = doubles(b, across ? gk_deviation_size(pair[w], (int)across) : 0);
     nodes->strip = take(b, across * sizeof *nodes->strip);
 }
 
@@ -151,11 +160,16 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         at += 3 * (size_t)setup->modal[g].n;
     }
     lay_out_base(&b, model, &setup->base, ground);
-    for (int e = 0; e < model->engagements; e++)
+    for (int e = 0; e < model->engagements; e++) {
+        gk_mesh *mesh = &setup->mesh[e];
+        const int *number = model->engagement[e].gear;
+        const gk_gear *const pair[2] = {&model->gear[number[0]], &model->gear[number[1]]};
         for (int w = 0; w < 2; w++) {
-            lay_out_side(&b, model, setup, &setup->mesh[e].side[w]);
-            lay_out_nodes(&b, model, &model->gear[model->engagement[e].gear[w]], &setup->mesh[e].nodes[w]);
+            lay_out_side(&b, model, setup, &mesh->side[w]);
+            lay_out_nodes(&b, model, pair, w, &mesh->nodes[w]);
+            mesh->deviation[w].depth = doubles(&b, gk_deviation_size(pair[w], setup->strips));
         }
+    }
     for (int g = 0; g < model->gears; g++) {
         const size_t cells = model->gear[g].nodes[0] ? 2 * (size_t)(POINTS * model->functions) : 0;
         setup->point_rows[g].modes = reals(&b, cells * (size_t)setup->modal[g].n);
@@ -201,6 +215,13 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
     engaged->index = e;
     engaged->matrix = doubles(b, 6 * rows * rows);
     engaged->given_ground = doubles(b, (size_t)setup->base.n);
+    if (!GK_ON(setup, friction)) return;
+    gk_glide *glide = engaged->glide = take(b, sizeof *glide);
+    gk_glide counted, *of = glide ? glide : &counted;
+    memset(of, 0, sizeof *of);
+    for (int w = 0; w < 2; w++) of->basis[w] = reals(b, contacts * (size_t)setup->modal[setup->mesh[e].side[w].gear].n);
+    of->ground = doubles(b, rows * (size_t)setup->base.n);
+    of->matrix = doubles(b, 6 * rows * rows);
 }
 
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
@@ -258,7 +279,7 @@ static size_t largest(const gk_model *model, gk_setup *setup)
     setup->slices = MAX_SLICES;
     setup->strips = gk_strips_count(model, MAX_SLICES);
     setup->spatial = model->spatial; /* tables of joint motion are wider then: gk_common */
-    setup->on.tip_contact = 1;
+    setup->on.tip_contact = setup->on.friction = 1;
     for (int g = 0; g < model->gears; g++) modes[g] = model->gear[g].modes;
     for (int s = 0; s < model->sets; s++)
         if (model->ground[s].n > ground) ground = model->ground[s].n, setup->base.set = s;

@@ -12,6 +12,13 @@ typedef struct gk_grid {
 
 enum { POINTS = 20 }; /* of a flank, even in arc length, at which displacements are read */
 
+/* Deviations of the flanks of a gear as an engagement reads them */
+typedef struct gk_deviation {
+    const gk_gear *gear; /* NULL: involutes */
+    int lines;           /* across the width, strips or layers of nodes; 1: all alike */
+    double *depth;       /* (teeth, 2 flanks, lines, rolls) m */
+} gk_deviation;
+
 /* Outward displacement at the points of a gear's flanks by its dynamic oscillators */
 typedef struct gk_point_rows {
     gk_real *modes;  /* (2 flanks, points, functions, lanes) of the gear group, tooth 0 */
@@ -28,9 +35,11 @@ typedef struct gk_nodes {
     double *z, *width;    /* (across): place; face width that the node stands for, its mirror image's included */
     double *functions[2]; /* (across, functions): (2a + 1) P_a there on gear A and on gear B */
     double *lead;         /* (2 flanks, across): what leads of both gears open, in the transverse section */
-    int32_t *strip;       /* (across): strip that reports the node's force */
+    gk_deviation deviation[2]; /* of gear A and of gear B at the places across */
+    int32_t *strip;            /* (across): strip that reports the node's force */
 } gk_nodes;
 
 gk_grid gk_grid_points(const gk_gear *gear, double roll);
+gk_grid gk_grid_flank(const gk_gear *gear, int count, double roll);
 gk_grid gk_grid_at(const gk_model *model, const gk_gear *gear, double roll);
 #endif

@@ -59,8 +59,20 @@ static void fill_across(const gk_model *model, const gk_setup *setup, const gk_e
             const gk_gear *gear = &model->gear[e->gear[w]];
             const double x = 2.0 * nodes->z[j] / gear->width;
             functions_at(model, x, nodes->functions[w] + j * A);
-            for (int flank = 0; flank < 2; flank++) nodes->lead[flank * count + j] += gk_strips_lead(gear, flank, x);
+            for (int flank = 0; flank < 2 && GK_ON(setup, flank_deviations); flank++)
+                nodes->lead[flank * count + j] += gk_strips_lead(gear, flank, x);
         }
+    }
+}
+
+/* what the flanks of both gears are beside involutes, at the places across */
+static void fill_deviations(const gk_model *model, const gk_setup *setup, const gk_engagement *e, gk_nodes *nodes)
+{
+    double x[MAX_NODES];
+    for (int w = 0; w < 2; w++) {
+        const gk_gear *gear = &model->gear[e->gear[w]];
+        for (int j = 0; j < nodes->across; j++) x[j] = 2.0 * nodes->z[j] / gear->width;
+        gk_deviation_fill(setup, gear, nodes->across, x, x, &nodes->deviation[w]);
     }
 }
 
@@ -157,6 +169,7 @@ void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *
         const gk_gear *gear = &model->gear[e->gear[w]];
         fill_along(gear, &mesh->nodes[w]);
         fill_across(model, setup, e, gear->nodes[1], &mesh->nodes[w]);
+        fill_deviations(model, setup, e, &mesh->nodes[w]);
         mesh->penalty[w] = penalty * (w ? 1.0 - e->nodes_of_a : e->nodes_of_a);
     }
     mesh->compliance = line_compliance(model, mesh, penalty);

@@ -26,7 +26,7 @@ size_t gk_node_scratch(const gk_model *model)
         for (int s = 0; s < model->sets; s++)
             reads = reads > (size_t)model->gear[g].ground[s].reads ? reads : (size_t)model->gear[g].ground[s].reads;
     }
-    const size_t of_node = points_of(model) * (modes + 2 * reads + (size_t)model->supports + 1) + modes;
+    const size_t of_node = points_of(model) * (2 * modes + 4 * reads + (size_t)model->supports + 1) + modes;
     const size_t of_step = 4 * points_of(model) * (modes + LANES);
     return of_node > of_step ? of_node : of_step;
 }
@@ -61,9 +61,10 @@ static void turn_row(const gk_gear *gear, int offset, double *row)
     }
 }
 
-typedef struct direction { /* in ground axes, at the nominal place of contact */
-    double angle;          /* of the tooth */
-    double n[3], arm[3];   /* outward normal; point of contact from the gear's centre × normal */
+typedef struct direction {     /* in ground axes, at the nominal place of contact */
+    double angle;              /* of the tooth */
+    double n[3], arm[3];       /* outward normal; point of contact from the gear's centre × normal */
+    double along[3], lever[3]; /* the same against the direction in which gear A slides past B */
 } direction;
 
 static direction direction_of(const gk_node *n, const gk_spot *p)
@@ -87,6 +88,9 @@ static direction direction_of(const gk_node *n, const gk_spot *p)
     d.arm[0] = y * d.n[2] - p->z * d.n[1];
     d.arm[1] = p->z * d.n[0] - x * d.n[2];
     d.arm[2] = helix_cosine * hollow * sg * r_b;
+    d.along[0] = -second * cosine, d.along[1] = -second * sine, d.along[2] = 0.0;
+    d.lever[0] = -p->z * d.along[1], d.lever[1] = p->z * d.along[0];
+    d.lever[2] = x * d.along[1] - y * d.along[0];
     return d;
 }
 
@@ -112,6 +116,42 @@ static void ground_point(const gk_node *n, const gk_spot *p, double *row, double
         blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
         for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
     }
+}
+
+/* what the ground oscillators of the gear move at a point along the profile */
+static void along_point(const gk_node *n, const gk_spot *p, double *row, double *rigid)
+{
+    const int set = n->setup->base.set, reads = n->gear->ground[set].reads;
+    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
+    const direction d = direction_of(n, p);
+    const double *centre = n->gear->ground[set].centre, sense = gk_node_along(n);
+    const double along[6] = {d.along[0], d.along[1], d.along[2], d.lever[0], d.lever[1], d.lever[2]};
+    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
+    gk_sincos(d.angle, &trig[2], &trig[1]);
+    for (int k = 0; k < reads; k++) {
+        rigid[k] = 0.0;
+        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
+        row[k] = rigid[k];
+    }
+    for (int c = 0; c < 3 && n->gear->ground[set].along; c++) {
+        blend(n, n->gear->ground[set].along + c * size * reads, p, reads, part);
+        for (int k = 0; k < reads; k++) row[k] += sense * trig[c] * part[k];
+    }
+}
+
+/* rows along the profile of a point */
+static void gather_along(gk_node *n, const gk_spot *p, int i)
+{
+    const int modes = n->gear->modes, set = n->setup->base.set;
+    double *row = n->along_rows + (size_t)i * modes;
+    if (n->gear->along_rows)
+        blend(n, n->gear->along_rows, p, modes, row);
+    else
+        memset(row, 0, (size_t)modes * sizeof *row);
+    for (int k = 0; k < modes; k++) row[k] *= gk_node_along(n);
+    if (p->offset) turn_row(n->gear, p->offset, row);
+    const size_t at = (size_t)i * n->gear->ground[set].reads;
+    if (n->e->kind != MESH_FLAT) along_point(n, p, n->along_ground + at, n->along_rigid + at);
 }
 
 /* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
@@ -176,6 +216,7 @@ void gk_node_gather(gk_node *n, double position)
             ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
                          n->rigid + (size_t)i * n->gear->ground[set].reads,
                          n->support + (size_t)i * n->model->supports);
+        if (GK_ON(n->setup, friction)) gather_along(n, p, i);
     }
 }
 
@@ -189,6 +230,9 @@ gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room
     n.ground = room, room += most * reads;
     n.rigid = room, room += most * reads;
     n.support = room, room += most * (size_t)model->supports;
+    n.along_rows = room, room += most * (size_t)n.gear->modes;
+    n.along_ground = room, room += most * reads;
+    n.along_rigid = room, room += most * reads;
     n.port = room, room += most;
     n.flexibility = room;
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);

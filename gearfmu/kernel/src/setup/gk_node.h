@@ -19,18 +19,24 @@ typedef struct gk_node { /* what a node's tables are made from */
     int points;                              /* candidates × strips */
     gk_spot at[MAX_CANDIDATES * MAX_SLICES]; /* points */
     gk_strip_weights weight;
-    double length;       /* of the line of action between the base circles, nominal */
-    double *rows;        /* (points, modes): all stored modes, tooth offset included */
-    double *ground;      /* (points, reads): outward, rigid motion included, of every ground oscillator */
-    double *rigid;       /* (points, reads): the part of it that is rigid motion */
-    double *support;     /* (points, supports): C_fs */
-    double *port;        /* (points) */
-    double *flexibility; /* (modes) 1/ω² of the dynamic ones */
+    double length;   /* of the line of action between the base circles, nominal */
+    double *rows;    /* (points, modes): all stored modes, tooth offset included */
+    double *ground;  /* (points, reads): outward, rigid motion included, of every ground oscillator */
+    double *rigid;   /* (points, reads): the part of it that is rigid motion */
+    double *support; /* (points, supports): C_fs */
+    double *along_rows, *along_ground, *along_rigid; /* rows, ground and rigid along the profile (gk_along) */
+    double *port;                                    /* (points) */
+    double *flexibility;                             /* (modes) 1/ω² of the dynamic ones */
 } gk_node;
 
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side);
 /* `position`: share of the pitch */
 void gk_node_gather(gk_node *n, double position);
+/* sense of growing roll on this side against the direction in which gear B slides past A */
+static inline double gk_node_along(const gk_node *n)
+{
+    return n->side->which == 1 && n->e->kind == MESH_INTERNAL ? 1.0 : -1.0;
+}
 /* length of roll of a candidate on the line of action at mid-width */
 double gk_node_roll(const gk_side *side, int flank, double position, int offset);
 double gk_node_tan(double angle);

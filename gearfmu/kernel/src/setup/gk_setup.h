@@ -17,7 +17,7 @@ enum {
 
 typedef struct gk_effects {
     int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping,
-        roll_motion, coriolis, centrifugal, gyroscopic;
+        roll_motion, coriolis, centrifugal, gyroscopic, flank_deviations, runout, friction;
 } gk_effects;
 
 /* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
@@ -42,7 +42,10 @@ enum {
     EFFECT_pitch_errors,
     EFFECT_coriolis,
     EFFECT_centrifugal,
-    EFFECT_gyroscopic
+    EFFECT_gyroscopic,
+    EFFECT_flank_deviations,
+    EFFECT_runout,
+    EFFECT_friction
 };
 #define GK_EFFECT(name) EFFECT_##name
 #define GK_EFFECT_OF(name) GK_EFFECT(name)
@@ -91,6 +94,17 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
 } gk_base;
 
+/* What a side knows of displacement and force along the profile (docs/theory.md, 2.8), for friction. Everything is
+ * against the direction in which gear A slides past B, so that rows stand beside those of the normal displacement. */
+typedef struct gk_along {
+    gk_real *rows;   /* as those of the side */
+    double *ground;  /* as those of the side */
+    gk_real *normal; /* (nodes + 1, points, columns): what is not dynamic yields along the normal at a point (first) per
+                        force along the profile at another */
+    gk_real *own;    /* the same along the profile */
+    double *support; /* as that of the side, over all supports */
+} gk_along;
+
 /* One gear of an engagement on its side: rows and compliances of its candidates (teeth that may touch), at NODES + 1
  * positions of the gear in one pitch, for the reference tooth 0; for another reference tooth the gear group's state is
  * turned, not the rows. Between two nodes rows are linear. */
@@ -111,13 +125,31 @@ typedef struct gk_side {
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     int port_of;   /* the port that the gear feels, −1: none */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
-    gk_span held;  /* the supports that this side loads */
+    gk_along along;
+    gk_span held;    /* the supports that this side loads */
     double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
 } gk_side;
 
 typedef struct gk_part {  /* the part of a strip that carries, z (m) in the engagement's width */
     double middle, share; /* share: of the strip's length, never 0 */
 } gk_part;
+
+typedef enum gk_friction_law { FRICTION_CONSTANT, FRICTION_BENEDICT_KELLEY, FRICTION_ISO_TR_14179 } gk_friction_law;
+
+typedef struct gk_friction { /* of an engagement */
+    gk_friction_law law;
+    double coefficient, viscosity, roughness;
+    double sliding;              /* largest sliding speed on the path of contact per speed of gear A, m */
+    double pitch_sum, pitch_rho; /* at the pitch point: sum of the rolling speeds per speed of gear A, m; reduced radius
+                                    of curvature in the normal section, m */
+} gk_friction;
+
+typedef struct gk_sliding { /* of a contact, at the moment */
+    double load;            /* normal force per metre of the line of contact */
+    double total;           /* normal force of the engagement */
+    double slides, rolls;   /* sliding speed; sum of the rolling speeds of both flanks */
+    double turns;           /* speed of gear A */
+} gk_sliding;
 
 typedef struct gk_mesh { /* an engagement */
     int index, island;   /* island: engagements that share rotors have one number */
@@ -130,13 +162,17 @@ typedef struct gk_mesh { /* an engagement */
     int spins, spin[7];   /* spins that its rows read: rotor of A, of B, of their frame, chains' inertias and discs */
     int frame;            /* rotor of the frame, −1: the ground */
     int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
-    double action[2];     /* t of the line of action of both flanks at the nominal axes (gk_flank.c) */
+    gk_friction friction;
+    double action[2]; /* t of the line of action of both flanks at the nominal axes (gk_flank.c) */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     int coasts;                                  /* its flanks sg = −1 are those that carry (gk_kinematics_carrying) */
     double allowance, damping;     /* what opens the coast flanks beyond the teeth's own numbers, along the normal */
     double helix[2], cosine, sine; /* tangents of both base helix angles; cosine of them, sine of A's */
     double past[2];                /* length of roll (m) past the end of a flank on which its tip edge carries */
     double lead[2][MAX_SLICES];    /* what leads open at a strip, by flank, in the transverse section */
+    gk_deviation deviation[2];     /* of gear A and of gear B, by strip */
+    double protrusion;             /* what places of teeth and flanks may close of a gap, m */
+    int runs_out;                  /* a toothing does not run true */
     double strip_width[MAX_SLICES], strip_middle[MAX_SLICES], strip_term, square_low, square_high, log_low,
         log_high;                               /* bounds of b² in the local law, and their ln */
     gk_nodes nodes[2];                          /* nodal contact: of gear A and of gear B */
@@ -248,6 +284,7 @@ static inline int gk_disc_of(const gk_model *model, int port)
 
 /* gk_vars.c */
 gk_effects gk_effects_of(const gk_data *data);
+void gk_vars_take(const gk_model *model, gk_data *data, const gk_data *from);
 /* gk_flow.c */
 const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
 const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
@@ -257,6 +294,20 @@ void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *
 /* gk_strips.c */
 int gk_strips_mirrored(const gk_model *model);
 double gk_strips_lead(const gk_gear *gear, int flank, double x);
+/* gk_deviation.c: `from` and `to` (lines), −1 … 1 of the gear's half-width: the part of it that a line is the mean of;
+ * the same array: the place itself */
+size_t gk_deviation_size(const gk_gear *gear, int lines);
+void gk_deviation_fill(const gk_setup *setup, const gk_gear *gear, int lines, const double *from, const double *to,
+                       gk_deviation *d);
+/* depth along the roll of a flank, NULL: an involute; its value (m) and slope at a length of roll, straight beyond the
+ * ends of the flank */
+const double *gk_deviation_line(const gk_deviation *d, int tooth, int flank, int line);
+double gk_deviation_at(const gk_gear *gear, const double *line, double roll, double *slope);
+/* moves both gears of a pose to where their toothings stand; turn (POSE): derivatives by the gear's own angle; 0 where
+ * all run true. What follows for a gradient by the pose as it was, and for a motion of the pose. */
+int gk_runout_move(const gk_model *model, const gk_setup *setup, const gk_engagement *e, double *pose, double *turn);
+void gk_runout_turn(const double *turn, double *gradient);
+void gk_runout_follow(const double *turn, double *motion);
 int gk_strips_count(const gk_model *model, int slices);
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
@@ -295,5 +346,8 @@ static inline void gk_local_gather(const gk_mesh *mesh, const double *x, double 
     memcpy(row, x + mesh->part[0].from, (size_t)mesh->part[0].width * sizeof *row);
     memcpy(row + mesh->part[0].width, x + mesh->part[1].from, (size_t)mesh->part[1].width * sizeof *row);
 }
+/* gk_lubrication.c */
+void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *mesh);
+double gk_lubrication_coefficient(const gk_friction *friction, double width, const gk_sliding *at);
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out);
 #endif

@@ -181,6 +181,88 @@ static void store_residual(const gk_node *n, int at, int halfway, const double *
         for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, still, p, q);
 }
 
+/* Compliance of one tooth by a table without offsets, between two points */
+static double one_tooth(const gk_node *n, const double *table, int i, int j)
+{
+    const int A = n->model->functions, R = n->model->rolls;
+    const gk_spot *p = &n->at[i], *q = &n->at[j];
+    const double *from = table + (size_t)(p->flank * 2 + q->flank) * (size_t)(R * R * A * A);
+    double sum = 0.0;
+    for (int k = 0; k < 4; k++)
+        for (int l = 0; l < 4; l++) {
+            const double w = p->grid.weight[k] * q->grid.weight[l];
+            const double *cell = from + ((p->grid.index + k) * R + q->grid.index + l) * A * A;
+            for (int a = 0; a < A; a++) sum += w * p->width[a] * dot(cell + a * A, q->width, A);
+        }
+    return sum;
+}
+
+/* Σ a b/ω² over modes `from` … `to` − 1 and over the ground oscillators that are not dynamic */
+static double carried_by(const gk_node *n, const double *a, const double *b, int from, int to)
+{
+    double sum = 0.0;
+    for (int k = from; k < to; k++) sum += a[k] * b[k] * n->flexibility[k];
+    return sum;
+}
+
+/* What is not dynamic yields along the normal and along the profile per force along the profile. One tooth by its own
+ * table; of others what stored modes carry. */
+static void store_along_residual(const gk_node *n, int at, const double *still)
+{
+    const gk_side *side = n->side;
+    const gk_gear *gear = n->gear;
+    const int modes = gear->modes, dynamic = n->setup->modal[side->gear].count;
+    const int reads = gear->ground[n->setup->base.set].reads;
+    const double own = gk_node_along(n);
+    for (int i = 0; i < n->points; i++)
+        for (int j = 0; j < n->points; j++) {
+            const int same = n->at[i].offset == n->at[j].offset && gear->along_normal;
+            const double *a = n->rows + (size_t)i * modes, *s = n->along_rows + (size_t)i * modes;
+            const double *t = n->along_rows + (size_t)j * modes, *x = n->ground + (size_t)i * reads;
+            const double *u = n->along_ground + (size_t)i * reads, *v = n->along_ground + (size_t)j * reads;
+            const int from = same ? 0 : dynamic, to = same ? dynamic : modes;
+            const double sign = same ? -1.0 : 1.0;
+            double normal = sign * carried_by(n, a, t, from, to), along = sign * carried_by(n, s, t, from, to);
+            if (same)
+                normal += own * one_tooth(n, gear->along_normal, i, j), along += one_tooth(n, gear->along_own, i, j);
+            for (int k = 0; k < reads; k++) normal += x[k] * v[k] * still[k], along += u[k] * v[k] * still[k];
+            const size_t to_table = ((size_t)at * n->points + (size_t)i) * (size_t)side->columns + (size_t)j;
+            side->along.normal[to_table] = (gk_real)normal;
+            side->along.own[to_table] = (gk_real)along;
+        }
+}
+
+/* rows along the profile of what is dynamic, and what friction puts on supports at once */
+static void store_along(const gk_node *n, int at, const double *still)
+{
+    const gk_side *side = n->side;
+    const gk_modal *m = &n->setup->modal[side->gear];
+    const gk_base *base = &n->setup->base;
+    const int reads = n->gear->ground[base->set].reads, from = base->from[side->gear], width = base->width[side->gear];
+    const int supports = n->model->supports;
+    const gk_ground *ground = &n->model->ground[base->set];
+    const int32_t *list = n->gear->ground[base->set].list;
+    for (int i = 0; i < n->points; i++) {
+        const size_t point = (size_t)at * n->points + (size_t)i;
+        gk_real *to = side->along.rows + point * m->n;
+        memset(to, 0, (size_t)m->n * sizeof *to);
+        for (int k = 0; k < m->count; k++) to[m->lane[k]] = (gk_real)n->along_rows[(size_t)i * n->gear->modes + k];
+        double *moves = side->along.ground + point * width, *held = side->along.support + point * supports;
+        double moved[MAX_SUPPORTS] = {0};
+        memset(moves, 0, (size_t)width * sizeof *moves);
+        memset(held, 0, (size_t)supports * sizeof *held);
+        if (n->e->kind == MESH_FLAT || !n->setup->on.elastic) continue;
+        const double *row = n->along_ground + (size_t)i * reads, *rigid = n->along_rigid + (size_t)i * reads;
+        for (int k = 0; k < reads; k++)
+            if (base->slot[list[k]] >= 0)
+                moves[base->slot[list[k]] - from] = row[k] - rigid[k];
+            else if (n->setup->on.residual)
+                for (int s = 0; s < supports; s++)
+                    moved[s] += row[k] * still[k] * ground->support_rows[s * ground->n + list[k]];
+        for (int s = 0; s < supports; s++) held[s] = dot(ground->kappa + s * supports, moved, supports);
+    }
+}
+
 /* flank to bore angle and to supports, beside what dynamic oscillators carry */
 static void store_joints(const gk_node *n, int at, const double *still)
 {
@@ -274,6 +356,8 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
         if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
         if (setup->on.residual) store_residual(&n, at, 0, still);
         if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, still);
+        if (GK_ON(setup, friction)) store_along(&n, at, still);
+        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, still);
     }
     for (int at = 0; at < side->nodes && setup->on.residual; at++) {
         gk_node_gather(&n, (at + 0.5) / side->nodes);
@@ -288,6 +372,10 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     if (!setup->on.residual || n.e->kind == MESH_FLAT) {
         memset(side->port, 0, nodes * points * sizeof *side->port);
         memset(side->support, 0, nodes * points * (size_t)gk_padded(model->supports) * sizeof *side->support);
+    }
+    if (GK_ON(setup, friction) && !setup->on.residual) {
+        memset(side->along.normal, 0, nodes * points * (size_t)side->columns * sizeof(gk_real));
+        memset(side->along.own, 0, nodes * points * (size_t)side->columns * sizeof(gk_real));
     }
     side->held = held_by(side->support, nodes * points, model->supports);
     keep_held(side, nodes * points, model->supports);

@@ -111,6 +111,27 @@ static double lead_over(const gk_gear *gear, int flank, double from, double to)
     return sum / SAMPLES;
 }
 
+/* what both gears' flanks are beside involutes, and how far they may reach out */
+static void fill_deviations(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
+{
+    const gk_engagement *e = &model->engagement[mesh->index];
+    mesh->protrusion = 0.0, mesh->runs_out = 0;
+    for (int w = 0; w < 2; w++) {
+        const gk_gear *gear = &model->gear[e->gear[w]];
+        double from[MAX_SLICES], to[MAX_SLICES];
+        for (int s = 0; s < setup->strips; s++) {
+            const double edge = e->width / gear->width;
+            from[s] = edge * (2.0 * s / setup->slices - 1.0), to[s] = edge * (2.0 * (s + 1) / setup->slices - 1.0);
+            for (int flank = 0; flank < 2 && GK_ON(setup, flank_deviations); flank++)
+                mesh->lead[flank][s] += lead_over(gear, flank, from[s], to[s]);
+        }
+        gk_deviation_fill(setup, gear, setup->strips, from, to, &mesh->deviation[w]);
+        mesh->protrusion += (GK_HAS(pitch_errors) ? gear->index_most : 0.0) +
+                            (GK_ON(setup, flank_deviations) ? gear->flanks.most : 0.0);
+        mesh->runs_out |= GK_ON(setup, runout) && gear->runout;
+    }
+}
+
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
     const gk_engagement *e = &model->engagement[mesh->index];
@@ -121,13 +142,9 @@ void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
                                (gk_strips_mirrored(model) && 2 * s + 1 != setup->slices ? 2.0 : 1.0);
     for (int s = 0; s < setup->strips; s++) mesh->strip_middle[s] = e->width * ((s + 0.5) / setup->slices - 0.5);
     memset(mesh->lead, 0, sizeof mesh->lead);
+    fill_deviations(model, setup, mesh);
     for (int w = 0; w < 2; w++) {
         const gk_gear *gear = &model->gear[e->gear[w]];
-        const double edge = e->width / gear->width;
-        for (int flank = 0; flank < 2; flank++)
-            for (int s = 0; s < setup->strips; s++)
-                mesh->lead[flank][s] += lead_over(gear, flank, edge * (2.0 * s / setup->slices - 1.0),
-                                                  edge * (2.0 * (s + 1) / setup->slices - 1.0));
         mesh->helix[w] = tan_of(gear->helix);
         mesh->past[w] = past_end(setup, e, gear, mesh->helix[w]);
         mesh->strip_term += gear->local * (gk_log(4.0 * gear->strip) - 1.0);

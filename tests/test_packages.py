@@ -13,18 +13,18 @@ SOURCES = sorted((ROOT / "gearfmu").rglob("*.py"))
 KERNEL_MAY_IMPORT = {"errors", "files", "kernel"}
 
 
-def rooms() -> list[str]:
-    """Room and file names in reading order, from the list in docs/architecture.md."""
+def packages() -> list[str]:
+    """Package and file names in reading order, from the list in docs/architecture.md."""
     block = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
     words = [word for line in block.splitlines() for word in line.split("  ")[0].split()]
     return [word.removeprefix("gearfmu/").removesuffix("/").removesuffix(".py") for word in words]
 
 
-ORDER = {name: rank for rank, name in enumerate(rooms())}
+ORDER = {name: rank for rank, name in enumerate(packages())}
 
 
-def room_of(module: str) -> str:
-    """Room of "gearfmu.stage.trace" is "stage"; of "gearfmu" itself the empty string, which stands above all."""
+def package_of(module: str) -> str:
+    """Package of "gearfmu.stage.trace" is "stage"; of "gearfmu" itself the empty string, which stands above all."""
     return (module.split(".") + [""])[1]
 
 
@@ -49,12 +49,12 @@ def imports_of(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_imports_point_upward_only(path: Path) -> None:
-    own = room_of("gearfmu." + path.relative_to(ROOT / "gearfmu").with_suffix("").as_posix().replace("/", "."))
-    assert own in ORDER, f"{path} is in no room of docs/architecture.md"
-    wrong = [m for m in imports_of(path) if room_of(m) and ORDER.get(room_of(m), len(ORDER)) > ORDER[own]]
-    assert not wrong, f"{path.name} in room '{own}' imports from below: {wrong}"
+    own = package_of("gearfmu." + path.relative_to(ROOT / "gearfmu").with_suffix("").as_posix().replace("/", "."))
+    assert own in ORDER, f"{path} is in no package of docs/architecture.md"
+    wrong = [m for m in imports_of(path) if package_of(m) and ORDER.get(package_of(m), len(ORDER)) > ORDER[own]]
+    assert not wrong, f"{path.name} in package '{own}' imports from below: {wrong}"
     if own == "kernel":
-        assert {room_of(m) for m in imports_of(path)} <= KERNEL_MAY_IMPORT
+        assert {package_of(m) for m in imports_of(path)} <= KERNEL_MAY_IMPORT
 
 
 def test_every_way_to_write_an_import_is_seen() -> None:

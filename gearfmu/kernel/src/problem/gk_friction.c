@@ -1,0 +1,457 @@
+/* Friction of the flanks within a step (docs/theory.md, 3.12). Along the profile of gear A every contact has a mean
+ * force p̄ = c λ̄, |c| ≤ µ, against the sliding speed w at the end of the step:
+ *     p̄ = −µ λ̄ w/ε for |w| < ε, else −µ λ̄ sgn w,    ε = a share of the largest sliding speed on the path of contact
+ * less where that would push along the sliding Δs in the step, so that −p̄ Δs ≥ 0. w and Δs are linear in p̄. ε = 0 at
+ * standstill: then w = 0 as long as |p̄| < µ λ̄ holds it. The speed at the end, for the mean of a step alone,
+ * w₀ + w = 0, would be held by a force that changes its sign from step to step. Solved by active sets, together with
+ * the normal forces. */
+#include "problem/gk_work.h"
+
+static const double FADES = 0.02;  /* of the largest sliding speed: below it friction fades */
+static const double STEADY = 2.0;  /* mean speed over its deviation: above it gears roll */
+static const double RECENT = 1e-3; /* s: of these means */
+enum { PATIENT = 8 };              /* rounds */
+
+/* ---- the start of the step --------------------------------------------------------------------------------------- */
+/* forces that the states contain */
+static void recall_friction(const gk_engaged *engaged, const gk_meshing *meshing, gk_glide *glide)
+{
+    const gk_system *s = &engaged->system;
+    const int strips = GK_STRIPS(s);
+    for (int i = 0; i < s->contacts; i++) {
+        const int memory = engaged->place[s->place_of[i]].memory;
+        const double ratio = memory < 0 ? 0.0 : meshing->memory[memory].ratio[i % strips];
+        glide->start[i] = ratio * s->force0[i];
+        glide->start_end[i] = ratio * (s->force0[i] + s->end0[i]);
+        glide->mean[i] = glide->step[i] = glide->last[i] = glide->start[i];
+        glide->end[i] = glide->start_end[i];
+        glide->ratio[i] = ratio;
+        glide->limit[i] = glide->frozen[i] = 0;
+        glide->others[i] = glide->others_start[i] = 0.0;
+    }
+}
+
+/* sliding in the step of length h without its forces */
+static void slide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_glide *glide = work->engaged[e].glide;
+    const double *x = gk_ground_seen(data);
+    const int contacts = work->engaged[e].system.contacts;
+    for (int i = 0; i < setup->base.n; i++) work->ground_reading[i] = work->ground_q[i] - x[i];
+    gk_rows_read_ground_along(setup, &work->engaged[e], e, work->ground_reading, glide->free);
+    gk_rows_read_ground_along(setup, &work->engaged[e], e, work->ground_start, glide->begin);
+    for (int w = 0; w < 2; w++) {
+        const int g = mesh->side[w].gear, n = GK_LANES(setup, g);
+        const gk_real *q = gk_modal_seen(setup, data, g);
+        for (int k = 0; k < n; k++) work->reading[g][k] = work->qp[g][k] - q[k];
+        gk_rows_read_modes_along(setup, work, e, w, work->reading[g], glide->free);
+        gk_rows_read_modes_along(setup, work, e, w, q + n, glide->begin);
+    }
+    for (int l = 0; l < mesh->spins; l++) {
+        const double turned = work->spin[mesh->spin[l]] - data->x[mesh->spin[l]];
+        for (int i = 0; i < contacts; i++) {
+            glide->free[i] += turned * glide->rigid[l][i];
+            glide->begin[i] += data->v[mesh->spin[l]] * glide->rigid[l][i];
+        }
+    }
+    for (int i = 0; i < contacts; i++) glide->begin[i] *= h;
+}
+
+/* coefficient of friction of every contact by the forces of the last step, and where it fades */
+static void find_coefficients(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, int e,
+                              gk_engaged *engaged)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    const gk_system *s = &engaged->system;
+    gk_glide *glide = engaged->glide;
+    const double frame = mesh->frame < 0 ? 0.0 : data->v[mesh->frame];
+    const double speed[2] = {data->v[mesh->spin[0]] - frame, data->v[mesh->spin[1]] - frame};
+    const gk_meshing *meshing = &data->meshing[e];
+    const int steady = fabs(meshing->rolling) > STEADY * meshing->unsteady; /* a gear that rings about rest sticks */
+    gk_sliding at = {.turns = speed[0]};
+    for (int i = 0; i < s->contacts; i++) at.total += s->force0[i];
+    for (int i = 0; i < s->contacts; i++) {
+        const gk_point *point = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s));
+        at.load = s->force0[i] * s->per_width[i];
+        at.slides = fabs(speed[0] * point->slide[PHIA] + speed[1] * point->slide[PHIB]);
+        at.rolls = fabs(speed[0]) * point->roll[0] + fabs(speed[1]) * point->roll[1];
+        glide->most[i] = gk_lubrication_coefficient(&mesh->friction, model->engagement[e].width, &at);
+        glide->creep[i] = steady ? FADES * mesh->friction.sliding * fabs(meshing->rolling) * h : 0.0;
+        if (fabs(glide->begin[i]) > glide->creep[i]) glide->limit[i] = glide->begin[i] > 0.0 ? -1 : 1;
+    }
+}
+
+/* ---- what friction does ------------------------------------------------------------------------------------------ */
+/* adds what is not dynamic, from the tables of a side, linear between nodes */
+static void slide_residual(const gk_engaged *engaged, const gk_side *side, gk_glide *glide)
+{
+    const gk_system *s = &engaged->system;
+    const gk_position *at = &engaged->position[side->which];
+    const int strips = GK_STRIPS(s);
+    const size_t columns = (size_t)side->columns, next = (size_t)(side->candidates * strips) * columns;
+    const size_t node = (size_t)at->node * next;
+    for (int i = 0; i < s->contacts; i++)
+        for (int j = 0; j < s->contacts; j++) {
+            const gk_place *p = &engaged->place[s->place_of[i]], *q = &engaged->place[s->place_of[j]];
+            const size_t row = (size_t)(p->candidate[side->which] * strips + i % strips);
+            const size_t cell = node + row * columns + (size_t)(q->candidate[side->which] * strips + j % strips);
+            const gk_real *normal = side->along.normal + cell, *own = side->along.own + cell;
+            glide->gap_yields[j * s->stride + i] += normal[0] + at->part * ((double)normal[next] - normal[0]);
+            glide->yields[j * s->stride + i] += own[0] + at->part * ((double)own[next] - own[0]);
+        }
+}
+
+/* adds the modes of a gear group */
+static void slide_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, int which)
+{
+    const int g = setup->mesh[e].side[which].gear, n = GK_LANES(setup, g);
+    const gk_engaged *engaged = &work->engaged[e];
+    const gk_system *s = &engaged->system;
+    gk_glide *glide = engaged->glide;
+    const gk_flow *flow = &k->flow[g];
+    gk_real *moves = work->scaled, *yields = moves + n;
+    for (int j = 0; j < s->contacts && n; j++) {
+        const gk_real *row = glide->basis[which] + (size_t)j * n;
+        for (int l = 0; l < n; l++) moves[l] = row[l] * flow->mobility[l], yields[l] = row[l] * flow->kappa[l];
+        for (int i = 0; i < s->contacts; i++) {
+            const gk_real *gap = engaged->basis[which] + (size_t)i * n, *slide = glide->basis[which] + (size_t)i * n;
+            const int at = j * s->stride + i;
+            glide->gap_moves[at] += gk_dot(moves, gap, n), glide->gap_yields[at] -= gk_dot(yields, gap, n);
+            glide->moves[at] += gk_dot(moves, slide, n);
+        }
+    }
+}
+
+/* adds the ground group */
+static void slide_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    const gk_engaged *engaged = &work->engaged[e];
+    const gk_system *s = &engaged->system;
+    gk_glide *glide = engaged->glide;
+    const int width = mesh->local;
+    double mobility[MAX_GROUND + 4 * MAX_ROTORS], kappa[MAX_GROUND + 4 * MAX_ROTORS];
+    double *moves = work->ground_scaled, *yields = moves + width;
+    gk_local_gather(mesh, k->ground.mobility, mobility);
+    gk_local_gather(mesh, k->ground.kappa, kappa);
+    for (int j = 0; j < s->contacts && width; j++) {
+        const double *row = glide->ground + (size_t)j * width;
+        for (int l = 0; l < width; l++) moves[l] = row[l] * mobility[l], yields[l] = row[l] * kappa[l];
+        for (int i = 0; i < s->n; i++) {
+            const double *gap = engaged->ground + (size_t)i * width, *slide = glide->ground + (size_t)i * width;
+            const int at = j * s->stride + i;
+            glide->gap_moves[at] += gk_dot_quads(moves, gap, width / 4);
+            glide->gap_yields[at] -= gk_dot_quads(yields, gap, width / 4);
+            if (i < s->contacts) glide->moves[at] += gk_dot_quads(moves, slide, width / 4);
+        }
+    }
+}
+
+/* adds the spins */
+static void slide_spins(const gk_setup *setup, const gk_coefficients *k, const gk_mesh *mesh, const gk_system *s,
+                        gk_glide *glide)
+{
+    for (int l = 0; l < mesh->spins; l++) {
+        const double inverse = setup->inverse_inertia[mesh->spin[l]];
+        for (int j = 0; j < s->contacts; j++) {
+            const double moves = k->rigid_mobility * inverse * glide->rigid[l][j];
+            const double yields = k->rigid_kappa * inverse * glide->rigid[l][j];
+            for (int i = 0; i < s->n && moves != 0.0; i++) {
+                const int at = j * s->stride + i;
+                glide->gap_moves[at] += moves * s->rigid[l][i], glide->gap_yields[at] -= yields * s->rigid[l][i];
+                if (i < s->contacts) glide->moves[at] += moves * glide->rigid[l][i];
+            }
+        }
+    }
+}
+
+/* energy that friction holds in what is quasi-static, with normal forces `force` + `more` */
+static double held(const gk_glide *glide, const gk_system *s, const double *force, const double *more,
+                   const double *friction)
+{
+    double sum = 0.0;
+    for (int j = 0; j < s->contacts; j++) {
+        double deflection = 0.0;
+        for (int i = 0; i < s->n; i++) deflection += glide->gap_yields[j * s->stride + i] * (force[i] + more[i]);
+        for (int i = 0; i < s->contacts; i++) deflection += 0.5 * glide->yields[j * s->stride + i] * friction[i];
+        sum += friction[j] * deflection;
+    }
+    return sum;
+}
+
+/* The friction of engagement e in the step k; its problem has been formed */
+void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
+                      gk_work *work, int e)
+{
+    gk_engaged *engaged = &work->engaged[e];
+    gk_glide *glide = engaged->glide;
+    gk_system *s = &engaged->system;
+    const size_t size = (size_t)(s->contacts * s->stride);
+    double **matrix[] = {&glide->gap_moves, &glide->gap_yields, &glide->moves, &glide->yields, &glide->by_z, &glide->D};
+    memcpy(glide->gap, s->g, (size_t)s->stride * sizeof *s->g);
+    memset(glide->matrix, 0, 4 * size * sizeof(double));
+    for (size_t i = 0; i < 6; i++) *matrix[i] = glide->matrix + i * size;
+    memcpy(glide->D, s->D, (size_t)(s->n * s->stride) * sizeof *s->D);
+    recall_friction(engaged, &data->meshing[e], glide);
+    gk_rows_form_along(setup, work, e);
+    slide_freely(setup, data, work, k->h, e);
+    find_coefficients(model, setup, data, k->h, e, engaged);
+    for (int w = 0; w < 2; w++) {
+        slide_modes(setup, work, k, e, w);
+        if (GK_ON(setup, residual)) slide_residual(engaged, &setup->mesh[e].side[w], glide);
+    }
+    slide_ground(setup, work, k, e);
+    slide_spins(setup, k, &setup->mesh[e], s, glide);
+    for (int j = 0; j < s->contacts; j++) /* a clutch is a row of speeds, without what yields at once */
+        for (int i = s->n - s->clutches; i < s->n; i++) glide->gap_yields[j * s->stride + i] = 0.0;
+    glide->held0 = held(glide, s, s->force0, s->end0, glide->start_end);
+}
+
+double gk_friction_held(const gk_glide *glide, const gk_system *s)
+{
+    return held(glide, s, s->force, s->end, glide->end);
+}
+
+/* ---- the step ---------------------------------------------------------------------------------------------------- */
+/* what friction `step` of contact j in the step, `end` of it at the end, add to all sliding */
+static void add_sliding(gk_glide *glide, const gk_system *s, int j, double step, double end)
+{
+    const double *moved = glide->moves + j * s->stride, *yielded = glide->yields + j * s->stride;
+    for (int k = 0; k < s->contacts; k++) {
+        glide->slid[k] += moved[k] * step + yielded[k] * end;
+        glide->late[k] += 2.0 * moved[k] * step + yielded[k] * end;
+    }
+}
+
+/* sliding in the step, and what its speed is at the end: what moves in the step does so with the mean of both ends */
+static void find_sliding(gk_glide *glide, const gk_system *s)
+{
+    for (int k = 0; k < s->contacts; k++) {
+        const double *by_z = glide->gap_moves + k * s->stride, *by_force = glide->gap_yields + k * s->stride;
+        double moved = glide->free[k] + glide->others[k] - glide->others_start[k], yielded = 0.0;
+        for (int i = 0; i < s->n; i++) {
+            moved += by_z[i] * s->z[i];
+            yielded += by_force[i] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]);
+        }
+        glide->slid[k] = moved + yielded;
+        glide->late[k] = 2.0 * moved - glide->begin[k] + yielded;
+    }
+    for (int j = 0; j < s->contacts; j++) add_sliding(glide, s, j, glide->step[j], glide->end[j] - glide->start_end[j]);
+}
+
+/* x ← a⁻¹ x for `columns` right-hand sides, a (n, n) by rows, close to symmetric positive definite: no pivoting */
+static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n, int columns)
+{
+    for (int k = 0; k < n; k++)
+        for (int i = k + 1; i < n; i++) {
+            const double f = a[i][k] / a[k][k];
+            if (f == 0.0) continue;
+            for (int j = k; j < n; j++) a[i][j] -= f * a[k][j];
+            for (int c = 0; c < columns; c++) x[i][c] -= f * x[k][c];
+        }
+    for (int k = n - 1; k >= 0; k--)
+        for (int c = 0; c < columns; c++) {
+            for (int j = k + 1; j < n; j++) x[k][c] -= a[k][j] * x[j][c];
+            x[k][c] /= a[k][k];
+        }
+}
+
+/* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
+ * end_by_z z + end_by_mean p̄. At a limit it is µ λ̄; below it what makes w = −ε p̄/most. What forces at the end of the
+ * step are more than z is taken from the last round. Sliding of contacts may hang together (strips of one tooth): then
+ * friction is shared out. */
+static void express_limits(gk_glide *glide, const gk_system *s)
+{
+    memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
+    for (int j = 0; j < s->contacts; j++) {
+        const double ratio = glide->frozen[j] ? 0.0 : glide->limit[j] * glide->most[j];
+        glide->held[j] = glide->most_force[j] > 0.0 && !glide->limit[j] && !glide->frozen[j];
+        glide->fixed[j] = glide->frozen[j] ? glide->mean[j] : 0.5 * ratio * (s->force0[j] + s->begin[j]);
+        glide->by_z[j * s->stride + j] = 0.5 * ratio;
+        glide->end_fixed[j] = glide->frozen[j] ? glide->share[j] * glide->mean[j]
+                                               : ratio * (s->force[j] + s->end[j] - s->z[j]);
+        glide->end_by_z[j] = ratio;
+        glide->end_by_mean[j] = glide->held[j] ? glide->share[j] : 0.0;
+    }
+}
+
+static void express_friction(gk_glide *glide, const gk_system *s)
+{
+    static const double SHARED_OUT = 1e-9;
+    double a[MAX_CONTACTS][MAX_CONTACTS], x[MAX_CONTACTS][MAX_STRIDE];
+    int held[MAX_CONTACTS], n = 0;
+    express_limits(glide, s);
+    for (int j = 0; j < s->contacts; j++)
+        if (glide->held[j]) held[n++] = j;
+    for (int k = 0; k < n; k++) { /* w without the forces in the step and without friction that follows them */
+        const int i = held[k];
+        const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
+        double rest = glide->late[i];
+        for (int r = 0; r < s->n; r++) {
+            const double each = 2.0 * moved[r] + yielded[r];
+            rest -= each * s->z[r], x[k][r] = -each;
+        }
+        for (int j = 0; j < s->contacts; j++) {
+            const int at = j * s->stride + i;
+            const double moves = 4.0 * glide->moves[at], yields = glide->yields[at];
+            rest += moves * (glide->fixed[j] - glide->mean[j]) + yields * (glide->end_fixed[j] - glide->end[j]);
+            x[k][j] -= moves * glide->by_z[j * s->stride + j] + yields * glide->end_by_z[j];
+        }
+        x[k][s->n] = -rest;
+        for (int j = 0; j < n; j++) {
+            const int at = held[j] * s->stride + i;
+            a[k][j] = 4.0 * glide->moves[at] + glide->share[held[j]] * glide->yields[at];
+        }
+        a[k][k] += SHARED_OUT * a[k][k] + glide->creep[i] / glide->most_force[i];
+    }
+    solve_small(a, x, n, s->n + 1);
+    for (int k = 0; k < n; k++) {
+        glide->fixed[held[k]] = x[k][s->n];
+        memcpy(glide->by_z + held[k] * s->stride, x[k], (size_t)s->n * sizeof(double));
+    }
+}
+
+/* friction at the end of the step */
+static void find_end(gk_glide *glide, const gk_system *s)
+{
+    for (int j = 0; j < s->contacts; j++)
+        glide->end[j] = glide->limit[j] && !glide->frozen[j]
+                            ? glide->limit[j] * glide->most[j] * (s->force[j] + s->end[j])
+                            : glide->share[j] * glide->mean[j];
+}
+
+/* Mean friction by the present forces, and the sliding with it; returns the largest change */
+static double follow(gk_glide *glide, const gk_system *s)
+{
+    double largest = 0.0;
+    for (int j = 0; j < s->contacts; j++) {
+        const double *by_z = glide->by_z + j * s->stride, before = glide->mean[j], end = glide->end[j];
+        glide->mean[j] = glide->fixed[j];
+        for (int r = 0; r < s->n; r++) glide->mean[j] += by_z[r] * s->z[r];
+        glide->step[j] = 2.0 * glide->mean[j] - glide->start[j];
+        glide->end[j] = glide->end_fixed[j] + glide->end_by_z[j] * s->z[j] + glide->end_by_mean[j] * glide->mean[j];
+        largest = gk_max(largest, gk_max(fabs(glide->mean[j] - before), fabs(glide->end[j] - end)));
+    }
+    find_sliding(glide, s);
+    return largest;
+}
+
+/* what friction may be, and how much of its mean is there at the end; returns the largest normal force */
+static double find_limits(gk_glide *glide, const gk_system *s)
+{
+    double largest = 1e-9;
+    for (int j = 0; j < s->contacts; j++) {
+        const double mean = gk_max(0.0, gk_solve_mean(s, j));
+        glide->share[j] = mean > 0.0 ? gk_clamp((s->force[j] + s->end[j]) / mean, 0.0, 2.0) : 0.0;
+        glide->most_force[j] = glide->most[j] * mean;
+        if (!(mean > 0.0)) glide->limit[j] = glide->frozen[j] = 0;
+        largest = gk_max(largest, mean);
+    }
+    return largest;
+}
+
+/* Where friction contradicts its status: beyond its limit, at a limit along the speed, or along the sliding of the
+ * step (then it is what stops that, at most nothing), unless the contact has been sticking: what it slides is half of
+ * how much more it yields than in the last step, which comes back. All change at once, later the last one only. Returns
+ * how many. */
+static int change_status(gk_glide *glide, const gk_system *s, int patient)
+{
+    static const double ALMOST = 1e-7, STUCK = 1e-3, BALANCED = 1e-9; /* of the energy that contacts hold */
+    int count = 0;
+    for (int j = s->contacts - 1; j >= 0 && (patient || !count); j--) {
+        const double most = glide->most_force[j], p = glide->mean[j], w = glide->late[j], along = p * glide->slid[j];
+        const int limit = glide->limit[j], at = j * s->stride + j;
+        const int stuck = s->force0[j] > 0.0 && fabs(glide->start[j]) < (1.0 - STUCK) * glide->most[j] * s->force0[j];
+        const double each = 2.0 * glide->moves[at] + glide->share[j] * glide->yields[at];
+        if (!(most > 0.0)) continue;
+        if (!limit && !glide->frozen[j] && fabs(p) > most * (1.0 + ALMOST))
+            glide->limit[j] = p > 0.0 ? 1 : -1, count++;
+        else if (limit && !glide->frozen[j] && limit * w > -glide->creep[j] * (1.0 - ALMOST))
+            glide->limit[j] = 0, count++;
+        else if ((limit || glide->frozen[j] || !stuck) && along > BALANCED * s->stored0) {
+            const double still = p - glide->slid[j] / each;
+            glide->mean[j] = p > 0.0 ? gk_clamp(still, 0.0, p) : gk_clamp(still, p, 0.0);
+            glide->frozen[j] = 1, count++;
+        }
+    }
+    return count;
+}
+
+/* D and gaps with friction as a function of the forces in the step */
+static void apply(const gk_glide *glide, gk_system *s)
+{
+    memcpy(s->g, glide->gap, (size_t)s->stride * sizeof *s->g);
+    memcpy(s->D, glide->D, (size_t)(s->n * s->stride) * sizeof *s->D);
+    for (int j = 0; j < s->contacts; j++) {
+        const double *moved = glide->gap_moves + j * s->stride, *yielded = glide->gap_yields + j * s->stride;
+        const double *by_z = glide->by_z + j * s->stride, by_mean = glide->end_by_mean[j];
+        double each[MAX_STRIDE];
+        for (int i = 0; i < s->stride; i++) each[i] = 2.0 * moved[i] + by_mean * yielded[i];
+        gk_axpy(glide->fixed[j], each, s->g, 0, s->stride / 4);
+        gk_axpy(-glide->start[j], moved, s->g, 0, s->stride / 4);
+        gk_axpy(glide->end_fixed[j], yielded, s->g, 0, s->stride / 4);
+        gk_axpy(glide->end_by_z[j], yielded, s->D + j * s->stride, 0, s->stride / 4);
+        for (int r = 0; r < s->n; r++)
+            if (by_z[r] != 0.0) gk_axpy(by_z[r], each, s->D + r * s->stride, 0, s->stride / 4);
+    }
+}
+
+/* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
+ * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
+double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
+{
+    find_limits(glide, s);
+    if (!round) find_end(glide, s);
+    find_sliding(glide, s);
+    const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
+    express_friction(glide, s);
+    apply(glide, s);
+    gk_solve_settle(s);
+    gk_solve_contacts(s);
+    const double moved = follow(glide, s);
+    s->rubbing = gk_friction_defect(glide, s);
+    if (changed || (!stands && !round)) return 1.0;
+    return moved / find_limits(glide, s);
+}
+
+/* What the forces of the step leave of the energy that friction holds in what is quasi-static, because they are no
+ * means of those at its ends: the step's one scalar balances it (docs/theory.md, eq. 12) */
+double gk_friction_defect(const gk_glide *glide, const gk_system *s)
+{
+    double sum = gk_friction_held(glide, s) - glide->held0;
+    for (int j = 0; j < s->contacts; j++) {
+        const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
+        const double moved = glide->end[j] - glide->start_end[j];
+        for (int i = 0; i < s->n; i++)
+            sum -= gap[i] * (gk_solve_mean(s, i) * moved +
+                             glide->mean[j] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]));
+        for (int k = 0; k < s->contacts; k++) sum -= glide->mean[k] * own[k] * moved;
+    }
+    return sum;
+}
+
+/* the speed of gear A as a mean over the last millisecond */
+void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e)
+{
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_meshing *meshing = &data->meshing[e];
+    const double speed = data->v[mesh->spin[0]] - (mesh->frame < 0 ? 0.0 : data->v[mesh->frame]);
+    const double part = data->steps ? h / (RECENT + h) : 1.0;
+    meshing->rolling += part * (speed - meshing->rolling);
+    meshing->unsteady += part * (fabs(speed - meshing->rolling) - meshing->unsteady);
+}
+
+/* the end of the step: friction by which the next one is predicted; returns what it took */
+double gk_friction_settle(gk_glide *glide, const gk_system *s)
+{
+    double taken = 0.0;
+    find_sliding(glide, s);
+    for (int j = 0; j < s->contacts; j++) {
+        const double mean = gk_solve_mean(s, j);
+        glide->ratio[j] = mean > 0.0 ? glide->mean[j] / mean : 0.0;
+        glide->last[j] = glide->ratio[j] * s->force[j];
+        taken -= glide->mean[j] * glide->slid[j];
+    }
+    return taken;
+}

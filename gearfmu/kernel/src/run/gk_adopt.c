@@ -1,0 +1,121 @@
+/* A run that goes on with another setup: the physical motion of the old state, expressed in the oscillators that are
+ * dynamic now. An oscillator that was compliance had the displacement f/ω² of its modal force f, and its speed is taken
+ * as zero; one that becomes compliance is left out, for the residual holds its static part. Contacts keep forces and
+ * gaps; where another number of strips is in use they begin as new ones do, which disturbs as much as half a step
+ * without contact. What contacts owed the energy balance is forgotten. */
+#include "run/gk_run.h"
+#include <stddef.h>
+
+typedef struct passage { /* from where to where */
+    const gk_model *model;
+    const gk_setup *old, *setup;
+    const gk_work *work; /* of the old run */
+    const gk_data *from;
+    gk_data *data;
+    const gk_coefficients *k; /* that the old state is expressed for */
+} passage;
+
+static int allowed(const gk_setup *old, const gk_data *from, const gk_setup *setup, const gk_data *data)
+{
+    return old->magic == GK_SETUP_MAGIC && setup->magic == GK_SETUP_MAGIC && from->magic == GK_DATA_MAGIC &&
+           data->magic == GK_DATA_MAGIC && from->phase == PHASE_RUNNING && data->phase == PHASE_NEW &&
+           from->steps > 0 && !gk_scheme_of(old->integrator)->is_explicit &&
+           !gk_scheme_of(setup->integrator)->is_explicit && old->base.set == setup->base.set;
+}
+
+/* gaps at the end of the step instead of what the old compliance made of them */
+static void take_contacts(const passage *c, int e)
+{
+    const gk_system *s = &c->work->engaged[e].system;
+    gk_meshing *meshing = &c->data->meshing[e];
+    meshing->owed = 0.0;
+    meshing->adopted = 1;
+    if (c->old->strips != c->setup->strips) meshing->pairs = 0;
+    for (int p = 0, i = 0; p < meshing->pairs; p++)
+        for (int strip = 0; strip < c->old->strips; strip++, i++)
+            meshing->memory[p].gap[strip] = gk_solve_end_gap(s, i);
+}
+
+/* all that does not depend on the setup; the energy balance begins anew */
+static void take_head(const passage *c)
+{
+    gk_vars_take(c->model, c->data, c->from);
+    const size_t start = offsetof(gk_data, x);
+    memcpy((char *)c->data + start, (const char *)c->from + start, sizeof(gk_data) - start);
+    c->data->phase = PHASE_RUNNING;
+    c->data->status = c->from->status;
+    c->data->amplitudes = (int64_t)c->setup->amplitudes;
+    c->data->state_h = c->data->state_gamma = c->data->expressed_h = c->data->expressed_gamma = 0.0;
+    c->data->table_h = c->data->rk_h = 0.0;
+    c->data->steps = 0;
+    c->data->ledger = (gk_ledger){0};
+    for (int e = 0; e < c->model->engagements; e++) take_contacts(c, e);
+}
+
+/* rigid rotations: what the scheme adds to displacement is taken off */
+static void take_spins(const passage *c)
+{
+    for (int d = 0; d < c->old->spins; d++)
+        c->data->x[d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * c->from->f[d];
+}
+
+/* displacement, speed and force of the ground oscillators; pushed: modal forces on those that were compliance */
+static void take_ground(const passage *c, const double *pushed)
+{
+    const gk_base *was = &c->old->base, *is = &c->setup->base;
+    const gk_ground *ground = &c->model->ground[is->set];
+    const double *x = gk_ground_seen(c->from), *kappa = c->k->ground.kappa;
+    double *out = gk_ground_of(c->data);
+    memset(out, 0, 3 * (size_t)is->n * sizeof *out);
+    for (int k = 0; k < ground->n; k++) {
+        const int a = was->slot[k], b = is->slot[k];
+        if (b < 0) continue;
+        out[b] = a >= 0 ? x[a] - kappa[a] * x[2 * was->n + a] : pushed[k] / (ground->omega[k] * ground->omega[k]);
+        out[is->n + b] = a >= 0 ? x[was->n + a] : 0.0;
+        out[2 * is->n + b] = a >= 0 ? x[2 * was->n + a] : pushed[k];
+    }
+}
+
+/* the same of the modes of a gear group */
+static void take_gear(const passage *c, int g, const double *pushed)
+{
+    const gk_modal *was = &c->old->modal[g], *is = &c->setup->modal[g];
+    const double *omega = c->model->gear[g].omega;
+    const gk_real *q = gk_modal_seen(c->old, c->from, g), *kappa = c->k->flow[g].kappa;
+    gk_real *out = gk_modal_of(c->setup, c->data, g);
+    memset(out, 0, 3 * (size_t)is->n * sizeof *out);
+    for (int i = 0; i < is->count; i++) {
+        const int b = is->lane[i], known = i < was->count, a = known ? was->lane[i] : 0;
+        out[b] = known ? q[a] - kappa[a] * q[2 * was->n + a] : (gk_real)(pushed[i] / (omega[i] * omega[i]));
+        out[is->n + b] = known ? q[was->n + a] : (gk_real)0;
+        out[2 * is->n + b] = known ? q[2 * was->n + a] : (gk_real)pushed[i];
+    }
+}
+
+/* modal forces of contacts on what was compliance, of one gear */
+static void push_gear(const passage *c, int g, double *modes, double *ground)
+{
+    memset(modes, 0, (size_t)c->model->gear[g].modes * sizeof *modes);
+    for (int e = 0; e < c->model->engagements && c->old->on.residual; e++)
+        for (int w = 0; w < 2; w++)
+            if (c->model->engagement[e].gear[w] == g && c->model->engagement[e].kind != MESH_FLAT)
+                gk_amplitudes_of_contacts(c->model, c->old, c->work, e, w, modes, ground);
+}
+
+gk_outcome gk_adopt(const gk_model *model, const gk_setup *from_setup, const gk_work *from_work, const gk_data *from,
+                    const gk_setup *setup, gk_data *data)
+{
+    if (!allowed(from_setup, from, setup, data)) return GK_BAD_CALL;
+    const gk_coefficients *k = gk_flow_known(from_work, from->state_h, from->state_gamma);
+    const passage c = {model, from_setup, setup, from_work, from, data, k};
+    double ground[MAX_GROUND] = {0}, modes[MAX_MODES];
+    take_head(&c);
+    take_spins(&c);
+    for (int g = 0; g < model->gears; g++) {
+        push_gear(&c, g, modes, ground);
+        take_gear(&c, g, modes);
+    }
+    if (from_setup->on.residual) gk_amplitudes_of_ports(model, from_setup, from_work, ground);
+    take_ground(&c, ground);
+    return GK_OK;
+}

@@ -1,0 +1,152 @@
+"""A plan as a value and as plan.toml: what every segment is run with, and why."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.files import write_text
+from gearfmu.planning.choice import Choice
+from gearfmu.spec.base import read_toml
+
+FORMAT = 1
+HEAD = """# Made by `gearfmu plan`: what each segment of a scene is run with for an error budget, and why.
+# Run it with `gearfmu run --plan {name}`. Errors are in budgets: 1 is as much as was asked for.
+"""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One effect of a segment. verdict: "on", "off", a level, a step, a number of slices; by: policy, formula or
+    measured; formula: predicted error of the knob as far down as it goes, budgets; error: what one step
+    down changes, measured; share: of the cost of a step. NaN: not known."""
+
+    effect: str
+    verdict: str
+    by: str
+    reason: str
+    formula: float = math.nan
+    error: float = math.nan
+    share: float = math.nan
+
+
+@dataclass(frozen=True)
+class Point:
+    """A measured set on the work–precision chart: words, price as in Segment, bound in budgets, whether it is the
+    chosen one."""
+
+    words: str
+    price: float
+    bound: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of the scene from start to end (s) with its choice.
+
+    kind: loaded, contact_loss or transient; window_start, window, settle: where it was measured, and what a state that
+    was taken over settled before, s; bound, error: of the chosen set, budgets; safety: what the bound is multiplied by;
+    noise: of the full model, budgets; price: processor time of the stage over that of level fast at its default step;
+    realtime: processor seconds of the stage per simulated second. price_full, price_default, error_default: of the full
+    model and of what the scene asks for itself.
+    """
+
+    name: str
+    start: float
+    end: float
+    kind: str
+    choice: Choice
+    window_start: float
+    window: float
+    settle: float
+    bound: float
+    error: float
+    safety: float
+    noise: float
+    price: float
+    realtime: float
+    price_full: float
+    price_default: float
+    error_default: float
+    lines: tuple[Line, ...] = ()
+    points: tuple[Point, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def kept(self) -> bool:
+        """Whether the bound with its safety is within the budget."""
+        return self.bound * self.safety <= 1.0 + 1e-9
+
+
+@dataclass(frozen=True)
+class Plan:
+    """scene: name or path; identity: digest of all that decides the plan; step: communication step, s; request: as in
+    `Request.plain`; cost: of planning, in runs of the full model over the window."""
+
+    scene: str
+    identity: str
+    step: float
+    request: Mapping[str, Any]
+    segments: tuple[Segment, ...]
+    cost: float = math.nan
+    cpu: float = math.nan
+    notes: tuple[str, ...] = field(default=())
+
+    def save(self, path: Path) -> Path:
+        """Write plan.toml, whole or not at all; returns the path."""
+        write_text(path, HEAD.format(name=path.name) + "\n".join(_toml({"format": FORMAT} | asdict(self))) + "\n")
+        return path
+
+    @classmethod
+    def load(cls, path: Path) -> Plan:
+        """Read plan.toml. SpecError when it is none, or of another version."""
+        try:
+            raw = dict(read_toml(path))
+            if raw.pop("format", None) != FORMAT:
+                raise ValueError(f"of another format than {FORMAT}")
+            segments = tuple(_segment(item) for item in raw.pop("segments"))
+            return cls(**raw | {"segments": segments, "notes": tuple(raw.get("notes", ()))})
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise _no_plan(path, f"is no plan ({error}): make it again with `gearfmu plan`") from error
+
+
+def _segment(raw: Mapping[str, Any]) -> Segment:
+    choice = Choice(**{**raw["choice"], "off": tuple(raw["choice"]["off"])})
+    lines = tuple(Line(**line) for line in raw.get("lines", ()))
+    points = tuple(Point(**point) for point in raw.get("points", ()))
+    return Segment(**{**raw, "choice": choice, "lines": lines, "points": points, "notes": tuple(raw.get("notes", ()))})
+
+
+def _no_plan(path: Path, remedy: str) -> SpecError:
+    return SpecError([Problem(str(path), "", "", remedy)])
+
+
+def _toml(table: Mapping[str, Any], prefix: str = "") -> list[str]:
+    """Lines of a table: plain values, then tables, then lists of tables."""
+    plain = {k: v for k, v in table.items() if not isinstance(v, dict) and not _tables(v)}
+    found = [f"{key} = {_value(value)}" for key, value in plain.items()]
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found += ["", f"[{prefix}{key}]", *_toml(value, f"{prefix}{key}.")]
+        elif _tables(value):
+            for item in value:
+                found += ["", f"[[{prefix}{key}]]", *_toml(item, f"{prefix}{key}.")]
+    return found
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and bool(value) and isinstance(value[0], dict)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, float):
+        return "nan" if math.isnan(value) else str(value)
+    return json.dumps(value, ensure_ascii=False)

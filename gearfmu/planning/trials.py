@@ -1,0 +1,206 @@
+"""Trial runs: a choice over a window of a scene. What a worker computes, here or elsewhere; a run that fails is an
+infinite error, not an end.
+
+A trial does not begin at the start of the scene. A pilot, level fast with all effects, is run there once in every
+process; the trial takes its state over (`CoupledRun.take_over`), settles, and is looked at over the window.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from gearfmu.cosim.coupled import OK, CoupledRun
+from gearfmu.cosim.scene_run import coupled_run, stage_model
+from gearfmu.cosim.source import Source
+from gearfmu.errors import GearfmuError
+from gearfmu.planning.choice import Choice
+from gearfmu.planning.judge import Signals
+from gearfmu.planning.request import Request
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.stage import StageModel, Trace
+from gearfmu.study.bench import KeptSource, Price, Replay, recorded_run, replayed_price
+from gearfmu.study.ladder import fitting
+from gearfmu.sweeps.points import program
+from gearfmu.sweeps.runners import Lost, Runner
+
+BASE_STEPS = 1000
+LOOKED_AT = 0.05  # s of processor time of a replay
+PILOT_LEVEL, PILOT_STEP = "fast", 5e-6  # s
+MESH_CHANNELS = ("open_time", "force_drive", "force_coast", "te")
+SOLVER = ("solver.status", "energy.residual")
+NO_PRICE = Price(float("nan"), float("nan"))
+
+
+@dataclass(frozen=True)
+class Window:
+    """start, length: s of the scene; settle: s before it that a trial takes to forget what it took over."""
+
+    start: float
+    length: float
+    settle: float = 0.01
+
+    @property
+    def end(self) -> float:
+        return self.start + self.length
+
+
+@dataclass(frozen=True)
+class Task:
+    """One trial: scene (as JSON), choice, window, what is asked, whether the price is measured; through: a choice that
+    the state passes through for one communication step, which makes a twin of a run."""
+
+    scene: str
+    choice: Choice
+    window: Window
+    request: Request
+    priced: bool = True
+    through: Choice | None = None
+    program: str = field(default_factory=program)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a trial gave. signals: over the window, empty after a failure; lost: s without contact in the window, of the
+    worst mesh; coast: whether both flanks of a mesh carried; drive: smallest force on the carrying flanks over its
+    mean; force: mean of the first mesh, N; price: processor time of the stage over that of level fast at its default
+    step, measured in turn; realtime: processor seconds of the stage per simulated second; cpu: processor seconds of
+    the trial."""
+
+    choice: Choice
+    outcome: str
+    message: str = ""
+    signals: Signals = field(default_factory=lambda: Signals({}, 0.0), repr=False)
+    lost: float = 0.0
+    coast: bool = False
+    drive: float = 1.0
+    force: float = 0.0
+    price: float = float("nan")
+    realtime: float = float("nan")
+    cpu: float = 0.0
+
+    @property
+    def loses_contact(self) -> bool:
+        """Whether teeth part, or meet on the other side, in the window."""
+        return self.lost > 0.0 or self.coast
+
+
+def run_trial(task: Task) -> Trial:
+    """The trial of a task; whatever goes wrong is its outcome."""
+    started = clock.process_time()
+    try:
+        if task.program != program():
+            return Trial(task.choice, "other version", f"the worker has gearfmu {program()}, the plan {task.program}")
+        found = _run(task)
+    except GearfmuError as error:
+        found = Trial(task.choice, getattr(error, "outcome", type(error).__name__), str(error))
+    except (FloatingPointError, ValueError, np.linalg.LinAlgError) as error:  # a diverged run in a spectrum
+        found = Trial(task.choice, "diverged", str(error))
+    return replace(found, cpu=clock.process_time() - started)
+
+
+def run_trials(tasks: Sequence[Task], runner: Runner) -> list[Trial]:
+    """Trials of the tasks, in their order."""
+    found: dict[int, Trial] = {}
+    for number, result in runner(run_trial, tasks):
+        lost = isinstance(result, Lost)
+        found[number] = Trial(tasks[number].choice, "worker lost", result.message) if lost else result
+    return [found[number] for number in range(len(tasks))]
+
+
+def shortened(scene: SceneSpec, end: float) -> SceneSpec:
+    """The scene up to `end` (s), or on to there, rounded up to a communication step."""
+    step = scene.coupling.step
+    return scene.model_copy(update={"duration": max(1, int(np.ceil(end / step - 1e-6))) * step})
+
+
+def pilot_choice(scene: SceneSpec) -> Choice:
+    """What states are made with: level fast, all effects of the scene."""
+    off = tuple(sorted(scene.stage.effects.off))
+    return Choice(PILOT_LEVEL, fitting(scene.coupling.step, PILOT_STEP), scene.stage.slices, off)
+
+
+@lru_cache(maxsize=2)
+def scene_and_model(text: str) -> tuple[SceneSpec, StageModel]:
+    """Scene and model of a task, kept in the process."""
+    scene = SceneSpec.model_validate_json(text)
+    return scene, stage_model(scene)
+
+
+@lru_cache(maxsize=2)
+def _base(text: str) -> Replay:
+    """What prices are measured in turn with: level fast at its default step."""
+    scene, model = scene_and_model(text)
+    part = shortened(scene, BASE_STEPS * scene.coupling.step).model_copy(update={"settle": 0.0})
+    choice = Choice("fast", 0.0, scene.stage.slices, scene.stage.effects.off)
+    return Replay(recorded_run(choice.of(part), model).recording)
+
+
+_pilots: dict[str, CoupledRun] = {}
+
+
+def _pilot(text: str, at: int) -> CoupledRun:
+    """The pilot of a scene after `at` communication steps, at least one."""
+    run = _pilots.get(text)
+    if run is None or run.at > at:
+        scene, model = scene_and_model(text)
+        _pilots.clear()
+        run = coupled_run(pilot_choice(scene).of(_recording(scene, SOLVER)), Source(model))
+        run.begin()
+    run.new_recorder(at - run.at)
+    run.advance(at)
+    _pilots[text] = run
+    return run
+
+
+def _recording(scene: SceneSpec, names: Sequence[str]) -> SceneSpec:
+    return scene.model_copy(update={"record": tuple(dict.fromkeys(names))})
+
+
+def _run(task: Task) -> Trial:
+    scene, model = scene_and_model(task.scene)
+    step, meshes = scene.coupling.step, [mesh.name for mesh in model.stage.engagements]
+    first, last = (round(t / step) for t in (task.window.start, task.window.end))
+    at = max(1, round((task.window.start - task.window.settle) / step))
+    source = KeptSource(model, task.window.start)
+    watched = [f"{mesh}.{key}" for mesh in meshes for key in MESH_CHANNELS]
+    scene = _recording(scene, [*task.request.channels, *watched, *SOLVER])
+    before: CoupledRun = _pilot(task.scene, at)
+    if task.through is not None:
+        before = _one_step(before, coupled_run(task.through.of(scene), Source(model)))
+    run = coupled_run(task.choice.of(scene), source)
+    run.take_over(before)
+    run.new_recorder(last - run.at)
+    run.advance(max(first, run.at))
+    run.new_recorder(last - run.at)
+    run.record()
+    run.advance(last)
+    price = NO_PRICE
+    if task.priced and source.unit_made is not None:
+        recording = source.unit_made.recording(model.blob, step)
+        price = replayed_price(Replay(recording), _base(task.scene), LOOKED_AT)
+    return _judged(task, run.recorder.trace({}), meshes, price)
+
+
+def _one_step(before: CoupledRun, run: CoupledRun) -> CoupledRun:
+    """The run after one step from the state of another."""
+    run.take_over(before)
+    run.advance(run.at + 1)
+    return run
+
+
+def _judged(task: Task, part: Trace, meshes: Sequence[str], price: Price) -> Trial:
+    """What the trace of the window says."""
+    interval = float(part.time[1] - part.time[0])
+    values = {o.name: np.sum([f * part[name] for name, f in o.channels], axis=0) for o in task.request.outputs}
+    lost = max(float(part[f"{mesh}.open_time"][-1] - part[f"{mesh}.open_time"][0]) for mesh in meshes)
+    sides = [(np.abs(part[f"{mesh}.force_drive"]), np.abs(part[f"{mesh}.force_coast"])) for mesh in meshes]
+    both = any(a.max() > 0 and b.max() > 0 for a, b in sides)  # one side carries in loaded running
+    carrying = [max(pair, key=np.mean) for pair in sides]
+    drive = min(float(side.min() / max(side.mean(), 1e-300)) for side in carrying)
+    head = (task.choice, OK, "", Signals(values, interval), lost, both, drive, float(np.mean(carrying[0])))
+    return Trial(*head, price.cpu_ratio, price.realtime_factor)

@@ -1,0 +1,190 @@
+"""Which figures a run is told by: a pair or train mesh by mesh, a set planet by planet, a run-up by its orders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+
+from gearfmu.modes.deformed import DeformedGear, deformed_gear
+from gearfmu.report import deformation as drawn
+from gearfmu.report import mesh_cycle, picture, plots, plots_nvh, plots_runup, plots_set, runup
+from gearfmu.report.chart import Plot
+from gearfmu.report.metrics import MetricsError
+from gearfmu.report.moving import View, moving_view
+from gearfmu.report.plots_set import PlanetSet
+from gearfmu.report.run import Run
+from gearfmu.report.signals import meshes
+from gearfmu.stage.deformation import DeformationError
+from gearfmu.stage.meshes import tooth_phases
+from gearfmu.stage.observed import gear_bodies
+from gearfmu.stage.trace import Trace
+
+Maker: TypeAlias = Callable[[], "Plot | None"]
+
+
+def chosen_plots(run: Run) -> tuple[list[Plot], list[str]]:
+    """Every figure the run allows, and in words why others are not there."""
+    deformed, gaps = _deformed(run)
+    gaps = [*gaps, *run.statics[1]]
+    if run.planets is not None:
+        made, missing = _made(_of_set(run, run.planets, deformed))
+        return made, [*gaps, *missing]
+    made, missing = _made(_of_meshes(run, deformed))
+    if not run.angles:
+        missing.append("No mesh orders: the trace has no gear speed or nobody said the tooth numbers.")
+    return made, [*gaps, *missing]
+
+
+def deformed_gears(run: Run) -> tuple[list[DeformedGear], list[str]]:
+    """The gears whose recorded deformation can be drawn, and in words why others cannot."""
+    if run.deformation is None:
+        return [], []
+    if run.stage is None:
+        return [], ["Deformed gears: the stage's bodies are not at hand."]
+    known, found, missing = gear_bodies(run.spec, run.bodies or ()), [], []
+    phases = tooth_phases(run.stage)
+    for name, motion in run.deformation.gears.items():
+        try:
+            found.append(deformed_gear(name, known[name], motion, phases[name]))
+        except (DeformationError, KeyError) as error:
+            missing.append(f"Deformed gears: {error}")
+    return found, missing
+
+
+def turning(run: Run) -> View | None:
+    """The deformed stage over some mesh periods; None where bodies, angles or forces are not at hand."""
+    forces = [mesh for mesh in meshes(run.trace) if f"{mesh}.force" in run.trace]
+    if run.stage is None or run.trace.time.size < 2 or not forces:
+        return None
+    if run.planets is not None:
+        window = plots_set.detail_window(run.trace, run.planets, run.window)
+    else:
+        window = detail_window(run.trace, forces[0], run.angles.get(forces[0]))
+    times = np.zeros(0) if run.deformation is None else run.deformation.time
+    recorded = [(gear, times) for gear in deformed_gears(run)[0]]
+    return moving_view(run.trace, run.stage, gear_bodies(run.spec, run.bodies or ()), window, recorded)
+
+
+def _deformed(run: Run) -> tuple[list[Maker], list[str]]:
+    """What makes the pictures and films of deformed gears, and why others are missing."""
+    gears, missing = deformed_gears(run)
+    kinds = (drawn.pictures, drawn.film)
+    assert run.deformation is not None or not gears
+    return [
+        partial(kind, run.deformation, gear, run.trace, run.stage)  # type: ignore[arg-type]
+        for gear in gears
+        for kind in kinds
+    ], missing
+
+
+def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
+    """A pair or a train."""
+    trace, window, names = run.trace, run.window, meshes(run.trace)
+    makers: list[Maker] = [lambda: plots.torque_and_slip(trace), lambda: plots.speeds(trace)]
+    for mesh in names:
+        makers.append(partial(plots.mesh_force_and_error, trace, mesh))
+        makers.append(
+            partial(plots.mesh_force_and_error, trace, mesh, detail_window(trace, mesh, run.angles.get(mesh)))
+        )
+    makers.append(lambda: plots.bearing_forces(trace))
+    makers += _statics(run, [[mesh] for mesh in run.shown_meshes])
+    if run.stage is not None:
+        makers += [partial(picture.deformed_pair, trace, run.stage, mesh, run.bodies or ()) for mesh in names]
+    makers += deformed
+    gathered = _run_up(run)
+    if gathered is not None:
+        makers += [partial(make, gathered) for make in plots_runup.FIGURES]
+    else:
+        makers.append(lambda: plots_nvh.force_spectrum(trace, window, run.angles))
+    makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in run.angles.items()]
+    if gathered is None:
+        makers.append(lambda: plots_nvh.force_spectrogram(trace, run.angles))
+    return makers
+
+
+def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
+    """A planetary set: its planets side by side instead of mesh by mesh."""
+    trace, window = run.trace, run.window
+    gathered = runup.run_up_of_set(trace, own, window, run.spec, run.bodies)
+    over_frequency: list[Maker] = [lambda: plots_set.spectrum(trace, own, window)]
+    if gathered is not None:
+        over_frequency = [partial(make, gathered) for make in plots_runup.FIGURES]
+    return [
+        lambda: plots_set.speeds(trace, own),
+        lambda: plots.torque_and_slip(trace),
+        lambda: plots_set.forces(trace, own),
+        lambda: plots_set.forces(trace, own, plots_set.detail_window(trace, own, window)),
+        lambda: plots_set.planets(trace, own, window),
+        lambda: plots_set.sharing(trace, own, window),
+        lambda: plots_set.pin_forces(trace, own),
+        *_statics(run, [[mesh] for mesh in run.shown_meshes]),
+        *deformed,
+        *_set_pair(run, own),
+        lambda: plots.bearing_forces(trace, carried=True),
+        lambda: plots_set.energy(trace),
+        *over_frequency,
+    ]
+
+
+def _statics(run: Run, groups: Sequence[Sequence[str]]) -> list[Maker]:
+    """Mesh cycle and contact pattern, which need the stage and its bodies."""
+    if run.stage is None:
+        return []
+    makers: list[Maker] = []
+    for group in groups:
+        makers.append(partial(mesh_cycle.transmission_error, run.trace, run.window, run.stage, group, run.loads))
+    for mesh, loads in run.loads.items():
+        makers.append(partial(mesh_cycle.contact_pattern, run.trace, run.stage, mesh, loads))
+    return makers
+
+
+def _run_up(run: Run) -> runup.RunUp | None:
+    """The run-up of a stage of one engagement, with its resonances where the stage is at hand; None for no run-up."""
+    if len(run.known) != 1:
+        return None
+    ((mesh, meshing),) = run.known.items()
+    found = runup.run_up_of_pair(run.trace, mesh, meshing, run.window)
+    if found is None or run.stage is None or f"{mesh}.force" not in found.signals:
+        return found
+    return replace(found, resonances=runup.resonances(found, mesh, run.spec, run.bodies or ()))
+
+
+def _set_pair(run: Run, own: PlanetSet) -> list[Maker]:
+    """What draws the sun with the planet that presses most."""
+    if run.stage is None or "sun" not in own.meshes:
+        return []
+    mesh = max(own.meshes["sun"].values(), key=lambda name: float(np.abs(run.trace[f"{name}.force"]).max()))
+    known = list(gear_bodies(run.spec, run.bodies or ()).values())
+    return [partial(picture.deformed_pair, run.trace, run.stage, mesh, known)]
+
+
+def _made(makers: Sequence[Maker]) -> tuple[list[Plot], list[str]]:
+    """The plots that could be made, and in words why others could not."""
+    made, missing = [], []
+    for maker in makers:
+        try:
+            plot = maker()
+        except MetricsError as error:
+            missing.append(str(error))
+            continue
+        if plot is not None:
+            made.append(plot)
+    return made, list(dict.fromkeys(missing))
+
+
+def detail_window(trace: Trace, mesh: str, angle: np.ndarray | None, periods: float = 6) -> tuple[float, float]:
+    """About `periods` mesh periods (s) around the largest force of an engagement, or a twentieth of the run where its
+    mesh angle is missing."""
+    start, end = float(trace.time[0]), float(trace.time[-1])
+    force = np.abs(trace[f"{mesh}.force"]) if f"{mesh}.force" in trace else np.zeros(1)
+    centre = float(trace.time[int(np.argmax(force))])
+    half = 0.025 * (end - start)
+    if angle is not None and angle[-1] > 2 * np.pi * periods:
+        frequency = np.interp(centre, trace.time, np.gradient(angle, trace.time)) / (2 * np.pi)
+        half = min(0.5 * periods / max(frequency, 1e-9), 0.5 * (end - start))
+    centre = min(max(centre, start + half), end - half)
+    return centre - half, centre + half

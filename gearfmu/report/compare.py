@@ -1,0 +1,322 @@
+"""Two or more runs in one page: results side by side, transmission error, spectra, octave bands and mesh orders over
+one another, differences against the first run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from gearfmu.files import write_text
+from gearfmu.report import metrics, page, sections
+from gearfmu.report.chart import TIME, Chart, Curve, Panel, Plot, level_limits
+from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded, position_of
+from gearfmu.report.metrics import MetricsError
+from gearfmu.report.names import shown
+from gearfmu.report.plots import of_mesh
+from gearfmu.report.plots_nvh import SHOWN_TO, averaging, force_channels, octave_table, segment, spectrum_of
+from gearfmu.report.results import dynamic_factors, key_results
+from gearfmu.report.run import Run
+from gearfmu.report.signals import meshes
+from gearfmu.stage.te import mesh_harmonics
+from gearfmu.stage.trace import write_columns
+
+ORDERS = 6
+ALIKE = 0.05  # dB, or %: smaller differences are not called better or worse
+LEVELS = ("rms_ac_N", "rms_ac_um")  # results whose differences are told in dB
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A run and what it is called on the page."""
+
+    label: str
+    run: Run
+
+
+def write_comparison(compared: Sequence[Compared], path: Path) -> Path:
+    """Write the page and, in <name>_data beside it, the data of its figures; returns `path`."""
+    folder = path.with_name(f"{path.stem}_data")
+    plots = [plot for plot in _plots(compared) if plot is not None]
+    for plot in plots:
+        write_columns(folder / f"{plot.name}.csv", plot.columns)
+    names = [own.label for own in compared]
+    described = " · ".join(
+        f"{own.label}: {own.run.title}, {own.run.stage_name}, {own.run.summary.get('outcome', 'outcome not given')}"
+        for own in compared
+    )
+    body = [
+        page.head(" and ".join((", ".join(names[:-1]), names[-1])), "", described),
+        page.tiles(_tiles(compared)),
+        page.section("Results", _results(compared), name="results"),
+        *[page.figure(plot, folder.name) for plot in plots],
+        *_octaves(compared),
+        *_order_table(compared),
+        page.section("How they were run", _facts(compared)),
+    ]
+    write_text(path, page.page(f"Comparison: {', '.join(names)}", body, plots))
+    return path
+
+
+def _values(own: Compared) -> dict[str, float]:
+    return {**key_results(own.run.trace), **dynamic_factors(own.run.trace)}
+
+
+def _difference(key: str, value: float, first: float) -> tuple[str, float]:
+    """A difference in words and as a number: dB of alternating parts, else per cent, else the plain difference."""
+    if key.endswith(LEVELS) and value > 0 and first > 0:
+        change = 20 * math.log10(value / first)
+        return _minus(f"{change:+.1f} dB"), change
+    if first and not key.endswith("percent"):
+        change = 100 * (value - first) / abs(first)
+        return _minus(f"{change:+.1f} %"), change
+    return _minus(f"{value - first:+.3g}"), value - first
+
+
+def _minus(text: str) -> str:
+    """A number with the sign that print has for minus."""
+    return text.replace("-", "−")
+
+
+def _tiles(compared: Sequence[Compared]) -> list[tuple[str, str, str]]:
+    """The largest news: what each other run changes against the first."""
+    first, found = _values(compared[0]), []
+    for own in compared[1:]:
+        values = _values(own)
+        for end, words in (
+            ("te_rms_ac_um", "alternating transmission error"), ("mesh_force_rms_ac_N", "alternating mesh force"),
+            ("dynamic_factor", "dynamic factor"),
+        ):  # fmt: skip
+            key = next((k for k in first if k.endswith(end) and k in values), None)
+            if key is not None:
+                value, _, unit = _difference(key, values[key], first[key])[0].partition(" ")
+                found.append((value, unit, f"{words}: {own.label} against {compared[0].label}"))
+    return found
+
+
+def _results(compared: Sequence[Compared]) -> str:
+    """The table of key results, one column a run and one a difference."""
+    known = [_values(own) for own in compared]
+    names = meshes(compared[0].run.trace)
+    head = '<tr><th></th><th>unit</th><th class="n">' + escape(compared[0].label) + "</th>"
+    for own in compared[1:]:
+        head += f'<th class="n">{escape(own.label)}</th><th class="n">change</th>'
+    rows = ""
+    for key, first in known[0].items():
+        words, _, unit = sections.result_words(key, names)
+        rows += f'<tr><td>{escape(words)}</td><td>{unit}</td><td class="n">{first:.4g}</td>'
+        for values in known[1:]:
+            rows += _cells(key, values.get(key), first)
+        rows += "</tr>"
+    where = "; ".join(f"{own.label} {own.run.window.start:.4g} s to {own.run.window.end:.4g} s" for own in compared)
+    note = page.note(f"Changes against {compared[0].label}. Windows: {where}. {sections.FACTOR_WORDS}")
+    return f'<div class="scroll"><table>{head}</tr>{rows}</table></div>{note}'
+
+
+def _cells(key: str, value: float | None, first: float) -> str:
+    if value is None:
+        return '<td class="n">–</td><td class="n">–</td>'
+    words, change = _difference(key, value, first)
+    kind = "" if abs(change) < ALIKE or "mean" in key or "lock" in key else (" better" if change < 0 else " worse")
+    return f'<td class="n">{value:.4g}</td><td class="n{kind}">{words}</td>'
+
+
+def _plots(compared: Sequence[Compared]) -> list[Plot | None]:
+    names = [mesh for mesh in meshes(compared[0].run.trace) if all(mesh in meshes(own.run.trace) for own in compared)]
+    found: list[Plot | None] = []
+    for mesh in names:
+        found += [_over_time(compared, mesh), _mesh_cycle(compared, mesh)]
+    return [*found, _spectra(compared), *[_orders(compared, mesh) for mesh in names]]
+
+
+def _over_time(compared: Sequence[Compared], mesh: str) -> Plot | None:
+    """Force and transmission error of a mesh over time, the runs over one another."""
+    panels, columns = [], {}
+    for channel, scale, label in (("te", 1e6, "transmission error in µm"), ("force", 1e-3, "mesh force in kN")):
+        own = [c for c in compared if f"{mesh}.{channel}" in c.run.trace]
+        curves = [
+            Curve(c.run.trace.time, scale * c.run.trace[f"{mesh}.{channel}"], c.label, label.split()[-1]) for c in own
+        ]
+        if curves:
+            panels.append(Panel(f"{shown(f'{mesh}.{channel}')}: {label}", tuple(curves), height=210))
+    if not panels:
+        return None
+    size = max(c.run.trace.time.size for c in compared)
+    for c in compared:
+        columns[f"{c.label} time_[s]"] = _padded(c.run.trace.time, size)
+        for channel in ("te", "force"):
+            if f"{mesh}.{channel}" in c.run.trace:
+                columns[f"{c.label} {mesh}.{channel}"] = _padded(c.run.trace[f"{mesh}.{channel}"], size)
+    chart = Chart(tuple(panels), TIME, "time")
+    title = of_mesh(compared[0].run.trace, mesh, "Transmission error and mesh force")
+    return Plot(f"{mesh}_time", title, "Each run in its own time.", chart, columns)
+
+
+def _padded(values: np.ndarray, size: int) -> np.ndarray:
+    """(size,): NaN behind the end."""
+    return np.concatenate([np.asarray(values, dtype=float), np.full(size - len(values), np.nan)])
+
+
+def _mesh_cycle(compared: Sequence[Compared], mesh: str) -> Plot | None:
+    """Mean transmission error over the mesh cycle and its harmonics."""
+    found: dict[str, np.ndarray] = {}
+    for own in compared:
+        stage, part = own.run.stage, own.run.trace.window(own.run.window.start, own.run.window.end)
+        engagement = None if stage is None else next((e for e in stage.engagements if e.name == mesh), None)
+        if stage is None or engagement is None or f"{mesh}.te" not in part:
+            continue
+        position = position_of(part, stage, engagement)
+        mean = None if position is None else folded(position, 1e6 * part[f"{mesh}.te"])
+        if mean is not None:
+            found[own.label] = mean
+    if len(found) < 2:
+        return None
+    x, orders = (np.arange(BINS) + 0.5) / BINS, np.arange(1.0, HARMONICS + 1)
+    lines = {label: mesh_harmonics(mean[None], HARMONICS)[0] for label, mean in found.items()}
+    curves = tuple(Curve(x, mean - mean.mean(), label, "µm") for label, mean in found.items())
+    bars = tuple(Curve(orders, line, label, "µm rms", "bars") for label, line in lines.items())
+    panels = (
+        Panel("transmission error in µm, without its mean", curves, height=230, x_label="position in pitches"),
+        Panel("harmonics in µm, rms", bars, height=230, x_label="harmonic of the mesh"),
+    )
+    told = "; ".join(f"{label} {np.ptp(mean):.3g} µm" for label, mean in found.items())
+    caption = f"Mean over all mesh cycles of each run's window. Peak to peak: {told}."
+    columns = {"harmonic": orders} | {f"{label}_[um rms]": line for label, line in lines.items()}
+    title = of_mesh(compared[0].run.trace, mesh, "Mesh cycle")
+    return Plot(f"{mesh}_cycle", title, caption, Chart(panels, across=2), columns)
+
+
+def _common(compared: Sequence[Compared]) -> list[str]:
+    names = force_channels(compared[0].run.trace)
+    return [name for name in names if all(name in own.run.trace for own in compared)]
+
+
+def _spectra(compared: Sequence[Compared]) -> Plot | None:
+    """Spectra of every force that all runs have, the runs over one another."""
+    panels, columns = [], {}
+    for name in _common(compared):
+        curves = []
+        for own in compared:
+            part = own.run.trace.window(own.run.window.start, own.run.window.end)
+            try:
+                found = spectrum_of(part, name, segment(part.time.size))
+            except MetricsError:
+                continue
+            inside = (found.frequency > 0) & (found.frequency <= SHOWN_TO)
+            level = metrics.level(found.amplitude)
+            curves.append(Curve(found.frequency[inside] / 1e3, level[inside], own.label, "dB re 1 N"))
+            columns[f"{own.label} frequency_[Hz]"] = found.frequency
+            columns[f"{own.label} {name}_[dB re 1 N]"] = level
+        if curves:
+            panels.append(Panel(f"{shown(name)}: level in dB re 1 N", tuple(curves), limits=level_limits(curves)))
+    if not panels:
+        return None
+    size = max(len(values) for values in columns.values())
+    columns = {name: _padded(values, size) for name, values in columns.items()}
+    caption = "Rms amplitude of each line, Hann windows; each run over its window."
+    chart = Chart(tuple(panels), "frequency in kHz", "frequency")
+    return Plot("spectra", "Spectra of the forces", caption, chart, columns)
+
+
+def order_levels(own: Compared, mesh: str) -> dict[str, np.ndarray]:
+    """Level (ORDERS,) dB re 1 N of the mesh orders in every force of a run, mean power over its window."""
+    run = own.run
+    found: dict[str, np.ndarray] = {}
+    if mesh not in run.angles:
+        return found
+    for name in force_channels(run.trace):
+        try:
+            cuts = metrics.order_cuts(
+                run.trace.time, run.trace[name], run.angles[mesh], ORDERS, averaged=averaging(run.trace, name)
+            )
+        except MetricsError:
+            continue
+        inside = (cuts.time >= run.window.start) & (cuts.time <= run.window.end)
+        if inside.any():
+            found[name] = metrics.level(np.sqrt(np.mean(cuts.amplitude[:, inside] ** 2, axis=1)))
+    return found
+
+
+def _orders(compared: Sequence[Compared], mesh: str) -> Plot | None:
+    """Mesh orders of every force, the runs beside one another."""
+    levels = {own.label: order_levels(own, mesh) for own in compared}
+    orders, panels, columns = np.arange(1.0, ORDERS + 1), [], {"order": np.arange(1.0, ORDERS + 1)}
+    for name in _common(compared):
+        known = {label: found[name] for label, found in levels.items() if name in found}
+        if not known:
+            continue
+        base = min(float(np.nanmin(level)) for level in known.values())
+        top = max(float(np.nanmax(level)) for level in known.values())
+        curves = tuple(Curve(orders, level, label, "dB re 1 N", "bars") for label, level in known.items())
+        limits = (max(math.floor(base / 10) * 10 - 10, top - 90), math.ceil(top / 10) * 10)
+        panels.append(Panel(f"{shown(name)}: level in dB re 1 N", curves, limits=limits, height=150))
+        columns |= {f"{label} {name}_[dB re 1 N]": level for label, level in known.items()}
+    if not panels:
+        return None
+    caption = "Level of every mesh order, mean power over the window of each run."
+    chart = Chart(tuple(panels), "order of the mesh", across=2)
+    title = of_mesh(compared[0].run.trace, mesh, "Mesh orders")
+    return Plot(f"{mesh}_orders", title, caption, chart, columns)
+
+
+def _octaves(compared: Sequence[Compared]) -> list[str]:
+    """Octave bands of the first run, and what the others change in dB."""
+    tables: dict[str, Mapping[str, Mapping[float, float]]] = {}
+    for own in compared:
+        try:
+            tables[own.label] = octave_table(own.run.trace, own.run.window)
+        except MetricsError:
+            return []
+    first = tables[compared[0].label]
+    bands = [band for band in next(iter(first.values()), {}) if all(_has(t, band) for t in tables.values())]
+    if not bands:
+        return []
+    rows = []
+    for name in _common(compared):
+        rows.append((f"{name}, {compared[0].label}", *(_db(first[name][band]) for band in bands)))
+        for own in compared[1:]:
+            change = [tables[own.label][name][band] - first[name][band] for band in bands]
+            rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
+    table = page.table(("Hz", *(f"{band:g}" for band in bands)), rows)
+    note = page.note(f"Level in dB re 1 N (rms) of {compared[0].label}, and changes of the others in dB.")
+    return [page.section("Octave bands", note, table, name="octaves")]
+
+
+def _has(table: Mapping[str, Mapping[float, float]], band: float) -> bool:
+    return all(band in row for row in table.values())
+
+
+def _order_table(compared: Sequence[Compared]) -> list[str]:
+    """Mesh orders of the first run in dB, and what the others change."""
+    found = []
+    for mesh in meshes(compared[0].run.trace):
+        levels = [order_levels(own, mesh) for own in compared]
+        rows = []
+        for name in (n for n in _common(compared) if all(n in level for level in levels)):
+            rows.append((f"{name}, {compared[0].label}", *(_db(value) for value in levels[0][name])))
+            for own, level in zip(compared[1:], levels[1:], strict=True):
+                change = level[name] - levels[0][name]
+                rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
+        if rows:
+            head = ("order", *(str(k) for k in range(1, ORDERS + 1)))
+            note = page.note(f"Level in dB re 1 N (rms) of {compared[0].label}, and changes of the others in dB.")
+            found.append(
+                page.section(
+                    of_mesh(compared[0].run.trace, mesh, "Mesh orders in numbers"), note, page.table(head, rows)
+                )
+            )
+    return found
+
+
+def _db(value: float, sign: str = "") -> str:
+    return "–" if math.isnan(value) else _minus(f"{value:{sign}.1f}")
+
+
+def _facts(compared: Sequence[Compared]) -> str:
+    known = [sections.facts(own.run.summary) for own in compared]
+    rows = [(key, *(facts.get(key, "–") for facts in known)) for key in known[0]]
+    return page.table(("", *(own.label for own in compared)), rows)

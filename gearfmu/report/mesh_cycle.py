@@ -1,0 +1,179 @@
+"""What an engagement does over one mesh cycle: transmission error with its harmonics, quasi-static and in the run, and
+how the force lies on the flanks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gearfmu.errors import ModelError, SimulationError
+from gearfmu.geometry import involute
+from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
+from gearfmu.report.plots import of_mesh
+from gearfmu.report.signals import GEAR_PHI, SETTLED, Window
+from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.stage import assemble
+from gearfmu.stage.flank_loads import FlankLoads, flank_loads
+from gearfmu.stage.meshes import EXTERNAL, kind_of, mesh_geometry
+from gearfmu.stage.place import place_of
+from gearfmu.stage.te import mesh_harmonics
+from gearfmu.stage.trace import Trace
+
+HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
+LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of
+ROLLS = 60  # rows of a contact pattern
+POSITIONS, POSITIONS_OF_SET = 24, 16  # over a pitch: a set solves all its meshes at each
+STATIC, RUN = "quasi-static", "in the run"
+
+
+def static_loads(
+    trace: Trace, window: Window, meshes: Sequence[str], spec: Any, bodies: Sequence[Any]
+) -> tuple[dict[str, FlankLoads], list[str]]:
+    """Statics of engagements under the mean mesh force that each has over the window, and in words why others are not
+    there; those with hardly a load are left out."""
+    model, part, found = assemble(spec, bodies), trace.window(window.start, window.end), {}
+    missing = []
+    slices = float(trace.meta.get("slices") or 5)
+    positions = POSITIONS if model.stage.frame_of(model.stage.engagements[0]) is None else POSITIONS_OF_SET
+    for mesh in meshes:
+        try:
+            place = place_of(model, mesh)
+            torque = float(np.mean(part[f"{mesh}.force"])) * place.lever
+            torque *= math.cos(mesh_geometry(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
+            if abs(torque) >= LEAST_LOAD * place.most:
+                found[mesh] = flank_loads(model, torque, mesh, positions, slices=slices)
+        except (SimulationError, ModelError) as error:
+            missing.append(f"Mesh cycle and contact pattern of {mesh}: {error}")
+    return found, missing
+
+
+def folded(position: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+    """Mean (BINS,) of values (n,) by the part of the mesh cycle, position (n,) in pitches; None for fewer than
+    LEAST_PERIODS pitches and where samples leave a part empty."""
+    if np.ptp(position) < LEAST_PERIODS:
+        return None
+    bins = (np.mod(position, 1.0) * BINS).astype(int) % BINS
+    count = np.bincount(bins, minlength=BINS)
+    return np.bincount(bins, values, BINS) / count if np.all(count) else None
+
+
+def position_of(trace: Trace, stage: GeneralStage, mesh: EngagementSpec) -> np.ndarray | None:
+    """(n,) pitches by which gear A of an engagement would have turned on without load, from the angle of gear B, in the
+    axes of what carries them; None where that was not recorded."""
+    rotor, frame = stage.rotor_of(mesh.gears[1]), stage.frame_of(mesh)
+    names = [name + GEAR_PHI for name in (rotor, frame) if name is not None]
+    pair = mesh_geometry(stage, mesh)
+    if any(name not in trace for name in names):
+        return None
+    angle = trace[names[0]] - (trace[names[1]] if len(names) > 1 else 0.0)
+    return np.asarray(-kind_of(pair) * angle * pair.gears[1].z / (2 * math.pi))
+
+
+def transmission_error(
+    trace: Trace, window: Window, stage: GeneralStage, names: Sequence[str], loads: Mapping[str, FlankLoads]
+) -> Plot | None:
+    """Transmission error of engagements over the mesh cycle with its harmonics: quasi-static where `loads` has it, and
+    of a steady run its mean over all cycles of the window; None without either."""
+    part, curves = trace.window(window.start, window.end), {}
+    for mesh in (e for e in stage.engagements if e.name in names):
+        if mesh.name in loads:
+            own = loads[mesh.name]
+            order = np.argsort(np.mod(own.position, 1.0))
+            curves[mesh.name, STATIC] = (np.mod(own.position, 1.0)[order], 1e6 * own.te[order])
+        position = position_of(part, stage, mesh)
+        if window.reason == SETTLED and position is not None and f"{mesh.name}.te" in part:
+            mean = folded(position, 1e6 * part[f"{mesh.name}.te"])
+            if mean is not None:
+                curves[mesh.name, RUN] = ((np.arange(BINS) + 0.5) / BINS, mean)
+    if not curves:
+        return None
+    words = {key: key[1] if len(names) == 1 else f"{key[0]}, {key[1]}" for key in curves}
+    looks = {STATIC: "dashed", RUN: ""}
+    over = [Curve(x, y, words[key], "µm", looks[key[1]], list(names).index(key[0])) for key, (x, y) in curves.items()]
+    lines = {key: mesh_harmonics(y[None], HARMONICS)[0] for key, (_, y) in curves.items()}
+    orders = np.arange(1.0, HARMONICS + 1)
+    bars = [Curve(orders, line, words[key], "µm rms", "bars", k) for k, (key, line) in enumerate(lines.items())]
+    if len(names) == 1:
+        over = [Curve(c.x, c.y, c.name, c.unit, c.look, k) for k, c in enumerate(over)]
+    panels = (
+        Panel("transmission error in µm", tuple(over), height=220, x_label="position in pitches", x_limits=(0.0, 1.0)),
+        Panel("harmonics in µm, rms", tuple(bars), height=220, x_label="harmonic of the mesh"),
+    )
+    told = "; ".join(f"{words[key]} {np.ptp(y):.3g} µm peak to peak" for key, (_, y) in curves.items())
+    caption = f"Dashed: {STATIC}, under the mean mesh force of the run. " if any(k[1] == STATIC for k in curves) else ""
+    if any(key[1] == RUN for key in curves):
+        caption += f"In the run: mean over all mesh cycles, {window.start:.3g} s to {window.end:.3g} s. "
+    else:
+        caption += "The run is not steady: it has no mean cycle. "
+    file = "mesh_cycle" if len(stage.engagements) == 1 or len(names) > 1 else f"mesh_cycle_{names[0]}"
+    columns = {f"{words[key]}_harmonic_[um rms]": line for key, line in lines.items()}
+    title = "Transmission error over the mesh cycle"
+    title = title if len(names) > 1 else of_mesh(trace, names[0], title)
+    data = {"harmonic": orders} | columns
+    return Plot(file, title, f"{caption}{told[:1].upper()}{told[1:]}.", Chart(panels, across=2), data)
+
+
+def contact_pattern(trace: Trace, stage: GeneralStage, mesh: str, loads: FlankLoads) -> Plot:
+    """Force per width on the flanks of both gears of an engagement, and its load over the width in the run where forces
+    of slices were recorded."""
+    engagement = next(e for e in stage.engagements if e.name == mesh)
+    pair = mesh_geometry(stage, engagement)
+    pressed = loads.roll[loads.force > 0]
+    rolls = np.linspace(pressed.min(), pressed.max(), ROLLS)
+    load, z = 1e-3 * loads.line_load(rolls), 1e3 * loads.width
+    sense = 1 if kind_of(pair) == EXTERNAL else -1
+    other = sense * (pair.length - rolls) if sense > 0 else rolls + pair.length
+    top, half, panels = float(load.max()), 500 * loads.face_width, []
+    for gear, geometry, own in zip(engagement.gears, pair.gears, (rolls, other), strict=True):
+        diameter = 2e3 * involute.radius_at_roll(np.maximum(own, 0.0), geometry.r_b)
+        order = np.argsort(diameter)
+        heat = Heat(z, diameter[order], load[order], 0.0, top, "N/mm", "steel")
+        panels.append(Panel(f"{gear}: diameter on the flank in mm", (), heat, height=230, x_limits=(-half, half)))
+    panels += _over_width(trace, mesh, loads)
+    flank = "drive" if loads.side > 0 else "coast"
+    caption = (
+        f"Force per width on the {flank} flanks over a whole engagement, quasi-static under the mean mesh force of the "
+        f"run; largest {top:.4g} N/mm. Left to right: from −b/2 to +b/2 of the common face width. "
+    )
+    factor = face_load_factor(trace, mesh)
+    if factor is not None:
+        caption += f"In the run the most loaded slice carries {factor:.3f} times the mean (K_Hβ of ISO 6336-1)."
+    file = "contact" if len(stage.engagements) == 1 else f"contact_{mesh}"
+    data = {
+        "roll_A_[mm]": np.repeat(1e3 * rolls, z.size),
+        "z_[mm]": np.tile(z, rolls.size),
+        "load_[N/mm]": load.ravel(),
+    }
+    title = of_mesh(trace, mesh, "Contact pattern")
+    return Plot(file, title, caption, Chart(tuple(panels), "place on the face width in mm", across=2), data)
+
+
+def slice_forces(trace: Trace, mesh: str) -> np.ndarray | None:
+    """(S, n) N: forces of the slices that were recorded; None where slices carry alike or were not recorded."""
+    names = [name for k in range(1, 11) if (name := f"{mesh}.slice_{k}") in trace]
+    found = np.array([trace[name] for name in names])
+    used = np.any(found != 0, axis=1) if names else np.zeros(0, bool)
+    return found[used] if used.sum() > 1 else None
+
+
+def face_load_factor(trace: Trace, mesh: str) -> float | None:
+    """Largest mean force of a slice over the mean of all: the face load factor K_Hβ of ISO 6336-1 for slices."""
+    found = slice_forces(trace, mesh)
+    if found is None:
+        return None
+    means = np.abs(found.mean(axis=1))
+    return float(means.max() / means.mean()) if means.mean() > 0 else None
+
+
+def _over_width(trace: Trace, mesh: str, loads: FlankLoads) -> list[Panel]:
+    found = slice_forces(trace, mesh)
+    if found is None:
+        return []
+    place = ((np.arange(len(found)) + 0.5) / len(found) - 0.5) * loads.face_width * 1e3
+    per = 1e-3 * len(found) / loads.face_width
+    mean, most = per * found.mean(axis=1), per * np.abs(found).max(axis=1)
+    curves = (Curve(place, mean, "mean", "N/mm"), Curve(place, most, "largest magnitude", "N/mm", "dashed"))
+    return [Panel("in the run, all pairs together, N/mm", curves, height=160)]

@@ -1,0 +1,68 @@
+"""Plain names beside the names of channels: "Transmission error" for mesh.te."""
+
+from __future__ import annotations
+
+import re
+
+MESH = {
+    "force": "Mesh force",
+    "force_mean": "Mesh force, mean over the step",
+    "force_max": "Mesh force, largest in the step",
+    "force_drive": "Force on the drive flanks",
+    "force_coast": "Force on the coast flanks",
+    "te": "Transmission error",
+    "contact": "Flanks in contact",
+    "pairs": "Tooth pairs in contact",
+    "impacts": "Impacts so far",
+    "open_time": "Time without contact",
+}
+ENDS = {
+    "gear.w": "Speed of the {}",
+    "gear.phi": "Angle of the {}",
+    "w": "Speed, {}",
+    "phi": "Angle, {}",
+    "tau": "Torque, {}",
+    "tau_mean": "Torque, mean over the step, {}",
+    "clutch.tau": "Clutch torque, {}",
+    "clutch.capacity": "Clutch capacity, {}",
+    "clutch.slip": "Clutch slip, {}",
+    "clutch.locked": "Clutch locked, {}",
+    "slip": "Slip, {}",
+    "capacity": "Capacity, {}",
+    "shaft.tau": "Shaft torque, {}",
+    "inertia.w": "Speed of the inertia, {}",
+    "disc.w": "Speed of the clutch disc, {}",
+    "work": "Work, {}",
+}
+WHOLE = {
+    "energy.stored": "Stored energy",
+    "energy.work": "Work of the ports",
+    "energy.dissipated": "Dissipated energy",
+    "energy.residual": "What the energy balance leaves",
+}
+DIRECTIONS = {"f": "force", "m": "moment"}
+
+
+def plain(channel: str) -> str:
+    """The plain name of a channel; "" for what is none that we know."""
+    if channel in WHOLE:
+        return WHOLE[channel]
+    found = re.fullmatch(r"(bearing|pin)\.([^.]+)\.([fm])([xyz])(_mean)?", channel)
+    if found:
+        kind, part, what, axis, mean = found.groups()
+        return f"{kind.capitalize()} {DIRECTIONS[what]} {axis}, {part}{', mean over the step' if mean else ''}"
+    first, _, last = channel.partition(".")
+    if last in MESH:
+        return MESH[last] if first == "mesh" else f"{MESH[last]}, {first}"
+    if last.startswith("slice_"):
+        return f"Force of slice {last.removeprefix('slice_')}" + ("" if first == "mesh" else f", {first}")
+    for end, words in ENDS.items():
+        if channel.endswith(f".{end}"):
+            return words.format(channel.removesuffix(f".{end}").removeprefix("drive.").replace(".", " "))
+    return ""
+
+
+def shown(name: str) -> str:
+    """Plain name and channel name in one line; words that are no channel as they are."""
+    words = plain(name)
+    return f"{words} ({name})" if words else name

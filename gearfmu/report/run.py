@@ -1,0 +1,94 @@
+"""One run as the parts of its report see it: trace, summary, stage and bodies where they are at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from gearfmu.report.mesh_cycle import static_loads
+from gearfmu.report.metrics import MetricsError, sample_step
+from gearfmu.report.plots_set import PlanetSet, planet_set
+from gearfmu.report.signals import Window, known_meshings, mesh_angles, meshes, window_of_interest
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.turning import Meshing
+from gearfmu.stage.deformation import Deformation
+from gearfmu.stage.flank_loads import FlankLoads
+from gearfmu.stage.trace import Trace
+
+
+@dataclass(frozen=True)
+class Run:
+    """trace; summary: fields of docs/file-formats.md; spec: the stage, bodies: its reduced bodies, deformation: of
+    gears at chosen times, each None where it is not at hand."""
+
+    trace: Trace
+    summary: Mapping[str, Any]
+    spec: Any = None
+    bodies: Sequence[Any] | None = None
+    deformation: Deformation | None = None
+
+    @cached_property
+    def window(self) -> Window:
+        """The part that results and spectra are taken from."""
+        return window_of_interest(self.trace)
+
+    @cached_property
+    def known(self) -> dict[str, Meshing]:
+        """Meshing by engagement."""
+        return known_meshings(self.trace, self.spec)
+
+    @cached_property
+    def planets(self) -> PlanetSet | None:
+        """The planetary set, None for other stages."""
+        return planet_set(self.trace, self.known)
+
+    @cached_property
+    def angles(self) -> dict[str, Any]:
+        """Mesh angle (n,) rad by engagement."""
+        return mesh_angles(self.trace, self.spec)
+
+    @cached_property
+    def stage(self) -> GeneralStage | None:
+        """The stage in general terms, where it and its bodies are at hand."""
+        return as_general(self.spec) if self.spec is not None and self.bodies else None
+
+    @cached_property
+    def shown_meshes(self) -> list[str]:
+        """Engagements whose statics stand in the report: all, of a set the first of every central gear."""
+        forces = [mesh for mesh in meshes(self.trace) if f"{mesh}.force" in self.trace]
+        if self.planets is None:
+            return forces
+        return [next(iter(own.values())) for own in self.planets.meshes.values()]
+
+    @cached_property
+    def statics(self) -> tuple[dict[str, FlankLoads], list[str]]:
+        """Statics under the run's mean load by engagement, and why some are missing; empty without stage and bodies."""
+        if self.stage is None:
+            return {}, []
+        return static_loads(self.trace, self.window, self.shown_meshes, self.spec, self.bodies or ())
+
+    @property
+    def loads(self) -> dict[str, FlankLoads]:
+        """Statics under the run's mean load by engagement."""
+        return self.statics[0]
+
+    @property
+    def title(self) -> str:
+        """What was run."""
+        return str(self.summary.get("scene") or self.trace.meta.get("scene") or "simulation")
+
+    @property
+    def stage_name(self) -> str:
+        """Name of the stage."""
+        return str(self.summary.get("stage") or self.trace.meta.get("stage") or "stage not named")
+
+    @cached_property
+    def step(self) -> float | None:
+        """Time between samples, s; None where that is not even."""
+        try:
+            return sample_step(self.trace.time)
+        except MetricsError:
+            return None

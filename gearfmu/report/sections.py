@@ -1,0 +1,272 @@
+"""The parts of a report in words and numbers: key results, tables, accuracy, where it comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from gearfmu.report import page, plots_nvh, plots_set
+from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
+from gearfmu.report.metrics import MetricsError
+from gearfmu.report.names import plain
+from gearfmu.report.plots import RPM
+from gearfmu.report.results import dynamic_factors, key_results
+from gearfmu.report.run import Run
+from gearfmu.report.signals import SETTLED, bearings, meshes
+from gearfmu.stage.trace import Trace
+
+WORDS = {  # key of a result: words, channel of the mesh, unit
+    "mesh_force_mean_N": ("Mesh force, mean", "force", "N"),
+    "mesh_force_rms_ac_N": ("Mesh force, rms of the alternating part", "force", "N"),
+    "te_mean_um": ("Transmission error, mean", "te", "µm"),
+    "te_rms_ac_um": ("Transmission error, rms of the alternating part", "te", "µm"),
+    "dynamic_factor": ("Dynamic factor", "force", ""),
+    "contact_loss_percent": ("Teeth apart, share of the samples of the whole run", "contact", "%"),
+    "coast_contact_percent": ("Coast flanks carry, share of the samples of the whole run", "contact", "%"),
+    "impacts": ("Impacts, whole run", "impacts", ""),
+}
+NOT_GIVEN = "not given"
+FACTOR_WORDS = (
+    "Dynamic factor: largest mesh force over the static one, in the sense of K_v of ISO 6336-1 (there by rating "
+    "methods; here of what was simulated). "
+)
+
+
+def tiles(run: Run) -> list[tuple[str, str, str]]:
+    """The key results: value, unit, what it is; of several meshes the largest, with its name."""
+    results, names = {**key_results(run.trace), **dynamic_factors(run.trace)}, meshes(run.trace)
+    found = []
+    for key, scale, unit, words in (
+        ("mesh_force_mean_N", 1e-3, "kN", "mean mesh force"),
+        ("dynamic_factor", 1.0, "", "dynamic factor: largest mesh force over the static one"),
+        ("te_rms_ac_um", 1.0, "µm rms", "alternating transmission error"),
+        ("contact_loss_percent", 1.0, "%", "of the samples with teeth apart"),
+    ):
+        known = {mesh: results[own] for mesh in names if (own := _key(mesh, key, names)) in results}
+        if known:
+            mesh = max(known, key=lambda name: abs(known[name]))
+            where = f", {mesh} (the largest)" if len(known) > 1 and known[mesh] else ""
+            found.append((f"{abs(known[mesh]) * scale:.3g}", unit, f"{words}{where}"))
+    if run.planets is not None:
+        found += _most_loaded(run)
+    loudest = {
+        name: results[f"bearing_{name}_rms_ac_N"]
+        for name in bearings(run.trace)
+        if f"bearing_{name}_rms_ac_N" in results
+    }
+    if loudest:
+        name = max(loudest, key=lambda bearing: loudest[bearing])
+        found.append((f"{loudest[name]:.3g}", "N rms", f"alternating bearing force, {name}"))
+    if "lock_time_s" in results:
+        found.append((f"{results['lock_time_s']:.4g}", "s", "clutch locked from here on"))
+    return found
+
+
+def _most_loaded(run: Run) -> list[tuple[str, str, str]]:
+    assert run.planets is not None
+    try:
+        means = plots_set.shares(run.trace, run.planets, run.window)[1]
+    except MetricsError:
+        return []
+    mesh = max(means, key=lambda name: means[name])
+    return [(f"{means[mesh]:.3f}", "", f"largest share of a planet, {mesh} (1: all alike)")]
+
+
+def _key(mesh: str, key: str, names: Sequence[str]) -> str:
+    return f"{mesh}_{key}" if len(names) > 1 else key
+
+
+def results(run: Run) -> str:
+    """The table of key results."""
+    names = meshes(run.trace)
+    values = {**key_results(run.trace), **dynamic_factors(run.trace)}
+    rows = "".join(_row(key, value, names) for key, value in values.items())
+    if not rows:
+        return page.note("The trace holds no mesh or bearing channel.")
+    window = run.window
+    where = f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}, unless it says otherwise. "
+    steady = window.reason == SETTLED
+    where += "Alternating: without the mean. " if steady else "Alternating: without a moving average of 10 ms. "
+    where += FACTOR_WORDS + (
+        "Static: the mean." if steady else "Static: the moving average of 10 ms, where it is a tenth of its largest."
+    )
+    head = '<tr><th></th><th>channel</th><th class="n">value</th><th>unit</th></tr>'
+    return f'<div class="scroll"><table>{head}{rows}</table></div>{page.note(where)}'
+
+
+def _row(key: str, value: float, names: Sequence[str]) -> str:
+    words, channel, unit = result_words(key, names)
+    return (
+        f'<tr><td>{escape(words)}</td><td><code class="channel">{escape(channel)}</code></td>'
+        f'<td class="n">{value:.4g}</td><td>{unit}</td></tr>'
+    )
+
+
+def result_words(key: str, names: Sequence[str]) -> tuple[str, str, str]:
+    """A result of key_results: words, its channel, its unit. names: of the meshes; of several the name is told."""
+    mesh = next((name for name in names if len(names) > 1 and key.startswith(f"{name}_")), "")
+    inner = key.removeprefix(f"{mesh}_") if mesh else key
+    if inner in WORDS:
+        words, channel, unit = WORDS[inner]
+        return f"{words}, {mesh}" if mesh else words, f"{mesh or names[0]}.{channel}", unit
+    if inner == "lock_time_s":
+        return "Clutch locked from", "*.locked", "s"
+    bearing = inner.removeprefix("bearing_").removesuffix("_rms_ac_N")
+    words = f"Bearing force of {bearing}, rms of the alternating part, both directions"
+    return words, f"bearing.{bearing}.fx, fy", "N"
+
+
+def planets(run: Run) -> list[str]:
+    """The table of planets of a set."""
+    if run.planets is None:
+        return []
+    try:
+        table = page.table(*plots_set.results(run.trace, run.planets, run.window))
+    except MetricsError:
+        return []
+    window = run.window
+    where = (
+        f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}. Share: 1 where all planets carry alike. "
+    )
+    factors = [v for v in dynamic_factors(run.trace).values() if math.isfinite(v)]
+    where += f"{FACTOR_WORDS}Largest of all meshes: {max(factors):.4g}." if factors else ""
+    return [page.section("Planets", table, page.note(where), name="results")]
+
+
+def warned(trace: Trace) -> list[str]:
+    """What the sampling does to spectra, as a warning."""
+    try:
+        warning = plots_nvh.sampling_warning(trace)
+    except MetricsError:
+        return []
+    return [page.warning(warning)] if warning else []
+
+
+def octaves(run: Run) -> str:
+    """Table of octave-band levels; "" without any."""
+    try:
+        levels = plots_nvh.octave_table(run.trace, run.window)
+    except MetricsError:
+        return ""
+    bands = list(dict.fromkeys(band for row in levels.values() for band in row))
+    if not bands:
+        return ""
+    rows = [(name, *(f"{row[band]:.1f}" for band in bands)) for name, row in levels.items()]
+    return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(
+        ("Hz", *(f"{band:g}" for band in bands)), rows
+    )
+
+
+def facts(summary: Mapping[str, Any]) -> dict[str, str]:
+    """How it was run."""
+    known = {
+        "torque of the input": _text(summary, "torque", 1, "N·m"),
+        "speed of the input": _text(summary, "speed", RPM, "rpm"),
+        "speed at the end": _text(summary, "end_speed", RPM, "rpm"),
+    }
+    given = {name: text for name, text in known.items() if text != NOT_GIVEN}
+    return given | {
+        "fidelity level": _text(summary, "level"),
+        "dynamic modes, all gears": _text(summary, "n_dyn"),
+        "slices": _text(summary, "slices"),
+        "internal step": _text(summary, "h", 1e6, "µs"),
+        "communication step": _text(summary, "H", 1e6, "µs"),
+        "simulated": _text(summary, "simulated_s", 1, "s"),
+        "CPU time": _text(summary, "cpu_s", 1, "s"),
+        "CPU time per simulated second": _text(summary, "realtime_factor"),
+    }
+
+
+def _text(summary: Mapping[str, Any], key: str, scale: float = 1, unit: str = "") -> str:
+    value = summary.get(key)
+    if value is None:
+        return NOT_GIVEN
+    if isinstance(value, (bool, str)):
+        return str(value)
+    return f"{value * scale:.4g} {unit}".strip()
+
+
+def accuracy(run: Run) -> list[str]:
+    """Errors and cost of the run, and of the fidelity levels of its stage where they were measured."""
+    summary, spec, bodies = run.summary, run.spec, run.bodies
+    rows = {
+        "Coupling error (Richardson, relative)": _text(summary, "coupling_error"),
+        "Energy residual (relative)": _text(summary, "energy_residual"),
+        "CPU time per simulated second, stage alone": _text(summary, "stage_realtime_factor"),
+        "CPU time per simulated second, whole run": _text(summary, "realtime_factor"),
+    }
+    parts = [
+        page.pairs_table(
+            {name: "not measured in this run" if text == NOT_GIVEN else text for name, text in rows.items()}
+        )
+    ]
+    made_with = fingerprint(body.input_hash for body in bodies or ())
+    prices = [row for row in read_levels(levels_path(spec)) if row["bodies"] == made_with] if spec is not None else []
+    if prices:
+        parts += [
+            "<h3>What the fidelity levels of this stage cost and how far they are off</h3>",
+            page.table(HEADER, shown_rows(prices, str(summary.get("level")))),
+            page.note(PRICES),
+        ]
+    else:
+        parts.append(
+            page.note(
+                "The error of the fidelity levels of this stage with these bodies has not been measured "
+                "(benchmarks/levels.py does it)."
+            )
+        )
+    return parts + [page.note(_frf_words(body)) for body in bodies or () if hasattr(body, "frf")]
+
+
+PRICES = (
+    "Errors of the alternating part against level full at a fifth of its step, after settling, each level at its "
+    "default step; "
+    "CPU time of the stage as measured when the list was made."
+)
+
+
+def _frf_words(body: Any) -> str:
+    frf = body.frf
+    return (
+        f"Body {body.name}: frequency response of the modes below {frf.cut / 1e3:g} kHz with their static "
+        "residual against the finite elements: "
+        f"largest relative error {frf.max_error:.1e} from {frf.band[0]:g} to {frf.band[1]:g} Hz, to be trusted up "
+        f"to {frf.trusted_to / 1e3:.3g} kHz."
+    )
+
+
+def provenance(summary: Mapping[str, Any]) -> dict[str, str]:
+    """The rest of the summary."""
+    shown = {
+        "scene",
+        "stage",
+        "outcome",
+        "level",
+        "n_dyn",
+        "slices",
+        "h",
+        "H",
+        "simulated_s",
+        "cpu_s",
+        "realtime_factor",
+    }
+    flat: dict[str, str] = {}
+    for key, value in summary.items():
+        if isinstance(value, Mapping) and key not in shown:
+            flat |= {f"{key}.{inner}": str(item) for inner, item in value.items()}
+        elif key not in shown:
+            flat[key] = str(value)
+    return flat
+
+
+def channels(trace: Trace) -> str:
+    """The channels of the trace: plain name, name, unit, what it is."""
+    rows = [
+        f"<tr><td>{escape(plain(name))}</td><td><code>{escape(name)}</code></td><td>{escape(own.unit)}</td>"
+        f"<td>{escape(own.description)}</td></tr>"
+        for name, own in trace.channels.items()
+    ]
+    head = "<tr><th></th><th>name</th><th>unit</th><th>what it is</th></tr>"
+    return f'<h3>Channels in trace.h5</h3><div class="scroll"><table>{head}{"".join(rows)}</table></div>'

@@ -1,0 +1,77 @@
+"""A stage in the making: tables of a stage file, and where each of their values comes from."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+from typing import Any
+
+from gearfmu.errors import Problem
+from gearfmu.spec.layers import read_layers
+from gearfmu.spec.library import find_stage
+
+
+@dataclass(frozen=True)
+class Unread:
+    """An attribute of the REXS file that no stage file has a place for, or that is not understood."""
+
+    component: str
+    attribute: str
+    value: str
+    unit: str
+
+
+@dataclass
+class Draft:
+    """Tables as TOML has them; marks: place ("gears.pinion.teeth") → its origin; problems: what could not be read;
+    unread: everything that was not used; notes: sentences for the reader; like: the stage that the rest is from."""
+
+    tables: dict[str, Any]
+    marks: dict[str, str] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    unread: tuple[Unread, ...] = ()
+    notes: list[str] = field(default_factory=list)
+    like: str = ""
+
+    @classmethod
+    def after(cls, stage: str) -> Draft:
+        """A draft that assumes of everything what the shipped `stage` says."""
+        draft = cls(copy.deepcopy(read_layers(find_stage(stage)).tables), like=stage)
+        draft._mark((), draft.tables, f"assumed, as in {stage}")
+        return draft
+
+    def put(self, place: str, value: Any, origin: str) -> None:
+        """Write a value, or a whole table, and where it is from."""
+        *way, key = place.split(".")
+        table = self.tables
+        for step in way:
+            table = table.setdefault(step, {})
+        table[key] = value
+        self._mark(tuple(place.split(".")), value, origin)
+
+    def assume(self, place: str, value: Any, why: str) -> None:
+        """`put` for a value that the file does not give."""
+        self.put(place, value, f"assumed: {why}")
+
+    def drop(self, place: str) -> None:
+        """Take a field or table out."""
+        *way, key = place.split(".")
+        table = self.tables
+        for step in way:
+            table = table.get(step, {})
+        table.pop(key, None)
+
+    def assumptions(self) -> dict[str, str]:
+        """Places of assumed values that a reader should look at, with the reason."""
+        return {place: mark for place, mark in self.marks.items() if mark.startswith("assumed: ")}
+
+    def _mark(self, place: tuple[str, ...], value: Any, origin: str) -> None:
+        self.marks[".".join(place)] = origin
+        if isinstance(value, dict):
+            for key, inner in value.items():
+                self._mark((*place, key), inner, origin)
+
+
+def millimetres(value: float) -> str:
+    """A length in m as text for a stage file, to a nanometre."""
+    return f"{round(1e3 * value, 6):.10g} mm"

@@ -1,0 +1,203 @@
+"""Gears of a REXS file as tables of a stage file: what a pair and a planetary set share.
+
+Attributes are those of the components cylindrical_gear, ring_gear, cylindrical_gear_flank (flank_geometry before 1.3),
+rack_shaped_tool, cutter_wheel_tool, material, shaft_section and concept_bearing. Formulas: ISO 21771.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from gearfmu.errors import Problem
+from gearfmu.geometry import involute
+from gearfmu.rexs.draft import Draft, millimetres
+from gearfmu.rexs.model import Component, RexsModel
+
+FLANKS = ("cylindrical_gear_flank", "flank_geometry")
+TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
+BEARINGS = ("concept_bearing",)
+TOOL_FACTORS = (("addendum_coefficient_reference_profile", "dedendum"), ("tip_radius_factor", "fillet_radius"))
+STIFFEST = 1e12  # N/m: beyond, a stiffness in a file means "rigid"
+
+
+@dataclass
+class RexsGear:
+    """A gear and what the file says about its teeth (SI); x is None where the file has none, or the tip diameter."""
+
+    component: Component
+    teeth: int
+    module: float
+    pressure_angle: float
+    helix_angle: float
+    x: float | None
+    tip_diameter: float | None
+    face_width: float
+
+    @property
+    def reference_radius(self) -> float:
+        """r = m_n z / (2 cos β), m."""
+        return self.module * self.teeth / math.cos(self.helix_angle) / 2
+
+    @property
+    def origin(self) -> str:
+        """The words of a mark."""
+        return f"REXS {self.component.type} {self.component.id}"
+
+
+def gear_of(model: RexsModel, component: Component) -> RexsGear | None:
+    """The gear of a component; None, and problems in the model, where its teeth cannot be told."""
+    places = [component, *model.related(component, *FLANKS)]
+    needed = {
+        "normal_module": _agreed(model, places, "normal_module", "m"),
+        "normal_pressure_angle": _agreed(model, places, "normal_pressure_angle", "rad"),
+        "face_width": _agreed(model, places, "face_width", "m"),
+        "number_of_teeth": _agreed(model, places, "number_of_teeth", ""),
+    }
+    missing = [name for name, value in needed.items() if value is None]
+    for name in missing:
+        model.problems.append(Problem(str(model.path), f"{component}: {name}", "", "this attribute is missing: add it"))
+    if missing:
+        return None
+    tip = _agreed(model, places, "tip_diameter", "m")
+    return RexsGear(
+        component,
+        teeth=abs(round(needed["number_of_teeth"] or 0)),
+        module=needed["normal_module"] or 0.0,
+        pressure_angle=needed["normal_pressure_angle"] or 0.0,
+        helix_angle=_agreed(model, places, "helix_angle_reference_diameter", "rad") or 0.0,
+        x=_agreed(model, places, "addendum_modification_coefficient", ""),
+        tip_diameter=None if tip is None else abs(tip),
+        face_width=needed["face_width"] or 0.0,
+    )
+
+
+def _agreed(model: RexsModel, places: list[Component], name: str, unit: str) -> float | None:
+    """The one value that gear and flanks give, SI; a problem where left and right flank differ."""
+    found = [model.si(place, name, unit) if unit else model.number(place, name) for place in places]
+    values = [value for value in found if value is not None]
+    if values and max(values) - min(values) > 1e-9 * max(abs(value) for value in values):
+        shown = ", ".join(f"{value:g}" for value in values)
+        remedy = "left and right flank, or gear and flank, differ; gears with unequal flanks are not known here"
+        model.problems.append(Problem(str(model.path), f"{places[0]}: {name}", shown, remedy))
+    return values[0] if values else None
+
+
+def sum_of_shifts(module: float, alpha: float, beta: float, teeth: int, distance: float) -> float:
+    """Σx of a pair without backlash at the centre distance (m), ISO 21771: (inv α_wt − inv α_t) Σz / (2 tan α_n).
+
+    teeth: z₁ + z₂, of an internal pair z_ring − z_pinion (then it is x_ring − x_pinion, positive outwards).
+    """
+    alpha_t = math.atan(math.tan(alpha) / math.cos(beta))
+    cosine = module * teeth / math.cos(beta) / 2 * math.cos(alpha_t) / distance
+    if not cosine < 1:
+        return math.nan
+    working = float(involute.inv(math.acos(cosine)))
+    return (working - float(involute.inv(alpha_t))) * teeth / (2 * math.tan(alpha))
+
+
+def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:
+    """Teeth, width, tool and material of a gear at `place` of the draft; not profile shift and diameters."""
+    draft.put(f"{place}.teeth", gear.teeth, gear.origin)
+    draft.put(f"{place}.face_width", millimetres(gear.face_width), gear.origin)
+    for part in ("tip_relief", "lead", "index_deviation", "import"):
+        draft.drop(f"{place}.{part}")
+    _put_material(model, draft, place, gear.component)
+
+
+def put_rack(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:
+    """Dedendum and fillet of the basic rack: the addendum and tip radius of the tool, factors of the module."""
+    tools = [t for c in (gear.component, *model.related(gear.component, *FLANKS)) for t in model.related(c, *TOOLS)]
+    for tool in tools[:1]:
+        origin = f"REXS {tool.type} {tool.id}, tool"
+        for name, key in TOOL_FACTORS:
+            value = model.number(tool, name)
+            if value is not None and value > 0:
+                draft.put(f"{place}.{key}", value, origin)
+
+
+def _put_material(model: RexsModel, draft: Draft, place: str, component: Component) -> None:
+    shafts = model.related(component, "shaft", relation="assembly")
+    found = [m for c in (component, *shafts) for m in model.related(c, "material")]
+    for material in found[:1]:
+        origin = f"REXS material {material.id}"
+        for name, key, unit in (
+            ("elastic_modulus", "youngs_modulus", "Pa"), ("density", "density", "kg/m^3"), ("poisson_ratio", "", "")
+        ):  # fmt: skip
+            value = model.quantity(material, name, unit) if unit else model.number(material, name)
+            if value is not None:
+                draft.put(f"{place}.material.{key or name}", value, origin)
+
+
+def section_diameters(model: RexsModel, component: Component) -> tuple[float, float, str] | None:
+    """Inner and outer diameter (m) of the shaft where a gear sits on it, and the words of a mark."""
+    at = model.si(component, "u_coordinate_on_shaft", "m")
+    for shaft in model.related(component, "shaft", relation="assembly"):
+        found = shaft_diameters(model, shaft, at)
+        if found is not None:
+            return found
+    return None
+
+
+def shaft_diameters(model: RexsModel, shaft: Component, at: float | None = None) -> tuple[float, float, str] | None:
+    """Inner and outer diameter (m) of the shaft's section at a place `at` (m) along it, of its first one without."""
+    for section in model.related(shaft, "shaft_section", relation="assembly"):
+        begin = model.si(section, "u_coordinate_on_shaft", "m") or 0.0
+        length = model.si(section, "length", "m") or 0.0
+        if at is None or begin - 1e-9 <= at <= begin + length + 1e-9:
+            inner = model.si(section, "inner_diameter_begin", "m")
+            outer = model.si(section, "outer_diameter_begin", "m")
+            if inner is not None and outer is not None:
+                return inner, outer, f"REXS shaft_section {section.id}"
+    return None
+
+
+def put_bore(model: RexsModel, draft: Draft, place: str, gear: RexsGear, root_diameter: float) -> None:
+    """The bore: the shaft's outer diameter where the gear sits on it, its inner one where both are one piece."""
+    largest = root_diameter - 2 * gear.module
+    field = f"{place}.bore_diameter"
+    found = section_diameters(model, gear.component)
+    if found is not None:
+        inner, outer, origin = found
+        if outer <= largest:
+            draft.put(field, millimetres(outer), f"{origin}, outer diameter")
+            return
+        if 0 < inner <= largest:
+            draft.put(field, millimetres(inner), f"{origin}, inner diameter: gear and shaft of one piece")
+            return
+    draft.assume(field, millimetres(round(0.5 * root_diameter, 4)), "half the root diameter")
+
+
+def put_bearing(model: RexsModel, draft: Draft, place: str, component: Component) -> None:
+    """Stiffness of the bearings of a gear's shaft as one bearing at the gear, the shaft being rigid."""
+    shafts = model.related(component, "shaft", relation="assembly")
+    bearings = [b for shaft in shafts for b in model.related(shaft, *BEARINGS, relation="side")]
+    radial = [(b, model.si(b, "radial_stiffness", "N/m")) for b in bearings]
+    known = [(b, k) for b, k in radial if k is not None and 0 < k < STIFFEST]
+    if not known or len(known) < len(bearings):
+        return
+    origin = f"REXS bearings {', '.join(b.id for b, _ in known)}, shaft rigid"
+    draft.put(f"{place}.stiffness", f"{sum(k for _, k in known):.6g} N/m", origin)
+    axial = sum(k for b in bearings if (k := model.si(b, "axial_stiffness", "N/m")) is not None and k < STIFFEST)
+    if axial > 0:
+        draft.put(f"{place}.axial", f"{axial:.6g} N/m", origin)
+    at = model.si(component, "u_coordinate_on_shaft", "m")
+    arms = [(k, model.si(b, "u_coordinate_on_shaft_inner_side", "m")) for b, k in known]
+    if at is not None and all(u is not None for _, u in arms):
+        tilt = sum(k * ((u or 0.0) - at) ** 2 for k, u in arms)
+        if tilt > 0:
+            draft.put(f"{place}.tilt", f"{tilt:.6g} N*m/rad", origin)
+
+
+def shaft_torque(model: RexsModel, component: Component) -> float | None:
+    """Largest torque (N·m) that an external load brings into the shaft of a gear, over all load cases."""
+    shafts = model.related(component, "shaft", relation="assembly")
+    loads = [load for shaft in shafts for load in model.related(shaft, "external_load")]
+    found = [model.largest(load, "torque_around_u_axis", "N*m") for load in loads]
+    return max((value for value in found if value), default=None)
+
+
+def shaft_speed(model: RexsModel, component: Component) -> float | None:
+    """Largest speed (rad/s) of the shaft of a gear, over all load cases."""
+    shafts = model.related(component, "shaft", relation="assembly")
+    return max((v for s in shafts if (v := model.largest(s, "rotational_speed", "rad/s"))), default=None)

@@ -1,0 +1,199 @@
+"""A cylindrical_stage of two external gears as an external pair."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from gearfmu.errors import Problem
+from gearfmu.geometry import PairGeometry
+from gearfmu.rexs.draft import Draft, millimetres
+from gearfmu.rexs.gears import (
+    RexsGear,
+    gear_of,
+    put_bearing,
+    put_bore,
+    put_rack,
+    put_teeth,
+    shaft_speed,
+    shaft_torque,
+    sum_of_shifts,
+)
+from gearfmu.rexs.model import Component, RexsModel
+from gearfmu.spec.base import validate
+from gearfmu.spec.checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.spec.gear import GearSpec, PairSpec
+from gearfmu.units import to_si
+
+LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
+PITCH_SPEED = 20.0  # m/s at the pitch circle
+BACKLASH_PER_MODULE = 0.02
+STRIP_PER_MODULE = 0.12
+NAMES = ("pinion", "wheel")
+
+
+def draft_pair(model: RexsModel, stage: Component, pair: tuple[Component, Component]) -> Draft:
+    """The draft of a pair; what cannot be read is in its problems."""
+    read = [gear_of(model, component) for component in pair]
+    distance = model.si(stage, "center_distance", "m")
+    if distance is None:
+        remedy = "this attribute is missing: add it"
+        model.problems.append(Problem(str(model.path), f"{stage}: center_distance", "", remedy))
+    gears = sorted((gear for gear in read if gear is not None), key=lambda gear: gear.teeth)
+    if len(gears) < 2 or distance is None:
+        return Draft({}, problems=model.problems)
+    draft = Draft.after("helical_demo" if gears[0].helix_angle else "fzg_c")
+    _put_pair(model, draft, stage, gears)
+    place_shifts(draft, gears, "gears.{}.profile_shift".format, distance)
+    for name, gear in zip(NAMES, gears, strict=True):
+        put_teeth(model, draft, f"gears.{name}", gear)
+        put_rack(model, draft, f"gears.{name}.rack", gear)
+        put_bearing(model, draft, f"gears.{name}.bearing", gear.component)
+    _even_bearings(draft, gears)
+    put_tips(draft, gears, "gears.{}".format, distance)
+    for name, gear in zip(NAMES, gears, strict=True):
+        put_bore(model, draft, f"gears.{name}", gear, root_diameter(draft, f"gears.{name}", gear))
+    _put_loads(model, draft, gears)
+    _put_what_fits(draft, gears)
+    return draft
+
+
+def _put_pair(model: RexsModel, draft: Draft, stage: Component, gears: list[RexsGear]) -> None:
+    origin = f"REXS {stage.type} {stage.id}"
+    draft.put("pair.center_distance", model.quantity(stage, "center_distance", "m"), origin)
+    put_rack_data(draft, "pair", gears)
+    if abs(gears[0].helix_angle + gears[1].helix_angle) > 1e-9:
+        shown = ", ".join(f"{math.degrees(gear.helix_angle):g} deg" for gear in gears)
+        remedy = "the helix angles of an external pair are equal and opposite"
+        model.problems.append(Problem(str(model.path), f"{stage}: helix_angle_reference_diameter", shown, remedy))
+    draft.drop("pair.misalignment")
+
+
+def _even_bearings(draft: Draft, gears: list[RexsGear]) -> None:
+    """Spur gears move along their axes and tilt either both or not at all."""
+    tables = [draft.tables["gears"][name]["bearing"] for name in NAMES]
+    for key in ("axial", "tilt"):
+        if gears[0].helix_angle == 0 and not all({"axial", "tilt"} <= set(table) for table in tables):
+            for name in NAMES:
+                draft.drop(f"gears.{name}.bearing.{key}")
+
+
+def put_rack_data(draft: Draft, place: str, gears: list[RexsGear]) -> None:
+    """Module, pressure and helix angle that the gears share; those of the first one."""
+    first = gears[0]
+    draft.put(f"{place}.normal_module", millimetres(first.module), first.origin)
+    draft.put(f"{place}.pressure_angle", degrees(first.pressure_angle), f"{first.origin}, its flanks")
+    draft.put(f"{place}.helix_angle", degrees(first.helix_angle), first.origin)
+    for gear in gears[1:]:
+        for name, value, own in (
+            ("normal module", gear.module, first.module),
+            ("normal pressure angle", gear.pressure_angle, first.pressure_angle),
+        ):
+            if abs(value - own) > 1e-9 * own:
+                draft.notes.append(f"{gear.component} has another {name} than {first.component}: that one is taken")
+
+
+def degrees(angle: float) -> str:
+    """An angle in rad as text for a stage file."""
+    return f"{round(math.degrees(angle), 9):.10g} deg"
+
+
+def place_shifts(draft: Draft, gears: list[RexsGear], place: Any, distance: float) -> None:
+    """Profile shifts as given; missing ones from the centre distance of a pair without backlash."""
+    first = gears[0]
+    total = sum_of_shifts(
+        first.module, first.pressure_angle, first.helix_angle, sum(gear.teeth for gear in gears), distance
+    )
+    rest = total - sum(gear.x for gear in gears if gear.x is not None)
+    missing = sum(gear.x is None for gear in gears)
+    for name, gear in zip(NAMES, gears, strict=True):
+        if gear.x is not None:
+            draft.put(place(name), gear.x, f"{gear.origin}, its flanks")
+        else:
+            gear.x = round(rest / missing, 6) + 0.0
+            draft.assume(place(name), gear.x, "no backlash at the centre distance, equal shares")
+
+
+def put_tips(draft: Draft, gears: list[RexsGear], place: Any, distance: float) -> None:
+    """Tip diameters as given; missing ones d + 2 m_n (h*_aP + x + k), k of ISO 21771 keeping the tip clearance."""
+    module, total = gears[0].module, sum(gear.x or 0.0 for gear in gears)
+    reference = sum(gear.reference_radius for gear in gears)
+    topping = min(0.0, (distance - reference) / module - total)
+    for name, gear in zip(NAMES, gears, strict=True):
+        field = f"{place(name)}.tip_diameter"
+        if gear.tip_diameter is not None:
+            draft.put(field, millimetres(gear.tip_diameter), gear.origin)
+            continue
+        addendum = draft.tables["gears"][name].get("rack", {}).get("addendum", 1.0)
+        radius = gear.reference_radius + module * (addendum + (gear.x or 0.0) + topping)
+        gear.tip_diameter = math.floor(2 * radius * 1e5) / 1e5
+        draft.assume(field, millimetres(gear.tip_diameter), "d + 2 m_n (h_aP + x + k), tip clearance kept")
+
+
+def root_diameter(draft: Draft, place: str, gear: RexsGear) -> float:
+    """d_f (m) with the rack that the draft has for the gear."""
+    table: Any = draft.tables
+    for step in place.split("."):
+        table = table[step]
+    dedendum = table.get("rack", {}).get("dedendum", 1.25)
+    return 2 * (gear.reference_radius - gear.module * (dedendum - (gear.x or 0.0)))
+
+
+def assumed_torque(gears: list[RexsGear]) -> float:
+    """Torque (N·m) on the first gear at the usual load K: K b d₁² u / (2 (u + 1))."""
+    diameter, ratio = 2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth
+    width = min(gear.face_width for gear in gears)
+    return LOAD_PER_FACE * width * diameter**2 * ratio / (ratio + 1) / 2
+
+
+def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:
+    ratio = gears[1].teeth / gears[0].teeth
+    torques = [shaft_torque(model, gear.component) for gear in gears]
+    found = torques[0] or (torques[1] / ratio if torques[1] else None)
+    if found:
+        draft.put("torque_max", f"{rounded_up(found, 3):g} N*m", "REXS external_load, the largest of all load cases")
+    else:
+        assumed = f"{rounded_up(assumed_torque(gears), 2):g} N*m"
+        draft.assume("torque_max", assumed, "K = F_t/(b d1) (u + 1)/u = 4 N/mm2 of case-hardened gears")
+    speeds = [shaft_speed(model, gear.component) for gear in gears]
+    speed = speeds[0] or (speeds[1] * ratio if speeds[1] else None)
+    if speed:
+        draft.put("speed_max", f"{rounded_up(speed, 4):g} rad/s", "REXS shaft, the largest of all load cases")
+    else:
+        assumed = f"{rounded_up(PITCH_SPEED / gears[0].reference_radius, 2):g} rad/s"
+        draft.assume("speed_max", assumed, "20 m/s at the reference circle")
+
+
+def _put_what_fits(draft: Draft, gears: list[RexsGear]) -> None:
+    """Backlash and load strips, which need the whole pair; where it cannot be formed the loader says why."""
+    module = gears[0].module
+    draft.assume("pair.backlash", millimetres(BACKLASH_PER_MODULE * module), "2 % of the module")
+    for name in NAMES:
+        draft.assume(f"gears.{name}.body.strip_half_width", millimetres(STRIP_PER_MODULE * module), "0.12 m_n")
+    pair, _ = validate(PairSpec, draft.tables["pair"], "")
+    specs = [validate(GearSpec, draft.tables["gears"][name] | {"name": name}, "")[0] for name in NAMES]
+    known = [spec for spec in specs if spec is not None]
+    if pair is None or len(known) < 2:
+        return
+    try:
+        geometry = PairGeometry.of(_Stage(pair, known))
+        if any(gear.r_a <= gear.r_b for gear in geometry.gears):
+            return
+        nominal = geometry.nominal_backlash
+        width = STRIP_PER_HERTZ * largest_half_width(known, geometry, to_si(draft.tables["torque_max"], "N*m"))
+    except (ValueError, ZeroDivisionError):
+        return
+    if nominal > BACKLASH_PER_MODULE * module:
+        text = millimetres(rounded_up(nominal, 3))
+        draft.assume("pair.backlash", text, "what profile shifts and centre distance give")
+    if width > STRIP_PER_MODULE * module:
+        for name in NAMES:
+            text = millimetres(rounded_up(width, 2))
+            draft.assume(f"gears.{name}.body.strip_half_width", text, "1.5 Hertz half-widths at torque_max")
+
+
+class _Stage:
+    """What PairGeometry reads of a stage."""
+
+    def __init__(self, pair: PairSpec, gears: list[GearSpec]):
+        self.pair, self.gears = pair, gears

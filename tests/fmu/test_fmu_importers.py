@@ -1,0 +1,186 @@
+"""Other importers run the native FMU and give fmpy's numbers.
+
+libcosim and Ecos come from PyPI. fmusim (Reference-FMUs), fmuCheck (FMI Library) and OMSimulator are taken from PATH or
+from the environment variables FMUSIM, FMUCHECK and OMSIMULATOR; a test without its program is skipped and says so."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+
+from gearfmu.fmu.probes import Subject
+
+STEPS, H = 200, 1e-4
+NAMES = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
+SPEED, RATIO = 200.0, 16 / 24  # rad/s; the wheel turns the other way
+
+
+@pytest.mark.needs("libcosimpy")
+def test_libcosim_gives_the_numbers_of_fmpy(native, unpacked):
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    variables = {v.name: v.valueReference for v in read_model_description(unpacked).modelVariables}
+    names = ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
+    execution = CosimExecution.from_step_size(int(H * 1e9))
+    slave = execution.add_local_slave(CosimLocalSlave(fmu_path=str(native), instance_name="stage"))
+    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
+    execution.add_observer(observer)
+    execution.add_manipulator(manipulator)
+    values = [2e-3, 1.0]
+    manipulator.slave_real_values(slave, [variables["pinion.phi"], variables["pinion.w"]], values)
+    rows = []
+    for _ in range(STEPS):
+        execution.step()
+        rows.append(observer.last_real_values(slave, [variables[name] for name in names]))
+    expected = held_run(unpacked, dict(zip(("pinion.phi", "pinion.w"), values, strict=True)), names)
+    scale = np.abs(expected).max(axis=0)
+    assert (np.abs(np.array(rows) - expected) / scale).max() <= 1e-12
+
+
+def held_run(folder: str, inputs: dict[str, float], outputs: list[str]) -> np.ndarray:
+    """Outputs after each of STEPS steps with inputs that are set after the initialisation and then held."""
+    subject = Subject(folder)
+    by_name = {v.name: v.valueReference for v in subject.variables}
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    subject.fmu.exitInitializationMode()
+    subject.fmu.setReal([by_name[name] for name in inputs], list(inputs.values()))
+    rows = []
+    for k in range(STEPS):
+        subject.fmu.doStep(k * H, H)
+        rows.append(subject.fmu.getReal([by_name[name] for name in outputs]))
+    subject.close()
+    return np.array(rows)
+
+
+ECOS = """
+import json, sys
+from ecospy import EcosSimulation, EcosSimulationStructure
+fmu, steps, h, inputs, outputs = json.loads(sys.argv[1])
+with EcosSimulationStructure() as structure:
+    structure.add_model("stage", fmu)
+    with EcosSimulation(structure=structure, step_size=h) as simulation:
+        simulation.init()
+        for name, value in inputs.items():
+            simulation.set_real("stage::" + name, value)
+        rows = []
+        for _ in range(steps):
+            simulation.step()
+            rows.append([simulation.get_real("stage::" + name) for name in outputs])
+        simulation.terminate()
+print(json.dumps(rows))
+"""
+
+
+@pytest.mark.needs("ecospy")
+def test_ecos_gives_the_numbers_of_fmpy(native, unpacked):
+    inputs, names = {"pinion.phi": 2e-3, "pinion.w": 1.0}, ["mesh.force", "mesh.te", "pinion.tau", "bearing.wheel.fx"]
+    setting = json.dumps([str(native), STEPS, H, inputs, names])
+    done = subprocess.run([sys.executable, "-c", ECOS, setting], capture_output=True, text=True)
+    if "libtbb" in done.stderr:
+        pytest.skip("needs the library libtbb: apt-get install libtbb12")
+    assert done.returncode == 0, done.stderr[-2000:]
+    expected = held_run(unpacked, inputs, names)
+    rows = np.array(json.loads(done.stdout.splitlines()[-1]))
+    assert (np.abs(rows - expected) / np.abs(expected).max(axis=0)).max() <= 1e-12
+
+
+def inputs_at(time: float) -> dict[str, float]:
+    """A loaded pair that turns."""
+    return {
+        "pinion.phi": 1e-3 + SPEED * time, "pinion.w": SPEED,
+        "wheel.phi": -SPEED * RATIO * time, "wheel.w": -SPEED * RATIO,
+    }  # fmt: skip
+
+
+def turning_run(folder: str) -> np.ndarray:
+    """Outputs NAMES at the times k H, k = 0 … STEPS, by calls of fmpy's binding alone."""
+    subject = Subject(folder)
+    by_name = {v.name: v.valueReference for v in subject.variables}
+    references = [by_name[name] for name in inputs_at(0)]
+    subject.fmu.setupExperiment(startTime=0.0)
+    subject.fmu.enterInitializationMode()
+    subject.fmu.setReal(references, list(inputs_at(0).values()))
+    subject.fmu.exitInitializationMode()
+    rows = [subject.fmu.getReal([by_name[name] for name in NAMES])]
+    for k in range(STEPS):
+        subject.fmu.setReal(references, list(inputs_at(k * H).values()))
+        subject.fmu.doStep(k * H, H)
+        rows.append(subject.fmu.getReal([by_name[name] for name in NAMES]))
+    subject.close()
+    return np.array(rows)
+
+
+def fmpy_command(_: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
+    return [sys.executable, "-m", "fmpy", "simulate", str(fmu), "--stop-time", str(STEPS * H), "--step-size", str(H),
+            "--output-interval", str(H), "--input-file", str(inputs), "--output-file", str(out)]  # fmt: skip
+
+
+def fmusim_command(program: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
+    outputs = [word for name in NAMES for word in ("--output-variable", name)]
+    return [program, "--interface-type", "cs", "--stop-time", str(STEPS * H), "--output-interval", str(H),
+            "--input-file", str(inputs), "--output-file", str(out), *outputs, str(fmu)]  # fmt: skip
+
+
+def fmucheck_command(program: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
+    return [program, "-k", "cs", "-h", str(H), "-s", str(STEPS * H), "-n", "0", "-i", str(inputs), "-o", str(out),
+            str(fmu)]  # fmt: skip
+
+
+def omsimulator_command(program: str, fmu: Path, inputs: Path, out: Path) -> list[str]:
+    """A Lua script: the pair in a weakly coupled system, its inputs from a table beside it."""
+    script = out.with_suffix(".lua")
+    wires = "".join(f'oms_addConnection("m.root.t.{n}", "m.root.stage.{n}")\n' for n in inputs_at(0))
+    script.write_text(
+        f'oms_setTempDirectory("{out.parent}")\noms_newModel("m")\noms_addSystem("m.root", oms_system_wc)\n'
+        f'oms_addSubModel("m.root.stage", "{fmu}")\noms_addSubModel("m.root.t", "{inputs}")\n{wires}'
+        f'oms_setResultFile("m", "{out}")\noms_setStopTime("m", {STEPS * H})\n'
+        f'oms_setFixedStepSize("m.root", {H})\noms_instantiate("m")\noms_initialize("m")\noms_simulate("m")\n'
+        'oms_terminate("m")\noms_delete("m")\n',
+        encoding="utf-8",
+    )
+    return [program, str(script)]
+
+
+PROGRAMS: dict[str, tuple[str, Callable[[str, Path, Path, Path], list[str]], str]] = {
+    "fmpy": ("python", fmpy_command, ""),
+    "fmusim": ("FMUSIM", fmusim_command, "a release of github.com/modelica/Reference-FMUs has it"),
+    "fmuCheck": ("FMUCHECK", fmucheck_command, "github.com/modelica-tools/FMUComplianceChecker has it"),
+    "OMSimulator": ("OMSIMULATOR", omsimulator_command, "openmodelica.org has it"),
+}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_programs_give_the_numbers_of_fmpy(name, native, unpacked, tmp_path):
+    """Inputs from a table, outputs as a table: within 1e-9 of the largest value of each output."""
+    variable, command, source = PROGRAMS[name]
+    program = sys.executable if name == "fmpy" else os.environ.get(variable) or shutil.which(name)
+    if program is None:
+        pytest.skip(f"needs the program {name} on PATH, or its path in {variable}: {source}")
+    inputs, out = tmp_path / "inputs.csv", tmp_path / "out.csv"
+    with inputs.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["time", *inputs_at(0)])
+        writer.writerows([t, *inputs_at(t).values()] for t in (k * H for k in range(STEPS + 1)))
+    done = subprocess.run(command(program, native, inputs, out), capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    table = np.genfromtxt(out, delimiter=",", names=True, deletechars="", dtype=float)
+    columns = [next(c for c in table.dtype.names if c.strip('"').endswith(n)) for n in NAMES]
+    found = np.array([np.interp(np.arange(STEPS + 1) * H, table[table.dtype.names[0]], table[c]) for c in columns]).T
+    expected = turning_run(unpacked)
+    assert np.ptp(expected[:, 0]) > 100, "the run loads the teeth"
+    assert (np.abs(found - expected)[1:] / np.abs(expected).max(axis=0)).max() <= 1e-9

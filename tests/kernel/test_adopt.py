@@ -1,0 +1,90 @@
+"""A run that goes on with another setup (gk_adopt): the motion is carried over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearfmu.body import load_bodies
+from gearfmu.errors import ModelError
+from gearfmu.kernel import Kernel
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import assemble
+from gearfmu.stage.steady import Steady
+
+STEP, BEFORE, AFTER = 20e-6, 250, 250  # s; communication steps
+
+
+@pytest.fixture(scope="module")
+def drive() -> Steady:
+    spec = load_stage("fzg_c/stage_relief")
+    return Steady(assemble(spec, load_bodies(spec)), 209.4, 250.0)
+
+
+def begun(drive: Steady, **parameters: float) -> Kernel:
+    kernel = drive.model.kernel(**parameters)
+    give(kernel, drive, 0.0)
+    kernel.initialize()
+    run(kernel, drive, 0, BEFORE)
+    return kernel
+
+
+def give(kernel: Kernel, drive: Steady, time: float) -> None:
+    for name, value in drive(time).items():
+        kernel.set(name, value)
+
+
+def run(kernel: Kernel, drive: Steady, start: int, end: int) -> np.ndarray:
+    """Transmission error after every step."""
+    found = []
+    for k in range(start, end):
+        give(kernel, drive, k * STEP)
+        kernel.step(k * STEP, STEP)
+        found.append(kernel.get("mesh.te"))
+    return np.array(found)
+
+
+def taken_over(drive: Steady, old: dict[str, float], new: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Transmission errors after the change, and of a run with the new setup from the start, over its alternating
+    part."""
+    first, kernel, own = begun(drive, **old), drive.model.kernel(**new), begun(drive, **new)
+    kernel.adopt(first)
+    found, wanted = (run(k, drive, BEFORE, BEFORE + AFTER) for k in (kernel, own))
+    return found / np.std(wanted), wanted / np.std(wanted)
+
+
+def test_the_same_setup_goes_on_as_if_nothing_had_been(drive: Steady) -> None:
+    setup = {"level": 1.0, "h": 2e-6}
+    found, wanted = taken_over(drive, setup, setup)
+    assert np.abs(found - wanted).max() < 5e-3  # states of modes are single precision, what contacts owe is forgotten
+
+
+def test_modes_that_become_dynamic_start_in_their_static_place(drive: Steady) -> None:
+    found, wanted = taken_over(drive, {"level": 1.0, "h": 5e-6}, {"level": 2.0, "h": 5e-6})
+    assert np.abs(found - wanted).max() < 0.02
+
+
+@pytest.mark.parametrize("new", [{"level": 0.0, "h": 5e-6}, {"level": 1.0, "h": 1e-5, "slices": 1.0}])
+def test_what_a_poorer_setup_cannot_keep_is_forgotten(drive: Steady, new: dict[str, float]) -> None:
+    found, wanted = taken_over(drive, {"level": 1.0, "h": 5e-6}, new)
+    distance = np.abs(found - wanted)
+    assert distance[-50:].max() < 0.1 and distance[-50:].max() < 0.2 * distance[:50].max()
+
+
+def test_a_change_leaves_no_debt_of_energy(drive: Steady) -> None:
+    first, kernel = begun(drive, level=1.0, h=5e-6), drive.model.kernel(level=2.0, h=5e-6)
+    kernel.adopt(first)
+    run(kernel, drive, BEFORE, BEFORE + 20)
+    rounds = kernel.get("solver.rounds")
+    run(kernel, drive, BEFORE + 20, BEFORE + 120)
+    assert kernel.get("solver.rounds") - rounds < 1.5 * 100 * STEP / 5e-6  # a debt costs 35 iterations a step
+
+
+def test_states_that_cannot_be_taken_over_are_refused(drive: Steady) -> None:
+    fresh = drive.model.kernel(level=1.0)
+    give(fresh, drive, 0.0)
+    fresh.initialize()
+    with pytest.raises(ModelError, match="must have made a step"):
+        drive.model.kernel(level=2.0).adopt(fresh)
+    with pytest.raises(ModelError, match="effect.bearings"):
+        drive.model.kernel(**{"effect.bearings": 0.0}).adopt(begun(drive, level=1.0))

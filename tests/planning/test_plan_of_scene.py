@@ -1,0 +1,109 @@
+"""A plan from request to run, on a short window of a loaded pair."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gearfmu.cosim.scene_run import stage_model
+from gearfmu.errors import SpecError
+from gearfmu.planning.book import Plan
+from gearfmu.planning.choice import Choice, space
+from gearfmu.planning.make import Job, make
+from gearfmu.planning.request import request
+from gearfmu.planning.run import run_planned
+from gearfmu.planning.table import plan_text
+from gearfmu.report.plan import plan_sections
+from gearfmu.spec.scene import load_scene
+from gearfmu.stage.effects import EFFECTS
+from gearfmu.sweeps.runners import in_this_process
+
+BAND = ("500 Hz", "5 kHz")
+SCENE: dict[str, Any] = {"settle": "20 ms", "duration": "80 ms"}
+
+
+@pytest.fixture(scope="module")
+def made() -> Plan:
+    scene = load_scene("pair_loaded", SCENE)
+    model = stage_model(scene)
+    asked = request(scene, model, ["te", "bearing.pinion.fx"], BAND, "1 dB")
+    return make(Job(scene, model, asked, in_this_process, force=("coast_flank",)), "pair_loaded")
+
+
+def test_a_request_is_refused_with_all_that_is_wrong() -> None:
+    scene = load_scene("pair_loaded")
+    with pytest.raises(SpecError) as caught:
+        request(scene, stage_model(scene), ["tee"], ("200 Hz", "50 kHz"), "5 %", "1 dB")
+    assert [p.field for p in caught.value.problems] == ["--output", "--band", "--budget", "--waveform"]
+    assert '--step "9 us"' in str(caught.value)
+
+
+def test_dissipation_and_the_static_residual_are_no_candidates() -> None:
+    scene = load_scene("pair_loaded")
+    names = {knob.name for knob in space(scene, stage_model(scene), least_share=-10.0).candidates}
+    assert names >= {"modes", "step", "slices", "hertz", "coast_flank"}
+    assert not names & {"contact_damping", "modal_damping", "residual", "roll_motion"}
+
+
+def test_every_switch_of_the_table_of_effects_is_a_knob() -> None:
+    scene = load_scene("pair_loaded")
+    model = stage_model(scene)
+    there = {variable.name for variable in model.kernel_variables()}
+    switched = {e.name for e in EFFECTS if e.off_setting and set(e.off_setting) <= there}
+    assert {knob.name for knob in space(scene, model).knobs} == switched | {"step"}
+
+
+@pytest.mark.full
+def test_the_chosen_set_keeps_the_budget_and_is_cheaper(made: Plan) -> None:
+    (segment,) = made.segments
+    assert segment.kept and segment.bound * segment.safety <= 1.0
+    assert segment.price < 0.3 * segment.price_full
+    assert "coast_flank" in segment.choice.off  # loaded: it does nothing, and it may go
+    lines = {line.effect: line for line in segment.lines}
+    assert lines["tip_contact"].verdict == "on" and lines["tip_contact"].error > 0.8
+    assert "predicted" in plan_text(made)
+
+
+@pytest.mark.full
+def test_a_plan_survives_its_file(made: Plan, tmp_path: Path) -> None:
+    assert str(Plan.load(made.save(tmp_path / "plan.toml"))) == str(made)
+    (tmp_path / "other.toml").write_text("format = 7\n", encoding="utf-8")
+    with pytest.raises(SpecError, match="no plan"):
+        Plan.load(tmp_path / "other.toml")
+
+
+@pytest.mark.full
+def test_a_planned_run_is_checked_from_its_own_states(made: Plan) -> None:
+    trace = run_planned(made)
+    assert trace.meta["outcome"] == "ok" and not trace.meta["plan"]["trips"]
+    assert all(check["kept"] for check in trace.meta["plan"]["checks"]) and trace.meta["plan"]["checks"]
+    assert "Spot check" in plan_sections(trace.meta["plan"])[0]
+
+
+def test_a_segment_that_loses_contact_trips_and_goes_on_with_the_coast_flank(made_by_hand: Plan) -> None:
+    trace = run_planned(made_by_hand, verify=False)
+    (first, *_) = trace.meta["plan"]["trips"]
+    assert first["wire"] == "coast flank" and "coast_flank off" not in first["answer"]
+    assert trace.meta["outcome"] == "ok" and trace["mesh.force_coast"].max() > 0
+    assert trace.time.size == 1601 and trace["mesh.te"].min() > -400e-6  # teeth do not pass through each other
+
+
+@pytest.fixture
+def made_by_hand(tmp_path: Path) -> Plan:
+    """A plan that takes the coast flank out where the clutch is dumped."""
+    scene = load_scene("clutch_dump", {"duration": "80 ms"})
+    nothing = dict.fromkeys(
+        ("bound", "error", "noise", "price", "realtime", "price_full", "price_default", "error_default"), 0.0
+    )
+    from gearfmu.planning.book import Segment
+
+    choice = Choice("fast", 1e-5, 1, ("coast_flank",))
+    segment = Segment("all", 0.0, 0.08, "loaded", choice, 0.02, 0.01, 0.01, safety=1.25, **nothing)
+    path = tmp_path / "dump.toml"
+    text = (Path(load_scene.__globals__["SHIPPED"]) / "clutch_dump.toml").read_text(encoding="utf-8")
+    path.write_text(text.replace('duration = "0.3 s"', 'duration = "80 ms"'), encoding="utf-8")
+    asked = {"outputs": ["mesh.te"], "band": ["500 Hz", "5000 Hz"], "budget": "1 dB"}
+    return replace(Plan(str(path), "", scene.coupling.step, asked, (segment,)))

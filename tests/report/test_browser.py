@@ -1,0 +1,102 @@
+"""Pages as Chromium shows them: drawn, without errors, at 420 px too; what is shown is what was computed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearfmu as gf
+from gearfmu.body import load_bodies
+from gearfmu.report.moving import moving_view
+from gearfmu.report.picture import _displacement
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.observed import gear_bodies
+from gearfmu.stage.trace import Trace
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from browser import Browser  # noqa: E402
+
+pytestmark = [pytest.mark.full, pytest.mark.needs("chromium")]
+
+
+@pytest.fixture(scope="module")
+def trace() -> Trace:
+    return gf.simulate("fzg_c/stage_relief", "302 N*m", "2000 rpm", duration="0.06 s", level="fast")
+
+
+@pytest.fixture(scope="module")
+def page(trace: Trace, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    trace.meta["stage"] = "fzg_c/stage_relief"
+    return gf.write_report(trace, tmp_path_factory.mktemp("page"))
+
+
+@pytest.fixture(scope="module")
+def opened(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("profile")) as browser:
+        browser.open(page)
+        browser.draw_all()
+        yield browser
+
+
+def test_every_figure_is_drawn_without_an_error(opened: Browser) -> None:
+    places = opened.value("document.querySelectorAll('.plot').length")
+    assert places > 15 and opened.value("gearfmuPage.drawn") == places
+    assert opened.value("document.querySelectorAll('.plot .main-svg').length") >= places
+    assert opened.errors == [] and opened.value("gearfmuPage.errors") == []
+
+
+@pytest.mark.parametrize("width", [420, 1280])
+def test_nothing_hangs_over_the_edge(page: Path, tmp_path: Path, width: int) -> None:
+    with Browser(tmp_path, width, 900) as browser:
+        browser.open(page)
+        browser.draw_all()
+        assert browser.value("document.documentElement.scrollWidth") <= width
+        wide = "[...document.querySelectorAll('section')].filter(s => s.getBoundingClientRect().right > innerWidth)"
+        assert browser.value(f"{wide}.length") == 0 and browser.errors == []
+
+
+def test_a_zoomed_curve_shows_the_samples_and_the_other_figures_follow(opened: Browser, trace: Trace) -> None:
+    opened.value("Plotly.relayout(document.getElementById('mesh.0'), {'xaxis.range': [0.03, 0.032]}).then(() => 1)")
+    opened.value("new Promise(done => setTimeout(done, 300)).then(() => 1)")
+    x, y = opened.value("(d => [Array.from(d.x), Array.from(d.y)])(document.getElementById('mesh.0').data[0])")
+    part = trace.window(0.03, 0.032)
+    shown = np.interp(part.time, x, y)
+    assert np.abs(shown - 1e-3 * part["mesh.force"]).max() < 1e-4 * np.ptp(1e-3 * trace["mesh.force"])
+    assert opened.value("document.getElementById('bearing.1').layout.xaxis.range") == pytest.approx([0.03, 0.032])
+    assert opened.value("document.getElementById('spectrum.0').layout.xaxis.range[0]") == 0
+
+
+def test_the_turning_view_moves_by_the_displacement_of_the_picture(opened: Browser, trace: Trace) -> None:
+    """The script's sum of unit loads is the one that Python makes, within the steps in which they are stored."""
+    spec = load_stage("fzg_c/stage_relief")
+    stage, bodies = as_general(spec), gear_bodies(spec, load_bodies(spec))
+    start, end = opened.value("gearfmuPage.stage.run(false), gearfmuPage.stage.state.at = 40, gearfmuPage.stage.span")
+    view = moving_view(trace, stage, bodies, (start, end))
+    assert view is not None
+    for body in view.bodies:
+        tooth, roll, force = (values[40] for values in body.contacts["mesh"])
+        loads = [(int(k), float(s)) for k, s, f in zip(tooth, roll, force, strict=True) if f]
+        wanted = _displacement(bodies[body.name], body.teeth, loads, float(force.sum()))
+        found = np.array(opened.value(f"gearfmuPage.stage.displaced('{body.name}')")).reshape(-1, 3)
+        assert np.abs(found - wanted).max() < 0.02 * np.abs(wanted).max()
+
+
+def test_it_turns(opened: Browser) -> None:
+    opened.value("gearfmuPage.stage.state.at = 0, gearfmuPage.stage.run(true), 1")
+    opened.value("new Promise(done => setTimeout(done, 700)).then(() => 1)")
+    assert opened.value("gearfmuPage.stage.state.at") > 1
+    opened.value("gearfmuPage.stage.run(false), 1")
+
+
+def test_a_comparison_is_drawn(trace: Trace, tmp_path: Path) -> None:
+    found = gf.compare({"a": trace, "b": trace}, tmp_path / "page.html")
+    with Browser(tmp_path / "profile", 420, 900) as browser:
+        browser.open(found)
+        browser.draw_all()
+        assert browser.value("document.documentElement.scrollWidth") <= 420 and browser.errors == []
+        assert browser.value("gearfmuPage.drawn") == browser.value("document.querySelectorAll('.plot').length") > 5

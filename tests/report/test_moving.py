@@ -1,0 +1,126 @@
+"""The turning view: forces, teeth and angles it hands to the page are those of the run."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfmu.body import load_bodies
+from gearfmu.geometry import PairGeometry
+from gearfmu.report.moving import FRAMES, View, moving_view
+from gearfmu.report.packed import Pack, unpacked
+from gearfmu.report.picture import contacts_at, meshing_angles
+from gearfmu.spec.expand import as_general
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage.meshes import mesh_geometry
+from gearfmu.stage.observed import gear_bodies
+from gearfmu.stage.trace import Channel, Trace
+
+SPEED, FORCE = 200.0, 8000.0  # rad/s, N
+TIME = np.linspace(0.0, 0.02, 2001)
+
+
+def turning_pair(sign: float = 1.0) -> tuple[Trace, Any, dict[str, Any]]:
+    """A pair that turns without slip under a constant force."""
+    spec = load_stage("fzg_c")
+    angle = SPEED * TIME
+    channels = {
+        "mesh.force": Channel(np.full(TIME.size, sign * FORCE), "N"),
+        "pinion.gear.phi": Channel(angle, "rad"),
+        "wheel.gear.phi": Channel(-angle * 16 / 24, "rad"),
+    }
+    return Trace(TIME, channels, {}), as_general(spec), gear_bodies(spec, load_bodies(spec))
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    trace, stage, bodies = turning_pair()
+    found = moving_view(trace, stage, bodies, (0.001, 0.019))
+    assert found is not None
+    return found
+
+
+def test_contacts_carry_the_recorded_force(view: View) -> None:
+    pinion, wheel = view.bodies
+    for body in (pinion, wheel):
+        _, roll, force = body.contacts["mesh"]
+        assert force.sum(axis=1) == pytest.approx(FORCE)
+        assert np.all((roll > 0) == (force > 0))
+    both = (pinion.contacts["mesh"][2] > 0).sum(axis=1)
+    assert set(both) == {1, 2}, "one and two tooth pairs take turns"
+
+
+def test_loaded_teeth_stand_where_the_flanks_of_both_gears_meet(view: View) -> None:
+    """The contact points of both gears, each from its own angle, tooth and roll, are one point."""
+    pair = mesh_geometry(turning_pair()[1], turning_pair()[1].engagements[0])
+    for frame in range(0, FRAMES, 7):
+        spots = []
+        for number, body in enumerate(view.bodies):
+            tooth, roll, force = (values[frame, 0] for values in body.contacts["mesh"])
+            geometry = pair.gears[number]
+            t = body.angle[frame] + 2 * math.pi * tooth / geometry.z + geometry.psi_b - roll / geometry.r_b
+            x, y, _ = body.place
+            spots.append(complex(x[frame], y[frame]) + (geometry.r_b + 1j * roll) * np.exp(1j * t))
+        assert abs(spots[0] - spots[1]) < 2e-6
+
+
+def test_a_pair_at_rest_has_the_contacts_of_the_picture() -> None:
+    trace, stage, bodies = turning_pair(-1.0)
+    found = moving_view(trace, stage, bodies, (0.0, 0.02))
+    assert found is not None and np.all(found.bodies[0].contacts["mesh"][2] <= 0)
+    pair = mesh_geometry(stage, stage.engagements[0])
+    assert isinstance(pair, PairGeometry)
+    angles = meshing_angles(pair, 0.1, 1)
+    assert [c.teeth for c in contacts_at(pair, angles, 1)] == [c.teeth for c in contacts_at(pair, list(angles), 1)]
+
+
+def test_without_angles_or_load_there_is_no_view() -> None:
+    trace, stage, bodies = turning_pair()
+    still = Trace(TIME, {"mesh.force": trace.channels["mesh.force"]}, {})
+    assert moving_view(still, stage, bodies, (0.0, 0.02)) is None
+    free = Trace(TIME, {**trace.channels, "mesh.force": Channel(np.zeros(TIME.size), "N")}, {})
+    assert moving_view(free, stage, bodies, (0.0, 0.02)) is None
+
+
+def test_the_page_gets_one_sector_and_small_numbers(view: View) -> None:
+    pack = Pack()
+    numbers = view.numbers(pack)
+    text = pack.text({"stage": numbers})
+    assert len(text) < 500_000
+    content, arrays = unpacked(text)
+    pinion = content["stage"]["bodies"][0]
+    assert pinion["teeth"] == 16 and arrays[pinion["points"]].size == 3 * pinion["size"]
+    unit = arrays[pinion["unit"]].astype(float) * pinion["step"]
+    assert np.abs(unit - view.bodies[0].unit.ravel()).max() <= 0.51 * pinion["step"]  # type: ignore[union-attr]
+    assert arrays[pinion["angle"]] == pytest.approx(view.bodies[0].angle)
+
+
+@pytest.mark.full
+def test_planets_stand_between_sun_and_ring() -> None:
+    """In a set at rest under a load every mesh has its contacts, and the points of both gears are one."""
+    spec = load_stage("planetary54")
+    stage, bodies = as_general(spec), gear_bodies(spec, load_bodies(spec))
+    carrier = 85.0 * TIME
+    channels = {"carrier.gear.phi": Channel(carrier, "rad"), "sun.gear.phi": Channel(4 * carrier, "rad")}
+    for k in range(1, 5):
+        channels[f"planet{k}.gear.phi"] = Channel(-2 * carrier, "rad")
+        for central, sign in (("sun", -1), ("ring", 1)):
+            channels[f"{central}_planet{k}.force"] = Channel(np.full(TIME.size, sign * 1800.0), "N")
+    view = moving_view(Trace(TIME, channels, {}), stage, bodies, (0.0, 0.02))
+    assert view is not None and len(view.bodies) == 6
+    made = {body.name: body for body in view.bodies}
+    for mesh in stage.engagements:
+        pair, sg = mesh_geometry(stage, mesh), -1 if mesh.name.startswith("sun") else 1
+        for frame in (3, 77):
+            spots = []
+            for name, geometry in zip(mesh.gears, pair.gears, strict=True):
+                body = made[name]
+                tooth, roll, force = (values[frame, 0] for values in body.contacts[mesh.name])
+                assert abs(force) >= 1800.0 / 3
+                t = body.angle[frame] + 2 * math.pi * tooth / geometry.z + sg * (geometry.psi_b - roll / geometry.r_b)
+                x, y, _ = body.place
+                spots.append(complex(x[frame], y[frame]) + (geometry.r_b + 1j * sg * roll) * np.exp(1j * t))
+            assert abs(spots[0] - spots[1]) < 5e-6, mesh.name

@@ -1,0 +1,390 @@
+"""Flanks that are no nominal involutes, by hand: rigid geometry says what the unloaded transmission error is, and the
+loaded one lies as far from that of nominal flanks."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from by_hand import Pair
+from scipy.special import j1
+
+from gearfmu.body import ReducedBody
+from gearfmu.errors import ModelError
+from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry.relief import ReliefCurve
+from gearfmu.kernel import Kernel
+from gearfmu.spec.flanks import Eccentricity, ProfileSpec, RootRelief, TipRelief, Wobble
+from gearfmu.spec.gear import GearSpec
+from gearfmu.spec.lead import EndRelief, LeadSpec, Misalignment
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage import StageModel, Steady, assemble, loaded_te, simulate
+from gearfmu.stage.blob import read_blob, write_blob
+from gearfmu.stage.te import statics_of
+
+NO_CORNERS = {"effect.tip_contact": 0.0}
+PROFILES: dict[str, dict[str, Any]] = {
+    "slope": {"profile": ProfileSpec(slope=10e-6)},
+    "crowning": {"profile": ProfileSpec(crowning=8e-6)},
+    "linear tip relief": {"tip_relief": TipRelief(amount=15e-6, kind="linear")},
+    "arc of tip relief": {"tip_relief": TipRelief(amount=15e-6, kind="arc")},
+    "linear root relief": {"root_relief": RootRelief(amount=12e-6, kind="linear")},
+    "root relief": {"root_relief": RootRelief(amount=12e-6)},
+}
+
+
+def changed(spec: StageSpec, pinion: dict[str, Any], wheel: dict[str, Any] | None = None) -> StageSpec:
+    """The stage with other fields of its gears; reliefs begin in the middle of single contact, said or not."""
+    pair, gears = PairGeometry.of(spec), []
+    for i, update in enumerate((pinion, wheel or {})):
+        middle = (pair.inner_single_contact(i) + pair.outer_single_contact(i)) / 2
+        reliefs = {
+            name: update[name].model_copy(update={"start_roll": middle})
+            for name in ("tip_relief", "root_relief")
+            if update.get(name) is not None and isinstance(update[name].start_roll, str)
+        }
+        gears.append(spec.gears[i].model_copy(update=update | reliefs))
+    return spec.model_copy(update={"gears": tuple(gears)})
+
+
+def depth_by_hand(gear: GearSpec, shape: GearGeometry, roll: float) -> float:
+    """What the profile of a gear has lost at a roll (m), formulas of docs/theory.md, 2.2."""
+    middle, half = (shape.s_form + shape.s_tip) / 2, (shape.s_tip - shape.s_form) / 2
+    depth = 0.0
+    if gear.profile is not None:
+        x = (roll - middle) / half
+        depth += gear.profile.crowning * x**2 - gear.profile.slope * x / 2
+    for relief, end in ((gear.tip_relief, shape.s_a), (gear.root_relief, shape.s_form)):
+        if relief is not None:
+            depth += float(ReliefCurve(relief.amount, float(relief.start_roll), end, relief.kind).depth(roll))
+    return depth
+
+
+def gap_by_hand(spec: StageSpec, pair: PairGeometry, position: float) -> float:
+    """The smallest depth of both gears together among the pairs that are on their flanks."""
+    pairs = Pair(spec, ()).rolls(position).values()
+    return min(
+        sum(depth_by_hand(gear, shape, roll) for gear, shape, roll in zip(spec.gears, pair.gears, rolls, strict=True))
+        for rolls in pairs
+    )
+
+
+# ---- along the profile -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize("gear", [0, 1])
+def test_unloaded_te_is_the_gap_of_the_modified_profile(
+    name: str, gear: int, spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+) -> None:
+    """A linear relief's bend is rounded over one interval of the table: by an eighth of what it changes there."""
+    update = PROFILES[name]
+    modified = changed(spec, update if gear == 0 else {}, update if gear == 1 else {})
+    found = loaded_te(assemble(modified, bodies), [0.0], 24, **NO_CORNERS)
+    by_hand = np.array([gap_by_hand(modified, pair, p) for p in found.position])
+    error = np.abs(found.te[0] - by_hand).max()
+    print(f"{name}: te {1e6 * by_hand.min():.3f} to {1e6 * by_hand.max():.3f} µm, off by {1e9 * error:.2f} nm")
+    assert np.ptp(by_hand) > 1e-6 and error < (40e-9 if "linear" in name else 12e-9)
+
+
+def test_loaded_te_lies_between_those_of_nominal_flanks_moved_by_the_smallest_and_the_largest_gap(
+    spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+) -> None:
+    """Whatever the pairs share: pressed further by more than the largest gap they would carry more than the load, by
+    less than the smallest less. Axes are held, so that the pinion's rolls have grown by te."""
+    modified = changed(spec, PROFILES["crowning"] | PROFILES["linear root relief"], PROFILES["slope"])
+    plain, found = (loaded_te(assemble(s, bodies), [302.0], 16, True, **NO_CORNERS) for s in (spec, modified))
+    for p, te, nominal in zip(found.position, found.te[0], plain.te[0], strict=True):
+        pairs = Pair(spec, ()).rolls(p).values()
+        gaps = [
+            sum(
+                depth_by_hand(g, s, roll)
+                for g, s, roll in zip(modified.gears, pair.gears, (rolls[0] + te, rolls[1]), strict=True)
+            )
+            for rolls in pairs
+        ]
+        assert nominal + min(gaps) - 0.1e-6 < te < nominal + max(gaps) + 0.1e-6
+        if len(gaps) == 1:
+            assert te == pytest.approx(nominal + gaps[0], abs=0.1e-6)  # rows at rolls of the pair turned by the gap
+
+
+def test_without_the_effect_flanks_are_nominal_to_the_last_bit(
+    spec: StageSpec, bodies: list[ReducedBody], plain: StageModel
+) -> None:
+    off = {"effect.flank_deviations": 0.0}
+    modified = assemble(changed(spec, *list(PROFILES.values())[:2]), bodies)
+    assert np.array_equal(loaded_te(modified, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
+    assert "effect.flank_deviations" not in plain.kernel().variables
+
+
+def test_a_stage_that_says_nothing_of_its_flanks_is_the_stage_it_was(spec: StageSpec, plain: StageModel) -> None:
+    sections = read_blob(plain.blob)
+    assert not [name for name in sections if name.startswith(("flank", "runout", "index", "lead"))]
+
+
+# ---- eccentricity ----------------------------------------------------------------------------------------------------
+def revolution(model: StageModel, pitches: int, positions: int, torque: float, **parameters: float) -> np.ndarray:
+    """te (m) at even positions over so many pitches."""
+    kernel = statics_of(model, **parameters)
+    pitch = 2 * math.pi / model.stage.gears[1].teeth
+    return np.array([kernel.transmission(-pitch * i / positions, torque).te for i in range(pitches * positions)])
+
+
+def orders(te: np.ndarray) -> np.ndarray:
+    """Amplitudes (m) by cycles over the whole of te."""
+    return 2 / te.size * np.abs(np.fft.rfft(te))
+
+
+@pytest.mark.parametrize(("gear", "teeth"), [(0, 16), (1, 24)])
+@pytest.mark.parametrize("torque", [0.1, 302.0])
+def test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn(
+    gear: int, teeth: int, torque: float, spec: StageSpec, bodies: list[ReducedBody]
+) -> None:
+    """The projection on the line of action is e sin(φ + …), all flanks of one side alike: amplitude e at the shaft
+    order, loaded or not. What it turns the line of action by is of the order e²/a."""
+    update = {"eccentricity": Eccentricity(amount=20e-6, angle=0.7)}
+    model = assemble(changed(spec, *((update, {}) if gear == 0 else ({}, update))), bodies)
+    found = orders(revolution(model, teeth, 4, torque))
+    print(f"amplitude {1e6 * found[1]:.4f} µm, twice a turn {1e6 * found[2]:.4f} µm")
+    assert found[1] == pytest.approx(20e-6, rel=0.01) and found[2] < 0.05e-6
+
+
+def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Drive flanks of the pinion, line of action at t = −α_wt: n = (sin α, cos α); an axis at angle ψ from tooth 0 goes
+    e (cos, sin)(φ + ψ), towards the wheel's flank by e sin(φ + ψ + α_wt): te falls by that."""
+    psi, pair = 0.7, PairGeometry.of(spec)
+    model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6, angle=psi)}), bodies)
+    te = revolution(model, 16, 4, 0.01)
+    phi = 2 * math.pi * np.arange(te.size) / te.size
+    expected = -20e-6 * np.sin(phi + psi + pair.alpha_wt)
+    assert np.abs(te - te.mean() - expected).max() < 0.1e-6
+
+
+def test_mesh_orders_get_sidebands_at_the_shaft_order(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Contact moves along the line of action by what te moves: the mesh order of amplitude A gets the phase 2π e/p_b
+    sin(φ + …) and so the sidebands A J₁(2π e/p_b). Its amplitude goes up and down with the centre distance too, which
+    adds on one side what it takes on the other: their mean is that of the closed form."""
+    e, pair = 200e-6, PairGeometry.of(spec)
+    assert pair.base_pitch > 10 * e
+    eccentric = assemble(changed(spec, {"eccentricity": Eccentricity(amount=e)}), bodies)
+    plain = assemble(spec, bodies)
+    lines, nominal = orders(revolution(eccentric, 16, 16, 302.0)), orders(revolution(plain, 16, 16, 302.0))
+    left, mesh, right = lines[15:18]
+    closed = nominal[16] * j1(2 * math.pi * e / pair.base_pitch)
+    print(
+        f"mesh order {1e6 * mesh:.3f} µm of {1e6 * nominal[16]:.3f}, sidebands {1e6 * left:.4f}, {1e6 * right:.4f}, "
+        f"closed form {1e6 * closed:.4f} µm"
+    )
+    assert max(nominal[15], nominal[17]) < 1e-12 and mesh == pytest.approx(nominal[16], rel=0.05)
+    assert (left + right) / 2 == pytest.approx(closed, rel=0.05) and left != pytest.approx(right, rel=0.1)
+
+
+def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """The pinion under a constant torque, the wheel's shaft end turning evenly; one turn of the pinion of two. The
+    shaft's inertia and spring carry 32 Hz without resonance."""
+    e, ports = 100e-6, spec.ports | {"pinion": PortSpec(kind="torque")}
+    eccentric = changed(spec, {"eccentricity": Eccentricity(amount=e)})
+    model = assemble(eccentric.model_copy(update={"ports": ports}), bodies)
+    speed, steps = 200.0, 640
+    turn = 2 * math.pi / speed
+
+    def inputs(time: float) -> dict[str, float]:
+        return {"pinion.tau": 302.0, "wheel.phi": -speed / 1.5 * time, "wheel.w": -speed / 1.5}
+
+    start = {"level": 0.0, "pinion.w_start": speed}
+    trace = simulate(model, inputs, 2 * turn, turn / steps, start)
+    te = trace["mesh.te"][-steps:]
+    found = orders(te)
+    print(f"once a turn {1e6 * found[1]:.3f} µm, sidebands of the mesh {1e6 * found[15:18]}")
+    assert found[1] == pytest.approx(e, rel=0.01) and min(found[15], found[17]) > 5 * found[20]
+    assert abs(trace["energy.residual"]).max() < 1e-3 * trace["energy.stored"].max()
+
+
+def test_without_the_effect_gears_run_true(spec: StageSpec, bodies: list[ReducedBody], plain: StageModel) -> None:
+    model = assemble(changed(spec, {"eccentricity": Eccentricity(amount=20e-6)}), bodies)
+    off = {"effect.runout": 0.0}
+    assert np.array_equal(loaded_te(model, [302.0], 8, **off).te, loaded_te(plain, [302.0], 8).te)
+
+
+# ---- wobble ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("quarter", [0, 1])
+def test_a_wobble_at_one_angle_is_a_misalignment(quarter: int, spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Wheel at rest at angle 0, its toothing leaning towards +x (from +z: the centre distance grows) or +y: the pair
+    with that parallelism error, to the last digits."""
+    tilt, span = 2e-4, 0.1
+    phase = PairGeometry.of(spec).wheel_phase
+    wobble = Wobble(amount=tilt, angle=quarter * math.pi / 2 - phase)
+    error = {"in_plane": tilt * span} if quarter == 0 else {"out_of_plane": tilt * span}
+    misaligned = spec.model_copy(
+        update={"pair": spec.pair.model_copy(update={"misalignment": Misalignment(span=span, **error)})}
+    )
+    turned = statics_of(assemble(changed(spec, {}, {"wobble": wobble}), bodies)).transmission(0.0, 302.0)
+    at_rest = statics_of(assemble(misaligned, bodies)).transmission(0.0, 302.0)
+    assert turned.te == pytest.approx(at_rest.te, rel=1e-9)
+    slices, same = (np.array(list(state.forces.values())) for state in (turned, at_rest))
+    assert np.allclose(slices, same, rtol=1e-4, atol=1e-3) and np.ptp(slices[0]) > 0.05 * slices[0].mean()
+
+
+def test_a_wobble_tips_the_load_over_once_a_turn(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """The first slice's share swings as a cosine of the pinion's angle; its mean is that of true running."""
+    model = assemble(changed(spec, {"wobble": Wobble(amount=1e-4)}), bodies)
+    kernel = statics_of(model)
+    share = []
+    for k in range(16):
+        forces = np.sum(list(kernel.transmission(-2 * math.pi * k / 24, 302.0).forces.values()), axis=0)
+        share.append((forces[0] - forces[-1]) / forces.sum())
+    lines = 2 / 16 * np.abs(np.fft.rfft(share))
+    print(f"difference of the end slices: {lines[:4]}")
+    assert lines[1] > 0.01 and max(lines[2:]) < 0.05 * lines[1] and abs(lines[0]) < 0.05 * lines[1]
+
+
+# ---- topography ------------------------------------------------------------------------------------------------------
+def write_topography(path: Path, roll: np.ndarray, z: np.ndarray, deviation: np.ndarray) -> None:
+    """A CSV file of both flanks, the same on all teeth; deviation (R, W) m."""
+    rows = [
+        f"{1e3 * r:.15g},{1e3 * y:.15g},{1e6 * d:.15g}"
+        for r, line in zip(roll, deviation, strict=True)
+        for y, d in zip(z, line, strict=True)
+    ]
+    path.write_text("\n".join(["# made for a test", "roll_mm,z_mm,deviation_um", *rows]), encoding="utf-8")
+
+
+def crowned(shape: GearGeometry, width: float, roll: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Profile crowning 6 µm, slope 4 µm, lead crowning 5 µm as material (R, W) m."""
+    x = 2 * (roll - shape.s_form) / (shape.s_tip - shape.s_form) - 1
+    return (2e-6 * x - 6e-6 * x**2)[:, None] - 5e-6 * (2 * z / width) ** 2
+
+
+def test_a_topography_is_the_same_flank_as_its_closed_form(
+    tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry
+) -> None:
+    """A coarse file of a flank that is a parabola both ways: splines through its points are that parabola, so that
+    table and transmission error are those of `profile` and `lead`. Across the width strips take means of straight
+    lines between 33 places either way."""
+    shape, gear = pair.gears[0], spec.gears[0]
+    roll = np.linspace(shape.s_form, shape.s_tip, 7)
+    z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)
+    write_topography(tmp_path / "flanks.csv", roll, z, crowned(shape, gear.face_width, roll, z))
+    measured = assemble(changed(spec, {"topography": str(tmp_path / "flanks.csv")}), bodies)
+    profile, lead = ProfileSpec(slope=4e-6, crowning=6e-6), LeadSpec(crowning=5e-6)
+    designed = assemble(changed(spec, {"profile": profile, "lead": lead}), bodies)
+    found, closed = read_blob(measured.blob), read_blob(designed.blob)
+    teeth, places, rolls = found["flank_size0"]
+    field = np.asarray(found["flank0"]).reshape(teeth, 2, places, rolls)
+    by_formula = -crowned(
+        shape,
+        gear.face_width,
+        np.linspace(shape.s_form, shape.s_tip, rolls),
+        np.linspace(-gear.face_width / 2, gear.face_width / 2, places),
+    )
+    print(f"largest difference on the grid {np.abs(field - by_formula.T).max():.1e} m")
+    assert teeth == 1 and np.abs(field - by_formula.T).max() < 1e-15 and "lead0" in closed
+    same = [loaded_te(model, [302.0], 8).te[0] for model in (measured, designed)]
+    assert same[0] == pytest.approx(same[1], rel=1e-9)
+
+
+def test_one_tooth_of_a_topography_is_met_once_a_turn(
+    tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody]
+) -> None:
+    """Tooth 3 of the pinion stands 5 µm out on its left flanks: te falls by 5 µm while it is in mesh, as if it were out
+    of its place, and nowhere else; right flanks are driven the other way round and stay."""
+    rows = ["tooth,flank,roll_mm,z_mm,deviation_um"]
+    rows += [f"{k},left,{r},0,{5 if k == 3 else 0}" for k in range(16) for r in (8, 20)]
+    (tmp_path / "teeth.csv").write_text("\n".join(rows), encoding="utf-8")
+    model = assemble(changed(spec, {"topography": str(tmp_path / "teeth.csv")}), bodies)
+    te = revolution(model, 16, 8, 0.01)
+    met = np.flatnonzero(te < -4.99e-6)
+    print(f"{met.size / 8:.2f} pitches long, at pitches {met.min() / 8:.2f} to {met.max() / 8:.2f}")
+    assert 8 < met.size < 14 and np.all(np.diff(met) == 1) and te.min() > -5.01e-6
+    assert te[(met.max() + 8) % 128 : met.min() - 8] == pytest.approx(0.0, abs=0.2e-6)
+    other = revolution(model, 16, 2, -0.01)
+    assert np.ptp(other) < 0.5e-6
+
+
+# ---- helical gears, and both kinds of contact ------------------------------------------------------------------------
+def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
+    """Unloaded, te is the smallest gap of all slices at the rolls of their middles, along the transverse normal."""
+    from gearfmu.body import load_stage_bodies
+
+    spec = load_stage("helical_demo")
+    bodies, pair = load_stage_bodies(spec), PairGeometry.of(spec)
+    modified = changed(
+        spec,
+        {"tip_relief": None, "lead": None, "profile": ProfileSpec(crowning=20e-6)},
+        {"tip_relief": None, "lead": None},
+    )
+    model = assemble(modified, bodies)
+    te = loaded_te(model, [0.0], 6, **NO_CORNERS).te[0]
+    slices, width = modified.contact.slices, modified.gears[0].face_width
+    shape, found = pair.gears[0], []
+    for p in np.arange(6) / 6:
+        gaps = []
+        for k in range(slices):
+            z = width * ((k + 0.5) / slices - 0.5)
+            for tooth in range(-4, 5):
+                at = 2 * math.pi * (p + tooth) / shape.z + shape.psi_b + pair.alpha_wt
+                roll = shape.r_b * at + z * math.tan(shape.beta_b)
+                if roll <= shape.s_tip and pair.length - roll <= pair.gears[1].s_tip:
+                    x = 2 * (roll - shape.s_form) / (shape.s_tip - shape.s_form) - 1
+                    gaps.append(20e-6 * x**2)
+        found.append(min(gaps))
+    print(f"te {1e6 * te} µm, by hand {1e6 * np.array(found)}")
+    assert te == pytest.approx(found, abs=0.3e-6)
+
+
+def test_nodal_contact_sees_the_same_flanks(tmp_path: Path, spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Lead and profile crowning as said and as a topography: nodes of flanks run alike; and not as without."""
+    pair = PairGeometry.of(spec)
+    shape, gear = pair.gears[0], spec.gears[0]
+    roll = np.linspace(shape.s_form, shape.s_tip, 7)
+    z = np.linspace(-gear.face_width / 2, gear.face_width / 2, 5)
+    write_topography(tmp_path / "flanks.csv", roll, z, crowned(shape, gear.face_width, roll, z))
+    profile, lead = ProfileSpec(slope=4e-6, crowning=6e-6), LeadSpec(crowning=5e-6)
+    kinds: list[dict[str, Any]] = [{"topography": str(tmp_path / "flanks.csv")}, {"profile": profile, "lead": lead}, {}]
+    runs = []
+    for update in kinds:
+        model = assemble(changed(spec, update | {"eccentricity": Eccentricity(amount=5e-6)}), bodies)
+        steady = Steady(model, 200.0, 302.0)
+        runs.append(simulate(model, steady, 4e-4, 2e-5, {"contact": 2.0, "integrator": 3.0, "level": 0.0})["mesh.te"])
+    assert runs[0] == pytest.approx(runs[1], abs=2e-9) and np.abs(runs[0] - runs[2]).max() > 0.5e-6
+
+
+def test_end_relief_kinds(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Depth of the lead's table at the ends and half way in."""
+    for kind, halfway in (("linear", 0.5), ("parabolic", 0.25), ("arc", 0.25)):
+        relief = EndRelief(amount=8e-6, length=spec.gears[0].face_width / 8, kind=kind)
+        sections = read_blob(assemble(changed(spec, {"lead": LeadSpec(end_relief=relief)}), bodies).blob)
+        depth = np.asarray(sections["lead0"]).reshape(2, 33)
+        expected = np.array([[8e-6, halfway * 8e-6, 0, 0, 8e-6]] * 2)
+        assert depth[:, [0, 2, 4, 16, 32]] == pytest.approx(expected, abs=1e-10)
+
+
+def test_te_over_several_pitches_is_that_of_one_after_the_other(plain: StageModel) -> None:
+    """Of a gear whose teeth are alike: columns of the pairs and harmonics of the mesh too."""
+    one, two = (loaded_te(plain, [302.0], 8, pitches=n) for n in (1, 2))
+    assert two.position[-1] == pytest.approx(15 / 8) and two.pitches == 2
+    for name in ("te", "stiffness", "shares"):
+        single, double = getattr(one, name), getattr(two, name)
+        assert double == pytest.approx(np.concatenate([single, single], axis=1), rel=1e-6, abs=1e-9)
+    assert two.harmonics(3) == pytest.approx(one.harmonics(3), rel=1e-6)
+
+
+def test_the_kernel_refuses_what_are_no_deviations(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    update = {"profile": ProfileSpec(slope=4e-6), "eccentricity": Eccentricity(amount=5e-6)}
+    sections = read_blob(assemble(changed(spec, update), bodies).blob)
+    size, depth = np.asarray(sections["flank_size0"]), np.asarray(sections["flank0"])
+    wrong: dict[str, dict[str, Any]] = {
+        "sizes of the deviations": {"flank_size0": np.array([3, *size[1:]], np.int32)},
+        "flank has the wrong length": {"flank0": depth[:-1]},
+        "flank is out of range": {"flank0": depth + 1.0},
+        "runout is out of range": {"runout0": np.array([1.0, 0.0, 0.0, 0.0])},
+        "runout has the wrong length": {"runout0": np.zeros(3)},
+    }
+    for words, change in wrong.items():
+        with pytest.raises(ModelError, match=words):
+            Kernel(write_blob(sections | change))
+    for name in ("flank_size0", "flank0"):
+        with pytest.raises(ModelError, match="are not whole|wrong length"):
+            Kernel(write_blob({key: value for key, value in sections.items() if key != name}))

@@ -1,0 +1,124 @@
+"""Flanks and runout of sets and trains: the same fields, whatever the stage is made of."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gearfmu as gf
+from gearfmu.body import load_bodies
+from gearfmu.geometry.planetary import planet_angles
+from gearfmu.spec.expand import expand_set
+from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, TipRelief
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.shapes import gear_shape
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import assemble
+from gearfmu.stage.blob import read_blob
+from gearfmu.stage.flanks import FlankField
+from gearfmu.stage.meshes import tooth_phases
+from gearfmu.stage.place import place_of
+from gearfmu.stage.set_te import set_te
+from gearfmu.stage.te import statics_of
+
+TORQUE = 600.0
+
+
+@pytest.fixture(scope="module")
+def spec() -> PlanetarySpec:
+    found = load_stage("planetary54")
+    assert isinstance(found, PlanetarySpec)
+    return found
+
+
+@pytest.fixture(scope="module")
+def parts(spec: PlanetarySpec) -> list[Any]:
+    return load_bodies(spec)
+
+
+def in_set(spec: PlanetarySpec, **fields: Any) -> PlanetarySpec:
+    return spec.model_copy(update={"set": spec.set.model_copy(update=fields)})
+
+
+@pytest.mark.full
+def test_an_eccentric_planet_at_one_angle_is_a_pin_out_of_its_place(spec: PlanetarySpec, parts: list[Any]) -> None:
+    """At angle 0 of all gears: toothing and pin error are the same place of the teeth of planet 2, so that forces of
+    all meshes are the same. Only the moment that the force has about the other axis differs, e/r_b."""
+    e, direction, bolt = 20e-6, 1.1, planet_angles(spec)[1]
+    phase = tooth_phases(expand_set(spec))["planet2"]
+    eccentric = in_set(spec, planet_eccentricity={1: Eccentricity(amount=e, angle=bolt + direction - phase)})
+    pinned = in_set(spec, pin_errors={1: (e * math.cos(direction), e * math.sin(direction))})
+    plain, found, expected = (set_te(assemble(s, parts), [TORQUE], 1) for s in (spec, eccentric, pinned))
+    shares = found.sharing[0, 0, :, 1], expected.sharing[0, 0, :, 1], plain.sharing[0, 0, :, 1]
+    print(f"shares of planet 2 at sun and ring {shares[0]}, by its pin {shares[1]}, in place {shares[2]}")
+    change = np.abs(expected.sharing - plain.sharing).max()
+    assert change > 0.02 and np.abs(found.sharing - expected.sharing).max() < 0.01 * change
+    assert found.te == pytest.approx(expected.te, abs=0.01 * np.abs(expected.te - plain.te).max())
+
+
+def test_every_gear_of_a_set_takes_deviations(spec: PlanetarySpec) -> None:
+    """Sun, planets and ring of one class and seed: planets differ; the flanks of a ring are counted from its tip, the
+    small roll, to its root."""
+    drawn = DeviationClass(tolerance_class=6, seed=3)
+    profile = ProfileSpec(slope=4e-6, crowning=1e-6)
+    fields = {"deviations": drawn, "profile": profile}
+    changed = spec.model_copy(
+        update={name: getattr(spec, name).model_copy(update=fields) for name in ("sun", "planet", "ring")}
+    )
+    stage = expand_set(changed)
+    first, second, ring = (
+        FlankField(stage.bodies[name], gear_shape(stage.bodies[name])) for name in ("planet1", "planet2", "ring")
+    )
+    assert not np.allclose(first.index(), second.index(), atol=1e-7)
+    assert ring.material().shape[0] == spec.ring.teeth and not stage.even
+    at_root, at_tip = ring.profile(np.array([ring.shape.s_form, ring.shape.s_tip]))
+    assert (at_root, at_tip) == (pytest.approx(-3e-6), pytest.approx(1e-6))
+
+
+@pytest.mark.full
+def test_relief_of_a_ring_opens_its_mesh(spec: PlanetarySpec, parts: list[Any]) -> None:
+    """Linear and parabolic relief at the ring's tips, from single contact on: a table for one, numbers for the other;
+    both let planets carry later, by less than what they take away."""
+    plain, errors = assemble(spec, parts), []
+    for kind in ("linear", "parabolic"):
+        ring = spec.ring.model_copy(update={"tip_relief": TipRelief(amount=20e-6, kind=kind)})
+        model = assemble(spec.model_copy(update={"ring": ring}), parts)
+        sections, number = read_blob(model.blob), [g.name for g in model.stage.gears].index("ring")
+        assert (f"flank{number}" in sections) is (kind == "linear")
+        errors.append(set_te(model, [TORQUE], 2).te[0] - set_te(plain, [TORQUE], 2).te[0])
+    linear, parabolic = np.abs(errors)
+    print(f"te by relief {1e6 * linear} µm, parabolic {1e6 * parabolic} µm")
+    assert 0.1e-6 < parabolic.max() < linear.max() < 20e-6
+
+
+def test_an_eccentric_gear_of_a_train_shows_at_the_order_of_its_shaft() -> None:
+    """Wheel 1 of the train, on the shaft in the middle: te of its mesh moves by e once a turn of that shaft."""
+    stage = load_stage("two_stage")
+    wheel = stage.bodies["wheel1"].model_copy(update={"eccentricity": Eccentricity(amount=30e-6)})
+    bodies = load_bodies(stage)
+    model = assemble(stage.model_copy(update={"bodies": stage.bodies | {"wheel1": wheel}}), bodies)
+    place = place_of(model, "stage1")
+    turn = place.pitch * wheel.teeth
+    eccentric, true = (
+        [kernel.transmission(-turn * i / 6, 0.5, place.number).te for i in range(6)]
+        for kernel in (statics_of(model), statics_of(model, **{"effect.runout": 0.0}))
+    )
+    lines = 2 / 6 * np.abs(np.fft.rfft(np.subtract(eccentric, true)))
+    print(f"once a turn {1e6 * lines[1]:.3f} µm, twice {1e6 * lines[2]:.4f} µm")
+    assert lines[1] == pytest.approx(30e-6, rel=0.01) and lines[2] < 0.5e-6
+
+
+def test_scatter_over_seeds_is_a_sweep(tmp_path: Path) -> None:
+    """Every seed is another gear; te over all its teeth."""
+    own = "stage.gears.pinion.deviations"
+    over = {f"{own}.class": [7], f"{own}.seed": [1, 2], "torque": 302.0, "positions": [2], "pitches": [16]}
+    table = gf.sweep("fzg_c", over, tmp_path, on=1)
+    spread = table["te_pp_um"]
+    print(f"te of class 7, peak to peak over a turn: {spread} µm")
+    assert table["outcome"].tolist() == ["ok", "ok"] and abs(spread[0] - spread[1]) > 0.05
+    stage = gf.load("fzg_c", {"gears.pinion.deviations.class": 7, "gears.pinion.deviations.seed": 2})
+    assert spread[1] == pytest.approx(1e6 * np.ptp(gf.te(stage, 302.0, 2, pitches=16).te), rel=1e-12)

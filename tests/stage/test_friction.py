@@ -1,0 +1,280 @@
+"""Friction of the flanks: exact solutions of a block on a spring, force across the line of action, energy, losses,
+coefficients, and what a stage file says of it. Gears are rigid where nothing else is said: statics by hand then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.errors import ModelError
+from gearfmu.geometry import PairGeometry
+from gearfmu.kernel import Kernel
+from gearfmu.scenes.rattle import CONSERVING, FreePair, Rattle, energies, free_pair, started
+from gearfmu.spec.ports import FrictionSpec, PortSpec
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stage.blob import read_blob
+from gearfmu.stage.fields import GEAR_NUMBERS
+
+RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
+EM = 2.0
+
+
+@pytest.fixture(scope="module")
+def pair_free(spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
+    return free_pair(spec, bodies)
+
+
+@pytest.fixture(scope="module")
+def helical() -> StageModel:
+    stage = load_stage("helical_demo")
+    return assemble(stage, load_stage_bodies(stage))
+
+
+# ---- a block on a spring: exact --------------------------------------------------------------------------------------
+
+
+def rolls(blob: bytes, kernel: Kernel, t: float) -> tuple[float, float]:
+    """Lengths of roll (m) of the tooth pair in contact on the drive flanks, where the gears of a started kernel stand;
+    t: working pressure angle."""
+    angle, approach = kernel.get("pinion.gear.phi"), kernel.get("mesh.te")
+    sections = read_blob(blob)
+    gears = [dict(zip(GEAR_NUMBERS, sections[f"gear{g}"], strict=True)) for g in (0, 1)]
+    length = (gears[0]["r_b"] + gears[1]["r_b"]) * math.tan(t)
+    pitch = 2 * math.pi / int(sections["size0"][1])
+    found = [gears[0]["r_b"] * (gears[0]["phase"] + gears[0]["psi_b"] + k * pitch + angle + t) for k in range(-20, 20)]
+    (roll,) = [s for s in found if length - gears[1]["s_tip"] < s < gears[0]["s_tip"]]
+    return roll, length - roll + approach
+
+
+def turning_points(block: Mapping[str, float], start: float) -> list[float]:
+    """Angles of the pinion (rad) at which a block on a spring turns back from rest at `start`; the last: it stays.
+
+    The normal force follows the motion, N = (τ_B + J_B r ä)/(r_B − µ s_B S) with S the sign of the sliding speed, so
+    that each swing is a harmonic one about its own middle c_S/k.
+    """
+    b = block
+    ratio = b["r_a"] / b["r_b"]
+    arm = b["s_a"] - ratio * b["s_b"]
+
+    def middle(sense: float) -> float:
+        """Middle of a swing on which the pinion turns with `sense`."""
+        sliding = -math.copysign(1.0, arm) * sense
+        friction = arm * b["mu"] * sliding * b["tau"] / (b["r_b"] - b["mu"] * b["s_b"] * sliding)
+        return b["outer"] - (ratio * b["tau"] - friction) / b["k"]
+
+    points = [start]
+    while len(points) < 50:
+        here = points[-1]
+        if here > middle(-1.0):
+            points.append(2 * middle(-1.0) - here)
+        elif here < middle(1.0):
+            points.append(2 * middle(1.0) - here)
+        else:
+            return points
+    raise AssertionError("it does not come to rest")
+
+
+def block_model(spec: StageSpec, bodies: Sequence[Any], stiffness: float) -> bytes:
+    ports = {"pinion": PortSpec(kind="spring", k=stiffness, c=0.0), "wheel": PortSpec(kind="torque")}
+    pair = FreePair(spec.model_copy(update={"ports": ports}), bodies)
+    return pair.place(Rattle(position=0.62, load=1.0))
+
+
+@pytest.mark.parametrize("integrator", [0.0, EM])
+def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
+    spec: StageSpec, bodies: list[ReducedBody], integrator: float
+) -> None:
+    """Pinion on a spring, wheel under a torque, one tooth pair that slides at a frozen position: the turning points
+    shrink by the friction, then it stands still."""
+    stiffness, torque, mu, outer, h = 2e4, 300.0, 0.3, -8e-3, 4e-6
+    blob = block_model(spec, bodies, stiffness)
+    frozen = {**CONSERVING, **RIGID, "effect.bearings": 0.0, "effect.hertz": 0.0, "effect.tip_relief": 0.0}
+    kernel = Kernel(blob, {**frozen, "friction_coefficient": mu, "h": h, "integrator": integrator})
+    kernel.set("wheel.tau", torque)
+    kernel.initialize()
+    start = kernel.get("pinion.gear.phi")
+    geometry = PairGeometry.of(spec)
+    s_a, s_b = rolls(blob, kernel, geometry.alpha_wt)
+    r_a, r_b = (gear.r_b for gear in geometry.gears)
+    block = dict(r_a=r_a, r_b=r_b, s_a=s_a, s_b=s_b, mu=mu, tau=torque, outer=outer, k=stiffness)
+    expected = turning_points(block, start)
+    kernel.set("pinion.phi", outer)
+    kernel.set("pinion.w", 0.0)
+    seen = []
+    for i in range(round(0.03 / h)):
+        kernel.step(i * h, h)
+        seen.append([kernel.get(f"{name}.gear.phi") for name in ("pinion", "wheel")] + [kernel.get("pinion.gear.w")])
+    phi, wheel, speed = np.array(seen).T
+    assert kernel.get("mesh.pairs") == 1 and len(expected) > 10
+    moving = np.abs(speed) > 1e-6
+    turns = [phi[i] for i in range(1, len(phi)) if speed[i - 1] * speed[i] < 0 and moving[i - 1] and moving[i]]
+    swing = abs(expected[1] - expected[0])
+    print(f"expected {expected}, turns {turns}, rest {phi[-1]}")
+    assert phi[-1] == pytest.approx(expected[-1], abs=15e-3 * swing)
+    assert turns[: len(expected) - 2] == pytest.approx(expected[1:-1], abs=15e-3 * swing)
+    assert np.ptp((s_a * phi + s_b * wheel)[-1000:]) < 2e-4 * swing * s_a  # sliding; along the normal it rings
+
+
+def test_below_the_limit_of_friction_nothing_moves(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """A torque that friction can hold: no creep, although friction fades with the speed of the pinion."""
+    blob = block_model(spec, bodies, 2e4)
+    frozen = {**CONSERVING, **RIGID, "effect.bearings": 0.0}
+    kernel = Kernel(blob, {**frozen, "friction_coefficient": 0.3})
+    kernel.set("wheel.tau", 300.0)
+    kernel.initialize()
+    kernel.set("pinion.phi", -0.1e-3)
+    kernel.set("pinion.w", 0.0)
+    s_a, s_b = rolls(blob, kernel, PairGeometry.of(spec).alpha_wt)
+    slid = []
+    for i in range(100):
+        kernel.step(i * 1e-3, 1e-3)
+        slid.append(s_a * kernel.get("pinion.gear.phi") + s_b * kernel.get("wheel.gear.phi"))
+    free = 0.1e-3 * s_a
+    print(f"slid {np.ptp(slid):.1e} m in 0.1 s, of {free:.1e} m without friction")
+    drift = abs(np.mean(slid[50:]) - np.mean(slid[:50]))
+    assert np.ptp(slid) < 1e-3 * free and drift < 1e-4 * free  # the normal force rings, undamped
+
+
+# ---- energy ----------------------------------------------------------------------------------------------------------
+STARTS = (
+    Rattle(position=0.3),
+    Rattle(position=0.3, load=100.0, speed=0.05),
+    Rattle(position=0.8, load=302.0, speed=0.05),
+)
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("h", [5e-6, 10e-6])
+def test_friction_takes_what_the_energy_loses(pair_free: FreePair, start: Rattle, h: float) -> None:
+    """Mesh damping off, frozen position: stored energy and what friction took are constant; it never grows."""
+    kernel = started(pair_free, start, {**RIGID, "h": h, "friction_coefficient": 0.1})
+    found = energies(kernel, h, 0.02)
+    print(
+        f"drift {found.drift:.1e}, growth {found.growth:.1e}, lost {found.dissipated[-1]:.2e} of {found.kinetic:.2e} J"
+    )
+    highest = np.max(found.total - np.minimum.accumulate(found.total)) / found.kinetic
+    assert found.drift < 1e-5 and highest < 5e-5 * found.stored[0] / found.kinetic + 1e-6
+    assert found.dissipated[-1] > 1e-4 * found.kinetic
+
+
+# ---- forces and losses -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("rpm", [60, 300])
+def test_force_across_the_line_of_action_jumps_at_the_pitch_point(
+    spec: StageSpec, bodies: list[ReducedBody], rpm: float
+) -> None:
+    """The off-line force of the pinion's bearing changes by 2 µ F where sliding changes its sign, at any speed."""
+    mu, speed, angle = 0.06, rpm * math.pi / 30, PairGeometry.of(spec).alpha_wt
+    model = assemble(spec, bodies)
+    pitch = 2 * math.pi / (16 * speed)
+    run = {**RIGID, "friction_coefficient": mu, "h": 10e-6}
+    trace = simulate(model, Steady(model, speed, 100.0), 1.2 * pitch, pitch / 2000, run)
+    across = math.cos(angle) * trace["bearing.pinion.fx"] - math.sin(angle) * trace["bearing.pinion.fy"]
+    single = (trace["mesh.pairs"][1:] == 1) & (across[1:] * across[:-1] < 0)
+    at = 200 + int(np.flatnonzero(single[200:])[0])
+    before, after = np.arange(at - 360, at - 60), np.arange(at + 60, at + 360)  # clear of where friction fades
+    jump = abs(
+        np.polyval(np.polyfit(after, across[after], 1), at) - np.polyval(np.polyfit(before, across[before], 1), at)
+    )
+    force = 2 * mu * trace["mesh.force"][at - 360 : at + 360].mean()
+    print(f"{rpm} rpm: {jump:.2f} N, 2 µ F {force:.2f} N")
+    assert jump == pytest.approx(force, rel=0.01)
+
+
+def test_mean_loss_is_the_integral_over_the_path(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """Mean power of a slow run against µ Σ λ |v| over a pitch, the load shared as statics without friction say."""
+    mu, speed = 0.05, 10.0
+    model, geometry = assemble(spec, bodies), PairGeometry.of(spec)
+    undamped = {**RIGID, "friction_coefficient": mu, "effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
+    pitch = 2 * math.pi / 16
+    count = 2000
+    step = pitch / speed / count
+    trace = simulate(model, Steady(model, speed, 100.0), 2 * pitch / speed, step, {**undamped, "h": 20e-6})
+    lost = trace["energy.dissipated"]
+    power = (lost[-1] - lost[-1 - count]) / (count * step)
+    force = trace["mesh.force_mean"][-count:].mean()
+    r_a, r_b = (gear.r_b for gear in geometry.gears)
+    kernel = Kernel(model.blob, {"effect.elastic": 0.0, "level": 0.0})
+    kernel.prepare()
+    slides, loads = [], []
+    for position in np.arange(200) / 200:
+        turned = -pitch * position * r_a / r_b
+        state = kernel.transmission(turned, 100.0)
+        for (_, tooth), slices in state.forces.items():
+            s_a = r_a * (geometry.gears[0].psi_b + geometry.alpha_wt + tooth * pitch + state.phi)
+            slides.append(abs(s_a - geometry.length * r_a / (r_a + r_b)) * speed * (1 + r_a / r_b))
+            loads.append(sum(slices))
+    expected = mu * np.dot(slides, loads) / np.sum(loads) * force
+    print(f"{power:.4f} W, by the path {expected:.4f} W")
+    assert power == pytest.approx(expected, rel=0.005)
+
+
+def test_a_helical_pair_loses_what_its_ports_do_not_give_on(helical: StageModel) -> None:
+    """Work of the ports of a steady run is what friction takes, and the outputs tell it."""
+    run = {"level": 0.0, "effect.friction": 1.0, "friction_coefficient": 0.05}
+    trace = simulate(helical, Steady(helical, 100.0, 100.0), 0.02, 20e-6, run)
+    half = len(trace.time) // 2
+    work, lost, rubbed = (
+        np.ptp(trace[name][half:]) for name in ("energy.work", "energy.dissipated", "mesh.friction_loss")
+    )
+    print(f"work {work:.4f} J, dissipated {lost:.4f} J, friction {rubbed:.4f} J")
+    assert rubbed == pytest.approx(lost, rel=0.01) and lost == pytest.approx(work, rel=0.02)
+    mean = trace["mesh.friction_power"][half:].mean()
+    assert mean * (trace.time[-1] - trace.time[half]) == pytest.approx(rubbed, rel=0.01)
+    assert trace["mesh.friction_power"].min() > -1e-6
+
+
+# ---- coefficients ----------------------------------------------------------------------------------------------------
+def test_coefficients_are_those_of_the_laws(helical: StageModel) -> None:
+    """ISO/TR 14179-2 by hand; Benedict and Kelley falls with speed and viscosity; both are one for light changes."""
+
+    drives = {speed: Steady(helical, speed, 100.0) for speed in (100.0, 200.0)}
+    common = {"level": 0.0, "slices": 1.0, "effect.friction": 1.0, "oil_viscosity": 0.04, "flank_roughness": 0.5e-6}
+
+    def ratio(speed: float = 100.0, **settings: float) -> float:
+        return float(simulate(helical, drives[speed], 4e-4, 1e-4, common | settings)["mesh.friction_ratio"][-1])
+
+    pair = PairGeometry.of(helical.pair)
+    a, b = pair.gears
+    trace = simulate(helical, drives[100.0], 4e-4, 1e-4, {"level": 0.0, "slices": 1.0})
+    cosine = math.cos(a.beta_b)
+    pitch = [pair.length * gear.r_b / (a.r_b + b.r_b) for gear in (a, b)]
+    rho = 1e3 * pitch[0] * pitch[1] / sum(pitch) / cosine
+    v_sum = 100.0 * 2 * pitch[0]
+    width = 1e3 * min(gear.face_width for gear in helical.pair.gears)
+    load = trace["mesh.force"][-1] / width
+    expected = 0.048 * (load / (v_sum * rho)) ** 0.2 * 40.0**-0.05 * 0.5**0.25
+    assert ratio(friction_law=2.0) == pytest.approx(expected, rel=0.01)
+    kelley = ratio(friction_law=1.0)
+    assert 0.01 < kelley < 0.2
+    assert ratio(friction_law=1.0, speed=200.0) < kelley and ratio(friction_law=1.0, oil_viscosity=0.08) < kelley
+    decade = kelley - ratio(friction_law=1.0, oil_viscosity=0.4)
+    assert decade == pytest.approx(0.0127 * 1.13 / (1.13 - 0.5), rel=1e-2)  # one decade of viscosity
+
+
+# ---- what a stage says -----------------------------------------------------------------------------------------------
+def test_a_stage_file_turns_friction_on(helical: StageModel) -> None:
+    own = FrictionSpec(law="iso_tr_14179", viscosity=0.05, roughness=1e-6)
+    stage = helical.pair
+    stage = stage.model_copy(update={"contact": stage.contact.model_copy(update={"friction": own})})
+    kernel = assemble(stage, load_stage_bodies(stage)).kernel()
+    names = ("effect.friction", "friction_law", "oil_viscosity", "flank_roughness")
+    assert [kernel.get(name) for name in names] == [1.0, 2.0, 0.05, 1e-6]
+
+
+def test_bodies_that_do_not_know_their_profile_are_refused(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    bare = [replace(body, tangent=None) for body in bodies]
+    with pytest.raises(ModelError, match="reduce its body again"):
+        assemble(spec, bare).kernel(**{"effect.friction": 1.0}).prepare()
+
+
+@pytest.mark.parametrize("integrator", [1.0, 3.0, 4.0])
+def test_other_integrators_refuse_friction(helical: StageModel, integrator: float) -> None:
+    with pytest.raises(ModelError, match="integrator dg4 or em"):
+        helical.kernel(**{"effect.friction": 1.0, "integrator": integrator}).prepare()
