@@ -4,7 +4,8 @@ compiled without its code. Callgrind counts, which repeat exactly.
     python benchmarks/effects_cost.py [EFFECT …]
 
 Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h = 5 µs; what only sets have on planetary54
-under 600 N·m at 85 rad/s of the carrier; settings of each effect in gearfmu/stage/effects.py. Needs valgrind and cc.
+under 600 N·m at 85 rad/s of the carrier; friction on helical_demo;
+settings of each effect in gearfmu/stage/effects.py. Needs valgrind and cc.
 Prints a table and writes gearfmu/stage/effects_cost.csv, where
 docs/effects.md takes it from; with EFFECT only those rows are measured again. Aim (issue 3): off costs at most 5 %
 more than without.
@@ -21,10 +22,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from gearfmu.body import load_bodies, load_stage_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel.build import build_library, source_hash, sources
+from gearfmu.spec.flanks import Eccentricity, ProfileSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 from gearfmu.stage.effects import COSTS, EFFECTS, Cost, Effect, costs
@@ -35,7 +38,12 @@ STAGE, SPEED = "fzg_c/stage_relief", 2000 * math.pi / 30
 TORQUE, LIGHT = 302.0, {"tip_contact": 80.0}  # light: flanks carry alone, else off is another motion
 H, WARM, STEPS = 50e-6, 10, 38  # communication steps; 38 are one mesh period
 BASE = {"level": 1.0, "h": 5e-6, "slices": 5.0}
-MISPLACED = {0: 5e-6}  # tooth → m
+OWN_DATA: dict[str, dict[str, Any]] = {  # of the pinion, where the stage does not have them
+    "pitch_errors": {"index_deviation": {0: 5e-6}},
+    "flank_deviations": {"profile": ProfileSpec(slope=2e-6, crowning=2e-6)},
+    "runout": {"eccentricity": Eccentricity(amount=5e-6)},
+}
+RUBBING = "helical_demo"
 SET, SET_WARM, SET_STEPS = "planetary54", 4, 10
 SET_START = {"carrier.w_start": 85.0, "sun.w_start": 340.0}
 SET_TORQUE = {"carrier.tau": 600.0, "sun.tau": -150.0}
@@ -64,9 +72,13 @@ class Bench:
         )
         spec = load_stage(STAGE)
         bodies = load_stage_bodies(spec)
-        pinion = spec.gears[0].model_copy(update={"index_deviation": MISPLACED})
         self.plain = assemble(spec, bodies)
-        self.misplaced = assemble(spec.model_copy(update={"gears": (pinion, spec.gears[1])}), bodies)
+        self.own = {
+            name: assemble(
+                spec.model_copy(update={"gears": (spec.gears[0].model_copy(update=data), spec.gears[1])}), bodies
+            )
+            for name, data in OWN_DATA.items()
+        }
 
     def library(self, without: str) -> Path:
         """A kernel of the sources of the moment, compiled without the code of one effect."""
@@ -93,10 +105,17 @@ class Bench:
         spec = load_stage(SET)
         return assemble(spec, load_bodies(spec))
 
+    @cached_property
+    def rubbing(self) -> StageModel:
+        """A pair whose bodies know how they yield along the profile."""
+        spec = load_stage(RUBBING)
+        return assemble(spec, load_bodies(spec))
+
     def measure(self, effect: Effect) -> tuple[Cost, bool]:
         """The three counts; and whether the kernel without the code computes the same bits as the effect off."""
-        plain = self.turning if effect.carried else self.plain
-        with_it = self.misplaced if effect.name == "pitch_errors" else plain
+        plain = self.turning if effect.carried else self.rubbing if effect.name == "friction" else self.plain
+        with_it = self.own.get(effect.name, plain)
+        plain = with_it if effect.off_setting else plain  # the switch is there where the data are
         whole, lacking, torque = self.library("nothing"), self.library(effect.build), LIGHT.get(effect.name, TORQUE)
         on = self.count(whole, with_it, {**BASE, **effect.on_setting}, torque)
         off = self.count(whole, plain, {**BASE, **effect.off_setting}, torque)

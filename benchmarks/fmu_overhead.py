@@ -2,7 +2,7 @@
 
     python benchmarks/fmu_overhead.py
 
-The two roads take turns step by step in one process (tests/fmu/host.c) and give the same bits; overhead: the median
+The two methods take turns step by step in one process (tests/fmu/host.c) and give the same bits; overhead: the median
 of the paired differences. Prints a table and writes benchmarks/fmu_overhead.csv.
 Aim (issue 2 and the design): at most 0.2 µs a step.
 """

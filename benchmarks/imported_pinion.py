@@ -1,5 +1,5 @@
-"""The pinion of fzg_c, exported and imported again by every road: frequencies and loaded transmission error against the
-native body on the same mesh. Writes imported_pinion.csv; the rows with CalculiX need `ccx`."""
+"""The pinion of fzg_c, exported and imported again by every method: frequencies and loaded transmission error
+against the native body on the same mesh. Writes imported_pinion.csv; the rows with CalculiX need `ccx`."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def row(name: str, spec: StageSpec, body: ReducedBody, native: ReducedBody, whee
     own, other = (b.static_ff[0, 0, 0, middle, middle, 0, 0] for b in (body, native))
     return {
         "case": name,
-        "road": facts.get("road", "native"),
+        "method": facts.get("method", "native"),
         "dof_body": facts["dof_body"],
         "cpu_s": body.provenance["cpu_s"],
         "fit_max_um": f"{facts['fit']['residual_max_um']:.1e}" if "fit" in facts else "",

@@ -42,6 +42,7 @@ def variant(folder: Path, name: str, edits: Mapping[str, str]) -> Path:
     command = [
         "cc",
         *FLAGS,
+        "-O1",  # the same bits in half the time of the compiler
         "-DGK_DOUBLE_MODES",
         "-fPIC",
         "-shared",

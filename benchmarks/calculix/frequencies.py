@@ -55,11 +55,10 @@ CASES = {
         Case("ring_coarse", "planetary54", "ring", 0.2),
         Case("ring", "planetary54", "ring", 0.4),
         Case("carrier_coarse", "planetary54", "carrier", 0.5),
-        Case("carrier", "planetary54", "carrier", 1.0),
+        Case("carrier", "planetary54", "carrier", 1.0, by_sector=True),
         Case("pinion_sector_coarse", "fzg_c", "pinion", 0.4, by_sector=True),
         Case("pinion_file", "fzg_c", "pinion", 1.0, by_sector=True),
         Case("ring_file", "planetary54", "ring", 1.0, by_sector=True),
-        Case("carrier_finer", "planetary54", "carrier", 1.5, by_sector=True),
     )
 }
 
