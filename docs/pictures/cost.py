@@ -31,7 +31,7 @@ with styled(), rc_context({"svg.hashsalt": "cost"}):
             line = sorted((row for row in of_set if row.level == level and row.te_error < 1), key=lambda row: row.h_s)
             error = [100 * getattr(row, f"{name}_error") for row in line]
             time = [row.realtime_factor for row in line]
-            panel.loglog(
+            panel.plot(
                 time,
                 error,
                 dashes,

@@ -1,29 +1,50 @@
-"""Pictures of the README from the trace of the demo: python docs/pictures/make.py [out/demo/trace.h5]
-(its chart of error against time: docs/pictures/cost.py)"""
+"""Pictures of the README and docs from runs: python docs/pictures/make.py FOLDER_OF_DEMO [FOLDER_OF_SET [COMPARISON]]
+(its chart of error against time: docs/pictures/cost.py). Needs Chromium."""
 
 from __future__ import annotations
 
-import base64
-import re
 import sys
+import tempfile
 from pathlib import Path
 
-from gearfmu.body import load_stage_bodies
-from gearfmu.files import write_text, written_whole
-from gearfmu.report import picture, plots
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.stage import load_stage
-from gearfmu.stage.trace import Trace
+HERE = Path(__file__).resolve().parent
+sys.path.append(str(HERE.parents[1] / "benchmarks"))
+from browser import Browser  # noqa: E402
 
-HERE = Path(__file__).parent
-NAMESPACES = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+WIDE, NARROW = (1200, 1000), (420, 900)
+FRAME = 62  # of the turning view
 
-trace = Trace.load(sys.argv[1] if len(sys.argv) > 1 else "out/demo/trace.h5")
-spec = load_stage(trace.meta["stage"])
-pair = picture.deformed_pair(trace, as_general(spec), "mesh", load_stage_bodies(spec))
-mesh = plots.mesh_force_and_error(trace, "mesh")
-if pair is None or mesh is None:
-    sys.exit("the trace lacks mesh force, transmission error or gear angles")
-with written_whole(HERE / "deformed_pair.png") as temporary:
-    temporary.write_bytes(base64.b64decode(re.search(r"base64,([^\"]+)", pair.picture)[1]))
-write_text(HERE / "mesh.svg", mesh.picture.replace("<svg", NAMESPACES, 1))
+
+def shot(page: Path, name: str, size: tuple[int, int], element: str | None = None, before: str = "1") -> None:
+    """A picture <name>.png of the top of a page, or of the part of it that a selector names; before: script."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, Browser(Path(profile), *size) as browser:
+        browser.open(page)
+        browser.value("new Promise(done => setTimeout(done, 1500)).then(() => 1)")
+        browser.value(f"if (gearfmuPage.stage) gearfmuPage.stage.show({FRAME}); {before}")
+        if element is None:
+            return browser.picture(HERE / f"{name}.png")
+        browser.value(f"document.querySelector({element!r}).scrollIntoView()")
+        browser.value("new Promise(done => setTimeout(done, 1500)).then(() => 1)")
+        corner = f"(b => [b.left + scrollX, b.top + scrollY, b.width, b.height])(document.querySelector({element!r})"
+        x, y, width, height = browser.value(f"{corner}.getBoundingClientRect())")
+        browser.picture(HERE / f"{name}.png", (x, y, width, height))
+        return None
+
+
+def main(demo: Path, planets: Path | None = None, comparison: Path | None = None) -> None:
+    """Every picture that the given runs allow."""
+    shot(demo / "report.html", "report", WIDE)
+    shot(demo / "report.html", "report_420", NARROW)
+    shot(demo / "report.html", "report_mesh", WIDE, "#mesh")
+    shot(demo / "report.html", "report_contact", WIDE, "#contact")
+    shot(
+        demo / "report.html", "deformed_pair", WIDE, "#stage figure canvas", "document.querySelector('.closer').click()"
+    )
+    if planets is not None:
+        shot(planets / "report.html", "report_set", WIDE)
+    if comparison is not None:
+        shot(comparison, "report_comparison", (1200, 1300))
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))
