@@ -14,7 +14,7 @@ from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.plots_set import planet_set
 from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
-from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_pair, run_up_of_set
+from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
@@ -154,7 +154,7 @@ def test_the_run_up_of_a_pair_has_its_maps_over_the_pinions_speed(tmp_path: Path
     assert not {"spectrum", "spectrogram"} & made
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "speed of the pinion in rpm" in text and "mesh orders k × 16" in text and "planets" not in text
-    own = run_up_of_pair(trace, "mesh", known_meshings(trace)["mesh"], Window(0.0, DURATION, "here"))
+    own = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
     assert own is not None and list(own.signals) == ["bearing.pinion.fy", "mesh.force"] and own.resonances == ()
     found = own.orders["mesh.force"]
     peak = found.speed[np.argmax(found.amplitude[:, found.order == 16.0].ravel())]
@@ -171,7 +171,7 @@ def test_orders_are_loudest_where_they_meet_the_linearised_stage() -> None:
     start, end, duration = 3500 * np.pi / 30, 6000 * np.pi / 30, 0.3
     drive = Steady(model, start, 150.0, (end - start) / duration)
     trace = simulate(model, drive, duration, 40e-6, {"level": 1.0})
-    run = run_up_of_pair(trace, "mesh", known_meshings(trace)["mesh"], Window(0.02, duration, "settled"))
+    run = run_up_of_meshes(trace, known_meshings(trace), Window(0.02, duration, "settled"))
     assert run is not None
     found = run.orders["bearing.wheel.fy"]
     near = np.abs(found.order - 32.0) < 0.6
