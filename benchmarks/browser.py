@@ -55,16 +55,23 @@ class Browser:
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
 
     def open(self, path: Path, limit: float = 60) -> float:
-        """Open a report and wait until its first figures are drawn; seconds that took by the wall clock."""
+        """Open a report and wait until all that is in the window is drawn; seconds that took by the wall clock."""
         begin = time.monotonic()
         self.call("Page.navigate", url=path.resolve().as_uri())
-        while not self.value("!!document.querySelector('html.ready,html.failed')"):
-            assert time.monotonic() < begin + limit, "the page does not get ready"
-            time.sleep(0.02)
+        self.wait("ready", limit)
         return time.monotonic() - begin
+
+    def wait(self, state: str, limit: float = 60) -> None:
+        """Wait until the report is `ready` (all that is in the window is drawn) or `complete` (every figure that comes
+        near the window is drawn at once), or has failed."""
+        end = time.monotonic() + limit
+        while not self.value(f"!!document.querySelector('html.{state},html.failed')"):
+            assert time.monotonic() < end, f"the page does not get {state}"
+            time.sleep(0.02)
 
     def draw_all(self, limit: float = 60) -> None:
         """Have every figure drawn, those below the window too."""
+        self.wait("complete", limit)
         self.value("window.dispatchEvent(new Event('beforeprint'))")
         end = time.monotonic() + limit
         while self.value("document.querySelectorAll('.plot').length > gearfmuPage.drawn") and time.monotonic() < end:

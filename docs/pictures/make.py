@@ -19,6 +19,7 @@ def shot(page: Path, name: str, size: tuple[int, int], element: str | None = Non
     """A picture <name>.png of the top of a page, or of the part of it that a selector names; before: script."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, Browser(Path(profile), *size) as browser:
         browser.open(page)
+        browser.wait("complete")
         browser.value("new Promise(done => setTimeout(done, 1500)).then(() => 1)")
         browser.value(f"if (gearfmuPage.stage) gearfmuPage.stage.show({FRAME}); {before}")
         if element is None:

@@ -12,6 +12,7 @@ from gearfmu.api.models import AnyStage, PathLike, Progress, Stage, load, load_s
 from gearfmu.cosim.scene_run import Staged
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.profile import Profile, read_profile
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import Steady, TeResult, Trace, loaded_te
 from gearfmu.stage import simulate as simulate_model
@@ -53,30 +54,44 @@ def te(
 
 def simulate(
     stage: AnyStage,
-    torque: Quantity,
-    speed: Quantity | tuple[Quantity, Quantity],
-    duration: Quantity = 0.1,
+    torque: Quantity | None = None,
+    speed: Quantity | tuple[Quantity, Quantity] | None = None,
+    duration: Quantity | None = None,
     step: Quantity = 20e-6,
     settle: Quantity = 0.02,
+    profile: PathLike | Profile | None = None,
     **settings: Any,
 ) -> Trace:
-    """Run a stage alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
-    the torque.
+    """Run a stage alone: the outer ends of input and output turn at constant speed, from one to another or along a
+    profile, wound up by the torque.
 
     stage : as in `te`.
     torque, speed : of the input: "302 N*m", "2000 rpm", or in N·m and rad/s; ("300 rpm", "6000 rpm") is a run-up.
-    duration, step : simulated time, time between samples; "0.1 s", or in s.
+    duration, step : simulated time, time between samples; "0.1 s", or in s. Duration None: of the profile, or 0.1 s.
     settle : from here on the report takes results and spectra.
+    profile : torque, speed or both over time, in place of the arguments: a CSV file with a head like
+        time_[s],torque_[N*m],speed_[rpm] or a `gearfmu.spec.profile.Profile` of arrays in SI.
     settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
 
     The trace's meta says the outcome: a run that stops early keeps its samples. Raises ModelError for an unknown
-    setting, SpecError for a port that this cannot turn.
+    setting, SpecError for a port that this cannot turn, for a profile that cannot be used and for a torque or a speed
+    that is missing or given twice.
     """
+    over_time = profile if profile is None or isinstance(profile, Profile) else read_profile(Path(profile))
+    start, *end = (
+        None if value is None else _si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,))
+    )
+    driven = Drive(
+        torque=None if torque is None else _si(torque, "N*m"),
+        speed=start,
+        duration=None if duration is None else _si(duration, "s"),
+        step=_si(step, "s"),
+        settle=_si(settle, "s"),
+        end_speed=end[0] if end else None,
+        profile=over_time,
+    )
     model = model_of(stage)
-    times = (_si(value, "s") for value in (duration, step, settle))
-    start, *end = (_si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,)))
-    drive = Drive(_si(torque, "N*m"), start, *times, *end)
-    return steady_run(model, drive, parameters(model, settings))
+    return steady_run(model, driven, parameters(model, settings))
 
 
 def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 20e-6, **settings: Any) -> Trace:

@@ -70,14 +70,19 @@ def run(scene: str | None, out: Path | None, stage: str | None, step: float | No
 
 @click.command()
 @click.argument("stage")
-@click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
-@click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
+@click.option("--torque", type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
+@click.option("--speed", type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
 @click.option(
     "--end-speed",
     type=Quantity("rad/s"),
     help='A run-up (or run-down) to this speed, "6000 rpm", at a constant rate: order maps and levels over the speed.',
 )
-@click.option("--duration", type=Quantity("s"), default="0.1 s", show_default=True, help="Simulated time.")
+@click.option(
+    "--profile",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="A CSV file of torque, speed or both over time, in place of the options: time_[s],torque_[N*m],speed_[rpm].",
+)
+@click.option("--duration", type=Quantity("s"), help="Simulated time; 0.1 s or that of the profile when not given.")
 @click.option("--step", type=Quantity("s"), default="20 us", show_default=True, help="Time between samples.")
 @click.option(
     "--settle",
@@ -94,16 +99,20 @@ def run(scene: str | None, out: Path | None, stage: str | None, step: float | No
     help="A parameter of docs/variables.md: level=fast, slices=10; may repeat.",
 )
 @click.option("--out", type=OUT, help="Folder of trace.h5, summary.json and report.html; out/<stage> when not given.")
-def simulate(stage: str, out: Path | None, settings: tuple[str, ...], **drive: Any) -> int:
-    """Run STAGE alone: the outer ends of input and output turn at constant speed, or from one to another, wound up by
-    the torque."""
+def simulate(stage: str, out: Path | None, settings: tuple[str, ...], profile: Path | None, **drive: Any) -> int:
+    """Run STAGE alone: the outer ends of input and output turn at constant speed, from one to another or along a
+    profile, wound up by the torque."""
     from gearfmu.commands.models import model_of
     from gearfmu.commands.settings import parameters
+    from gearfmu.spec.profile import read_profile
     from gearfmu.stage.steady import Drive, steady_run
 
+    if profile is None and (missing := [f"--{name}" for name in ("torque", "speed") if drive[name] is None]):
+        raise click.UsageError(f"give {' and '.join(missing)}, or a --profile")
+    driven = Drive(**drive, profile=None if profile is None else read_profile(profile))
     model = model_of(stage)
     with progress_bar(model.name) as progress:
-        trace = steady_run(model, Drive(**drive), parameters(model, settings), progress)
+        trace = steady_run(model, driven, parameters(model, settings), progress)
     trace.meta["stage"] = stage
     return finish(trace, out or Path("out") / model.name, stage)
 

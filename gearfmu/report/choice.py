@@ -143,14 +143,13 @@ def _statics(run: Run, groups: Sequence[Sequence[str]]) -> list[Maker]:
 
 
 def _run_up(run: Run) -> runup.RunUp | None:
-    """The run-up of a stage of one engagement, with its resonances where the stage is at hand; None for no run-up."""
-    if len(run.known) != 1:
+    """The run-up of a pair or train, with its resonances where the stage is at hand; None for no run-up."""
+    if not run.known:
         return None
-    ((mesh, meshing),) = run.known.items()
-    found = runup.run_up_of_pair(run.trace, mesh, meshing, run.window)
-    if found is None or run.stage is None or f"{mesh}.force" not in found.signals:
+    found, first = runup.run_up_of_meshes(run.trace, run.known, run.window), next(iter(run.known))
+    if found is None or run.stage is None or f"{first}.force" not in found.signals:
         return found
-    return replace(found, resonances=runup.resonances(found, mesh, run.spec, run.bodies or ()))
+    return replace(found, resonances=runup.resonances(found, first, run.spec, run.bodies or ()))
 
 
 def _set_pair(run: Run, own: PlanetSet) -> list[Maker]:

@@ -27,12 +27,13 @@ def frequency_maps(run: RunUp) -> Plot:
     size = min(samples, 2 ** max(6, round(np.log2(samples / 40))))
     hop = max(1, (samples - size) // BINS)
     maps = {name: metrics.spectrogram(own.values, step, size, hop, own.averaged) for name, own in run.signals.items()}
-    top = min((run.orders_shown + 0.3) * run.each * _fastest(run), 0.5 / step)
+    top = min(run.highest * _fastest(run), 0.5 / step)
     first = next(iter(maps.values()))
     speed, kept = _speed_at(run, first.time, size * step) * RPM, first.frequency <= top
     ends = np.array([speed.min(), speed.max()])
     rays = tuple(
-        Curve(ends, k * run.each * ends / 60e3, f"order {k}", "kHz", "dashed") for k in range(1, run.orders_shown + 1)
+        Curve(ends, order * ends / 60e3, f"{mesh} order {k}".strip(), "kHz", _look(run, mesh, "dashed"))
+        for mesh, k, order in run.mesh_orders
     )
     panels = []
     for name, found in maps.items():
@@ -42,8 +43,8 @@ def frequency_maps(run: RunUp) -> Plot:
     along = f"speed of the {run.shaft} in rpm"
     chart = Chart(tuple(panels), along, "speed", x_limits=(float(ends[0]), float(ends[1])))
     caption = (
-        f"Hann windows of {size * step * 1e3:.0f} ms, resolution {first.frequency[1]:.0f} Hz. Dashed: mesh orders "
-        f"k·f_m, f_m = {run.each:.6g} f of the {run.shaft}. What lies level is a resonance."
+        f"Hann windows of {size * step * 1e3:.0f} ms, resolution {first.frequency[1]:.0f} Hz. {_rays(run)} "
+        f"What lies level is a resonance."
         f"{CROSSED if run.resonances else ''}{_about_pickup(run)}"
     )
     data = {"speed_[rpm]": np.repeat(speed, kept.sum()), "frequency_[Hz]": np.tile(first.frequency[kept], speed.size)}
@@ -58,13 +59,12 @@ def order_maps(run: RunUp) -> Plot:
         heat = _heat(found.order, found.speed * RPM, found.amplitude, run.signals[name])
         marks = tuple(_order_marks(run, run.signals[name]))
         panels.append(Panel(f"{shown(name)}: speed of the {run.shaft} in rpm", (), heat, marks, height=250))
-    highest = (run.orders_shown + 0.3) * run.each
-    chart = Chart(tuple(panels), f"order of the {run.shaft}", "order", x_limits=(0.0, highest))
+    chart = Chart(tuple(panels), f"order of the {run.shaft}", "order", x_limits=(0.0, run.highest))
     first = next(iter(run.orders.values()))
     passing = PASSING if any(own.sides for own in run.signals.values()) else ""
     caption = (
         f"Orders per revolution of the {run.shaft}, Hann windows of {1 / first.order[1]:.0f} revolutions. Marked "
-        f"by dotted lines: mesh orders k × {run.each:.6g}{passing}. What stands upright goes with the speed; a "
+        f"by dotted lines: {_families(run)}{passing}.{_shafts(run)} What stands upright goes with the speed; a "
         "resonance lies on a hyperbola, frequency over speed."
     )
     data = {"speed_[rpm]": np.repeat(first.speed * RPM, first.order.size)}
@@ -81,12 +81,15 @@ def order_levels(run: RunUp) -> Plot:
     panels = []
     for name, bands in found.items():
         own = run.signals[name]
-        curves = tuple(_band_curve(speed, label, own.level(amplitude), own) for label, amplitude in bands.items())
+        curves = tuple(
+            _band_curve(speed, label, own.level(amplitude), own, k)
+            for k, (label, amplitude) in enumerate(bands.items())
+        )
         marks = tuple(_ticks(run, speed))
         panels.append(Panel(f"{shown(name)}, {own.label}", curves, marks=marks, limits=level_limits(curves)))
     chart = Chart(tuple(panels), f"speed of the {run.shaft} in rpm", "speed")
     caption = (
-        f"Level within half an order of k × {run.each:.6g} orders of the {run.shaft}{BESIDE if beside else ''}. "
+        f"Level within half an order of {_families(run)}, orders of the {run.shaft}{BESIDE if beside else ''}. "
         f"A peak is a resonance that the order meets.{MARKED if run.resonances else ''}"
     )
     data = {"speed_[rpm]": speed}
@@ -96,7 +99,7 @@ def order_levels(run: RunUp) -> Plot:
 
 def _bands(run: RunUp, name: str) -> dict[str, np.ndarray]:
     """Rms amplitude (T,) of every mesh order and of the orders beside it, by label."""
-    wanted: dict[str, tuple[float, ...]] = {f"order {k}": (k * run.each,) for k in range(1, run.orders_shown + 1)}
+    wanted: dict[str, tuple[float, ...]] = {f"{mesh} order {k}".strip(): (at,) for mesh, k, at in run.mesh_orders}
     wanted |= {f"beside {k}": orders for k, orders in run.signals[name].sides.items()}
     found, orders = {}, run.orders[name]
     for label, chosen in wanted.items():
@@ -123,20 +126,53 @@ def _heat(x: np.ndarray, y: np.ndarray, amplitude: np.ndarray, own: Signal) -> H
     return heat_of(x, y, values, (top - SHOWN_DB, top), own.label)
 
 
-def _band_curve(speed: np.ndarray, label: str, level: np.ndarray, own: Signal) -> Curve:
-    look = "dotted" if label.startswith("beside") else ""
-    return Curve(speed, level, label, own.label, look, int(label.split()[-1]) - 1)
+def _band_curve(speed: np.ndarray, label: str, level: np.ndarray, own: Signal, number: int) -> Curve:
+    beside = label.startswith("beside")
+    colour = int(label.split()[-1]) - 1 if beside else number
+    return Curve(speed, level, label, own.label, "dotted" if beside else "", colour)
 
 
 def _order_marks(run: RunUp, own: Signal) -> list[Mark]:
-    marks = [Mark(k * run.each, str(k)) for k in range(1, run.orders_shown + 1)]
+    marks = [Mark(order, f"{k}{_prime(run, mesh)}") for mesh, k, order in run.mesh_orders]
     return marks + [Mark(order, "", "side") for orders in own.sides.values() for order in orders]
 
 
 def crossings(run: RunUp) -> list[tuple[int, float, float]]:
-    """(mesh order, frequency in Hz, speed in rpm) where an order meets a natural frequency."""
-    orders = range(1, run.orders_shown + 1)
-    return [(k, f, 60 * f / (k * run.each)) for f in run.resonances for k in orders]
+    """(number of the mesh order among those shown, from 1, frequency in Hz, speed in rpm) where an order meets a
+    natural frequency."""
+    orders = [order for _, _, order in run.mesh_orders]
+    return [(k + 1, f, 60 * f / order) for f in run.resonances for k, order in enumerate(orders)]
+
+
+def _prime(run: RunUp, mesh: str) -> str:
+    """What tells the orders of a mesh from those of the first."""
+    return "′" * list(run.families).index(mesh)
+
+
+def _look(run: RunUp, mesh: str, first: str) -> str:
+    return "dotted" if _prime(run, mesh) else first
+
+
+def _families(run: RunUp) -> str:
+    """Mesh orders, in words."""
+    if len(run.families) == 1:
+        return f"mesh orders k × {run.each:.6g}"
+    told = (f"k{_prime(run, mesh)} × {each:.6g} of {mesh}" for mesh, each in run.families.items())
+    return f"mesh orders {', '.join(told)}"
+
+
+def _rays(run: RunUp) -> str:
+    """The lines of a Campbell diagram, in words."""
+    if len(run.families) == 1:
+        return f"Dashed: mesh orders k·f_m, f_m = {run.each:.6g} f of the {run.shaft}."
+    first, *others = (f"{each:.6g} f of the {run.shaft} for {mesh}" for mesh, each in run.families.items())
+    return f"Mesh orders k·f_m, f_m = {first} (dashed), {', '.join(others)} (dotted)."
+
+
+def _shafts(run: RunUp) -> str:
+    """Orders of the other shafts, in words."""
+    told = (f"{order:.4g} ({name})" for name, order in run.others.items())
+    return f" Shafts turn at the orders 1 ({run.shaft}), {', '.join(told)}." if run.others else ""
 
 
 def _circles(run: RunUp, ends: np.ndarray, top: float) -> tuple[np.ndarray, np.ndarray] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -25,7 +25,8 @@ LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
 BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive
 SLOWEST = 0.02  # of it: slower than that there are no orders
 WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
-SET_ORDERS, PAIR_ORDERS = 3, 6  # mesh orders shown
+SET_ORDERS, PAIR_ORDERS, TRAIN_ORDERS = 3, 6, 4  # mesh orders shown
+TRAIN_BEARINGS = 2  # directions of bearings shown
 PICKUP = "pickup on the ring"
 LEAST_LOAD = 0.01  # of torque_max: below it flanks may part, and there is nothing to linearise
 MODES = 30  # of the linearised stage, the lowest
@@ -54,24 +55,41 @@ class Signal:
 
 @dataclass(frozen=True)
 class RunUp:
-    """Part of a trace in which a shaft gathers speed (or loses it) steadily. each: mesh frequency over the shaft's;
-    signals by name; resonances: natural frequencies of the linearised stage that its transmission error drives, Hz."""
+    """Part of a trace in which a shaft gathers speed (or loses it) steadily. families: mesh frequency over the shaft's
+    of every mesh, one of a pair or set; signals by name; resonances: natural frequencies of the linearised stage that
+    its transmission error drives, Hz; others: speeds of other shafts over this one's, by name."""
 
     part: Trace
     shaft: str
-    each: float
+    families: Mapping[str, float]
     signals: Mapping[str, Signal]
     resonances: tuple[float, ...] = ()
     orders_shown: int = SET_ORDERS
+    others: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def each(self) -> float:
+        """Mesh frequency over the shaft's, of several meshes that of the fastest."""
+        return max(self.families.values())
+
+    @property
+    def highest(self) -> float:
+        """The highest order shown."""
+        return (self.orders_shown + 0.3) * self.each
+
+    @property
+    def mesh_orders(self) -> list[tuple[str, int, float]]:
+        """(mesh, its order k, order of the shaft) of all that are shown."""
+        shown = range(1, self.orders_shown + 1)
+        return [(mesh, k, k * each) for mesh, each in self.families.items() for k in shown]
 
     @cached_property
     def orders(self) -> dict[str, metrics.OrderMap]:
         """The order map of every signal."""
         angle, time = self.part[f"{self.shaft}{GEAR_PHI}"], self.part.time
         angle = angle if angle[-1] > angle[0] else -angle
-        highest = (self.orders_shown + 0.3) * self.each
         return {
-            name: metrics.order_map(time, own.values, angle, highest, averaged=own.averaged)
+            name: metrics.order_map(time, own.values, angle, self.highest, averaged=own.averaged)
             for name, own in self.signals.items()
         }
 
@@ -95,25 +113,49 @@ def run_up_of_set(
     if velocity is not None:
         beside = {k: passing_orders(k * each, len(own.planets)) for k in range(1, SET_ORDERS + 1)}
         signals = {PICKUP: Signal(velocity, "m/s", 1e-9, beside)} | signals
-    return RunUp(part, own.carrier, each, signals) if signals else None
+    return RunUp(part, own.carrier, {"": each}, signals) if signals else None
 
 
-def run_up_of_pair(trace: Trace, mesh: str, meshing: Meshing, window: Window) -> RunUp | None:
-    """The run-up of a stage of one engagement within `window`, by its gear A; None where that does not gather speed (or
-    lose it) steadily."""
-    part, gear = trace.window(window.start, window.end), meshing.rotor
-    if meshing.carrier is not None or any(f"{gear}{end}" not in part for end in (GEAR_SPEED, GEAR_PHI)):
+def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window) -> RunUp | None:
+    """The run-up of a pair or a train within `window`, by gear A of its first engagement; None where that does not
+    gather speed (or lose it) steadily, or where gears ride on a carrier."""
+    part, rotors = trace.window(window.start, window.end), [meshing.rotor for meshing in known.values()]
+    if any(meshing.carrier is not None for meshing in known.values()):
         return None
-    if not _gathers(np.abs(part[f"{gear}{GEAR_SPEED}"])):
+    if any(f"{gear}{end}" not in part for gear in rotors for end in (GEAR_SPEED, GEAR_PHI)):
         return None
-    names = [f"bearing.{name}.fy" for name in bearings(part)] + [f"{mesh}.force"]
+    first = rotors[0]
+    if not _gathers(np.abs(part[f"{first}{GEAR_SPEED}"])):
+        return None
+    turned = {gear: float(np.ptp(part[f"{gear}{GEAR_PHI}"][[0, -1]])) for gear in _rotors(part)}
+    families = {mesh: own.teeth * turned[own.rotor] / turned[first] for mesh, own in known.items()}
+    if len(known) == 1:
+        families, others = {"": float(next(iter(known.values())).teeth)}, {}
+        names, shown = [f"bearing.{name}.fy" for name in bearings(part)], PAIR_ORDERS
+    else:
+        others, shown = {gear: turn / turned[first] for gear, turn in turned.items() if gear != first}, TRAIN_ORDERS
+        names = _loudest_bearings(part)
+    names += [f"{mesh}.force" for mesh in known]
     signals = {name: _force(part, name) for name in names if name in part or f"{name}_mean" in part}
-    return RunUp(part, gear, float(meshing.teeth), signals, orders_shown=PAIR_ORDERS) if signals else None
+    return RunUp(part, first, families, signals, orders_shown=shown, others=others) if signals else None
+
+
+def _rotors(part: Trace) -> list[str]:
+    """Those whose angle is recorded."""
+    return [name.removesuffix(GEAR_PHI) for name in part.channels if name.endswith(GEAR_PHI)]
+
+
+def _loudest_bearings(part: Trace) -> list[str]:
+    """Of the radial forces of the bearings those that vary most, TRAIN_BEARINGS of them, in the trace's order."""
+    found = [f"bearing.{name}.{axis}" for name in bearings(part) for axis in ("fx", "fy")]
+    found = [name for name in found if name in part]
+    loud = sorted(found, key=lambda name: -float(np.std(np.diff(part[name]))))[:TRAIN_BEARINGS]
+    return [name for name in found if name in loud]
 
 
 def resonances(run: RunUp, mesh: str, spec: Any, bodies: Sequence[Any]) -> tuple[float, ...]:
-    """Natural frequencies (Hz) of a pair linearised under the run's mean mesh force, those modes that a transmission
-    error drives; none where the stage finds no equilibrium with its flanks in contact."""
+    """Natural frequencies (Hz) of a pair or train linearised under the run's mean mesh force, those modes that a
+    transmission error drives; none where the stage finds no equilibrium with its flanks in contact."""
     model = assemble(spec, bodies)
     place = place_of(model, mesh)
     torque = float(np.mean(run.signals[f"{mesh}.force"].values)) * place.lever

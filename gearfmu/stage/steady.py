@@ -1,41 +1,81 @@
-"""The standalone solver under a constant load, and settings of the kernel by name."""
+"""The standalone solver at a constant load, in a run-up or along a profile, and settings of the kernel by name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Variable
+from gearfmu.spec.profile import Profile
 from gearfmu.spec.turning import require_driven
 from gearfmu.stage.limits import beyond_limits, limit_named
 from gearfmu.stage.model import StageModel
-from gearfmu.stage.simulate import Steady, simulate
+from gearfmu.stage.profiled import Line, Profiled
+from gearfmu.stage.simulate import Inputs, Steady, simulate
 from gearfmu.stage.trace import Trace
+
+DURATION = 0.1  # s, of a run whose profile says none
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A run under a constant load: torque (N·m) and speed (rad/s) of the input, duration (s), time between samples (s),
-    time from which on results are taken (s); end_speed (rad/s), which the speed grows or falls to; None: it stays."""
+    """A run of a stage alone: torque (N·m) and speed (rad/s) of the input; duration (s), None for that of the profile
+    or 0.1; time between samples (s); time from which on results are taken (s); end_speed (rad/s), which the speed grows
+    or falls to, None: it stays; profile: torque, speed or both over time, in their place. SpecError with all that is
+    missing or said twice."""
 
-    torque: float
-    speed: float
-    duration: float = 0.1
+    torque: float | None = None
+    speed: float | None = None
+    duration: float | None = None
     step: float = 20e-6
     settle: float = 0.02
     end_speed: float | None = None
+    profile: Profile | None = None
+
+    def __post_init__(self) -> None:
+        if problems := list(_drive_problems(self)):
+            raise SpecError(problems)
 
     @property
-    def rate(self) -> float:
-        """Of the speed, rad/s²."""
-        return 0.0 if self.end_speed is None else (self.end_speed - self.speed) / self.duration
+    def length(self) -> float:
+        """Simulated time, s."""
+        if self.duration is not None:
+            return self.duration
+        return DURATION if self.profile is None else self.profile.duration
+
+    def lines(self) -> tuple[Line, Line]:
+        """Torque (N·m) and speed (rad/s) over time."""
+        profile = self.profile or Profile(np.array([0.0, self.length]))
+        ends = (self.torque, self.torque), (self.speed, self.speed if self.end_speed is None else self.end_speed)
+        torque, speed = (
+            Line(np.array([0.0, self.length]), np.array(given)) if own is None else Line(profile.time, own)
+            for own, given in zip((profile.torque, profile.speed), ends, strict=True)
+        )
+        return torque, speed
 
     @property
-    def fastest(self) -> float:
-        """The speed of larger magnitude, rad/s."""
-        return max(self.speed, self.speed if self.end_speed is None else self.end_speed, key=abs)
+    def scene(self) -> str:
+        """What the run is, in words."""
+        if self.profile is not None:
+            return "torque and speed over time"
+        return "constant speed and load" if self.end_speed is None else "run-up under constant torque"
+
+
+def _drive_problems(drive: Drive) -> Iterator[Problem]:
+    profile = drive.profile
+    for name in ("torque", "speed"):
+        in_profile, given = profile is not None and getattr(profile, name) is not None, getattr(drive, name)
+        if given is None and not in_profile:
+            remedy = f"the run needs a {name}: give it" + ("" if profile is None else ", or a column in the profile")
+            yield Problem("", name, "", remedy)
+        if given is not None and in_profile:
+            yield Problem("", name, f"{given:g}", f"the profile has a {name} too: leave one of them away")
+    if drive.end_speed is not None and profile is not None and profile.speed is not None:
+        yield Problem("", "end_speed", f"{drive.end_speed:g} rad/s", "the profile has a speed: leave one of them away")
 
 
 def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, float]:
@@ -54,22 +94,30 @@ def steady_run(
     settings: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Trace:
-    """Trace of the model under this drive (`Steady`). settings: kernel parameters, as numbers (`parameters`); progress
-    is called with the part done, 0 … 1. SpecError where a port that would have to turn is no spring port without a
-    chain."""
+    """Trace of the model under this drive (`Steady`, with a profile `Profiled`). settings: kernel parameters, as
+    numbers (`parameters`); progress is called with the part done, 0 … 1. SpecError where a port that would have to turn
+    is no spring port without a chain."""
     _require_springs(model)
-    inputs = Steady(model, drive.speed, drive.torque, drive.rate)
-    with limit_named(model, drive.torque):
-        trace = simulate(model, inputs, drive.duration, drive.step, settings, progress)
-    trace.meta["warnings"] = [*beyond_limits(model, drive.torque, drive.fastest), *trace.meta["warnings"]]
+    torque, speed = drive.lines()
+    inputs = _inputs(model, drive, torque, speed)
+    most, fastest = (float(max(line.values, key=abs)) for line in (torque, speed))
+    with limit_named(model, most):
+        trace = simulate(model, inputs, drive.length, drive.step, settings, progress)
+    trace.meta["warnings"] = [*beyond_limits(model, most, fastest), *trace.meta["warnings"]]
     trace.meta.update(
         settle=drive.settle,
-        scene="constant speed and load" if drive.end_speed is None else "run-up under constant torque",
+        scene=drive.scene,
         torque=drive.torque,
         speed=drive.speed,
         end_speed=drive.end_speed,
     )
     return trace
+
+
+def _inputs(model: StageModel, drive: Drive, torque: Line, speed: Line) -> Inputs:
+    if drive.profile is not None:
+        return Profiled(model, torque, speed)
+    return Steady(model, float(speed.values[0]), float(torque.values[0]), speed.at(0.0)[1])
 
 
 def _require_springs(model: StageModel) -> None:

@@ -48,7 +48,7 @@ def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, floa
 
 def run_alone(model: StageModel, values: Mapping[str, Any]) -> Trace:
     """`steady_run` at a point."""
-    return steady_run(model, Drive(**_own(SIMULATE, values)), _settings(SIMULATE, model, values))
+    return steady_run(model, Drive(**dict[str, Any](_own(SIMULATE, values))), _settings(SIMULATE, model, values))
 
 
 def run_scene(scene: SceneSpec, spec: Any, bodies: list[Any]) -> Trace:

@@ -11,7 +11,7 @@ from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
 
 
 def test_shipped_scenes():
-    pairs = ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded"]
+    pairs = ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded", "train_runup"]
     sets = {name: "planetary54" for name in ("planetary_backfire", "planetary_paper", "planetary_closure")}
     sets |= {"planetary_runup": "planetary54/stage_pin_error", "planetary_shift": "planetary54/stage_ring_port"}
     assert shipped_scenes() == sorted([*pairs, *sets])
@@ -19,13 +19,10 @@ def test_shipped_scenes():
         scene = load_scene(name)
         assert (scene.name, scene.stage.name, scene.stage.level) == (name, stage, "fast")
     for name in pairs:
-        scene = load_scene(name)
-        assert (
-            scene.name == name
-            and scene.stage.name == ("two_stage" if name.endswith("_train") else "fzg_c/stage_relief")
-            and scene.stage.level == ("fast" if name.endswith("_train") else "standard")
-            and scene.stage.slices == (7 if name.endswith("_train") else 5)
-        )
+        scene, train = load_scene(name), "train" in name
+        assert scene.name == name
+        assert scene.stage.name == ("two_stage" if train else "fzg_c/stage_relief")
+        assert (scene.stage.level, scene.stage.slices) == (("fast", 7) if train else ("standard", 5))
 
 
 def test_clutch_closure_is_the_demo():

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import gearfmu as gf
 from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.plots_set import planet_set
 from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
-from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_pair, run_up_of_set
+from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
@@ -154,7 +155,7 @@ def test_the_run_up_of_a_pair_has_its_maps_over_the_pinions_speed(tmp_path: Path
     assert not {"spectrum", "spectrogram"} & made
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "speed of the pinion in rpm" in text and "mesh orders k × 16" in text and "planets" not in text
-    own = run_up_of_pair(trace, "mesh", known_meshings(trace)["mesh"], Window(0.0, DURATION, "here"))
+    own = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
     assert own is not None and list(own.signals) == ["bearing.pinion.fy", "mesh.force"] and own.resonances == ()
     found = own.orders["mesh.force"]
     peak = found.speed[np.argmax(found.amplitude[:, found.order == 16.0].ravel())]
@@ -171,7 +172,7 @@ def test_orders_are_loudest_where_they_meet_the_linearised_stage() -> None:
     start, end, duration = 3500 * np.pi / 30, 6000 * np.pi / 30, 0.3
     drive = Steady(model, start, 150.0, (end - start) / duration)
     trace = simulate(model, drive, duration, 40e-6, {"level": 1.0})
-    run = run_up_of_pair(trace, "mesh", known_meshings(trace)["mesh"], Window(0.02, duration, "settled"))
+    run = run_up_of_meshes(trace, known_meshings(trace), Window(0.02, duration, "settled"))
     assert run is not None
     found = run.orders["bearing.wheel.fy"]
     near = np.abs(found.order - 32.0) < 0.6
@@ -192,3 +193,59 @@ def test_a_run_up_turns_through_the_angle_of_its_speeds() -> None:
         assert speed == pytest.approx(now[f"{port}.w"], rel=1e-9)
         assert (after[f"{port}.w"] - before[f"{port}.w"]) / (2 * step) == pytest.approx(now[f"{port}.a"], rel=1e-9)
     assert now["pinion.w"] == pytest.approx(110.0) and now["wheel.w"] == pytest.approx(-110.0 * 16 / 24)
+
+
+def train_sweep() -> Trace:
+    """25/61 and 19/73 teeth: every mesh has its own orders of the input, the second is loudest at 500 Hz."""
+    second = 25 / 61 * 19
+    frequency = second * 2.0 * SPEED / (2 * np.pi)
+    loud = 1.0 / np.abs(1 - (frequency / 500.0) ** 2 + 0.05j * frequency / 500.0)
+    channels = {
+        "stage1.force": Channel(1000.0 + 10.0 * np.cos(25 * 2.0 * ANGLE), "N"),
+        "stage2.force": Channel(-2000.0 + 5.0 * loud * np.cos(second * 2.0 * ANGLE), "N"),
+    }
+    for gear, ratio in (("input", 2.0), ("intermediate", -2.0 * 25 / 61), ("output", 2.0 * 25 * 19 / 61 / 73)):
+        channels[f"{gear}.gear.w"] = Channel(ratio * SPEED, "rad/s")
+        channels[f"{gear}.gear.phi"] = Channel(ratio * ANGLE, "rad")
+    meta = {"scene": "sweep", "stage": "train", "meshes": {"stage1": ["input", 25], "stage2": ["intermediate", 19]}}
+    return Trace(TIME, channels, meta)
+
+
+def test_the_run_up_of_a_train_has_the_orders_of_every_mesh(tmp_path: Path) -> None:
+    trace = train_sweep()
+    run = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
+    assert run is not None and run.shaft == "input"
+    assert run.families == pytest.approx({"stage1": 25.0, "stage2": 25 * 19 / 61}, rel=1e-9)
+    assert run.others == pytest.approx({"intermediate": 25 / 61, "output": 25 * 19 / 61 / 73}, rel=1e-9)
+    marked = {k: (f, rpm) for k, f, rpm in crossings(replace(run, resonances=(500.0,)))}
+    assert marked[5] == (500.0, pytest.approx(60 * 500.0 * 61 / 25 / 19)), "orders of the second mesh follow"
+    found = run.orders["stage2.force"]
+    near = np.abs(found.order - 25 * 19 / 61) < 0.5
+    peak = found.speed[np.argmax(np.linalg.norm(found.amplitude[:, near], axis=1))]
+    assert peak == pytest.approx(2 * np.pi * 500.0 * 61 / 25 / 19, rel=0.04)
+    report.write(trace, trace.meta, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "mesh orders k × 25 of stage1, k′ × 7.78689 of stage2" in text
+    assert "Shafts turn at the orders 1 (input), 0.4098 (intermediate), 0.1067 (output)." in text
+    head = (tmp_path / "data" / "orders_speed.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "stage2 order 4 of stage1.force_rms_[N]" in head
+
+
+@pytest.mark.full
+def test_the_shipped_run_up_of_the_train_is_loudest_where_it_meets_the_linearised_stage() -> None:
+    """train_runup: orders 3 and 4 of the second mesh in its own force peak within 3 % of a resonance."""
+    trace = gf.run("train_runup", unit="kernel")
+    assert trace.meta["outcome"] == "ok" and trace.meta["cpu_s"] < 60
+    spec = load_stage("two_stage")
+    bodies = load_bodies(spec)
+    run = run_up_of_meshes(trace, known_meshings(trace), Window(0.05, float(trace.time[-1]), "settled"))
+    assert run is not None
+    known, found = resonances(run, "stage1", spec, bodies), run.orders["stage2.force"]
+    for k in (3, 4):
+        order = k * run.families["stage2"]
+        near = np.abs(found.order - order) < 0.5
+        level = np.linalg.norm(found.amplitude[:, near], axis=1)
+        peak = found.speed[np.argmax(level)] * order / (2 * np.pi)
+        print(f"order {k} of stage2 peaks at {peak:.0f} Hz; resonances {[round(f) for f in known]}")
+        assert min(abs(peak / f - 1) for f in known if f < 2500) < 0.03
+        assert level.max() > 5 * np.median(level)

@@ -1,6 +1,8 @@
 "use strict";
 /* Draws the figures of a report: unpacks the numbers (gearfmu/report/packed.py), draws each panel with Plotly when it
-   comes near the window, zooms panels of one group together, and thins long curves to what the width can show. */
+   comes near the window, zooms panels of one group together, and thins long curves to what the width can show. What is
+   in the window comes first: Plotly is unpacked and run once the first picture stands, or at once where a figure is
+   seen. The document's element is of class `ready` when all that is in the window is drawn. */
 (() => {
   const LEFT = 58, RIGHT = 12, PALETTE = 8, THIN_FROM = 3000;
   const root = document.documentElement;
@@ -189,7 +191,8 @@
   function keys(own) {
     own.place.parentElement.querySelectorAll("button.key").forEach(key => {
       key.setAttribute("aria-pressed", "true");
-      key.addEventListener("click", () => {
+      key.addEventListener("click", async () => {
+        await plotly();
         draw(own.place);
         const on = key.getAttribute("aria-pressed") !== "true";
         key.setAttribute("aria-pressed", String(on));
@@ -226,33 +229,53 @@
     });
   }
 
+  /* Plotly, unpacked and run by the first that needs it */
+  let loading = null;
+  function plotly() {
+    if (!loading) loading = inflated("plotly").then(load).then(() => performance.mark("plotly"));
+    return loading;
+  }
+
+  const painted = () => new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+  const seen = () => [...panels.values()].filter(own => {
+    const at = own.place.getBoundingClientRect();
+    return at.top < innerHeight && at.bottom > 0;
+  });
+
   async function begin() {
     performance.mark("begin");
-    const script = document.getElementById("plotly") ? inflated("plotly") : null;
     await unpack();
     performance.mark("numbers");
     register();
     if (window.gearfmuStage && content.stage) window.gearfmuStage(content.stage, array, colour);
-    if (panels.size) await figures(await script);
+    if (seen().length) {
+      await plotly();
+      for (const own of seen()) draw(own.place);
+    }
+    await painted();
+  }
+
+  /* after the first picture: figures that come near the window, what prints, what changes its colours; then the gears turn */
+  async function rest() {
+    if (panels.size) {
+      addEventListener("beforeprint", () => { if (window.Plotly) { for (const own of panels.values()) draw(own.place); redraw(); } });
+      await plotly();
+      const watch = new IntersectionObserver(found => found.forEach(entry => {
+        if (entry.isIntersecting) { watch.unobserve(entry.target); draw(entry.target); }
+      }), { rootMargin: "500px 0px" });
+      for (const own of panels.values()) watch.observe(own.place);
+      matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+      addEventListener("afterprint", redraw);
+    }
     if (page.stage) page.stage.start();
+    root.classList.add("complete");
   }
 
-  async function figures(text) {
-    performance.mark("inflated");
-    await load(text);
-    performance.mark("plotly");
-    const watch = new IntersectionObserver(found => found.forEach(entry => {
-      if (entry.isIntersecting) { watch.unobserve(entry.target); draw(entry.target); }
-    }), { rootMargin: "500px 0px" });
-    for (const own of panels.values()) watch.observe(own.place);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-    addEventListener("beforeprint", () => { for (const own of panels.values()) draw(own.place); redraw(); });
-    addEventListener("afterprint", redraw);
-  }
-
-  begin().then(() => root.classList.add("ready"), error => {
+  function failed(error) {
     page.errors.push(String(error));
     root.classList.add("failed");
     console.error(error);
-  });
+  }
+
+  begin().then(() => { root.classList.add("ready"); performance.mark("ready"); return rest(); }).catch(failed);
 })();

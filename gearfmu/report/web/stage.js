@@ -179,12 +179,11 @@ window.gearfmuStage = (stage, array, colour) => {
     if (turn) { state.yaw += turn[0]; state.pitch += turn[1]; event.preventDefault(); } else state.zoom *= zoom;
     draw();
   });
-  new ResizeObserver(draw).observe(canvas);
+  new ResizeObserver(draw).observe(canvas); /* its first call draws the first picture */
   addEventListener("beforeprint", draw);
   const calm = matchMedia("(prefers-reduced-motion: reduce)").matches || document.hidden;
   let wanted = !calm;
   const start = () => new IntersectionObserver(found => { if (wanted) run(found[0].isIntersecting); else if (state.running && !found[0].isIntersecting) run(false); }).observe(canvas);
   button.addEventListener("click", () => { wanted = state.running; });
   window.gearfmuPage.stage = { span: [time[0], time[last]], state, draw, run, start, show: frame => { wanted = false; run(false); state.at = frame; slider.value = String(frame / last); draw(); }, displaced: name => { const body = bodies.find(b => b.own.name === name); displace(body, Math.min(Math.floor(state.at), last), 0); return Array.from(body.moved); } };
-  draw();
 };

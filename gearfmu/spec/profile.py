@@ -1,0 +1,137 @@
+"""Torque and speed over time: CSV files with a head like `time_[s],torque_[N*m],speed_[rpm]`, as traces are exported.
+
+A row is a point; between points the values follow straight lines, outside they stay. Columns in any order, each with
+its unit; `torque` or `speed` may be missing. What follows a # is remark.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.units import to_si
+
+UNITS = {"time": "s", "torque": "N*m", "speed": "rad/s"}
+EXAMPLE = "time_[s],torque_[N*m],speed_[rpm]"
+MOST_SHOWN = 20
+_HEADING = re.compile(r"(\w+?)[_ ]?\[(.+)\]")
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Straight lines through points. time: (n,) s, ascending from 0 on; torque: (n,) N·m, speed: (n,) rad/s, both of
+    the input, None where the file does not say."""
+
+    time: np.ndarray
+    torque: np.ndarray | None = None
+    speed: np.ndarray | None = None
+
+    @property
+    def duration(self) -> float:
+        """Time of the last point, s."""
+        return float(self.time[-1])
+
+
+def read_profile(path: Path) -> Profile:
+    """The profile in a CSV file. SpecError with everything that is wrong with it."""
+    reader = _Reader(str(path))
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise SpecError([Problem(str(path), "", "", f"the profile cannot be read ({why}): name a CSV file")]) from None
+    found = reader.read(text)
+    if reader.problems:
+        raise SpecError(reader.shown)
+    assert found is not None, "no profile and no problem"
+    return found
+
+
+class _Reader:
+    """Rows of one file, and what is wrong with them."""
+
+    def __init__(self, file: str):
+        self.file = file
+        self.problems: list[Problem] = []
+
+    def refuse(self, where: str, value: str, remedy: str) -> None:
+        self.problems.append(Problem(self.file, where, value, remedy))
+
+    @property
+    def shown(self) -> list[Problem]:
+        """The problems, of many the first."""
+        left = len(self.problems) - MOST_SHOWN
+        rest = [Problem(self.file, "", "", f"and {left} more problems: correct these first")] if left > 0 else []
+        return self.problems[:MOST_SHOWN] + rest
+
+    def read(self, text: str) -> Profile | None:
+        lines = [(i + 1, line.split("#")[0].strip()) for i, line in enumerate(text.splitlines())]
+        rows = [(f"line {i}", next(csv.reader([line]))) for i, line in lines if line]
+        if not rows:
+            self.refuse("", "", f"the file holds no rows: give a head {EXAMPLE} and points")
+            return None
+        scales = self.head(*rows[0])
+        points = [self.row(where, cells, scales) for where, cells in rows[1:]]
+        if len(points) < 2:
+            self.refuse("", "", "a profile needs at least two points")
+        if self.problems:
+            return None
+        columns = {name: np.array([point[name] for point in points]) for name in UNITS if name in points[0]}
+        self.times(columns["time"], [where for where, _ in rows[1:]])
+        return Profile(**columns)
+
+    def head(self, where: str, cells: list[str]) -> list[tuple[str, float]]:
+        """Of every column its name ("" where it is none of ours) and the SI size of its unit."""
+        found = [self.column(where, cell.strip()) for cell in cells]
+        names = [name for name, _ in found if name]
+        known = [name for name in UNITS if any(cell.strip().startswith(name) for cell in cells)]
+        if "time" not in known:
+            self.refuse(where, ",".join(cells), f"there is no time: write a head like {EXAMPLE}")
+        elif len(known) == 1:
+            self.refuse(where, ",".join(cells), f"there is neither torque nor speed: write a head like {EXAMPLE}")
+        for name in UNITS:
+            if names.count(name) > 1:
+                self.refuse(where, ",".join(cells), f"{name} is there twice: remove one")
+        return found
+
+    def column(self, where: str, text: str) -> tuple[str, float]:
+        match = _HEADING.fullmatch(text)
+        name = match[1] if match else text
+        if name not in UNITS:
+            self.refuse(
+                where, text, f"unknown column: there are {', '.join(UNITS)}, each with its unit, as in {EXAMPLE}"
+            )
+        elif match is None:
+            self.refuse(where, text, f"the unit is missing: write {name}_[{UNITS[name]}] or another unit of its kind")
+        else:
+            try:
+                return name, to_si(f"1 {match[2]}", UNITS[name])
+            except UnitError as error:
+                self.refuse(where, text, str(error))
+        return "", 1.0
+
+    def row(self, where: str, cells: list[str], scales: list[tuple[str, float]]) -> dict[str, float]:
+        if len(cells) != len(scales):
+            self.refuse(where, ",".join(cells), f"{len(cells)} values, the head has {len(scales)}: complete the row")
+            return {}
+        found = {}
+        for (name, scale), cell in zip(scales, cells, strict=True):
+            try:
+                value = float(cell)
+            except ValueError:
+                value = np.nan
+            if name and not np.isfinite(value):
+                self.refuse(f"{where}, {name}", cell.strip(), "expected a finite number")
+            found[name] = scale * value
+        return found
+
+    def times(self, time: np.ndarray, places: list[str]) -> None:
+        if time[0] != 0.0:
+            self.refuse(places[0], f"{time[0]:g} s", "a profile begins at the time 0")
+        for k in np.flatnonzero(np.diff(time) <= 0) + 1:
+            self.refuse(places[k], f"{time[k]:g} s", f"not after the point before, {time[k - 1]:g} s: times must grow")
