@@ -29,7 +29,7 @@ from gearfmu.study.ladder import fitting
 from gearfmu.sweeps.points import program
 from gearfmu.sweeps.runners import Lost, Runner
 
-BASE_STEPS = 1000  # communication steps of which prices are made
+BASE_STEPS = 400  # communication steps of which prices are made
 LOOKED_AT = 0.01  # s of processor time of a replay
 CHUNK = 50  # communication steps whose median time stands for all: what another process takes away does not count
 IDLE_CALLS = 20  # timed one by one; the median counts
