@@ -67,7 +67,9 @@ def run_plan(
     unit : "kernel", "fmu" (exported into `out`) or the path of an FMU exported earlier. Both give the same numbers.
     """
     known = plan if isinstance(plan, Plan) else Plan.load(Path(plan))
-    return run_planned(known, None if out is None else Path(out), progress, unit=unit)
+    return run_planned(
+        known, None if out is None else Path(out), progress, unit=unit if isinstance(unit, str) else Path(unit)
+    )
 
 
 def _runner(on: Any) -> Any:

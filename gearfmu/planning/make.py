@@ -188,7 +188,8 @@ class _Made:
         if not steady:
             return trial, None
         if trial.outcome != OK:
-            return trial, f"{choice.words}: does not reach {window.end:.3g} s: {trial.outcome}: put all back by one step"
+            stopped = f"does not reach {window.end:.3g} s: {trial.outcome}"
+            return trial, f"{choice.words}: {stopped}: put all back by one step"
         rise = trend(trial.signals, self.job.request)
         if rise <= GROWTH * (self.job.request.level or 1.0):
             return trial, None

@@ -155,12 +155,12 @@ class _Runner:
                     break
             self._rest()
         finally:
-            run.cut.stage.close()
+            self.road.close(run)
         return self.done
 
     def _change(self, run: CoupledRun, choice: Choice) -> CoupledRun:
         """On with another choice from the end of the last leg, which the run may have left."""
-        run.cut.stage.close()
+        self.road.close(run)
         if self._before is None:
             run = self.road.begin(choice)
         else:
@@ -220,8 +220,7 @@ class _Runner:
 
     # -- spot checks ---------------------------------------------------------------------------------------------------
     def _checked(self, run: CoupledRun, segment: Segment) -> Iterator[tuple[Spot, Check]]:
-        """Checks begin that are due; those whose window is over are judged. Once one is missed the caller goes back, and
-        no other is looked at."""
+        """Checks begin that are due; one whose window is over is judged."""
         if self.spots is None or self._before is None:
             return
         self.spots.look(run.at, segment, Mark(self._choice, self._before, len(self.done.legs)))

@@ -93,7 +93,8 @@ def quiet_enough(bench: Bench, most: float, steady: bool, looser: Choice) -> tup
     larger step, which is the twin of a waveform with loss of contact."""
     asked = bench.request
     if steady and bench.full.loses_contact and asked.waveform is not None:
-        bench.widen(replace(bench.window, length=bench.window.length * max(1, min(WATCHED, most // bench.window.length))))
+        length = bench.window.length
+        bench.widen(replace(bench.window, length=length * max(1, min(WATCHED, most // length))))
     while True:
         full, window = bench.full, bench.window
         lost = full.loses_contact
