@@ -3,12 +3,11 @@
     python benchmarks/plans.py [--budget "1 dB"] [--only NAME] [--out benchmarks/plans.csv]
 
 Every scene is planned for a budget; then the chosen set and the full model run on from a state of the scene over a
-window behind that of the plan, three times as long where the scene is steady. The scenes are shipped ones (`pair_loaded`,
-`clutch_closure`, `clutch_dump`, `planetary_paper`, `planetary_backfire`) with another torque, speed or stage, and
-shipped stages under alternating torques. kept: the error there is at most the
-budget (and the noise of the full model where contact is lost). A part with no room behind its window is not judged:
-true is nan. None of the scenes set a constant of gearfmu/planning.
-Rows are added as they come; a row that is there is not made again.
+window behind that of the plan, three times as long where the scene is steady. The scenes are shipped ones
+(`pair_loaded`, `clutch_closure`, `clutch_dump`, `planetary_paper`, `planetary_backfire`) with another torque, speed or
+stage, and shipped stages under alternating torques. kept: the error there is at most the budget (and the noise of the
+full model where contact is lost). A part with no room behind its window is not judged: true is nan. None of the scenes
+set a constant of gearfmu/planning. Rows are added as they come; a row that is there is not made again.
 """
 
 from __future__ import annotations
