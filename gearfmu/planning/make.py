@@ -180,9 +180,10 @@ class _Made:
 
     def _alone_for_longer(self, choice: Choice) -> tuple[Trial, str | None]:
         """The chosen set run alone over LONGER windows, at most LONGEST_ALONE and no less than one, and how it grows
-        there where the scene is steady: None when it stays."""
+        there, where the scene is steady, beyond what the full model does over its window: None when it stays."""
         window, steady = self.bench.window, self.part.kind == "loaded"
-        longer = min(LONGER, max(1.0, LONGEST_ALONE / window.length)) if steady else 1.0
+        room = min(LONGER, LONGEST_ALONE / window.length)
+        longer = room if steady and room >= 2 else 1.0
         window = replace(window, length=longer * window.length)
         trial = self.bench.run(Task(self.text, choice, window, self.job.request, priced=True))
         if not steady:
@@ -190,7 +191,7 @@ class _Made:
         if trial.outcome != OK:
             stopped = f"does not reach {window.end:.3g} s: {trial.outcome}"
             return trial, f"{choice.words}: {stopped}: put all back by one step"
-        rise = trend(trial.signals, self.job.request)
+        rise = trend(trial.signals, self.job.request) - trend(self.bench.full.signals, self.job.request)
         if rise <= GROWTH * (self.job.request.level or 1.0):
             return trial, None
         return trial, f"{choice.words}: grows by {rise:.2g} dB in {window.length:.3g} s: put all back by one step"
