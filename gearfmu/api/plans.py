@@ -51,16 +51,25 @@ def plan(
     return known or cache.keep(make(job, name))
 
 
-def run_plan(plan: Plan | PathLike, out: PathLike | None = None, progress: Progress | None = None) -> Trace:
-    """Run the scene of a plan as it says, by the kernel, with tripwires: where the run leaves what was planned for it
-    goes back to its last saved state and on with the effect that was missing. meta["plan"] of the trace tells.
+def run_plan(
+    plan: Plan | PathLike,
+    out: PathLike | None = None,
+    progress: Progress | None = None,
+    unit: PathLike = "kernel",
+) -> Trace:
+    """Run the scene of a plan as it says, with tripwires: where the run leaves what was planned for it goes back to its
+    last saved state and on with the effect that was missing; where a spot check is missed, back to where the check
+    began and on with a richer set. meta["plan"] of the trace tells.
 
     plan : a Plan or the path of a plan.toml.
     out : folder of trace.h5; nothing is written when None.
     progress : called with the part that is done, 0 … 1.
+    unit : "kernel", "fmu" (exported into `out`) or the path of an FMU exported earlier. Both give the same numbers.
     """
     known = plan if isinstance(plan, Plan) else Plan.load(Path(plan))
-    return run_planned(known, None if out is None else Path(out), progress)
+    return run_planned(
+        known, None if out is None else Path(out), progress, unit=unit if isinstance(unit, str) else Path(unit)
+    )
 
 
 def _runner(on: Any) -> Any:

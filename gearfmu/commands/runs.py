@@ -32,7 +32,7 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
     "--plan",
     "plan_path",
     type=click.Path(path_type=Path),
-    help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned, by the kernel.",
+    help="A plan.toml of `gearfmu plan`, which names the scene: it is run as planned.",
 )
 @click.option(
     "--unit",
@@ -57,15 +57,19 @@ def run(scene: str | None, out: Path | None, stage: str | None, step: float | No
     if how["plan_path"] is not None:
         if scene is not None or stage is not None or step is not None or how["verify"]:
             raise click.UsageError("--plan names scene, stage and step itself, and verifies by spot checks: give none")
-        return run_plan(how["plan_path"], out)
+        return run_plan(how["plan_path"], out, _unit(how))
     if scene is None:
         raise click.UsageError("name a SCENE, or a plan with --plan")
     spec = load_scene(scene)
     if stage is not None:
         spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
-    unit = how["fmu_path"] if how["fmu_path"] is not None and how["unit"] == "fmu" else how["unit"]
     spec = spec if step is None else with_step(spec, step)
-    return run_scene(spec, out or Path("out") / spec.name, unit=unit, verify=how["verify"])
+    return run_scene(spec, out or Path("out") / spec.name, unit=_unit(how), verify=how["verify"])
+
+
+def _unit(how: dict[str, Any]) -> Any:
+    """ "kernel", "fmu" or the path of an FMU."""
+    return how["fmu_path"] if how["fmu_path"] is not None and how["unit"] == "fmu" else how["unit"]
 
 
 @click.command()
@@ -191,7 +195,7 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
     return finish(trace, out, scene.stage.name)
 
 
-def run_plan(path: Path, out: Path | None) -> int:
+def run_plan(path: Path, out: Path | None, unit: Any) -> int:
     """Run a plan.toml, print what became of it; 0 when the run reached its end, else 1."""
     from gearfmu.api.plans import run_plan as run_it
     from gearfmu.planning.book import Plan
@@ -200,7 +204,7 @@ def run_plan(path: Path, out: Path | None) -> int:
     plan = Plan.load(path)
     folder = out or Path("out") / Path(plan.scene).stem
     with progress_bar(plan.scene) as progress:
-        trace = run_it(plan, folder, progress)
+        trace = run_it(plan, folder, progress, unit)
     click.echo(run_text(trace.meta["plan"]))
     return finish(trace, folder, trace.meta["stage"])
 

@@ -78,7 +78,7 @@ def run(
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
     staged = scene if isinstance(scene, Staged) else Staged.of(load_scene(scene) if isinstance(scene, str) else scene)
     scene, model = staged.scene, staged.model
-    with _source(model, unit, fmu_path, out_dir) as source:
+    with stage_source(model, unit if fmu_path is None or unit == "kernel" else fmu_path, out_dir) as source:
         first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
         result = run_once(scene, source, first, frames=frame_plan(scene))
         errors = (
@@ -123,9 +123,11 @@ def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec
 
 
 @contextmanager
-def _source(model: StageModel, unit: str, fmu_path: str | Path | None, out_dir: str | Path | None) -> Iterator[Source]:
-    if unit == "kernel" or fmu_path is not None:
-        yield Source(model, Path(fmu_path) if fmu_path is not None and unit == "fmu" else None)
+def stage_source(model: StageModel, unit: str | Path, out_dir: str | Path | None) -> Iterator[Source]:
+    """Where the stage of a run comes from. unit: "kernel", "fmu" (exported into out_dir, a temporary folder when None)
+    or the path of an FMU."""
+    if unit != "fmu":
+        yield Source(model, None if unit == "kernel" else Path(unit))
         return
     with tempfile.TemporaryDirectory(prefix="gearfmu-") as folder:
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))

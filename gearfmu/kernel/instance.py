@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,6 +46,28 @@ class TeState:
     forces: dict[tuple[int, int], tuple[float, ...]]
 
 
+@dataclass(frozen=True)
+class _Opened:
+    """A model that was checked and opened; kernels of the same blob share it, for nothing writes to it. keep: the
+    memory behind the address."""
+
+    model: int
+    keep: tuple[ctypes.Array, ctypes.Array]
+
+
+@lru_cache(maxsize=2)
+def _opened(blob: bytes, library: Path | None) -> _Opened:
+    """ModelError: the blob is refused, with the kernel's message."""
+    kernel = load(library)
+    blob_keep, address = aligned(len(blob))
+    ctypes.memmove(address, blob, len(blob))
+    model_keep, model = aligned(kernel.gk_model_size())
+    message = blank_message()
+    if kernel.gk_model_open(model, address, len(blob), message):
+        raise ModelError(message.value.decode(errors="replace"))
+    return _Opened(model, (blob_keep, model_keep))
+
+
 class Kernel:
     """A stage model with its own parameters, state and time.
 
@@ -54,12 +77,8 @@ class Kernel:
 
     def __init__(self, blob: bytes, parameters: Mapping[str, float] | None = None, library: Path | None = None):
         self._lib = load(library)
-        self._blob_keep, self._blob = aligned(len(blob))
-        ctypes.memmove(self._blob, blob, len(blob))
-        self._model_keep, self._model = aligned(self._lib.gk_model_size())
-        message = blank_message()
-        if self._lib.gk_model_open(self._model, self._blob, len(blob), message):
-            raise ModelError(message.value.decode(errors="replace"))
+        self._opened = _opened(bytes(blob), library)
+        self._model = self._opened.model
         self._setup_keep, self._setup = aligned(self._lib.gk_setup_size(self._model))
         self._work_keep, self._work = aligned(self._lib.gk_work_size(self._model))
         self._data_keep, self._data = aligned(self._lib.gk_data_size(self._model))
@@ -136,8 +155,9 @@ class Kernel:
         """Fast path: outcome number of gk_get, the value in `out`."""
         return self._lib.gk_get(self._model, self._data, reference, ctypes.byref(out))
 
-    def set_many(self, references: ctypes.Array, values: ctypes.Array) -> int:
-        """Inputs by value reference (c_uint32) and number (c_double), all or none: outcome number."""
+    def set_many(self, references: ctypes.Array, values: ctypes.Array | int) -> int:
+        """Inputs by value reference (c_uint32) and number (c_double; an array or its address), all or none: outcome
+        number."""
         return self._set_many(self._model, self._data, references, len(references), values)
 
     def get_many(self, references: ctypes.Array, values: ctypes.Array | int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,6 @@ from gearfmu.stage.effects import EFFECTS, Effect, costs
 from gearfmu.study.ladder import LEVELS, SLICES, STEPS, fitting
 
 LEAST_SHARE = 0.03  # of the cost of a step: what saves less stays on
-LEAST_SAVING = 0.005  # of the price of a run
 FULL = "full"
 FULL_STEP, FULL_STEP_OF_SETS = 2e-6, 4e-6  # s; a step of a set costs twenty times as much
 MODES, SLICED, STEP = "modes", "slices", "step"
@@ -127,13 +126,19 @@ def space(scene: SceneSpec, model: StageModel, least_share: float = LEAST_SHARE,
     return Space(full, tuple(_knobs(scene, model, least_share, tuple(force))), tuple(steps), slices)
 
 
+def _can_be_off(effect: Effect, starts: Mapping[str, float]) -> bool:
+    """Whether the stage has it, on, with a parameter that turns it off."""
+    off = effect.off_setting
+    return bool(off) and set(off) <= set(starts) and any(starts[name] != value for name, value in off.items())
+
+
 def _knobs(scene: SceneSpec, model: StageModel, least: float, force: tuple[str, ...]) -> Iterator[Knob]:
-    known, there = costs(), {v.name for v in model.kernel_variables()}
+    known, starts = costs(), {v.name: v.start for v in model.kernel_variables()}
     for effect in EFFECTS:
         share = known[effect.name].share if effect.name in known else float("nan")
         if effect.name in (MODES, SLICED):
             yield Knob(effect.name, share, effect=effect)
-        elif not effect.off_setting or not set(effect.off_setting) <= there or effect.name in scene.stage.effects.off:
+        elif effect.name in scene.stage.effects.off or not _can_be_off(effect, starts):
             continue
         else:
             small = f"costs {share:.1%} of a step" if share < least and effect.name not in force else ""

@@ -15,15 +15,16 @@ from gearfmu.planning.choice import LEAST_SHARE, MODES, SLICED, STEP, Choice, Kn
 from gearfmu.planning.formulas import Conditions, predicted
 from gearfmu.planning.judge import FAILED, SAFETY, SAFETY_LOSS, error, silent_outputs, trend
 from gearfmu.planning.request import Request
-from gearfmu.planning.search import Bench, Found, Measured, measurable, neighbours, search
+from gearfmu.planning.search import Bench, Found, Measured, Pair, measurable, pairs, search
 from gearfmu.planning.segments import Part, parts
-from gearfmu.planning.trials import Task, run_trials
-from gearfmu.planning.windows import GROWN, LONGEST, QUIET, Noise, mesh_frequency, quiet_enough
+from gearfmu.planning.trials import Task, Trial, prime, run_trials
+from gearfmu.planning.windows import GROWN, GROWN_LOST, LONGEST, QUIET, Noise, mesh_frequency, quiet_enough
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.sweeps.runners import Runner
 
 LONGER = 4  # windows that the chosen set is run alone for, to see slow growth
+LONGEST_ALONE = 0.4  # s of that
 GROWTH = 0.5  # of the budget (of 1 dB where none is given in dB) over these windows
 RETRIES = 3
 Tell = Callable[[str], None]
@@ -61,7 +62,7 @@ def make(job: Job, name: str) -> Plan:
     for part in parts(job.scene, job.model, job.request):
         made = _Made(job, part)
         segments.append(made.segment())
-        cpu, unit = cpu + made.bench.cpu, unit + made.bench.full.cpu
+        cpu, unit = cpu + made.bench.cpu, unit + made.bench.full.run
     return Plan(name, job.identity, job.scene.coupling.step, job.request.plain, tuple(segments), cpu / unit, cpu)
 
 
@@ -72,7 +73,8 @@ class _Made:
         self.job, self.part = job, part
         self.space: Space = space(job.scene, job.model, job.least_share, job.force)
         self.text = job.scene.model_dump_json()
-        task = Task(self.text, self.space.full, part.window, job.request)
+        prime(self.text, job.scene, job.model)
+        task = Task(self.text, self.space.full, part.window, job.request, priced=True)
         job.tell(f"{part.name}: full model over {1e3 * part.window.length:.3g} ms")
         full = run_trials([task], job.runner)[0]
         if full.outcome != OK:
@@ -82,12 +84,13 @@ class _Made:
     def segment(self) -> Segment:
         """Window, noise, search, slow growth, reasons."""
         job, bench = self.job, self.bench
-        full, window, noise = quiet_enough(bench, self.part.longest, self.part.kind == "loaded")
+        looser = self.space.cheaper(self.space.full, STEP) or self.space.full
+        full, window, noise = quiet_enough(bench, self.part.longest, self.part.kind == "loaded", looser)
         self._refuse_silence()
-        self._refuse_chaos(noise)
+        self._refuse_chaos(noise, looser)
         safety = SAFETY_LOSS if full.loses_contact else SAFETY
         known = Conditions(job.model, job.request, full.force, self.part.speed, self._mesh_hz(), full)
-        found, notes = self._search(known, safety)
+        found, priced, notes = self._search(known, safety)
         own = self._own()
         lines = tuple(self._lines(found, known, safety))
         return Segment(
@@ -102,31 +105,42 @@ class _Made:
             found.chosen.bound,
             found.chosen.error.whole,
             safety,
-            max(noise.split if full.loses_contact else 0.0, noise.twin),
-            found.chosen.price,
-            found.chosen.trial.realtime,
+            self._noise(noise),
+            priced.price,
+            priced.realtime,
             full.price,
             own.price,
-            own.error.whole,
+            error(own.signals, full.signals, job.request).whole,
             lines,
-            self._points(found.chosen),
+            self._points(found.chosen, own),
             (*notes, *_noise_notes(noise, full.loses_contact)),
         )
 
-    def _points(self, chosen: Measured) -> tuple[Point, ...]:
-        """All that was measured and ran, the full model among it."""
-        full = self.bench.full
+    def _noise(self, noise: Noise) -> float:
+        """Of the full model, in budgets of what is asked for."""
+        asked = self.job.request
+        if asked.level is None and asked.waveform is not None:
+            return noise.waveform / asked.waveform
+        return max(noise.split if self.bench.full.loses_contact else 0.0, noise.twin)
+
+    def _points(self, chosen: Measured, own: Trial) -> tuple[Point, ...]:
+        """All that was measured and ran, what the scene asks for itself and the full model among it."""
+        full, asked = self.bench.full, self.job.request
         known = [m for m in self.bench.known.values() if m.price > 0 and m.bound < FAILED]
         made = [Point(m.choice.words, m.price, m.bound, m == chosen) for m in known]
+        bound = error(own.signals, full.signals, asked).bound
+        if own.choice != chosen.choice and bound < FAILED:
+            made.append(Point(f"the scene's own, {own.choice.words}", own.price, bound, False))
         return (*made, Point(f"full model, {full.choice.words}", full.price, 0.0, False))
 
     def _mesh_hz(self) -> float:
         return mesh_frequency(self.job.model, self.part.speed)
 
-    def _own(self) -> Measured:
+    def _own(self) -> Trial:
         """What the scene asks for itself."""
-        choice = self.job.scene.stage
-        return self.bench.one(Choice(choice.level, choice.h, choice.slices, tuple(sorted(choice.effects.off))))
+        stage, bench = self.job.scene.stage, self.bench
+        choice = Choice(stage.level, stage.h, stage.slices, tuple(sorted(stage.effects.off)))
+        return bench.run(Task(self.text, choice, bench.window, self.job.request, priced=True))
 
     def _refuse_silence(self) -> None:
         silent = silent_outputs(self.bench.full.signals, self.job.request)
@@ -137,22 +151,23 @@ class _Made:
                 "choose another band"
             )
 
-    def _refuse_chaos(self, noise: Noise) -> None:
-        budget = self.job.request.waveform
-        if budget is None or not noise.waveform > GROWN * budget:
+    def _refuse_chaos(self, noise: Noise, looser: Choice) -> None:
+        budget, lost = self.job.request.waveform, self.bench.full.loses_contact
+        if budget is None or not noise.waveform > (GROWN_LOST if lost else GROWN) * budget:
             return
+        what = f"a step of {1e6 * looser.h:.3g} µs" if lost else "a small disturbance before it"
         raise PlanError(
-            f"{self.part.name}: the waveform does not repeat: a small disturbance before it changes it by "
-            f"{100 * noise.waveform:.2g} %, so that no model keeps {100 * budget:g} %. Ask for levels, which repeat "
+            f"{self.part.name}: the waveform does not repeat: {what} changes that of the full model by "
+            f"{100 * noise.waveform:.2g} %, so that no set keeps {100 * budget:g} %. Ask for levels, which repeat "
             f'within {noise.twin * (self.job.request.level or 1.0):.2g} dB here: --budget "1 dB"'
         )
 
-    def _search(self, known: Conditions, safety: float) -> tuple[Found, list[str]]:
-        """The search, again from a richer set while the chosen one grows slowly."""
+    def _search(self, known: Conditions, safety: float) -> tuple[Found, Trial, list[str]]:
+        """The search, again from a richer set while the chosen one grows slowly; and the trial that says its price."""
         job, notes = self.job, list[str]()
         found = search(self.space, self.bench, known, safety, job.tell)
         for _ in range(RETRIES):
-            grown = self._growth(found)
+            alone, grown = self._alone_for_longer(found.chosen.choice)
             if grown is None:
                 break
             notes.append(grown)
@@ -161,47 +176,41 @@ class _Made:
             found = replace(found, chosen=richer, kept=richer.bound * safety <= 1)
         if not found.kept:
             notes.append("no set cheaper than the full model keeps the budget: the full model is taken")
-        return found, notes
+        return found, self.bench.full if found.chosen.choice == self.space.full else alone, notes
 
-    def _growth(self, found: Found) -> str | None:
-        """What the chosen set does alone over LONGER windows, where the scene is steady: None when it stays."""
-        if self.part.kind != "loaded":
-            return None
-        window = replace(self.bench.window, length=LONGER * self.bench.window.length)
-        choice = found.chosen.choice
-        trial = run_trials([Task(self.text, choice, window, self.job.request, priced=False)], self.job.runner)[0]
-        self.bench.cpu += trial.cpu
+    def _alone_for_longer(self, choice: Choice) -> tuple[Trial, str | None]:
+        """The chosen set run alone over LONGER windows, at most LONGEST_ALONE and no less than one, and how it grows
+        there, where the scene is steady, beyond what the full model does over its window: None when it stays."""
+        window, steady = self.bench.window, self.part.kind == "loaded"
+        room = min(LONGER, LONGEST_ALONE / window.length)
+        longer = room if steady and room >= 2 else 1.0
+        window = replace(window, length=longer * window.length)
+        trial = self.bench.run(Task(self.text, choice, window, self.job.request, priced=True))
+        if not steady:
+            return trial, None
         if trial.outcome != OK:
-            return f"{choice.words}: does not reach {window.end:.3g} s: {trial.outcome}: put all back by one step"
-        rise = trend(trial.signals, self.job.request)
+            stopped = f"does not reach {window.end:.3g} s: {trial.outcome}"
+            return trial, f"{choice.words}: {stopped}: put all back by one step"
+        rise = trend(trial.signals, self.job.request) - trend(self.bench.full.signals, self.job.request)
         if rise <= GROWTH * (self.job.request.level or 1.0):
-            return None
-        return f"{choice.words}: grows by {rise:.2g} dB in {window.length:.3g} s: put all back by one step"
+            return trial, None
+        return trial, f"{choice.words}: grows by {rise:.2g} dB in {window.length:.3g} s: put all back by one step"
 
     # -- reasons -------------------------------------------------------------------------------------------------------
     def _lines(self, found: Found, known: Conditions, safety: float) -> Iterator[Line]:
-        """A line for every knob. What the search left open is measured: one step down, where there is none one up."""
-        chosen = found.chosen.choice
-        names = measurable(self.space.knobs)
-        lower = neighbours(self.space.cheaper, self.bench, chosen, [n for n in names if n not in found.refused])
-        lower |= found.refused
-        richer = neighbours(self.space.richer, self.bench, chosen, [n for n in names if n not in lower])
+        """A line for every knob, with what the search measured of it."""
+        names = [n for n in measurable(self.space.knobs) if n not in found.refused]
+        known_pairs = pairs(self.space, self.bench, found.chosen.choice, names)
+        known_pairs |= {n: (lower, found.tried_from[n]) for n, lower in found.refused.items()}
         for knob in self.space.knobs:
-            pair = lower.get(knob.name), richer.get(knob.name)
-            yield self._line(knob, found.chosen, pair, known, 1.0 / safety)
+            yield self._line(knob, found, known_pairs.get(knob.name), known, 1.0 / safety)
 
-    def _line(
-        self,
-        knob: Knob,
-        chosen: Measured,
-        beside: tuple[Measured | None, Measured | None],
-        known: Conditions,
-        most: float,
-    ) -> Line:
-        """beside: the chosen set with a step down and with a step up of this knob, where there are such."""
-        verdict, lower = _verdict(knob, chosen.choice), beside[0]
+    def _line(self, knob: Knob, found: Found, pair: Pair | None, known: Conditions, most: float) -> Line:
+        """pair: two measured sets that differ by one step of this knob, where there are such."""
+        chosen, lower = found.chosen, found.refused.get(knob.name)
+        verdict = _verdict(knob, chosen.choice)
         formula = predicted(knob, self.space.cheapest(knob.name), known) if not _by_nature(knob) else math.nan
-        alone = self._alone(chosen, lower or beside[1])
+        alone = math.nan if pair is None else self._between(*pair)
         if knob.kept:
             return Line(knob.name, verdict, "policy", knob.kept, formula, alone, knob.share)
         if lower is None:
@@ -212,11 +221,9 @@ class _Made:
             reason = f"{_step_down(knob, lower.choice)} saves nothing"
         return Line(knob.name, verdict, "measured", reason, formula, alone, knob.share)
 
-    def _alone(self, chosen: Measured, other: Measured | None) -> float:
-        """What this one knob changes: distance of the two runs, budgets."""
-        if other is None:
-            return math.nan
-        return error(other.trial.signals, chosen.trial.signals, self.job.request).whole
+    def _between(self, lower: Measured, richer: Measured) -> float:
+        """Distance of two runs, budgets."""
+        return error(lower.trial.signals, richer.trial.signals, self.job.request).whole
 
 
 def _by_nature(knob: Knob) -> bool:

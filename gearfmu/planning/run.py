@@ -1,8 +1,9 @@
-"""A scene run as its plan says: segment by segment, with tripwires.
+"""A scene run as its plan says: segment by segment, with tripwires and spot checks.
 
 The run goes in legs. At the end of each the tripwires are read; where one has tripped the leg is forgotten, the run
-goes back to where the leg began, takes one communication step as before and goes on with what was missing. Between
-segments the state is taken over by the next choice (`CoupledRun.take_over`).
+goes back to where the leg began and on with what was missing. Where a spot check is missed the run goes back to where
+the check began, and on with a richer set that keeps the budget from that state. Between segments the state is taken
+over by the next choice (`CoupledRun.take_over`; planning/road.py).
 """
 
 from __future__ import annotations
@@ -16,21 +17,22 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun, Saved
-from gearfmu.cosim.scene_run import coupled_run, stage_model
-from gearfmu.cosim.source import Source
+from gearfmu.cosim.scene_run import stage_model, stage_source
 from gearfmu.errors import SimulationError
 from gearfmu.planning.book import Plan, Segment
 from gearfmu.planning.choice import Choice
+from gearfmu.planning.road import Road
 from gearfmu.planning.tripwires import Trip, Wires, answer
-from gearfmu.planning.verify import SpotChecks
+from gearfmu.planning.verify import Check, Mark, Spot, SpotChecks
 from gearfmu.report.results import strict
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.turning import meshings
-from gearfmu.stage import StageModel, Trace
+from gearfmu.stage import Trace
 from gearfmu.stage.trace import Channel
 
 LEG = 5e-3  # s
 MOST_TRIPS = 8  # in one leg
+MOST_REPLANS = 3  # in one segment
 
 Progress = Callable[[float], None]
 
@@ -45,10 +47,11 @@ class Leg:
 
 @dataclass
 class PlannedRun:
-    """The legs of a run, what tripped, and the processor time."""
+    """The legs of a run, what tripped, what was checked, and the processor time."""
 
     legs: list[Leg] = field(default_factory=list)
     trips: list[Trip] = field(default_factory=list)
+    checks: list[Check] = field(default_factory=list)
     outcome: str = OK
     message: str = ""
     cpu: float = 0.0
@@ -75,24 +78,34 @@ def planned_scene(plan: Plan) -> SceneSpec:
     return scene.model_copy(update={"coupling": coupling})
 
 
-def run_planned(plan: Plan, out: Path | None = None, progress: Progress | None = None, verify: bool = True) -> Trace:
-    """Run the scene of the plan by the kernel; the trace's meta "plan" says what was predicted and what happened.
+def run_planned(
+    plan: Plan,
+    out: Path | None = None,
+    progress: Progress | None = None,
+    verify: bool = True,
+    unit: str | Path = "kernel",
+) -> Trace:
+    """Run the scene of the plan; the trace's meta "plan" says what was predicted and what happened.
 
     verify : two spot checks a segment: the full model from states of the run against the plan from the same states.
+    unit : "kernel", "fmu" (exported into `out`) or the path of an FMU exported earlier.
     """
     scene = planned_scene(plan)
     model = stage_model(scene)
-    spots = SpotChecks(plan, scene, model) if verify else None
-    done = _Runner(scene, model, plan.segments, spots, progress).go()
-    trace = done.trace(_meta(scene, model, done))
-    checks = [] if spots is None or done.outcome != OK else [asdict(check) for check in spots.checks(trace)]
-    trace.meta["plan"] = strict(asdict(plan) | {"trips": [asdict(trip) for trip in done.trips], "checks": checks})
+    with stage_source(model, unit, out) as source:
+        road = Road(scene, model, source.fmu_path)
+        spots = SpotChecks(plan, road) if verify else None
+        done = _Runner(road, plan.segments, spots, progress).go()
+        trace = done.trace(_meta(road, done))
+    events = {name: [asdict(item) for item in getattr(done, name)] for name in ("trips", "checks")}
+    trace.meta["plan"] = strict(asdict(plan) | events)
     if out is not None:
         trace.save(out / "trace.h5")
     return trace
 
 
-def _meta(scene: SceneSpec, model: StageModel, done: PlannedRun) -> dict[str, Any]:
+def _meta(road: Road, done: PlannedRun) -> dict[str, Any]:
+    scene, model = road.scene, road.model
     end = float(done.legs[-1].trace.time[-1])
     return {
         "scene": scene.name,
@@ -104,7 +117,7 @@ def _meta(scene: SceneSpec, model: StageModel, done: PlannedRun) -> dict[str, An
         "H": scene.coupling.step,
         "h": done.legs[-1].choice.h,
         "settle": scene.settle,
-        "unit": "kernel",
+        "unit": road.unit,
         "outcome": done.outcome,
         "message": done.message,
         "simulated_s": end,
@@ -116,71 +129,74 @@ def _meta(scene: SceneSpec, model: StageModel, done: PlannedRun) -> dict[str, An
 
 
 class _Runner:
-    """A planned run on its way."""
+    """A planned run on its way. before: where it stood one communication step before the end of the last leg."""
 
     def __init__(
-        self,
-        scene: SceneSpec,
-        model: StageModel,
-        segments: Sequence[Segment],
-        spots: SpotChecks | None,
-        progress: Progress | None,
+        self, road: Road, segments: Sequence[Segment], spots: SpotChecks | None, progress: Progress | None
     ) -> None:
-        self.scene, self.model, self.segments, self.spots = scene, model, segments, spots
+        self.road, self.segments, self.spots = road, segments, spots
         self.tell = progress or (lambda part: None)
-        self.done, self.wires = PlannedRun(), Wires(model)
+        self.done, self.wires = PlannedRun(), Wires(road.model)
+        self.step, self.steps = road.scene.coupling.step, road.scene.steps
+        self.leg = max(1, round(LEG / self.step))
         self._choice = segments[0].choice
-        self.leg = max(1, round(LEG / scene.coupling.step))
+        self._before: Saved | None = None
 
     def go(self) -> PlannedRun:
         """Segment by segment to the end, or to where nothing helps any more."""
-        run: CoupledRun | None = None
-        for number, segment in enumerate(self.segments):
-            run = self._start(segment.choice, run)
-            last = number == len(self.segments) - 1
-            end = self.scene.steps if last else round(segment.end / self.scene.coupling.step)
-            run = self._segment(run, segment, end)
-            if self.done.outcome != OK:
-                break
+        run = self.road.begin(self._choice)
+        try:
+            for number, segment in enumerate(self.segments):
+                if self._choice != segment.choice:
+                    run = self._change(run, segment.choice)
+                last = number == len(self.segments) - 1
+                run = self._segment(run, segment, self.steps if last else round(segment.end / self.step))
+                if self.done.outcome != OK:
+                    break
+            self._rest()
+        finally:
+            self.road.close(run)
         return self.done
 
-    def _start(self, choice: Choice, before: CoupledRun | None) -> CoupledRun:
-        """A run with this choice: begun, or on from where another stands."""
-        if before is not None and self._choice == choice:
-            return before
-        run = coupled_run(choice.of(self.scene), Source(self.model))
-        self._choice = choice
-        if before is None:
-            run.begin()
+    def _change(self, run: CoupledRun, choice: Choice) -> CoupledRun:
+        """On with another choice from the end of the last leg, which the run may have left."""
+        self.road.close(run)
+        if self._before is None:
+            run = self.road.begin(choice)
         else:
-            run.take_over(before)
+            run = self.road.change(choice, self.road.again(self._choice, self._before))
+        self._choice = choice
         return run
 
     def _segment(self, run: CoupledRun, segment: Segment, end: int) -> CoupledRun:
-        for to in self._ends(run.at, end):
-            for _ in range(MOST_TRIPS):
-                saved, choice = run.save(), self._choice
-                trip = self._leg(run, segment, to)
-                if trip is None:
-                    break
-                better = answer(choice, trip, segment)
-                if better is None:
-                    self.done.outcome, self.done.message = trip.wire, trip.message
-                    return run
-                self.done.trips.append(replace(trip, answer=better.words))
-                run = self._back(run, saved, better)
-            else:
-                self.done.outcome, self.done.message = "tripwires", f"{MOST_TRIPS} tripwires in one leg"
+        replans = 0
+        while run.at < end:
+            run = self._one_leg(run, segment, min(run.at + self.leg, end))
+            if self.done.outcome != OK:
                 return run
-            self.tell(run.at / self.scene.steps)
-            if self.spots is not None:
-                self.spots.look(run, segment)
+            self.tell(run.at / self.steps)
+            for spot, check in self._checked(run, segment):
+                better = None if check.kept or replans == MOST_REPLANS else self._better(spot)
+                self.done.checks.append(check if better is None else replace(check, answer=better.words))
+                if better is not None:
+                    replans += 1
+                    run, segment = self._back_to(run, spot, better), replace(segment, choice=better)
         return run
 
-    def _ends(self, at: int, end: int) -> Iterator[int]:
-        while at < end:
-            at = min(at + self.leg, end)
-            yield at
+    def _one_leg(self, run: CoupledRun, segment: Segment, to: int) -> CoupledRun:
+        """The leg up to step `to`, begun anew with what was missing as long as a wire trips."""
+        for _ in range(MOST_TRIPS):
+            trip = self._leg(run, segment, to)
+            if trip is None:
+                return run
+            better = answer(self._choice, trip, segment)
+            if better is None:
+                self.done.outcome, self.done.message = trip.wire, trip.message
+                return run
+            self.done.trips.append(replace(trip, answer=better.words))
+            run = self._change(run, better)
+        self.done.outcome, self.done.message = "tripwires", f"{MOST_TRIPS} tripwires in one leg"
+        return run
 
     def _leg(self, run: CoupledRun, segment: Segment, to: int) -> Trip | None:
         """The leg, kept when no wire trips."""
@@ -188,6 +204,8 @@ class _Runner:
         run.record()
         started = clock.process_time()
         try:
+            run.advance(to - 1)
+            before = self.road.keep(run)
             run.advance(to)
         except SimulationError as error:
             return Trip(segment.name, run.time, error.outcome, str(error))
@@ -197,13 +215,36 @@ class _Runner:
         trip = self.wires.look(trace, segment, self._choice)
         if trip is None:
             self.done.legs.append(Leg(trace, self._choice))
+            self._before = before
         return trip
 
-    def _back(self, run: CoupledRun, saved: Saved, choice: Choice) -> CoupledRun:
-        """Back to the start of the leg; what was recorded of its first step is kept, then the choice changes."""
-        run.restore(saved)
-        run.new_recorder(1)
-        run.record()
-        run.advance(run.at + 1)
-        self.done.legs.append(Leg(run.recorder.trace({}), self._choice))
-        return self._start(choice, run)
+    # -- spot checks ---------------------------------------------------------------------------------------------------
+    def _checked(self, run: CoupledRun, segment: Segment) -> Iterator[tuple[Spot, Check]]:
+        """Checks begin that are due; one whose window is over is judged."""
+        if self.spots is None or self._before is None:
+            return
+        self.spots.look(run.at, segment, Mark(self._choice, self._before, len(self.done.legs)))
+        spot = self.spots.over(run.at)
+        if spot is not None:
+            check = self.spots.judged(spot, self.done.trace({}))
+            self.spots.done(spot)
+            yield spot, check
+
+    def _better(self, spot: Spot) -> Choice | None:
+        assert self.spots is not None, "there was a check"
+        return self.spots.better(spot, self._choice)
+
+    def _back_to(self, run: CoupledRun, spot: Spot, better: Choice) -> CoupledRun:
+        """Back to where a check began, on with a richer set; the same window is checked again."""
+        assert self.spots is not None, "there was a check"
+        self.spots.back_to(spot)
+        self.spots.begun.insert(0, spot)
+        del self.done.legs[spot.mark.legs :]
+        self._choice, self._before = spot.mark.choice, spot.mark.before
+        return self._change(run, better)
+
+    def _rest(self) -> None:
+        """Checks of a run that came to its end and were not looked at yet: told, and no more."""
+        while self.spots is not None and self.done.outcome == OK and (spot := self.spots.over(self.steps)) is not None:
+            self.done.checks.append(self.spots.judged(spot, self.done.trace({})))
+            self.spots.done(spot)

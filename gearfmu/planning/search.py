@@ -4,10 +4,11 @@ that is taken was measured as a set."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
-from gearfmu.planning.choice import LEAST_SAVING, MODES, SLICED, STEP, Choice, Knob, Space
+from gearfmu.planning.choice import MODES, SLICED, STEP, Choice, Knob, Space
 from gearfmu.planning.formulas import CERTAIN, Conditions, predicted
 from gearfmu.planning.judge import Error, error
 from gearfmu.planning.request import Request
@@ -17,6 +18,8 @@ from gearfmu.sweeps.runners import Runner
 
 LADDERS = (STEP, MODES, SLICED)
 START = 0.5  # of what is allowed: where a ladder begins by its formula
+UNSEEN = 1  # effects that formulas decided alone and that are measured for the table
+DEARER = 1.05  # times the price: so much two runs differ without a reason
 Tell = Callable[[str], None]
 
 
@@ -50,11 +53,11 @@ class Bench:
     known: dict[Choice, Measured] = field(default_factory=dict)
     cpu: float = 0.0
 
-    def measure(self, choices: Iterable[Choice], priced: bool = True) -> list[Measured]:
-        """Errors and, where `priced`, prices; of what is new by trials side by side."""
+    def measure(self, choices: Iterable[Choice]) -> list[Measured]:
+        """Errors and prices; of what is new by trials side by side."""
         wanted = list(dict.fromkeys(choices))
         new = [choice for choice in wanted if choice not in self.known]
-        tasks = [Task(self.scene, choice, self.window, self.request, priced) for choice in new]
+        tasks = [Task(self.scene, choice, self.window, self.request) for choice in new]
         for choice, trial in zip(new, run_trials(tasks, self.runner), strict=True):
             self.cpu += trial.cpu
             self.known[choice] = Measured(choice, trial, error(trial.signals, self.full.signals, self.request))
@@ -63,13 +66,15 @@ class Bench:
     def widen(self, window: Window) -> None:
         """Another window: the full model is run again, what was measured is forgotten."""
         self.window, self.known = window, {}
-        self.full = self.again(twin=False)
+        self.full = self.run(Task(self.scene, self.full.choice, window, self.request, priced=True))
 
-    def again(self, twin: bool) -> Trial:
-        """The full model once more; twin: disturbed before it settles."""
+    def twin(self) -> Trial:
+        """The full model once more, disturbed before it settles."""
         full = self.full.choice
-        through = replace(full, level=LEVELS[0]) if twin else None
-        task = Task(self.scene, full, self.window, self.request, not twin, through)
+        return self.run(Task(self.scene, full, self.window, self.request, through=replace(full, level=LEVELS[0])))
+
+    def run(self, task: Task) -> Trial:
+        """One trial; what it costs is counted."""
         found = run_trials([task], self.runner)[0]
         self.cpu += found.cpu
         return found
@@ -82,10 +87,11 @@ class Bench:
 @dataclass(frozen=True)
 class Found:
     """chosen: the cheapest set that keeps the budget; refused: by knob, what one step further down would have been;
-    kept: whether the bound is within the safety."""
+    tried_from: by knob, the set that this step began at; kept: whether the bound is within the safety."""
 
     chosen: Measured
     refused: dict[str, Measured]
+    tried_from: dict[str, Measured]
     kept: bool
 
 
@@ -94,7 +100,7 @@ def search(space: Space, bench: Bench, known: Conditions, safety: float, tell: T
     most = 1.0 / safety
     now = bench.one(begin(space, known, most))
     tell(_said("candidate", now))
-    now = _restored(space, bench, now, most, tell)
+    now = restored(space, bench, now, most, tell, _worst_first(known))
     return _pruned(space, bench, now, most, tell)
 
 
@@ -108,12 +114,38 @@ def begin(space: Space, known: Conditions, most: float) -> Choice:
     return choice
 
 
-def _restored(space: Space, bench: Bench, now: Measured, most: float, tell: Tell) -> Measured:
-    """Put back what lowers the error most for its price, until the set keeps the budget."""
+Order = Callable[[list[tuple[Knob, Choice]], Choice], list[Choice]]
+
+
+class Measures(Protocol):
+    """What `restored` needs of a Bench."""
+
+    def measure(self, choices: Iterable[Choice]) -> list[Measured]: ...
+
+    def one(self, choice: Choice) -> Measured: ...
+
+
+def _worst_first(known: Conditions) -> Order:
+    """What the formulas say is farthest off comes first; what no formula says comes last."""
+
+    def order(steps: list[tuple[Knob, Choice]], now: Choice) -> list[Choice]:
+        far = [predicted(knob, now, known) for knob, _ in steps]
+        rank = sorted(range(len(steps)), key=lambda k: -far[k] if far[k] == far[k] else math.inf)
+        return [steps[k][1] for k in rank]
+
+    return order
+
+
+def restored(space: Space, bench: Measures, now: Measured, most: float, tell: Tell, order: Order) -> Measured:
+    """Put back what lowers the error most for its price, until the set keeps the budget. Steps are tried in the order
+    of `order`; the first that is enough ends the round."""
     while now.bound > most and now.choice != space.full:
-        names = [knob.name for knob in space.candidates]
-        richer = [c for name in names if (c := space.richer(now.choice, name)) is not None]
-        tried = bench.measure(richer)
+        steps = [(knob, c) for knob in space.candidates if (c := space.richer(now.choice, knob.name)) is not None]
+        tried: list[Measured] = []
+        for choice in order(steps, now.choice):
+            tried += bench.measure([choice])
+            if tried[-1].bound <= most:
+                break
         better = [m for m in tried if m.bound < 0.98 * now.bound]
         now = max(better, key=lambda m: _gain(now, m)) if better else bench.one(space.all_richer(now.choice))
         tell(_said("put back", now))
@@ -130,23 +162,42 @@ def _gain(now: Measured, richer: Measured) -> float:
 def _pruned(space: Space, bench: Bench, now: Measured, most: float, tell: Tell) -> Found:
     """Take out what is dearest first, as long as the set keeps the budget; what fails once is not tried again."""
     refused: dict[str, Measured] = {}
+    before: dict[str, Measured] = {}
     for knob in space.candidates:
         while (lower := space.cheaper(now.choice, knob.name)) is not None:
             tried = bench.one(lower)
-            if tried.bound > most or not tried.price < (1.0 - LEAST_SAVING) * now.price:
-                refused[knob.name] = tried
+            if tried.bound > most or not tried.price < DEARER * now.price:
+                refused[knob.name], before[knob.name] = tried, now
                 break
             now = tried
             tell(_said("without", now))
-    return Found(now, refused, now.bound <= most)
+    return Found(now, refused, before, now.bound <= most)
 
 
-def neighbours(
-    step: Callable[[Choice, str], Choice | None], bench: Bench, chosen: Choice, names: Sequence[str]
-) -> dict[str, Measured]:
-    """One step (`Space.cheaper`, `Space.richer`) from the chosen set by each of these knobs, where there is one."""
-    beside = {name: c for name in names if (c := step(chosen, name)) is not None}
-    return dict(zip(beside, bench.measure(beside.values(), priced=False), strict=True))
+Pair = tuple[Measured, Measured]
+
+
+def pairs(space: Space, bench: Bench, chosen: Choice, names: Sequence[str]) -> dict[str, Pair]:
+    """By knob two measured sets that differ by one step of it alone, the poorer first: beside the chosen set where that
+    was measured, else beside another. At most UNSEEN of what was never looked at is measured now, one step up."""
+    found: dict[str, Pair] = {}
+    unseen = 0
+    for name in names:
+        pair = next(iter(_seen(space, bench, chosen, name)), None)
+        richer = space.richer(chosen, name)
+        if pair is None and richer is not None and unseen < UNSEEN:
+            unseen += 1
+            pair = bench.one(chosen), bench.one(richer)
+        if pair is not None:
+            found[name] = pair
+    return found
+
+
+def _seen(space: Space, bench: Bench, chosen: Choice, name: str) -> Iterator[Pair]:
+    known = bench.known
+    for choice in (chosen, space.richer(chosen, name), *reversed(known)):
+        if choice in known and (lower := space.cheaper(choice, name)) in known:
+            yield known[lower], known[choice]
 
 
 def measurable(knobs: Sequence[Knob]) -> list[str]:

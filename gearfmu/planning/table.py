@@ -71,7 +71,7 @@ def run_text(told: Mapping[str, Any]) -> str:
     ]
     for c in told["checks"]:
         far = "the full model fails" if c["error"] is None else f"{number(c['error'])} budgets"
-        lines.append(
-            f"spot check at {c['start']:.4g} s: {far}, {number(c['allowed'])} allowed{'' if c['kept'] else ': MISSED'}"
-        )
+        after = f": back to where it began, on with {c['answer']}" if c.get("answer") else ""
+        missed = "" if c["kept"] else f": MISSED{after}"
+        lines.append(f"spot check at {c['start']:.4g} s: {far}, {number(c['allowed'])} allowed{missed}")
     return "\n".join(lines)

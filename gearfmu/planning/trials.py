@@ -8,13 +8,14 @@ process; the trial takes its state over (`CoupledRun.take_over`), settles, and i
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun
+from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.scene_run import coupled_run, stage_model
 from gearfmu.cosim.source import Source
 from gearfmu.errors import GearfmuError
@@ -23,17 +24,18 @@ from gearfmu.planning.judge import Signals
 from gearfmu.planning.request import Request
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.study.bench import KeptSource, Price, Replay, recorded_run, replayed_price
+from gearfmu.study.bench import Kept, Price, Replay, recorded_run, replayed_price
 from gearfmu.study.ladder import fitting
 from gearfmu.sweeps.points import program
 from gearfmu.sweeps.runners import Lost, Runner
 
-BASE_STEPS = 1000
-LOOKED_AT = 0.05  # s of processor time of a replay
+BASE_STEPS = 400  # communication steps of which prices are made
+LOOKED_AT = 0.01  # s of processor time of a replay
+CHUNK = 50  # communication steps whose median time stands for all: what another process takes away does not count
+IDLE_CALLS = 20  # timed one by one; the median counts
 PILOT_LEVEL, PILOT_STEP = "fast", 5e-6  # s
 MESH_CHANNELS = ("open_time", "force_drive", "force_coast", "te")
 SOLVER = ("solver.status", "energy.residual")
-NO_PRICE = Price(float("nan"), float("nan"))
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,15 @@ class Window:
 
 @dataclass(frozen=True)
 class Task:
-    """One trial: scene (as JSON), choice, window, what is asked, whether the price is measured; through: a choice that
-    the state passes through for one communication step, which makes a twin of a run."""
+    """One trial: scene (as JSON), choice, window, what is asked; priced: whether the price is measured by replay, in
+    turn with that of level fast, or read off the run itself; through: a choice that the state passes through for one
+    communication step, which makes a twin of a run."""
 
     scene: str
     choice: Choice
     window: Window
     request: Request
-    priced: bool = True
+    priced: bool = False
     through: Choice | None = None
     program: str = field(default_factory=program)
 
@@ -68,8 +71,8 @@ class Trial:
     """What a trial gave. signals: over the window, empty after a failure; lost: s without contact in the window, of the
     worst mesh; coast: whether both flanks of a mesh carried; drive: smallest force on the carrying flanks over its
     mean; force: mean of the first mesh, N; price: processor time of the stage over that of level fast at its default
-    step, measured in turn; realtime: processor seconds of the stage per simulated second; cpu: processor seconds of
-    the trial."""
+    step; realtime: processor seconds of the stage per simulated second; cpu: processor seconds of
+    the trial; run: of its window and the way there, without the measurement of its price."""
 
     choice: Choice
     outcome: str
@@ -82,6 +85,7 @@ class Trial:
     price: float = float("nan")
     realtime: float = float("nan")
     cpu: float = 0.0
+    run: float = 0.0
 
     @property
     def loses_contact(self) -> bool:
@@ -124,11 +128,62 @@ def pilot_choice(scene: SceneSpec) -> Choice:
     return Choice(PILOT_LEVEL, fitting(scene.coupling.step, PILOT_STEP), scene.stage.slices, off)
 
 
-@lru_cache(maxsize=2)
+class _Timed(Kept):
+    """Keeps its inputs and how long every communication step took, s."""
+
+    def __init__(self, blob: bytes, parameters: Mapping[str, float | bool | str], settle: float) -> None:
+        super().__init__(blob, parameters, settle)
+        self.took: list[float] = []
+
+    def step(self, time: float, h: float) -> None:
+        self.note(time, h)
+        started = clock.perf_counter()
+        KernelUnit.step(self, time, h)
+        self.took.append(clock.perf_counter() - started)
+
+    def realtime(self, step: float) -> float:
+        """Seconds of the stage per simulated second from the first kept state on: medians of chunks, less what a call
+        takes."""
+        idle = float(np.median([self._idle() for _ in range(IDLE_CALLS)]))
+        took = np.array(self.took[max(self.first, 0) :])
+        medians = [float(np.median(part)) for part in np.array_split(took, max(1, took.size // CHUNK))]
+        return (float(np.mean(medians)) - idle) / step
+
+    def _idle(self) -> float:
+        """s of a call that is refused at the door."""
+        started = clock.perf_counter()
+        self.kernel.try_step(0.0, float("nan"))
+        return clock.perf_counter() - started
+
+
+@dataclass
+class _TimedSource:
+    """A Source whose unit is kept."""
+
+    model: StageModel
+    settle: float
+    made: _Timed | None = None
+
+    def unit(self, parameters: Mapping[str, float | bool | str]) -> _Timed:
+        self.made = _Timed(self.model.blob, parameters, self.settle)
+        return self.made
+
+
+_known: dict[str, tuple[SceneSpec, StageModel]] = {}
+
+
+def prime(text: str, scene: SceneSpec, model: StageModel) -> None:
+    """Trials of this scene in this process need not assemble its stage."""
+    _known.clear()
+    _known[text] = scene, model
+
+
 def scene_and_model(text: str) -> tuple[SceneSpec, StageModel]:
-    """Scene and model of a task, kept in the process."""
-    scene = SceneSpec.model_validate_json(text)
-    return scene, stage_model(scene)
+    """Scene and model of a task; the last is kept in the process."""
+    if text not in _known:
+        scene = SceneSpec.model_validate_json(text)
+        prime(text, scene, stage_model(scene))
+    return _known[text]
 
 
 @lru_cache(maxsize=2)
@@ -138,6 +193,15 @@ def _base(text: str) -> Replay:
     part = shortened(scene, BASE_STEPS * scene.coupling.step).model_copy(update={"settle": 0.0})
     choice = Choice("fast", 0.0, scene.stage.slices, scene.stage.effects.off)
     return Replay(recorded_run(choice.of(part), model).recording)
+
+
+@lru_cache(maxsize=2)
+def _base_realtime(text: str) -> float:
+    """Seconds of the stage per simulated second."""
+    replay = _base(text)
+    replay.rewind()
+    steps = replay.left
+    return replay.chunk(steps) / (steps * replay.recording.step)
 
 
 _pilots: dict[str, CoupledRun] = {}
@@ -166,9 +230,10 @@ def _run(task: Task) -> Trial:
     step, meshes = scene.coupling.step, [mesh.name for mesh in model.stage.engagements]
     first, last = (round(t / step) for t in (task.window.start, task.window.end))
     at = max(1, round((task.window.start - task.window.settle) / step))
-    source = KeptSource(model, task.window.start)
+    source = _TimedSource(model, task.window.start)
     watched = [f"{mesh}.{key}" for mesh in meshes for key in MESH_CHANNELS]
     scene = _recording(scene, [*task.request.channels, *watched, *SOLVER])
+    started = clock.process_time()
     before: CoupledRun = _pilot(task.scene, at)
     if task.through is not None:
         before = _one_step(before, coupled_run(task.through.of(scene), Source(model)))
@@ -179,11 +244,21 @@ def _run(task: Task) -> Trial:
     run.new_recorder(last - run.at)
     run.record()
     run.advance(last)
-    price = NO_PRICE
-    if task.priced and source.unit_made is not None:
-        recording = source.unit_made.recording(model.blob, step)
-        price = replayed_price(Replay(recording), _base(task.scene), LOOKED_AT)
-    return _judged(task, run.recorder.trace({}), meshes, price)
+    spent = clock.process_time() - started
+    assert source.made is not None, "the run made its unit"
+    price = _price(task, source.made, model)
+    return replace(_judged(task, run.recorder.trace({}), meshes, price), run=spent)
+
+
+def _price(task: Task, unit: _Timed, model: StageModel) -> Price:
+    """By replay of the first BASE_STEPS of the window, or as the run itself was timed."""
+    step = scene_and_model(task.scene)[0].coupling.step
+    if not task.priced:
+        realtime = unit.realtime(step)
+        return Price(realtime, realtime / _base_realtime(task.scene))
+    recording = unit.recording(model.blob, step)
+    short = replace(recording, values=recording.values[: recording.first + BASE_STEPS])
+    return replayed_price(Replay(short), _base(task.scene), LOOKED_AT)
 
 
 def _one_step(before: CoupledRun, run: CoupledRun) -> CoupledRun:

@@ -1,23 +1,24 @@
 """Spot checks of a planned run: the full model takes over a state of the run, settles, and is compared with what the
-run did over the same window."""
+run does over the same window. Where a check is missed, richer sets run from the same state tell what would have kept
+the budget there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.cosim.coupled import CoupledRun
-from gearfmu.cosim.scene_run import coupled_run
-from gearfmu.cosim.source import Source
+from gearfmu.cosim.coupled import OK, CoupledRun, Saved
 from gearfmu.errors import SimulationError
 from gearfmu.planning.book import Plan, Segment
-from gearfmu.planning.choice import space
+from gearfmu.planning.choice import Choice, Knob, space
 from gearfmu.planning.judge import FAILED, Signals, error
 from gearfmu.planning.request import request_of
-from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage import StageModel, Trace
+from gearfmu.planning.road import Road
+from gearfmu.planning.search import Measured, restored
+from gearfmu.planning.trials import Trial
+from gearfmu.stage import Trace
 
 CHECKS = 2  # a segment
 LATE = 6e-3  # s: a check begins at the end of a leg
@@ -25,63 +26,141 @@ LATE = 6e-3  # s: a check begins at the end of a leg
 
 @dataclass(frozen=True)
 class Check:
-    """segment; start, s; error of the plan, budgets; allowed: 1 and the noise of the full model; kept."""
+    """segment; start, s; error of the plan, budgets; allowed: 1 and the noise of the full model; kept; answer: the
+    choice that the run went back for and on with, "" where it went on as it was."""
 
     segment: str
     start: float
     error: float
     allowed: float
     kept: bool
+    answer: str = ""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point to go back to, at the end of a leg: choice, state one communication step before, number of legs."""
+
+    choice: Choice
+    before: Saved
+    legs: int
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A check on its way: due: when it was, s; from where; first and last step of its window; the full model there,
+    None where it fails."""
+
+    segment: Segment
+    due: float
+    mark: Mark
+    first: int
+    last: int
+    full: Trace | None
 
 
 class SpotChecks:
-    """CHECKS windows a segment, made while the run goes on and judged when it is over."""
+    """CHECKS windows a segment, judged as soon as the run has gone through them."""
 
-    def __init__(self, plan: Plan, scene: SceneSpec, model: StageModel) -> None:
-        self.scene, self.model, self.asked = scene, model, request_of(scene, model, plan.request)
-        self.full = space(scene, model).full
+    def __init__(self, plan: Plan, road: Road) -> None:
+        self.road, self.asked = road, request_of(road.scene, road.model, plan.request)
+        self.step = road.scene.coupling.step
+        self.space = space(road.scene, road.model)
         self.due = {segment.name: list(_starts(segment)) for segment in plan.segments}
-        self.made: list[tuple[Segment, float, Trace | None]] = []
+        self.begun: list[Spot] = []
 
-    def look(self, run: CoupledRun, segment: Segment) -> None:
+    def look(self, at: int, segment: Segment, mark: Mark) -> None:
         """Run the full model over a window that is due now."""
         due = self.due[segment.name]
-        if due and run.time >= due[0] - segment.settle - 1e-9:
-            due.pop(0)
-            start = run.at + round(segment.settle / self.scene.coupling.step)
-            self.made.append((segment, start * self.scene.coupling.step, self._full(run, start, segment.window)))
+        if not due or at * self.step < due[0] - segment.settle - 1e-9:
+            return
+        first = at + round(segment.settle / self.step)
+        last = first + round(segment.window / self.step)
+        full = self._run(self.space.full, self.road.again(mark.choice, mark.before), first, last)
+        self.begun.append(Spot(segment, due.pop(0), mark, first, last, full))
 
-    def _full(self, run: CoupledRun, start: int, window: float) -> Trace | None:
-        """The window of the full model from the state of the run; None where it fails."""
-        scene = self.scene.model_copy(update={"record": tuple(self.asked.channels)})
-        full = coupled_run(self.full.of(scene), Source(self.model))
-        last = start + round(window / scene.coupling.step)
+    def over(self, at: int) -> Spot | None:
+        """The first check whose window the run has gone through."""
+        return next((spot for spot in self.begun if spot.last <= at), None)
+
+    def judged(self, spot: Spot, trace: Trace) -> Check:
+        """How far the run was from the full model. trace: of the run, the window at least."""
+        allowed = 1.0 + spot.segment.noise
+        far = FAILED if spot.full is None else error(self._of(trace, spot), self._signals(spot.full), self.asked).whole
+        return Check(spot.segment.name, spot.first * self.step, far, allowed, far <= allowed)
+
+    def done(self, spot: Spot) -> None:
+        """This check is settled."""
+        self.begun.remove(spot)
+
+    def back_to(self, spot: Spot) -> None:
+        """The run goes back to where this check began: later ones are due again."""
+        for later in [s for s in self.begun if s.first > spot.first]:
+            self.begun.remove(later)
+            self.due[later.segment.name].insert(0, later.due)
+
+    def better(self, spot: Spot, choice: Choice) -> Choice | None:
+        """A richer set that keeps the budget, with the safety of the segment, from the state where the check began;
+        None where the full model runs already, or fails."""
+        if spot.full is None or choice == self.space.full:
+            return None
+        bench = _FromState(self, spot)
+        now = bench.one(choice)
+        found = restored(self.space, bench, now, 1.0 / spot.segment.safety, lambda text: None, _dearest_first)
+        return self.space.all_richer(choice) if found.choice == choice else found.choice
+
+    def trial(self, spot: Spot, choice: Choice) -> Measured:
+        """A set over the window of a check, from its state."""
+        assert spot.full is not None, "only what was judged is looked at again"
+        found = self._run(choice, self.road.again(spot.mark.choice, spot.mark.before), spot.first, spot.last)
+        values = Signals({}, self.step) if found is None else self._signals(found)
+        trial = Trial(choice, "stopped" if found is None else OK, signals=values)
+        return Measured(choice, trial, error(values, self._signals(spot.full), self.asked))
+
+    def _run(self, choice: Choice, before: CoupledRun, first: int, last: int) -> Trace | None:
+        """From step `first` to `last` with this choice, settled since `before`; None where it fails."""
+        run = self.road.kernel(choice, tuple(self.asked.channels))
         try:
-            full.take_over(run)
-            full.new_recorder(start - full.at)
-            full.advance(start)
-            full.new_recorder(last - start)
-            full.record()
-            full.advance(last)
+            run.take_over(before)
+            run.new_recorder(first - run.at)
+            run.advance(first)
+            run.new_recorder(last - first)
+            run.record()
+            run.advance(last)
         except SimulationError:
             return None
-        return full.recorder.trace({})
+        return run.recorder.trace({})
 
-    def checks(self, trace: Trace) -> Iterator[Check]:
-        """Every window that the run went through."""
-        for segment, start, full in self.made:
-            allowed = 1.0 + segment.noise
-            far = FAILED if full is None else self._distance(trace, full)
-            yield Check(segment.name, start, far, allowed, far <= allowed)
-
-    def _distance(self, trace: Trace, full: Trace) -> float:
-        step = self.scene.coupling.step
-        part = trace.window(full.time[0] - 0.1 * step, full.time[-1] + 0.1 * step)
-        return error(self._signals(part), self._signals(full), self.asked).whole
+    def _of(self, trace: Trace, spot: Spot) -> Signals:
+        return self._signals(trace.window((spot.first - 0.1) * self.step, (spot.last + 0.1) * self.step))
 
     def _signals(self, part: Trace) -> Signals:
         values = {o.name: np.sum([f * part[name] for name, f in o.channels], axis=0) for o in self.asked.outputs}
-        return Signals(values, self.scene.coupling.step)
+        return Signals(values, self.step)
+
+
+class _FromState:
+    """What `restored` measures with: sets over the window of a check."""
+
+    def __init__(self, checks: SpotChecks, spot: Spot) -> None:
+        self.checks, self.spot = checks, spot
+        self.known: dict[Choice, Measured] = {}
+
+    def measure(self, choices: Iterable[Choice]) -> list[Measured]:
+        """Errors against the full model from the same state."""
+        wanted = list(choices)
+        for choice in wanted:
+            if choice not in self.known:
+                self.known[choice] = self.checks.trial(self.spot, choice)
+        return [self.known[choice] for choice in wanted]
+
+    def one(self, choice: Choice) -> Measured:
+        """`measure` of one."""
+        return self.measure([choice])[0]
+
+
+def _dearest_first(steps: list[tuple[Knob, Choice]], now: Choice) -> list[Choice]:
+    return [choice for _, choice in steps]
 
 
 def _starts(segment: Segment) -> Iterator[float]:

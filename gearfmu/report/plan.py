@@ -58,7 +58,10 @@ def _told(item: Mapping[str, Any], kind: str) -> str:
             f"Tripwire at {item['time']:.4g} s, {item['wire']}: {item['message']}; on with {item['answer']}."
         )
     text = f"Spot check at {item['start']:.4g} s: {_number(item['error'])} budgets, {item['allowed']:.2g} allowed."
-    return page.note(text) if item["kept"] else page.warning(f"{text} The budget is missed there.")
+    if item["kept"]:
+        return page.note(text)
+    after = f": the run went back to where the check began, and on with {item['answer']}" if item.get("answer") else ""
+    return page.warning(f"{text} The budget is missed there{after}.")
 
 
 def _number(value: float | None) -> str:

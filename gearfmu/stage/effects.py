@@ -340,6 +340,7 @@ EFFECTS: tuple[Effect, ...] = (
         off="flanks slide without resistance",
         code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_side.c (store_along)",
         test="tests/stage/test_friction.py::test_force_across_the_line_of_action_jumps_at_the_pitch_point",
+        kept=DISSIPATION,
     ),
 )
 

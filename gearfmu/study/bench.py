@@ -8,6 +8,7 @@ once, at initialisation and in the first step, is no part of the price.
 
 from __future__ import annotations
 
+import ctypes
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -99,12 +100,16 @@ class Kept(KernelUnit):
         super().set(handle, values)
 
     def step(self, time: float, h: float) -> None:
+        self.note(time, h)
+        super().step(time, h)
+
+    def note(self, time: float, h: float) -> None:
+        """Keep the inputs of the step that comes, and the state before it where replays begin."""
         if not self.rows:
             self.before = round(time / h)
         if self.first < 0 and time >= self.settle * (1.0 - 1e-12):
             self.first, self.state = len(self.rows), self.save()
         self.rows.append(list(self.now.values()))
-        super().step(time, h)
 
     def recording(self, blob: bytes, step: float) -> Recording:
         """What plays this unit back."""
@@ -198,7 +203,8 @@ class Replay:
     def __init__(self, recording: Recording) -> None:
         unit = KernelUnit(recording.blob, recording.parameters)
         self.kernel, self.recording = unit.kernel, recording
-        self.references = [self.kernel.variables[name].reference for name in recording.names]
+        known = [self.kernel.variables[name].reference for name in recording.names]
+        self.references, self.rows = (ctypes.c_uint32 * len(known))(*known), np.ascontiguousarray(recording.values)
         self.kernel.prepare()
         self.rewind()
         self.chunk(1)  # makes the tables of the step, once a run
@@ -216,19 +222,18 @@ class Replay:
 
     def chunk(self, count: int) -> float:
         """Processor seconds of the next `count` communication steps, without the calls'."""
-        rows = self.recording.values[self.at : self.at + count].tolist()
-        idle = self._timed(rows, float("nan"))
-        spent = self._timed(rows, self.recording.step) - idle
+        idle = self._timed(count, float("nan"))
+        spent = self._timed(count, self.recording.step) - idle
         self.at += count
         return spent
 
-    def _timed(self, rows: list[list[float]], step: float) -> float:
-        set_one, take = self.kernel.set_reference, self.kernel.try_step
-        references, h, at = self.references, self.recording.step, self.recording.before + self.at
+    def _timed(self, count: int, step: float) -> float:
+        set_all, take, references = self.kernel.set_many, self.kernel.try_step, self.references
+        h, at = self.recording.step, self.recording.before + self.at
+        address, width = self.rows.ctypes.data + self.at * self.rows.strides[0], self.rows.strides[0]
         started = clock.thread_time()
-        for k, row in enumerate(rows):
-            for reference, value in zip(references, row, strict=True):
-                set_one(reference, value)
+        for k in range(count):
+            set_all(references, address + k * width)
             take((at + k) * h, step)
         return clock.thread_time() - started
 
@@ -262,6 +267,8 @@ def _one_pass(one: Replay, other: Replay) -> tuple[np.ndarray, int]:
     spent, steps = np.zeros(2), 0
     while one.left and spent[0] < LONGEST_PASS:
         count = min(CHUNK, one.left)
+        if other.left < count:  # a shorter recording is played again
+            other.rewind()
         spent += one.chunk(count), other.chunk(count)
         steps += count
     return spent, steps

@@ -6,23 +6,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.errors import SpecError
-from gearfmu.planning.book import Plan
+from gearfmu.planning.book import Plan, Segment
 from gearfmu.planning.choice import Choice, space
 from gearfmu.planning.make import Job, make
 from gearfmu.planning.request import request
 from gearfmu.planning.run import run_planned
-from gearfmu.planning.table import plan_text
+from gearfmu.planning.table import plan_text, run_text
 from gearfmu.report.plan import plan_sections
 from gearfmu.spec.scene import load_scene
-from gearfmu.stage.effects import EFFECTS
+from gearfmu.stage.effects import DISSIPATION, EFFECTS
 from gearfmu.sweeps.runners import in_this_process
 
 BAND = ("500 Hz", "5 kHz")
 SCENE: dict[str, Any] = {"settle": "20 ms", "duration": "80 ms"}
+MEASURED = ("bound", "error", "noise", "price", "realtime", "price_full", "price_default", "error_default")
+NOTHING: dict[str, Any] = dict.fromkeys(MEASURED, 0.0)  # of a plan by hand
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +56,16 @@ def test_every_switch_of_the_table_of_effects_is_a_knob() -> None:
     model = stage_model(scene)
     there = {variable.name for variable in model.kernel_variables()}
     switched = {e.name for e in EFFECTS if e.off_setting and set(e.off_setting) <= there}
-    assert {knob.name for knob in space(scene, model).knobs} == switched | {"step"}
+    without = {"friction"}  # this stage says nothing of friction: it is off, and no choice
+    assert {knob.name for knob in space(scene, model).knobs} == (switched - without) | {"step"}
+
+
+def test_friction_that_the_stage_has_is_never_left_out() -> None:
+    scene = load_scene("pair_loaded")
+    model = stage_model(scene).with_starts({"effect.friction": 1.0})
+    known = {knob.name: knob for knob in space(scene, model, least_share=-10.0).knobs}
+    assert known["friction"].kept == DISSIPATION
+    assert "friction" not in {knob.name for knob in space(scene, model, -10.0, force=["friction"]).candidates}
 
 
 @pytest.mark.full
@@ -91,17 +103,57 @@ def test_a_segment_that_loses_contact_trips_and_goes_on_with_the_coast_flank(mad
     assert trace.time.size == 1601 and trace["mesh.te"].min() > -400e-6  # teeth do not pass through each other
 
 
+def test_the_fmu_runs_a_plan_as_the_kernel_does(made_by_hand: Plan, tmp_path: Path) -> None:
+    """A tripwire, a change of segments and a spot check on the way: the same numbers."""
+    first = replace(made_by_hand.segments[0], end=0.06)
+    then = replace(first, name="then", start=0.06, end=0.08, choice=Choice("standard", 5e-6, 3), window_start=0.061)
+    plan = replace(made_by_hand, segments=(first, replace(then, window=0.004, settle=0.002)))
+    by_kernel, by_fmu = (run_planned(plan, tmp_path, unit=unit) for unit in ("kernel", "fmu"))
+    assert by_fmu.meta["unit"] == "fmu" and by_kernel.meta["plan"]["trips"] and by_kernel.meta["plan"]["checks"]
+    assert by_fmu.meta["plan"] == by_kernel.meta["plan"]
+    for name in ("mesh.te", "mesh.force", "bearing.pinion.fx", "drive.vehicle.w"):
+        assert np.array_equal(by_fmu[name], by_kernel[name]), name
+
+
+def test_a_missed_spot_check_leads_to_a_richer_set(poor: Plan) -> None:
+    """Rigid gears without tip corners for 0.2 dB, which tip corners alone miss by far."""
+    trace = run_planned(poor)
+    missed, *again = trace.meta["plan"]["checks"]
+    assert not missed["kept"] and missed["error"] > 2.0 and "tip_contact off" not in missed["answer"]
+    assert again[0]["start"] == missed["start"] and again[0]["kept"]  # the same window, with the richer set
+    assert all(check["kept"] for check in again) and len(again) == 2
+    assert trace.time.size == 4001 and np.all(np.diff(trace.time) > 0)
+    told = run_text(trace.meta["plan"])
+    assert f"MISSED: back to where it began, on with {missed['answer']}" in told
+
+
+def test_what_keeps_its_budget_is_not_planned_anew(poor: Plan) -> None:
+    rich = replace(poor.segments[0], choice=Choice("fast", 1e-5, 1))
+    trace = run_planned(replace(poor, segments=(rich,)))
+    checks = trace.meta["plan"]["checks"]
+    assert len(checks) == 2 and all(check["kept"] and not check["answer"] for check in checks)
+
+
+@pytest.fixture
+def poor(tmp_path: Path) -> Plan:
+    """A plan by hand whose set is far from its budget."""
+    text = (Path(load_scene.__globals__["SHIPPED"]) / "pair_loaded.toml").read_text(encoding="utf-8")
+    path = tmp_path / "loaded.toml"
+    path.write_text(text.replace('duration = "0.15 s"', 'duration = "80 ms"'), encoding="utf-8")
+    scene = load_scene(str(path))
+    assert scene.duration == 0.08
+    choice = Choice("rigid", 2e-5, 1, ("tip_contact",))
+    segment = Segment("steady", 0.0, 0.08, "loaded", choice, 0.02, 0.012, 0.005, safety=1.25, **NOTHING)
+    asked = {"outputs": ["mesh.te", "bearing.pinion.fx"], "band": ["500 Hz", "5000 Hz"], "budget": "0.2 dB"}
+    return Plan(str(path), "", scene.coupling.step, asked, (segment,))
+
+
 @pytest.fixture
 def made_by_hand(tmp_path: Path) -> Plan:
     """A plan that takes the coast flank out where the clutch is dumped."""
     scene = load_scene("clutch_dump", {"duration": "80 ms"})
-    nothing = dict.fromkeys(
-        ("bound", "error", "noise", "price", "realtime", "price_full", "price_default", "error_default"), 0.0
-    )
-    from gearfmu.planning.book import Segment
-
     choice = Choice("fast", 1e-5, 1, ("coast_flank",))
-    segment = Segment("all", 0.0, 0.08, "loaded", choice, 0.02, 0.01, 0.01, safety=1.25, **nothing)
+    segment = Segment("all", 0.0, 0.08, "loaded", choice, 0.02, 0.01, 0.01, safety=1.25, **NOTHING)
     path = tmp_path / "dump.toml"
     text = (Path(load_scene.__globals__["SHIPPED"]) / "clutch_dump.toml").read_text(encoding="utf-8")
     path.write_text(text.replace('duration = "0.3 s"', 'duration = "80 ms"'), encoding="utf-8")
