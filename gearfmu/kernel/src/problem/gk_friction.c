@@ -58,14 +58,19 @@ static void slide_freely(const gk_setup *setup, const gk_data *data, gk_work *wo
     for (int i = 0; i < contacts; i++) glide->begin[i] *= h;
 }
 
+/* limit at which friction works against a sliding that is more than `creep` */
+static signed char against(double sliding, double creep)
+{
+    return (signed char)(sliding > creep ? -1 : sliding < -creep ? 1 : 0);
+}
+
 /* where friction is to begin with: at the limit of the last step, or where the speed puts it */
 static signed char first_limit(const gk_glide *glide, const gk_system *s, int i)
 {
     static const double STUCK = 1e-6;
     if (!glide->rolls && s->force0[i] > 0.0 && fabs(glide->ratio[i]) < (1.0 - STUCK) * glide->most[i]) return 0;
     if (!glide->rolls && s->force0[i] > 0.0) return glide->ratio[i] > 0.0 ? 1 : -1;
-    if (fabs(glide->begin[i]) <= glide->creep[i]) return 0;
-    return glide->begin[i] > 0.0 ? -1 : 1;
+    return against(glide->begin[i], glide->creep[i]);
 }
 
 /* coefficient of friction of every contact by the forces of the last step, and where it fades */
@@ -266,18 +271,24 @@ static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n,
  * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
  * that of both ends, p̄ = ½ (p₀ + p₁); of gears that roll on it has the coefficient of the end. What forces at the end
  * of the step are more than z is taken from the last round. */
+/* would the mean of both ends push along the sliding? Then there is none. */
+static int turns_round(const gk_glide *glide, int j)
+{
+    return glide->limit[j] && !glide->rolls && glide->limit[j] * glide->start_end[j] < -glide->most_end[j];
+}
+
 static void express_limits(gk_glide *glide, const gk_system *s)
 {
     memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
     for (int j = 0; j < s->contacts; j++) {
         const double ratio = glide->limit[j] * glide->most[j], end = ratio * (s->force[j] + s->end[j] - s->z[j]);
-        const int touches = glide->most_force[j] > 0.0;
+        const int touches = glide->most_force[j] > 0.0, turns = turns_round(glide, j);
         glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
-        glide->by_z[j * s->stride + j] = 0.5 * ratio;
+        glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
         glide->end_by_z[j] = ratio;
-        glide->fixed[j] = glide->held[j] || !touches ? 0.0
-                          : glide->rolls             ? 0.5 * ratio * (s->force0[j] + s->begin[j])
-                                                     : 0.5 * (glide->start_end[j] + end);
+        glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
+                          : glide->rolls                      ? 0.5 * ratio * (s->force0[j] + s->begin[j])
+                                                              : 0.5 * (glide->start_end[j] + end);
         glide->end_fixed[j] = glide->held[j] && !glide->rolls ? -glide->start_end[j] : end;
         glide->end_by_mean[j] = !glide->held[j] ? 0.0 : glide->rolls ? glide->share[j] : 2.0;
     }
@@ -353,7 +364,6 @@ static double find_limits(gk_glide *glide, const gk_system *s)
         glide->share[j] = mean > 0.0 ? gk_clamp(end / mean, 0.0, 2.0) : 0.0;
         glide->most_force[j] = glide->most[j] * mean;
         glide->most_end[j] = glide->most[j] * end;
-        if (!(mean > 0.0)) glide->limit[j] = 0;
         largest = gk_max(largest, mean);
     }
     return largest;
@@ -368,7 +378,12 @@ static int change_status(gk_glide *glide, const gk_system *s, int patient)
     for (int j = s->contacts - 1; j >= 0 && (patient || !count); j--) {
         const double most = glide->rolls ? glide->most_force[j] : glide->most_end[j];
         const double p = glide->rolls ? glide->mean[j] : glide->end[j];
-        if (!(most > 0.0)) continue;
+        if (!(most > 0.0)) { /* apart at the end: what there was may not push along the sliding */
+            const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * glide->slid[j] > 0.0;
+            if (pushes) glide->limit[j] = glide->start_end[j] > 0.0 ? -1 : 1, count++;
+            if (!(glide->most_force[j] > 0.0)) glide->limit[j] = against(glide->slid[j], glide->creep[j]);
+            continue;
+        }
         if (glide->limit[j] ? glide->limit[j] * glide->slid[j] > -glide->creep[j] * (1.0 - ALMOST)
                             : fabs(p) > most * (1.0 + ALMOST)) {
             glide->limit[j] = (signed char)(glide->limit[j] ? 0 : p > 0.0 ? 1 : -1);
