@@ -430,11 +430,24 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
     return moved / find_limits(glide, s);
 }
 
+/* What a mean of friction that is not that of both ends leaves of the energy it holds along the profile: taken where it
+ * is less than nothing */
+static double faded(const gk_glide *glide, const gk_system *s)
+{
+    double sum = 0.0;
+    for (int j = 0; j < s->contacts; j++) {
+        const double *own = glide->yields + j * s->stride;
+        const double off = 0.5 * (glide->start_end[j] + glide->end[j]) - glide->mean[j];
+        for (int k = 0; k < s->contacts && off != 0.0; k++) sum += off * own[k] * (glide->end[k] - glide->start_end[k]);
+    }
+    return gk_min(sum, 0.0);
+}
+
 /* What the forces of the step leave of the energy that friction holds in what is quasi-static, because they are no
  * means of those at its ends: the step's one scalar balances it (docs/theory.md, eq. 12) */
 double gk_friction_defect(const gk_glide *glide, const gk_system *s)
 {
-    double sum = gk_friction_held(glide, s) - glide->held0;
+    double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
         const double moved = glide->end[j] - glide->start_end[j];
@@ -460,7 +473,7 @@ void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e)
 /* the end of the step: friction by which the next one is predicted; returns what it took */
 double gk_friction_settle(gk_glide *glide, const gk_system *s)
 {
-    double taken = 0.0;
+    double taken = -faded(glide, s);
     find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double end = s->force[j] + s->end[j];
