@@ -219,7 +219,11 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
         slide_modes(setup, work, k, e, w);
         if (GK_ON(setup, residual)) slide_residual(engaged, &setup->mesh[e].side[w], glide);
     }
-    for (int i = 0; i < s->contacts; i++) glide->yields[i * s->stride + i] += local_yield(s, i);
+    for (int i = 0; i < s->contacts; i++) {
+        const double yields = local_yield(s, i);
+        glide->yields[i * s->stride + i] += yields;
+        glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
+    }
     slide_ground(setup, work, k, e);
     slide_spins(setup, k, &setup->mesh[e], s, glide);
     for (int j = 0; j < s->contacts; j++) /* a clutch is a row of speeds, without what yields at once */
@@ -269,8 +273,9 @@ static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n,
 
 /* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
  * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
- * that of both ends, p̄ = ½ (p₀ + p₁); of gears that roll on it has the coefficient of the end. What forces at the end
- * of the step are more than z is taken from the last round. */
+ * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears that
+ * roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the last
+ * round. */
 /* would the mean of both ends push along the sliding? Then there is none. */
 static int turns_round(const gk_glide *glide, int j)
 {
@@ -289,8 +294,10 @@ static void express_limits(gk_glide *glide, const gk_system *s)
         glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
                           : glide->rolls                      ? 0.5 * ratio * (s->force0[j] + s->begin[j])
                                                               : 0.5 * (glide->start_end[j] + end);
-        glide->end_fixed[j] = glide->held[j] && !glide->rolls ? -glide->start_end[j] : end;
-        glide->end_by_mean[j] = !glide->held[j] ? 0.0 : glide->rolls ? glide->share[j] : 2.0;
+        const double by_mean = glide->rolls ? glide->share[j] : 1.0 / (0.5 + glide->damps[j]);
+        const double by_start = glide->rolls ? 0.0 : (glide->damps[j] - 0.5) * by_mean;
+        glide->end_fixed[j] = glide->held[j] ? by_start * glide->start_end[j] : end;
+        glide->end_by_mean[j] = glide->held[j] ? by_mean : 0.0;
     }
 }
 

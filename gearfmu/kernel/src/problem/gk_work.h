@@ -85,7 +85,8 @@ typedef struct gk_glide {
     double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */
     double mean[MAX_STRIDE], ratio[MAX_STRIDE];      /* in the step; over the mean normal force */
     double step[MAX_STRIDE], end[MAX_STRIDE], last[MAX_STRIDE]; /* as z, λ + f_d and λ of the normal forces are used */
-    double slid[MAX_STRIDE]; /* sliding in the step */
+    double slid[MAX_STRIDE];  /* sliding in the step */
+    double damps[MAX_STRIDE]; /* relaxation time of a contact that sticks over h */
     double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
 } gk_glide;
 
