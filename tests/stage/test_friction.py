@@ -21,6 +21,7 @@ from gearfmu.spec.ports import FrictionSpec, PortSpec
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, Steady, assemble, simulate
 from gearfmu.stage.blob import read_blob
+from gearfmu.stage.efficiency import loss_factor, mesh_efficiency
 from gearfmu.stage.fields import GEAR_NUMBERS
 
 RIGID = {"effect.elastic": 0.0, "level": 0.0, "effect.friction": 1.0}
@@ -158,7 +159,7 @@ def swing(
         seen.append([kernel.get(name) for name in ("pinion.gear.phi", "mesh.friction_loss")])
     phi, lost = np.array(seen).T
     assert kernel.get("mesh.pairs") == 1 and len(expected) > 10 and kernel.get("solver.trouble") == 0
-    turns = extremes(phi, 0.02 * abs(expected[1] - expected[0]))
+    turns = extremes(phi, 0.005 * abs(expected[1] - expected[0]))
     late = -steps // 10
     return Swings(expected, turns, float(phi[late:].mean()), float((lost[-1] - lost[late]) / lost[-1]))
 
@@ -181,13 +182,13 @@ def test_a_block_on_a_spring_swings_and_sticks_as_its_exact_solution(
 
     found = swing(spec, blob, kernel, turn, lambda angle: 0.5 * stiffness * (angle - outer) ** 2, 10000)
     print(f"error {found.error:.1e} of the first swing, {found}")
-    assert found.error < 5e-3 and abs(found.slipped) < 1e-9
+    assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
 def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: StageSpec, bodies: list[ReducedBody]) -> None:
-    """The same with a weight on an arm that turns 60 times as far as the pinion instead of the spring, swinging by 40°
+    """The same with a weight on an arm that turns 60 times as far as the pinion instead of the spring, swinging by 30°
     about where the wheel lifts it to: its torque is set before each step for the angle at the end of it."""
-    weight, times, torque, h = 0.5, 60.0, 30.0, 1e-5
+    weight, times, torque, h = 0.175, 60.0, 7.5, 1e-5
     blob = swinging(spec, bodies, PortSpec(kind="torque"))
     kernel = Kernel(blob, {**FROZEN, "friction_coefficient": MU, "h": h})
     r_a, r_b = (gear.r_b for gear in PairGeometry.of(spec).gears)
@@ -200,9 +201,9 @@ def test_a_pendulum_swings_and_sticks_as_its_exact_solution(spec: StageSpec, bod
         angle = kernel.get("pinion.gear.phi") + h * kernel.get("pinion.gear.w")
         kernel.set("pinion.tau", -weight * times * math.sin(times * (angle - hangs)))
 
-    found = swing(spec, blob, kernel, fall, lambda angle: -weight * math.cos(times * (angle - hangs)), 15000)
+    found = swing(spec, blob, kernel, fall, lambda angle: -weight * math.cos(times * (angle - hangs)), 30000)
     print(f"error {found.error:.1e} of the first swing, {found}")
-    assert found.error < 5e-3 and abs(found.slipped) < 1e-9
+    assert found.error < 5e-3 and abs(found.slipped) < 1e-5
 
 
 def test_below_the_limit_of_friction_nothing_moves(spec: StageSpec, bodies: list[ReducedBody]) -> None:
@@ -297,6 +298,31 @@ def test_mean_loss_is_the_integral_over_the_path(spec: StageSpec, bodies: list[R
     expected = mu * np.dot(slides, loads) / np.sum(loads) * force
     print(f"{power:.4f} W, by the path {expected:.4f} W")
     assert power == pytest.approx(expected, rel=0.005)
+
+
+def test_the_tooth_loss_factor_is_the_integral_of_an_evenly_shared_load(spec: StageSpec) -> None:
+    """Ohlendorf's H_V against Σ |v| of all pairs on the path, each with its share, over a base pitch."""
+    pair = PairGeometry.of(spec)
+    path, p = pair.path, pair.base_pitch
+    positions = (np.arange(20000) + 0.5) / 20000 * p
+    slides, pairs = np.zeros(20000), np.zeros(20000)
+    for k in range(-1, 3):
+        roll = path["A"] + positions + k * p
+        on = (roll >= path["A"]) & (roll <= path["E"])
+        slides += on * np.abs(roll - path["C"])
+        pairs += on
+    r_a, r_b = (gear.r_b for gear in pair.gears)
+    assert loss_factor(pair) == pytest.approx(np.mean(slides / pairs) * (1 / r_a + 1 / r_b), rel=1e-4)
+
+
+def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """A spur pair with a constant coefficient: teeth that yield share the load more gently than evenly, so that the
+    run loses less, but not by a tenth."""
+    found = mesh_efficiency(assemble(spec, bodies), 302.0, 200.0, {"level": 0.0, "friction_coefficient": 0.05})
+    print(found.columns())
+    assert found.coefficient == pytest.approx(0.05, rel=0.02) and found.trouble == 0
+    assert found.lost == pytest.approx(found.closed, rel=0.1)
+    assert 0.98 < found.efficiency < 1.0
 
 
 def test_a_helical_pair_loses_what_its_ports_do_not_give_on(helical: StageModel) -> None:
