@@ -27,8 +27,8 @@ from gearfmu.stability.sets import BACKFIRE, planetary
 from gearfmu.stability.trains import CLOSING, train
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
-JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains", "sets")
-SET_JUDGES = ("bench", "loads", "speeds", "faults", "shifts", "stepping", "effects")  # set_*.py
+JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains", "sets", "rubbing")
+SET_JUDGES = ("bench", "loads", "speeds", "faults", "shifts", "stepping", "effects", "rubbing")  # set_*.py
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 

@@ -26,7 +26,7 @@ static void recall_friction(const gk_engaged *engaged, const gk_meshing *meshing
         glide->mean[i] = glide->step[i] = glide->last[i] = glide->start[i];
         glide->end[i] = glide->start_end[i];
         glide->ratio[i] = ratio;
-        glide->limit[i] = glide->frozen[i] = 0;
+        glide->limit[i] = 0;
         glide->others[i] = glide->others_start[i] = 0.0;
     }
 }
@@ -58,6 +58,21 @@ static void slide_freely(const gk_setup *setup, const gk_data *data, gk_work *wo
     for (int i = 0; i < contacts; i++) glide->begin[i] *= h;
 }
 
+/* limit at which friction works against a sliding that is more than `creep` */
+static signed char against(double sliding, double creep)
+{
+    return (signed char)(sliding > creep ? -1 : sliding < -creep ? 1 : 0);
+}
+
+/* where friction is to begin with: at the limit of the last step, or where the speed puts it */
+static signed char first_limit(const gk_glide *glide, const gk_system *s, int i)
+{
+    static const double STUCK = 1e-6;
+    if (!glide->rolls && s->force0[i] > 0.0 && fabs(glide->ratio[i]) < (1.0 - STUCK) * glide->most[i]) return 0;
+    if (!glide->rolls && s->force0[i] > 0.0) return glide->ratio[i] > 0.0 ? 1 : -1;
+    return against(glide->begin[i], glide->creep[i]);
+}
+
 /* coefficient of friction of every contact by the forces of the last step, and where it fades */
 static void find_coefficients(const gk_model *model, const gk_setup *setup, const gk_data *data, double h, int e,
                               gk_engaged *engaged)
@@ -68,8 +83,8 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
     const double frame = mesh->frame < 0 ? 0.0 : data->v[mesh->frame];
     const double speed[2] = {data->v[mesh->spin[0]] - frame, data->v[mesh->spin[1]] - frame};
     const gk_meshing *meshing = &data->meshing[e];
-    const int steady = fabs(meshing->rolling) > STEADY * meshing->unsteady; /* a gear that rings about rest sticks */
     gk_sliding at = {.turns = speed[0]};
+    glide->rolls = fabs(meshing->rolling) > STEADY * meshing->unsteady; /* a gear that rings about rest sticks */
     for (int i = 0; i < s->contacts; i++) at.total += s->force0[i];
     for (int i = 0; i < s->contacts; i++) {
         const gk_point *point = gk_point_of(setup, &engaged->place[s->place_of[i]], i % GK_STRIPS(s));
@@ -77,8 +92,8 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
         at.slides = fabs(speed[0] * point->slide[PHIA] + speed[1] * point->slide[PHIB]);
         at.rolls = fabs(speed[0]) * point->roll[0] + fabs(speed[1]) * point->roll[1];
         glide->most[i] = gk_lubrication_coefficient(&mesh->friction, model->engagement[e].width, &at);
-        glide->creep[i] = steady ? FADES * mesh->friction.sliding * fabs(meshing->rolling) * h : 0.0;
-        if (fabs(glide->begin[i]) > glide->creep[i]) glide->limit[i] = glide->begin[i] > 0.0 ? -1 : 1;
+        glide->creep[i] = glide->rolls ? FADES * mesh->friction.sliding * fabs(meshing->rolling) * h : 0.0;
+        glide->limit[i] = first_limit(glide, s, i);
     }
 }
 
@@ -166,6 +181,9 @@ static void slide_spins(const gk_setup *setup, const gk_coefficients *k, const g
     }
 }
 
+/* What a contact yields along the profile by itself: as much as its local law does above its upper bound */
+static double local_yield(const gk_system *s, int i) { return s->law[i / 4].slope_high[i % 4] * s->per_width[i]; }
+
 /* energy that friction holds in what is quasi-static, with normal forces `force` + `more` */
 static double held(const gk_glide *glide, const gk_system *s, const double *force, const double *more,
                    const double *friction)
@@ -201,6 +219,11 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
         slide_modes(setup, work, k, e, w);
         if (GK_ON(setup, residual)) slide_residual(engaged, &setup->mesh[e].side[w], glide);
     }
+    for (int i = 0; i < s->contacts; i++) {
+        const double yields = local_yield(s, i);
+        glide->yields[i * s->stride + i] += yields;
+        glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
+    }
     slide_ground(setup, work, k, e);
     slide_spins(setup, k, &setup->mesh[e], s, glide);
     for (int j = 0; j < s->contacts; j++) /* a clutch is a row of speeds, without what yields at once */
@@ -214,30 +237,21 @@ double gk_friction_held(const gk_glide *glide, const gk_system *s)
 }
 
 /* ---- the step ---------------------------------------------------------------------------------------------------- */
-/* what friction `step` of contact j in the step, `end` of it at the end, add to all sliding */
-static void add_sliding(gk_glide *glide, const gk_system *s, int j, double step, double end)
-{
-    const double *moved = glide->moves + j * s->stride, *yielded = glide->yields + j * s->stride;
-    for (int k = 0; k < s->contacts; k++) {
-        glide->slid[k] += moved[k] * step + yielded[k] * end;
-        glide->late[k] += 2.0 * moved[k] * step + yielded[k] * end;
-    }
-}
-
-/* sliding in the step, and what its speed is at the end: what moves in the step does so with the mean of both ends */
+/* sliding in the step */
 static void find_sliding(gk_glide *glide, const gk_system *s)
 {
     for (int k = 0; k < s->contacts; k++) {
-        const double *by_z = glide->gap_moves + k * s->stride, *by_force = glide->gap_yields + k * s->stride;
-        double moved = glide->free[k] + glide->others[k] - glide->others_start[k], yielded = 0.0;
-        for (int i = 0; i < s->n; i++) {
-            moved += by_z[i] * s->z[i];
-            yielded += by_force[i] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]);
-        }
-        glide->slid[k] = moved + yielded;
-        glide->late[k] = 2.0 * moved - glide->begin[k] + yielded;
+        const double *moved = glide->gap_moves + k * s->stride, *yielded = glide->gap_yields + k * s->stride;
+        double sum = glide->free[k] + glide->others[k] - glide->others_start[k];
+        for (int i = 0; i < s->n; i++)
+            sum += moved[i] * s->z[i] + yielded[i] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]);
+        glide->slid[k] = sum;
     }
-    for (int j = 0; j < s->contacts; j++) add_sliding(glide, s, j, glide->step[j], glide->end[j] - glide->start_end[j]);
+    for (int j = 0; j < s->contacts; j++) {
+        const double *moved = glide->moves + j * s->stride, *yielded = glide->yields + j * s->stride;
+        const double step = glide->step[j], more = glide->end[j] - glide->start_end[j];
+        for (int k = 0; k < s->contacts; k++) glide->slid[k] += moved[k] * step + yielded[k] * more;
+    }
 }
 
 /* x ← a⁻¹ x for `columns` right-hand sides, a (n, n) by rows, close to symmetric positive definite: no pivoting */
@@ -258,52 +272,62 @@ static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n,
 }
 
 /* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
- * end_by_z z + end_by_mean p̄. At a limit it is µ λ̄; below it what makes w = −ε p̄/most. What forces at the end of the
- * step are more than z is taken from the last round. Sliding of contacts may hang together (strips of one tooth): then
- * friction is shared out. */
+ * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
+ * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears that
+ * roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the last
+ * round. */
+/* would the mean of both ends push along the sliding? Then there is none. */
+static int turns_round(const gk_glide *glide, int j)
+{
+    return glide->limit[j] && !glide->rolls && glide->limit[j] * glide->start_end[j] < -glide->most_end[j];
+}
+
 static void express_limits(gk_glide *glide, const gk_system *s)
 {
     memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
     for (int j = 0; j < s->contacts; j++) {
-        const double ratio = glide->frozen[j] ? 0.0 : glide->limit[j] * glide->most[j];
-        glide->held[j] = glide->most_force[j] > 0.0 && !glide->limit[j] && !glide->frozen[j];
-        glide->fixed[j] = glide->frozen[j] ? glide->mean[j] : 0.5 * ratio * (s->force0[j] + s->begin[j]);
-        glide->by_z[j * s->stride + j] = 0.5 * ratio;
-        glide->end_fixed[j] = glide->frozen[j] ? glide->share[j] * glide->mean[j]
-                                               : ratio * (s->force[j] + s->end[j] - s->z[j]);
+        const double ratio = glide->limit[j] * glide->most[j], end = ratio * (s->force[j] + s->end[j] - s->z[j]);
+        const int touches = glide->most_force[j] > 0.0, turns = turns_round(glide, j);
+        glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
+        glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
         glide->end_by_z[j] = ratio;
-        glide->end_by_mean[j] = glide->held[j] ? glide->share[j] : 0.0;
+        glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
+                          : glide->rolls                      ? 0.5 * ratio * (s->force0[j] + s->begin[j])
+                                                              : 0.5 * (glide->start_end[j] + end);
+        const double by_mean = glide->rolls ? glide->share[j] : 1.0 / (0.5 + glide->damps[j]);
+        const double by_start = glide->rolls ? 0.0 : (glide->damps[j] - 0.5) * by_mean;
+        glide->end_fixed[j] = glide->held[j] ? by_start * glide->start_end[j] : end;
+        glide->end_by_mean[j] = glide->held[j] ? by_mean : 0.0;
     }
 }
 
 static void express_friction(gk_glide *glide, const gk_system *s)
 {
-    static const double SHARED_OUT = 1e-9;
     double a[MAX_CONTACTS][MAX_CONTACTS], x[MAX_CONTACTS][MAX_STRIDE];
     int held[MAX_CONTACTS], n = 0;
     express_limits(glide, s);
     for (int j = 0; j < s->contacts; j++)
         if (glide->held[j]) held[n++] = j;
-    for (int k = 0; k < n; k++) { /* w without the forces in the step and without friction that follows them */
+    for (int k = 0; k < n; k++) { /* Δs without the forces in the step and without friction that follows them */
         const int i = held[k];
         const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
-        double rest = glide->late[i];
+        double rest = glide->slid[i];
         for (int r = 0; r < s->n; r++) {
-            const double each = 2.0 * moved[r] + yielded[r];
+            const double each = moved[r] + yielded[r];
             rest -= each * s->z[r], x[k][r] = -each;
         }
         for (int j = 0; j < s->contacts; j++) {
             const int at = j * s->stride + i;
-            const double moves = 4.0 * glide->moves[at], yields = glide->yields[at];
+            const double moves = 2.0 * glide->moves[at], yields = glide->yields[at];
             rest += moves * (glide->fixed[j] - glide->mean[j]) + yields * (glide->end_fixed[j] - glide->end[j]);
             x[k][j] -= moves * glide->by_z[j * s->stride + j] + yields * glide->end_by_z[j];
         }
         x[k][s->n] = -rest;
         for (int j = 0; j < n; j++) {
             const int at = held[j] * s->stride + i;
-            a[k][j] = 4.0 * glide->moves[at] + glide->share[held[j]] * glide->yields[at];
+            a[k][j] = 2.0 * glide->moves[at] + glide->end_by_mean[held[j]] * glide->yields[at];
         }
-        a[k][k] += SHARED_OUT * a[k][k] + glide->creep[i] / glide->most_force[i];
+        a[k][k] += glide->creep[i] / glide->most_force[i];
     }
     solve_small(a, x, n, s->n + 1);
     for (int k = 0; k < n; k++) {
@@ -312,13 +336,13 @@ static void express_friction(gk_glide *glide, const gk_system *s)
     }
 }
 
-/* friction at the end of the step */
-static void find_end(gk_glide *glide, const gk_system *s)
+/* friction at the end of the step, before anything is known of it */
+static void guess_end(gk_glide *glide, const gk_system *s)
 {
     for (int j = 0; j < s->contacts; j++)
-        glide->end[j] = glide->limit[j] && !glide->frozen[j]
-                            ? glide->limit[j] * glide->most[j] * (s->force[j] + s->end[j])
-                            : glide->share[j] * glide->mean[j];
+        glide->end[j] = glide->limit[j] ? glide->limit[j] * glide->most[j] * (s->force[j] + s->end[j])
+                        : glide->rolls  ? glide->share[j] * glide->mean[j]
+                                        : glide->start_end[j];
 }
 
 /* Mean friction by the present forces, and the sliding with it; returns the largest change */
@@ -337,42 +361,40 @@ static double follow(gk_glide *glide, const gk_system *s)
     return largest;
 }
 
-/* what friction may be, and how much of its mean is there at the end; returns the largest normal force */
+/* what friction may be, in the step and at its end, and how much of its mean is there then where gears roll; returns
+ * the largest normal force */
 static double find_limits(gk_glide *glide, const gk_system *s)
 {
     double largest = 1e-9;
     for (int j = 0; j < s->contacts; j++) {
-        const double mean = gk_max(0.0, gk_solve_mean(s, j));
-        glide->share[j] = mean > 0.0 ? gk_clamp((s->force[j] + s->end[j]) / mean, 0.0, 2.0) : 0.0;
+        const double mean = gk_max(0.0, gk_solve_mean(s, j)), end = gk_max(0.0, s->force[j] + s->end[j]);
+        glide->share[j] = mean > 0.0 ? gk_clamp(end / mean, 0.0, 2.0) : 0.0;
         glide->most_force[j] = glide->most[j] * mean;
-        if (!(mean > 0.0)) glide->limit[j] = glide->frozen[j] = 0;
+        glide->most_end[j] = glide->most[j] * end;
         largest = gk_max(largest, mean);
     }
     return largest;
 }
 
-/* Where friction contradicts its status: beyond its limit, at a limit along the speed, or along the sliding of the
- * step (then it is what stops that, at most nothing), unless the contact has been sticking: what it slides is half of
- * how much more it yields than in the last step, which comes back. All change at once, later the last one only. Returns
- * how many. */
+/* Where friction contradicts its status: beyond its limit, or at a limit along the sliding of the step. All change at
+ * once, later the last one only. Returns how many. */
 static int change_status(gk_glide *glide, const gk_system *s, int patient)
 {
-    static const double ALMOST = 1e-7, STUCK = 1e-3, BALANCED = 1e-9; /* of the energy that contacts hold */
+    static const double ALMOST = 1e-7;
     int count = 0;
     for (int j = s->contacts - 1; j >= 0 && (patient || !count); j--) {
-        const double most = glide->most_force[j], p = glide->mean[j], w = glide->late[j], along = p * glide->slid[j];
-        const int limit = glide->limit[j], at = j * s->stride + j;
-        const int stuck = s->force0[j] > 0.0 && fabs(glide->start[j]) < (1.0 - STUCK) * glide->most[j] * s->force0[j];
-        const double each = 2.0 * glide->moves[at] + glide->share[j] * glide->yields[at];
-        if (!(most > 0.0)) continue;
-        if (!limit && !glide->frozen[j] && fabs(p) > most * (1.0 + ALMOST))
-            glide->limit[j] = p > 0.0 ? 1 : -1, count++;
-        else if (limit && !glide->frozen[j] && limit * w > -glide->creep[j] * (1.0 - ALMOST))
-            glide->limit[j] = 0, count++;
-        else if ((limit || glide->frozen[j] || !stuck) && along > BALANCED * s->stored0) {
-            const double still = p - glide->slid[j] / each;
-            glide->mean[j] = p > 0.0 ? gk_clamp(still, 0.0, p) : gk_clamp(still, p, 0.0);
-            glide->frozen[j] = 1, count++;
+        const double most = glide->rolls ? glide->most_force[j] : glide->most_end[j];
+        const double p = glide->rolls ? glide->mean[j] : glide->end[j];
+        if (!(most > 0.0)) { /* apart at the end: what there was may not push along the sliding */
+            const int pushes = glide->most_force[j] > 0.0 && glide->mean[j] * glide->slid[j] > 0.0;
+            if (pushes) glide->limit[j] = glide->start_end[j] > 0.0 ? -1 : 1, count++;
+            if (!(glide->most_force[j] > 0.0)) glide->limit[j] = against(glide->slid[j], glide->creep[j]);
+            continue;
+        }
+        if (glide->limit[j] ? glide->limit[j] * glide->slid[j] > -glide->creep[j] * (1.0 - ALMOST)
+                            : fabs(p) > most * (1.0 + ALMOST)) {
+            glide->limit[j] = (signed char)(glide->limit[j] ? 0 : p > 0.0 ? 1 : -1);
+            count++;
         }
     }
     return count;
@@ -402,7 +424,7 @@ static void apply(const gk_glide *glide, gk_system *s)
 double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
 {
     find_limits(glide, s);
-    if (!round) find_end(glide, s);
+    if (!round) guess_end(glide, s);
     find_sliding(glide, s);
     const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
     express_friction(glide, s);
@@ -415,11 +437,24 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
     return moved / find_limits(glide, s);
 }
 
+/* What a mean of friction that is not that of both ends leaves of the energy it holds along the profile: taken where it
+ * is less than nothing */
+static double faded(const gk_glide *glide, const gk_system *s)
+{
+    double sum = 0.0;
+    for (int j = 0; j < s->contacts; j++) {
+        const double *own = glide->yields + j * s->stride;
+        const double off = 0.5 * (glide->start_end[j] + glide->end[j]) - glide->mean[j];
+        for (int k = 0; k < s->contacts && off != 0.0; k++) sum += off * own[k] * (glide->end[k] - glide->start_end[k]);
+    }
+    return gk_min(sum, 0.0);
+}
+
 /* What the forces of the step leave of the energy that friction holds in what is quasi-static, because they are no
  * means of those at its ends: the step's one scalar balances it (docs/theory.md, eq. 12) */
 double gk_friction_defect(const gk_glide *glide, const gk_system *s)
 {
-    double sum = gk_friction_held(glide, s) - glide->held0;
+    double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
         const double moved = glide->end[j] - glide->start_end[j];
@@ -445,11 +480,11 @@ void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e)
 /* the end of the step: friction by which the next one is predicted; returns what it took */
 double gk_friction_settle(gk_glide *glide, const gk_system *s)
 {
-    double taken = 0.0;
+    double taken = -faded(glide, s);
     find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {
-        const double mean = gk_solve_mean(s, j);
-        glide->ratio[j] = mean > 0.0 ? glide->mean[j] / mean : 0.0;
+        const double end = s->force[j] + s->end[j];
+        glide->ratio[j] = end > 0.0 ? glide->end[j] / end : 0.0;
         glide->last[j] = glide->ratio[j] * s->force[j];
         taken -= glide->mean[j] * glide->slid[j];
     }

@@ -1,0 +1,24 @@
+"""The verb efficiency: what the mesh of a pair loses to friction, by a run and by the closed form."""
+
+from __future__ import annotations
+
+import click
+
+from gearfmu.commands.models import model_of
+from gearfmu.commands.shared import Quantity, echo_pairs
+
+
+@click.command()
+@click.argument("stage")
+@click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
+@click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
+@click.option("--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches.")
+def efficiency(stage: str, torque: float, speed: float, pitches: int) -> None:
+    """Efficiency of the mesh of the pair STAGE at constant load: mean friction power of a run over whole pitches, and
+    P mu H_V with the tooth loss factor of Ohlendorf (ISO/TR 14179-2) and the run's mean coefficient of friction.
+
+    The coefficient follows what the stage says ([contact] friction), else it is 0.05. Losses of bearings, seals and
+    churned oil are in neither number."""
+    from gearfmu.stage.efficiency import mesh_efficiency
+
+    echo_pairs(mesh_efficiency(model_of(stage), torque, speed, pitches=pitches).columns())
