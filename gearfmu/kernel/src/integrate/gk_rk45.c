@@ -59,7 +59,7 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
     gk_system *s = &engaged->system;
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
     engaged->places = setup->on.roll_motion
-                          ? gk_flank_find(model, setup, mesh, engaged->pose, gk_max(meshing->reach, 50e-6),
+                          ? gk_flank_find(model, setup, mesh, engaged->pose, GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : gk_max(meshing->reach, 50e-6),
                                           engaged->position, engaged->place)
                           : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
                                           engaged->place);
@@ -80,6 +80,10 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
 static void solve_contacts(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_real *const speed[])
 {
     double rate[MAX_STRIDE];
+    for (int e = 0; e < model->engagements && GK_ON(setup, film); e++) {
+        gk_form_rates(setup, work, e, speed, work->ground_trial + setup->base.n, work->speed, rate);
+        gk_film_begin_rates(setup, work, e, rate);
+    }
     for (int i = 0; i < setup->islands; i++) {
         gk_coupled coupled = {model, setup, work, &work->explicit_rows, i, 0, 0, 1.0};
         const gk_island island = gk_couple_island(&coupled);

@@ -27,13 +27,15 @@ static int open_balance(const balance *b, double tolerance)
  * from outside and counts with its massless displacement alone */
 static double gap_change(const gk_system *s, int i)
 {
-    return (s->active[i] || s->kind[i] == ROW_TORQUE ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
+    const int massless = (s->active[i] && gk_film_lift(s, i) == 0.0) || s->kind[i] == ROW_TORQUE;
+    return (massless ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
 }
 
 static double share(const gk_system *s, int i)
 {
-    return 0.5 * (s->force0[i] + s->force[i] + s->alpha * s->direction[i]);
-} /* ½ (λ₀ + λ₁ + α d) */
+    const double films = gk_film_lift(s, i) * (s->force[i] - s->force0[i]);
+    return 0.5 * (s->force0[i] + s->force[i] + films + s->alpha * s->direction[i]);
+} /* ½ (λ₀ + λ₁ + α d); λ₁ + ½ α d where a film is */
 
 static int takes_part(const gk_system *s, int i)
 {
@@ -45,6 +47,7 @@ static int takes_part(const gk_system *s, int i)
 static balance defect(const gk_system *s)
 {
     balance b = {s->due - s->stored0 + s->rubbing, 0.0, 0.0, fabs(s->stored0), 0.0};
+    if (gk_film_on(s)) b.defect += gk_film_lost(s);
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
@@ -55,6 +58,8 @@ static balance defect(const gk_system *s)
         const double change = gap_change(s, i);
         b.defect += share(s, i) * change;
         b.rounding += 4e-16 * (fabs(s->force0[i]) + fabs(s->force[i])) * fabs(change); /* a contact that only grazes */
+        if (gk_film_lift(s, i) != 0.0)
+            b.rounding += 1e-15 * (fabs(s->force0[i]) + fabs(s->force[i])) * s->film->open[i];
     }
     return b;
 }
@@ -68,7 +73,7 @@ static void sensitivity(const gk_system *s, double *p, double *dash)
     gk_tangent_solve(s, p);
     gk_solve_path(s, p, path);
     for (int i = 0; i < s->n; i++) {
-        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
+        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * (1.0 + gk_film_lift(s, i)) * p[i];
     }
 }
 
@@ -77,25 +82,29 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
 {
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++)
-        w[i] = p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
+        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
     gk_solve_times(s, s->A, late, lag);
     for (int i = 0; i < s->n; i++) {
-        const double direct = p[i] + s->direction[i];
+        const double lift = gk_film_lift(s, i), direct = (1.0 + lift) * p[i] + s->direction[i];
         if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;
         const double massless = yields[i] + path[i] + s->slope[i] * p[i];
-        const double gap = s->active[i] || s->kind[i] == ROW_TORQUE ? -massless : moved[i] + lag[i];
+        const int rests = (s->active[i] && lift == 0.0) || s->kind[i] == ROW_TORQUE;
+        const double gap = rests ? -massless : moved[i] + lag[i];
         b->c1 += s->force[i] * massless + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
         b->c2 += 0.5 * p[i] * massless + 0.5 * direct * gap;
     }
+    if (!gk_film_on(s)) return;
+    for (int i = 0; i < s->contacts; i++) yields[i] += path[i];
+    b->c1 += gk_film_grows(s, p, dash, yields, &b->c2);
 }
 
 static int status_changed(const gk_system *s)
 {
     for (int i = 0; i < s->contacts; i++)
-        if ((s->force0[i] > 0.0) != (s->force[i] > 0.0)) return 1;
+        if ((s->force0[i] > 0.0 && gk_film_lift(s, i) == 0.0) != gk_solve_touches(s, i)) return 1;
     return 0;
 }
 
@@ -104,7 +113,8 @@ static int status_changed(const gk_system *s)
 static void choose_direction(gk_system *s, int all_rows)
 {
     for (int i = 0; i < s->n; i++) {
-        const int may = s->kind[i] == ROW_CONTACT || (all_rows && s->kind[i] == ROW_SPRING);
+        const int film = gk_film_lift(s, i) != 0.0 && !gk_solve_touches(s, i);
+        const int may = (s->kind[i] == ROW_CONTACT && !film) || (all_rows && s->kind[i] == ROW_SPRING);
         s->direction[i] = may && (s->force0[i] != 0.0 || s->force[i] != 0.0) ? s->weight[i] * gap_change(s, i) : 0.0;
     }
 }
