@@ -170,7 +170,7 @@ double gk_film_lost(const gk_system *s)
     double sum = 0.0;
     for (int i = 0; i < s->contacts; i++)
         if (s->film->sinks[i] != 0.0) sum += lost(s, i);
-    return gk_max(sum, 0.0);
+    return gk_max(sum, 0.0) + s->film->burst;
 }
 
 /* of the films that stay open: what gk_film_lost grows with the step's scalar α, linear and (square) squared; by α

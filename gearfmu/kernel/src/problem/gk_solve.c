@@ -81,14 +81,19 @@ void gk_solve_status(gk_system *s)
     s->dashpots = (any[0] | any[1] | any[2] | any[3]) != 0;
 }
 
-/* films: those whose force at the end of the step is its mean have z = 2λ1 − λ0 + η */
+/* films: what they carry is a mean of the step */
 GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
 {
 #define OF(array) ((gk_quad *)s->array)
     for (int q = 0; q < quads; q++) {
         OF(squeeze)[q] = OF(linear)[q] + OF(delta)[q];
         gk_quad force = OF(force)[q];
-        if (films) force += ((gk_quad *)s->film->sinks)[q] * (force - OF(force0)[q]);
+        if (films) {
+            const gk_quad closes = OF(film->closes)[q], sinks = OF(film->sinks)[q];
+            const gk_quad carried = GK_CHOOSE(force < closes, force, closes);
+            OF(film->lift)[q] = GK_CHOOSE(force < closes, sinks, GK_ALL(0.0));
+            force += sinks * (carried - OF(force0)[q]);
+        }
         OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + force);
         OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
@@ -242,8 +247,7 @@ static int limit_dashpots(gk_system *s)
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2, hold = 0;
         if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
-            const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i] +
-                                                                                            gk_film_lift(s, i) * (s->force[i] - s->force0[i]);
+            const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i] + gk_film_carried(s, i);
             clip = towards(s->clip[i], beyond(free, limit));
             hold = s->active[i] ? towards(s->hold[i],
                                           beyond(s->beta[i] * gk_clamp(free, -limit, limit) + s->tail[i], s->force[i]))

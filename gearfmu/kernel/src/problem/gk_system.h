@@ -95,12 +95,14 @@ typedef struct gk_film {
     double factor[MAX_STRIDE];  /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
     double open[MAX_STRIDE];    /* thickness d0 at the start */
     double speed[MAX_STRIDE];   /* of approach, where that is given */
-    double sinks[MAX_STRIDE];   /* 1: λ1 is the mean force of the step, z = 2λ1 − λ0 + … */
+    double sinks[MAX_STRIDE];   /* 1: time passes, z = λ1 + min(λ1, closes) − λ0 + η: what a film carries is a mean */
+    double lift[MAX_STRIDE];    /* 1: z grows by twice the force */
     double at_open[MAX_STRIDE]; /* I(d0) */
     double closes[MAX_STRIDE];  /* mean force from which on flanks touch at the end */
     double left[MAX_STRIDE];    /* thickness at the end by the present forces */
     double yields[MAX_STRIDE];  /* its decrease per mean force of the step */
     double delta0[MAX_STRIDE], potential0[MAX_STRIDE]; /* local law at the start */
+    double burst; /* energy lost where flanks touch through a film and no scalar balances the step */
 } gk_film;
 
 static inline int gk_film_on(const gk_system *s) { return GK_HAS(film) && s->films > 0; }
@@ -110,8 +112,13 @@ static inline int gk_solve_touches(const gk_system *s, int i)
     return s->force[i] > 0.0 && !(gk_film_on(s) && s->film->left[i] > 0.0);
 }
 
-/* how much more of z a force at the end of the step is */
-static inline double gk_film_lift(const gk_system *s, int i) { return gk_film_on(s) ? s->film->sinks[i] : 0.0; }
+static inline int gk_film_sinks(const gk_system *s, int i) { return gk_film_on(s) && s->film->sinks[i] != 0.0; }
+/* dz/dλ − 1; what z is more than λ + η */
+static inline double gk_film_lift(const gk_system *s, int i) { return gk_film_on(s) ? s->film->lift[i] : 0.0; }
+static inline double gk_film_carried(const gk_system *s, int i)
+{
+    return gk_film_sinks(s, i) ? gk_min(s->force[i], s->film->closes[i]) - s->force0[i] : 0.0;
+}
 
 /* gk_film.c */
 void gk_film_apply(gk_system *s);

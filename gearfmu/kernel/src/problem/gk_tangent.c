@@ -26,8 +26,8 @@ GK_INLINE void form_column(const gk_system *s, int j, double *column, const int 
     for (int q = 0; q < quads; q++) c[q] = D[q] + A[q] + P[q];
     if (s->pull[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
-    if (gk_film_on(s) && s->film->sinks[j] != 0.0)
-        for (int q = 0; q < quads; q++) c[q] += s->film->sinks[j] * (D[q] + s->pull[j] * B[j * quads + q]);
+    if (gk_film_lift(s, j) != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += D[q] + s->pull[j] * B[j * quads + q];
     if (s->held[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->held[j] * A[q];
     for (int e = first; e < last; e++) {
