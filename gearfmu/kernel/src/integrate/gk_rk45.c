@@ -233,6 +233,13 @@ static void keep(const gk_model *model, const gk_setup *setup, const gk_work *wo
         memcpy(gk_modal_of(setup, data, g), work->trial[g], 2 * (size_t)setup->modal[g].n * sizeof(gk_real));
 }
 
+/* what films take in an inner step, by the power at its end: these integrators keep no account but this */
+void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double step)
+{
+    for (int e = 0; e < model->engagements && GK_ON(setup, film); e++)
+        data->meshing[e].squeezed += gk_film_power(&work->engaged[e].system) * step;
+}
+
 /* angles of the bores with a given torque, quasi-static part included */
 void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 {
@@ -267,6 +274,7 @@ gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *w
         const double factor = gk_clamp(ratio > 0.0 ? 0.8 * gk_exp(-0.2 * gk_log(ratio)) : 5.0, 0.2, 5.0);
         if (ratio <= 1.0) {
             keep(model, setup, work, data);
+            gk_rk45_squeeze(model, setup, work, data, step);
             done = done + step >= h * (1.0 - 1e-12) ? h : done + step;
             data->steps++;
         } else if (step < SMALLEST) {

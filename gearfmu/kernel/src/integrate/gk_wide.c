@@ -99,6 +99,7 @@
 #define gk_rk45_evaluate gk_rk45_evaluate_avx2
 #define gk_rk45_resist gk_rk45_resist_avx2
 #define gk_rk45_angles gk_rk45_angles_avx2
+#define gk_rk45_squeeze gk_rk45_squeeze_avx2
 #define gk_rk45_step gk_rk45_step_avx2
 #define gk_central_step gk_central_step_avx2
 #define gk_supports_motion gk_supports_motion_avx2

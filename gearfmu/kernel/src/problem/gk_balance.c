@@ -72,7 +72,7 @@ static void sensitivity(const gk_system *s, double *p, double *dash)
     gk_tangent_solve(s, p);
     gk_solve_path(s, p, path);
     for (int i = 0; i < s->n; i++) {
-        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * (1.0 + gk_film_lift(s, i)) * p[i];
+        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
     }
 }
 
@@ -97,7 +97,7 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
     }
     if (!gk_film_on(s)) return;
     for (int i = 0; i < s->contacts; i++) yields[i] += path[i];
-    b->c1 += gk_film_grows(s, p, dash, yields, &b->c2);
+    b->c1 += gk_film_grows(s, p, yields, &b->c2);
 }
 
 static int status_changed(const gk_system *s)

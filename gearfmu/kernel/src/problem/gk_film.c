@@ -2,10 +2,11 @@
  * tension: with thickness d, roughness r, reach H
  *     f = −c(d) ḋ where ḋ < 0, else 0;   c(d) = 3√2 π η b R^3/2 [(d + r)^-3/2 − (H + r)^-3/2]
  * A contact whose gap is open at the start of a step stands on such a film, in series with everything that yields. For
- * the mean force x of the step the exact solution is I(d0) − I(d1) = h x, I = ∫ c dd; where that ends below 0 flanks
- * touch. So 0 ≤ x, gap + deflection ≥ d1(x) is one more local law, d1 decreasing and convex. x = λ1 + ½η_d: the force at
- * the end of the step is its mean, which is right to second order for what has mass, and lets no force ring in what has
- * none. Where no time passes (rk45, central) the speed of approach is given: f = c(d)·speed. */
+ * the mean force λ1 of the step the exact solution is I(d0) − I(d1) = hλ1, I = ∫ c dd; where that ends below 0 flanks
+ * touch. So 0 ≤ λ1, gap + deflection ≥ d1(λ1) is one more local law, d1 decreasing and convex. The force at the end of
+ * the step is its mean, z = 2λ1 − λ0, which is right to second order for what has mass and lets no force ring in what
+ * has none; beyond what closes the film z grows as that of a contact. Contact dampers wait until flanks touch. Where no
+ * time passes (rk45, central) the speed of approach is given: f = c(d)·speed. */
 #include "problem/gk_work.h"
 
 static const double TOUCHES = 1e-9; /* m: flanks that are closer touch */
@@ -67,6 +68,7 @@ void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h)
         film->factor[i] = factor(&setup->mesh[e], s, i);
         film->open[i] = film->left[i] = open;
         film->sinks[i] = 1.0;
+        s->damping[i] = 0.0, s->clip[i] = 2; /* the contact damper acts on flanks that touch */
         film->delta0[i] = s->delta[i], film->potential0[i] = s->potential[i];
         const double u = inverse_root(film, open), at_open = impulse(film, i, open, u);
         film->at_open[i] = at_open;
@@ -128,7 +130,7 @@ void gk_film_apply(gk_system *s)
     gk_film *film = s->film;
     for (int i = 0; i < s->contacts; i++) {
         if (!(film->factor[i] > 0.0)) continue;
-        const double x = s->force[i] + 0.5 * s->dash[i];
+        const double x = s->force[i];
         film->left[i] = film->yields[i] = 0.0;
         if (!(x < film->closes[i])) continue; /* flanks touch */
         if (film->step > 0.0)
@@ -174,14 +176,14 @@ double gk_film_lost(const gk_system *s)
 }
 
 /* of the films that stay open: what gk_film_lost grows with the step's scalar α, linear and (square) squared; by α
- * forces grow by p, dampers by dash, deflection without the local law by `linear` */
-double gk_film_grows(const gk_system *s, const double *p, const double *dash, const double *linear, double *square)
+ * forces grow by p, deflection without the local law by `linear` */
+double gk_film_grows(const gk_system *s, const double *p, const double *linear, double *square)
 {
     const gk_film *film = s->film;
     double sum = 0.0;
     for (int i = 0; i < s->contacts; i++) {
         if (!s->active[i] || film->sinks[i] == 0.0 || !(film->left[i] > 0.0)) continue;
-        const double sinks = film->yields[i] * (p[i] + 0.5 * dash[i]);
+        const double sinks = film->yields[i] * p[i];
         sum += p[i] * (sunk_by(s, i) + s->delta[i] - film->delta0[i] + 0.5 * deflected(s, i)) +
                s->force[i] * sinks + 0.5 * (s->force[i] - s->force0[i]) * linear[i];
         *square += p[i] * (sinks + 0.5 * linear[i]);

@@ -94,7 +94,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
             OF(film->lift)[q] = GK_CHOOSE(force < closes, sinks, GK_ALL(0.0));
             force += sinks * (carried - OF(force0)[q]);
         }
-        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + force);
+        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
         OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
         OF(z)[q] = force + OF(eta)[q] - OF(begin)[q];
@@ -247,7 +247,7 @@ static int limit_dashpots(gk_system *s)
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2, hold = 0;
         if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
-            const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i] + gk_film_carried(s, i);
+            const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i];
             clip = towards(s->clip[i], beyond(free, limit));
             hold = s->active[i] ? towards(s->hold[i],
                                           beyond(s->beta[i] * gk_clamp(free, -limit, limit) + s->tail[i], s->force[i]))

@@ -123,7 +123,7 @@ static inline double gk_film_carried(const gk_system *s, int i)
 /* gk_film.c */
 void gk_film_apply(gk_system *s);
 double gk_film_lost(const gk_system *s);
-double gk_film_grows(const gk_system *s, const double *p, const double *dash, const double *linear, double *square);
+double gk_film_grows(const gk_system *s, const double *p, const double *linear, double *square);
 double gk_film_power(const gk_system *s);
 
 /* gk_solve.c */
