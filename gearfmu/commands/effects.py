@@ -140,6 +140,7 @@ def _numbers(stage: str) -> dict[str, str]:
         "gyroscopic": _whirling(model),
         "flank_deviations": _listed(f"{size:.3g} µm" for size in deviating) + _idle(not any(deviating)),
         "friction": _listed(map(_friction, meshes)),
+        "film": _listed(_film(spec, mesh) for mesh in meshes),
         "runout": _listed(map(_runout, gears)) + _idle(not any(g.eccentricity or g.wobble for g in gears)),
     }
 
@@ -156,6 +157,23 @@ def _friction(mesh: Any) -> str:
         return "none is stated: it costs nothing"
     constant = mesh.friction.law == "constant"
     return f"coefficient {mesh.friction.coefficient:g}" if constant else f"law {mesh.friction.law}"
+
+
+def _film(spec: Any, mesh: Any) -> str:
+    """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
+    if mesh.film is None:
+        return "none is stated: it costs nothing"
+    from gearfmu.stage.film import REACH, film_impulse
+
+    pair = mesh_geometry(spec, mesh)
+    a, b = (gear.r_b for gear in pair.gears)
+    rings = any(gear.name in mesh.gears and gear.kind == "ring" for gear in spec.gears)
+    reach = b - a if rings else a + b
+    rolls = [pair.length * r_b / reach for r_b in (a, b)]
+    radius = rolls[0] * rolls[1] / (rolls[1] - rolls[0] if rings else rolls[0] + rolls[1])
+    width = min(gear.face_width for gear in spec.gears if gear.name in mesh.gears)
+    taken = film_impulse(REACH, mesh.film.viscosity, mesh.film.roughness, radius, width)
+    return f"takes {1e3 * taken:.3g} mN·s of an approach from {1e6 * REACH:g} µm at the pitch point"
 
 
 def _whirling(model: Any) -> str:

@@ -61,6 +61,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
                 speed_max=spec.speed_max,
                 misalignment=pair.misalignment,
                 friction=spec.contact.friction,
+                film=spec.contact.film,
             ),
         ),
         supports=tuple(
@@ -188,7 +189,7 @@ def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]
 def _set_meshes(spec: PlanetarySpec, planets: list[str]) -> tuple[EngagementSpec, ...]:
     assert spec.contact is not None and spec.speed_max is not None
     z_s, z_p, z_r = (gear.teeth for gear in spec.gears)
-    contact = {"damping": spec.contact.damping, "friction": spec.contact.friction}
+    contact = {name: getattr(spec.contact, name) for name in ("damping", "friction", "film")}
     common: dict[str, Any] = {"backlash": spec.set.backlash, **contact}
     torque, relative = mesh_torque(spec), spec.speed_max * z_r  # teeth past a planet in the carrier's axes
     return tuple(

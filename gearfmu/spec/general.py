@@ -15,7 +15,7 @@ from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size, SurfaceCoupling
 from gearfmu.spec.lead import Misalignment
 from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
-from gearfmu.spec.ports import Frequency, FrictionSpec, LevelSpec, NodalSpec, PortSpec
+from gearfmu.spec.ports import FilmSpec, Frequency, FrictionSpec, LevelSpec, NodalSpec, PortSpec
 
 Place = Annotated[float, Quantity("m")]
 Spring = Annotated[float, Quantity("N/m", above=0, words=("rigid",))]
@@ -157,6 +157,7 @@ class EngagementSpec(Spec):
     torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest torque on gear A")
     speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
     friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
+    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
     misalignment: Misalignment | None = Field(
         default=None,
         description="parallelism errors of the axes, B's seen from A's; parallel when the table is absent",

@@ -51,6 +51,17 @@ class FrictionSpec(Spec):
     )
 
 
+class FilmSpec(Spec):
+    """Squeeze film of oil between flanks that approach."""
+
+    viscosity: Annotated[float, Quantity("Pa*s", at_least=1e-4, at_most=10)] = Field(
+        default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth"
+    )
+    roughness: Annotated[float, Quantity("m", at_least=1e-8, at_most=1e-5)] = Field(
+        default=1e-6, description="oil left between flanks that touch by their roughness, added to every gap"
+    )
+
+
 class ContactSpec(Spec):
     """Tooth contact."""
 
@@ -61,6 +72,7 @@ class ContactSpec(Spec):
     law: Literal["line"] = Field(default="line", description="contact law")
     nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
     friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
+    film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
 
 
 class ChainSpec(Spec):

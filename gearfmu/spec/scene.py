@@ -48,6 +48,7 @@ class Effects(Spec):
     flank_deviations: Switch = True
     runout: Switch = True
     friction: Switch = True
+    film: Switch = True
 
     @property
     def off(self) -> tuple[str, ...]:

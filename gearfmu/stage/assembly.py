@@ -22,6 +22,7 @@ from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.flanks import deviation_sections
+from gearfmu.stage.film import film_starts
 from gearfmu.stage.friction import along_rows, friction_starts
 from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
@@ -54,7 +55,7 @@ def assemble(
     sections = order_sections(general_sections(spec, bodies, rolls, observe))
     hashes = tuple(body.input_hash for body in bodies)
     model = StageModel(spec, write_blob(sections), hashes)
-    starts = friction_starts(model.stage)
+    starts = friction_starts(model.stage) | film_starts(model.stage)
     return model.with_starts(starts) if starts else model
 
 

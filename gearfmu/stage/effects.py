@@ -342,6 +342,21 @@ EFFECTS: tuple[Effect, ...] = (
         test="tests/stage/test_friction.py::test_force_across_the_line_of_action_jumps_at_the_pitch_point",
         kept=DISSIPATION,
     ),
+    _switched(
+        "film",
+        title="squeeze film in open gaps",
+        formula="f = −c(d) ḋ while flanks approach, c = 3√2 π η b R^(3/2) [(d + r)^(−3/2) − (H + r)^(−3/2)], H = 100 µm",
+        equation="2.9, 3.13 (eqs. 8q to 8s, 17p to 17r)",
+        matters=(
+            "light-load rattle, reversal, engagement: it takes the momentum ∫ c dd of an approach, and flanks that "
+            "bring less do not touch (`gearfmu effects` prints it); nothing where flanks stay closed. Off "
+            "unless the stage says `[contact] film = {…}`"
+        ),
+        off="dry flanks meet with the speed they have",
+        code="gk_film.c, gk_solve.c (dashpots_and_sums), gk_tangent.c, gk_balance.c",
+        test="tests/stage/test_film.py::test_a_falling_body_sinks_as_the_exact_solution",
+        kept=DISSIPATION,
+    ),
 )
 
 

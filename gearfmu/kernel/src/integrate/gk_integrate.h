@@ -38,6 +38,7 @@ int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work
                      const double *outer);
 void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, double *y);
 void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data);
+void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double step);
 gk_step_function gk_rk45_step;
 /* gk_central.c */
 gk_step_function gk_central_step;

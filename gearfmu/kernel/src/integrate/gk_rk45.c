@@ -59,7 +59,7 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
     gk_system *s = &engaged->system;
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
     engaged->places = setup->on.roll_motion
-                          ? gk_flank_find(model, setup, mesh, engaged->pose, gk_max(meshing->reach, 50e-6),
+                          ? gk_flank_find(model, setup, mesh, engaged->pose, GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : gk_max(meshing->reach, 50e-6),
                                           engaged->position, engaged->place)
                           : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
                                           engaged->place);
@@ -80,6 +80,10 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
 static void solve_contacts(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_real *const speed[])
 {
     double rate[MAX_STRIDE];
+    for (int e = 0; e < model->engagements && GK_ON(setup, film); e++) {
+        gk_form_rates(setup, work, e, speed, work->ground_trial + setup->base.n, work->speed, rate);
+        gk_film_begin_rates(setup, work, e, rate);
+    }
     for (int i = 0; i < setup->islands; i++) {
         gk_coupled coupled = {model, setup, work, &work->explicit_rows, i, 0, 0, 1.0};
         const gk_island island = gk_couple_island(&coupled);
@@ -229,6 +233,13 @@ static void keep(const gk_model *model, const gk_setup *setup, const gk_work *wo
         memcpy(gk_modal_of(setup, data, g), work->trial[g], 2 * (size_t)setup->modal[g].n * sizeof(gk_real));
 }
 
+/* what films take in an inner step, by the power at its end: these integrators keep no account but this */
+void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double step)
+{
+    for (int e = 0; e < model->engagements && GK_ON(setup, film); e++)
+        data->meshing[e].squeezed += gk_film_power(&work->engaged[e].system) * step;
+}
+
 /* angles of the bores with a given torque, quasi-static part included */
 void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 {
@@ -263,6 +274,7 @@ gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *w
         const double factor = gk_clamp(ratio > 0.0 ? 0.8 * gk_exp(-0.2 * gk_log(ratio)) : 5.0, 0.2, 5.0);
         if (ratio <= 1.0) {
             keep(model, setup, work, data);
+            gk_rk45_squeeze(model, setup, work, data, step);
             done = done + step >= h * (1.0 - 1e-12) ? h : done + step;
             data->steps++;
         } else if (step < SMALLEST) {

@@ -620,7 +620,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
         r.setup.chained[p] = 0;
         r.setup.joint[p][JOINT_SHAFT].live = r.setup.joint[p][JOINT_CLUTCH].live = 0;
     }
-    r.setup.on.contact_damping = r.setup.on.friction = 0;
+    r.setup.on.contact_damping = r.setup.on.friction = r.setup.on.film = 0;
     r.setup.on.roll_motion = 1;
     work->another = 0;
     set_joints(&r);

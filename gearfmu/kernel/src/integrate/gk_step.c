@@ -175,7 +175,7 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
     engaged->places =
         GK_ON(setup, roll_motion)
-            ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->reach, engaged->position, engaged->place)
+            ? gk_flank_find(model, setup, mesh, engaged->pose, GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : meshing->reach, engaged->position, engaged->place)
             : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
     if (engaged->places < 0) return engaged->places = 0, GK_DIVERGED;
     for (int p = 0; p < engaged->places; p++) {
@@ -430,6 +430,14 @@ static double account_friction(const gk_work *work, gk_data *data, int e)
     return gk_friction_held(glide, &work->engaged[e].system);
 }
 
+/* the same of films, which hold none */
+static void account_film(const gk_work *work, gk_data *data, int e)
+{
+    const double lost = gk_film_on(&work->engaged[e].system) ? gk_film_lost(&work->engaged[e].system) : 0.0;
+    data->ledger.dissipated += lost;
+    data->meshing[e].squeezed += lost;
+}
+
 static void settle_accounts(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     const double before = data->ledger.massless;
@@ -439,6 +447,7 @@ static void settle_accounts(const gk_model *model, const gk_setup *setup, const 
         const gk_system *s = &work->engaged[e].system;
         data->ledger.massless += account(model, work, data, s);
         if (GK_ON(setup, friction)) data->ledger.massless += account_friction(work, data, e);
+        if (GK_ON(setup, film)) account_film(work, data, e);
         data->rounds += s->rounds;
         if (s->limit_reached) data->trouble++, data->status |= STATUS_LIMIT;
     }
@@ -468,6 +477,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
         gk_form_system(model, setup, data, k, work, e);
         if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
         gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
+        if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
     }
     GK_LAP(work, PHASE_SYSTEM);
     if ((outcome = solve_all(model, setup, work, data, k)) != GK_OK) return outcome;

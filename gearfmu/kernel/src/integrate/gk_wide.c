@@ -53,6 +53,12 @@
 #define gk_rows_push_ground_along gk_rows_push_ground_along_avx2
 #define gk_rows_push_modes_along gk_rows_push_modes_along_avx2
 #define gk_rows_read_modes_along gk_rows_read_modes_along_avx2
+#define gk_film_begin gk_film_begin_avx2
+#define gk_film_begin_rates gk_film_begin_rates_avx2
+#define gk_film_apply gk_film_apply_avx2
+#define gk_film_lost gk_film_lost_avx2
+#define gk_film_grows gk_film_grows_avx2
+#define gk_film_power gk_film_power_avx2
 #define gk_friction_form gk_friction_form_avx2
 #define gk_friction_solve gk_friction_solve_avx2
 #define gk_friction_held gk_friction_held_avx2
@@ -93,6 +99,7 @@
 #define gk_rk45_evaluate gk_rk45_evaluate_avx2
 #define gk_rk45_resist gk_rk45_resist_avx2
 #define gk_rk45_angles gk_rk45_angles_avx2
+#define gk_rk45_squeeze gk_rk45_squeeze_avx2
 #define gk_rk45_step gk_rk45_step_avx2
 #define gk_central_step gk_central_step_avx2
 #define gk_supports_motion gk_supports_motion_avx2
@@ -112,6 +119,7 @@
 #include "problem/gk_compliance.c"
 #include "problem/gk_ground.c"
 #include "problem/gk_form.c"
+#include "problem/gk_film.c"
 #include "problem/gk_tangent.c"
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"

@@ -50,6 +50,7 @@ typedef struct gk_meshing { /* an engagement */
     double reach;     /* how far to look for contacts */
     double open_time; /* without any contact */
     double rubbed;    /* energy lost to friction */
+    double squeezed;  /* energy lost to the squeeze film */
     double rolling, unsteady; /* speed of gear A and its deviation from that, means over the last millisecond */
     double owed;              /* defect of energy that the balance of contacts tolerated so far */
     double pitch_angle, pitch_time,

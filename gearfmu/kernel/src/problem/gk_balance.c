@@ -28,13 +28,14 @@ static int open_balance(const balance *b, double tolerance)
  * from outside and counts with its massless displacement alone */
 static double gap_change(const gk_system *s, int i)
 {
-    return (s->active[i] || s->kind[i] == ROW_TORQUE ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
+    const int massless = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
+    return (massless ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
 }
 
 static double share(const gk_system *s, int i)
 {
-    return 0.5 * (s->force0[i] + s->force[i] + s->alpha * s->direction[i]);
-} /* ½ (λ₀ + λ₁ + α d) */
+    return 0.5 * (s->force0[i] + s->force[i] + gk_film_carried(s, i) + s->alpha * s->direction[i]);
+} /* ½ (λ₀ + λ₁ + α d); of a film λ₁ + ½ α d */
 
 static int takes_part(const gk_system *s, int i)
 {
@@ -46,6 +47,7 @@ static int takes_part(const gk_system *s, int i)
 static balance defect(const gk_system *s)
 {
     balance b = {s->due - s->stored0 + s->rubbing, 0.0, 0.0, fabs(s->stored0), 0.0};
+    if (gk_film_on(s)) b.defect += gk_film_lost(s);
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
         if (s->force[i] != 0.0) {
@@ -56,6 +58,8 @@ static balance defect(const gk_system *s)
         const double change = gap_change(s, i);
         b.defect += share(s, i) * change;
         b.rounding += 4e-16 * (fabs(s->force0[i]) + fabs(s->force[i])) * fabs(change); /* a contact that only grazes */
+        if (gk_film_sinks(s, i))
+            b.rounding += 1e-15 * (fabs(s->force0[i]) + fabs(s->force[i])) * s->film->open[i];
     }
     return b;
 }
@@ -78,25 +82,29 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
 {
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++)
-        w[i] = p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
+        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
     gk_solve_times(s, s->A, late, lag);
     for (int i = 0; i < s->n; i++) {
-        const double direct = p[i] + s->direction[i];
+        const double lift = gk_film_lift(s, i), direct = (1.0 + lift) * p[i] + s->direction[i];
         if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;
         const double massless = yields[i] + path[i] + s->slope[i] * p[i];
-        const double gap = s->active[i] || s->kind[i] == ROW_TORQUE ? -massless : moved[i] + lag[i];
+        const int rests = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
+        const double gap = rests ? -massless : moved[i] + lag[i];
         b->c1 += s->force[i] * massless + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
         b->c2 += 0.5 * p[i] * massless + 0.5 * direct * gap;
     }
+    if (!gk_film_on(s)) return;
+    for (int i = 0; i < s->contacts; i++) yields[i] += path[i];
+    b->c1 += gk_film_grows(s, p, yields, &b->c2);
 }
 
 static int status_changed(const gk_system *s)
 {
     for (int i = 0; i < s->contacts; i++)
-        if ((s->force0[i] > 0.0) != (s->force[i] > 0.0)) return 1;
+        if ((s->force0[i] > 0.0 && !gk_film_sinks(s, i)) != gk_solve_touches(s, i)) return 1;
     return 0;
 }
 
@@ -105,7 +113,8 @@ static int status_changed(const gk_system *s)
 static void choose_direction(gk_system *s, int all_rows)
 {
     for (int i = 0; i < s->n; i++) {
-        const int may = s->kind[i] == ROW_CONTACT || (all_rows && s->kind[i] == ROW_SPRING);
+        const int film = gk_film_sinks(s, i) && !gk_solve_touches(s, i);
+        const int may = (s->kind[i] == ROW_CONTACT && !film) || (all_rows && s->kind[i] == ROW_SPRING);
         s->direction[i] = may && (s->force0[i] != 0.0 || s->force[i] != 0.0) ? s->weight[i] * gap_change(s, i) : 0.0;
     }
 }
@@ -215,6 +224,20 @@ static int find_alpha(const gk_island *island, balance b)
     return 0;
 }
 
+/* A step without a root in which flanks touched through a film: energy that is missing has been lost in it */
+static int bursts(const gk_island *island, double defect)
+{
+    for (int m = 0; m < island->count; m++) {
+        const gk_system *s = island->member[m];
+        for (int i = 0; i < s->contacts; i++)
+            if (gk_film_sinks(s, i) && gk_solve_touches(s, i)) {
+                s->film->burst -= defect;
+                return 1;
+            }
+    }
+    return 0;
+}
+
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
  * quasi-static part's energy change equal its work. Contacts that hardly move cannot repay what the steps before left:
  * then the defect waits, as it does in a step without change of status. */
@@ -242,6 +265,7 @@ void gk_balance_solve(const gk_island *island)
     }
     gk_balance_plain(island);
     balance b = defect_of_all(island);
+    if (b.defect < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
     leave(island, &b);
     b.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
     if (open_balance(&b, rubs ? RUBBED_BALANCE : steady))

@@ -62,7 +62,8 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
     const gk_mesh *mesh = &setup->mesh[e];
     gk_system *s = &work->engaged[e].system;
     s->strips = setup->strips;
-    s->n = s->clutches = 0;
+    s->n = s->clutches = s->films = 0;
+    s->film = &work->engaged[e].film;
     list_contacts(model, setup, data, h, work, e);
     for (int joint = 0; joint < JOINTS; joint++) /* clutches last */
         for (int p = 0; p < mesh->ports; p++)

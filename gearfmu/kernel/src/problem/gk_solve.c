@@ -9,7 +9,7 @@
  * one (block principal pivoting, Júdice & Pires 1994). */
 #include "problem/gk_system.h"
 
-enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, DASHPOT_ROUNDS = 8 };
+enum { ROUND_LIMIT = 40, CHORD_LIMIT = 12, FILM_LIMIT = 40, DASHPOT_ROUNDS = 8 };
 #ifdef GK_DOUBLE_MODES
 static const double SOLVED = 1e-11;
 #else
@@ -81,15 +81,23 @@ void gk_solve_status(gk_system *s)
     s->dashpots = (any[0] | any[1] | any[2] | any[3]) != 0;
 }
 
-GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
+/* films: what they carry is a mean of the step */
+GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
 {
 #define OF(array) ((gk_quad *)s->array)
     for (int q = 0; q < quads; q++) {
         OF(squeeze)[q] = OF(linear)[q] + OF(delta)[q];
+        gk_quad force = OF(force)[q];
+        if (films) {
+            const gk_quad closes = OF(film->closes)[q], sinks = OF(film->sinks)[q];
+            const gk_quad carried = GK_CHOOSE(force < closes, force, closes);
+            OF(film->lift)[q] = GK_CHOOSE(force < closes, sinks, GK_ALL(0.0));
+            force += sinks * (carried - OF(force0)[q]);
+        }
         OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
         OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
-        OF(z)[q] = OF(force)[q] + OF(eta)[q] - OF(begin)[q];
+        OF(z)[q] = force + OF(eta)[q] - OF(begin)[q];
     }
 #undef OF
     for (int i = s->n - s->clutches; i < s->n; i++)
@@ -104,7 +112,12 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int quads)
 void gk_solve_settle(gk_system *s)
 {
     gk_solve_path(s, s->force, s->linear);
-    GK_SIZED(s->stride / 4, dashpots_and_sums, s)
+    if (gk_film_on(s)) {
+        dashpots_and_sums(s, 1, s->stride / 4);
+        gk_film_apply(s);
+        return;
+    }
+    GK_SIZED(s->stride / 4, dashpots_and_sums, s, 0)
 }
 
 /* the start of a step, before rows and dashpots have a status: what follows from λ0 and from what dampers did last */
@@ -138,6 +151,8 @@ static void residual(const gk_system *s, double *r)
                   *Al = (const gk_quad *)s->Al, *squeeze = (const gk_quad *)s->squeeze, *on = (const gk_quad *)s->on;
     for (int q = 0; q < s->stride / 4; q++)
         ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + squeeze[q] + outer[q] + beyond[q]) * on[q];
+    if (!gk_film_on(s)) return;
+    for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)r)[q] += ((gk_quad *)s->film->left)[q] * on[q];
 }
 
 /* moves the active λ by x; e: what the local law bends away from its tangent. Returns whether the change still matters.
@@ -158,7 +173,7 @@ static int move(gk_system *s, const double *x, double *e, double *change)
     gk_law_apply(s);
     for (int q = 0; q < quads; q++) bent[q] += delta[q];
     *change = gk_largest(&most);
-    return GK_HAS(hertz) && s->curved && *change > SOLVED * gk_largest(&size);
+    return ((GK_HAS(hertz) && s->curved) || gk_film_on(s)) && *change > SOLVED * gk_largest(&size);
 }
 
 /* what the law's bend e leaves in the equations: −(e + B Γ e) */
@@ -177,12 +192,13 @@ static void bend(const gk_system *s, const double *e, double *r)
 static void newton(gk_system *s)
 {
     double x[MAX_STRIDE], e[MAX_STRIDE], change, last = INFINITY;
+    const int films = gk_film_on(s), most = films ? FILM_LIMIT : CHORD_LIMIT;
     gk_tangent_factorise(s);
     residual(s, x);
-    for (int round = 0; round < CHORD_LIMIT; round++) {
+    for (int round = 0; round < most; round++) {
         gk_tangent_solve(s, x);
         if (!move(s, x, e, &change)) break;
-        if (change > 0.2 * last) { /* slow: a new tangent */
+        if (films || change > 0.2 * last) { /* slow, or bent by films: a new tangent */
             gk_solve_settle(s);
             gk_tangent_factorise(s);
             residual(s, x);
@@ -198,7 +214,8 @@ static void newton(gk_system *s)
 static int violated(const gk_system *s, int i)
 {
     if (is_contact(s, i))
-        return s->active[i] ? s->force[i] < 0.0 : gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < 0.0;
+        return s->active[i] ? s->force[i] < 0.0
+                            : gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < (gk_film_on(s) ? s->film->left[i] : 0.0);
     if (!is_clutch(s, i)) return 0;
     if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
     return s->bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0; /* friction must oppose slip */

@@ -70,6 +70,8 @@ typedef struct gk_system {
     double rubbing;   /* what friction leaves of that energy in the step (gk_friction_defect) */
     int rounds, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
     int dashpots_stand;                      /* where they are: no search for what limits them */
+    int films;                               /* rows whose gap is open at the start of the step, with oil in it */
+    struct gk_film *film;                    /* with the squeeze film */
     double outer[MAX_STRIDE],
         beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
                                                      deflection at once */
@@ -85,6 +87,44 @@ struct gk_island {
     void (*sweep)(const gk_island *island); /* solves all members, NULL: there is one */
     void *context;
 };
+
+/* Squeeze film of an engagement in a step (gk_film.c); zeros in rows without */
+typedef struct gk_film {
+    double step;                /* h; 0: no time passes, the speed of approach is given */
+    double cut, inverse_root;   /* roughness r; (H + r)^-½ */
+    double factor[MAX_STRIDE];  /* c = factor·[(d + r)^-3/2 − (H + r)^-3/2] */
+    double open[MAX_STRIDE];    /* thickness d0 at the start */
+    double speed[MAX_STRIDE];   /* of approach, where that is given */
+    double sinks[MAX_STRIDE];   /* 1: time passes, z = λ1 + min(λ1, closes) − λ0 + η: what a film carries is a mean */
+    double lift[MAX_STRIDE];    /* 1: z grows by twice the force */
+    double at_open[MAX_STRIDE]; /* I(d0) */
+    double closes[MAX_STRIDE];  /* mean force from which on flanks touch at the end */
+    double left[MAX_STRIDE];    /* thickness at the end by the present forces */
+    double yields[MAX_STRIDE];  /* its decrease per mean force of the step */
+    double delta0[MAX_STRIDE], potential0[MAX_STRIDE]; /* local law at the start */
+    double burst; /* energy lost where flanks touch through a film and no scalar balances the step */
+} gk_film;
+
+static inline int gk_film_on(const gk_system *s) { return GK_HAS(film) && s->films > 0; }
+/* flanks of a contact that carries touch: it is no film alone */
+static inline int gk_solve_touches(const gk_system *s, int i)
+{
+    return s->force[i] > 0.0 && !(gk_film_on(s) && s->film->left[i] > 0.0);
+}
+
+static inline int gk_film_sinks(const gk_system *s, int i) { return gk_film_on(s) && s->film->sinks[i] != 0.0; }
+/* dz/dλ − 1; what z is more than λ + η */
+static inline double gk_film_lift(const gk_system *s, int i) { return gk_film_on(s) ? s->film->lift[i] : 0.0; }
+static inline double gk_film_carried(const gk_system *s, int i)
+{
+    return gk_film_sinks(s, i) ? gk_min(s->force[i], s->film->closes[i]) - s->force0[i] : 0.0;
+}
+
+/* gk_film.c */
+void gk_film_apply(gk_system *s);
+double gk_film_lost(const gk_system *s);
+double gk_film_grows(const gk_system *s, const double *p, const double *linear, double *square);
+double gk_film_power(const gk_system *s);
 
 /* gk_solve.c */
 void gk_solve_contacts(gk_system *s);

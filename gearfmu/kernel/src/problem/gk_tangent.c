@@ -26,6 +26,8 @@ GK_INLINE void form_column(const gk_system *s, int j, double *column, const int 
     for (int q = 0; q < quads; q++) c[q] = D[q] + A[q] + P[q];
     if (s->pull[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->pull[j] * B[j * quads + q];
+    if (gk_film_lift(s, j) != 0.0)
+        for (int q = 0; q < quads; q++) c[q] += D[q];
     if (s->held[j] != 0.0)
         for (int q = 0; q < quads; q++) c[q] += s->held[j] * A[q];
     for (int e = first; e < last; e++) {
@@ -35,6 +37,7 @@ GK_INLINE void form_column(const gk_system *s, int j, double *column, const int 
     }
     for (int q = 0; q < quads; q++) ((gk_quad *)column)[q] = c[q] * on[q];
     ((gk_quad *)column)[j / 4] += s->slope[j] * UNIT[j % 4];
+    if (gk_film_on(s)) column[j] += s->film->yields[j];
 }
 
 GK_INLINE void columns(gk_system *s, const int quads)

@@ -93,6 +93,7 @@ typedef struct gk_glide {
 typedef struct gk_engaged { /* an engagement in a step */
     int index;
     gk_glide *glide; /* with friction */
+    gk_film film;
     gk_place place[MAX_PAIRS];
     int places;
     double pose[POSE]; /* predicted */
@@ -218,6 +219,9 @@ void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged,
 void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
                               gk_real *out_x, gk_real *out_y);
 void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
+/* gk_film.c */
+void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
+void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);
 /* gk_friction.c */
 void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                       gk_work *work, int e);

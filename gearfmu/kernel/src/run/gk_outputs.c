@@ -10,7 +10,7 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
 {
     const gk_system *s = &engaged->system;
     double side[2] = {0, 0}, *v = data->mesh[e];
-    int pairs = 0;
+    int pairs = 0, touched[2] = {0, 0};
     for (int i = 0; i < MAX_SLICES; i++) v[V_SLICE_1 + i] = 0.0;
     for (int p = 0; p < engaged->places; p++) {
         const double sense = engaged->place[p].flank ? -1.0 : 1.0;
@@ -18,15 +18,18 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
         for (int i = p * s->strips; i < (p + 1) * s->strips; i++) {
             side[engaged->place[p].flank] += gk_reported(s, i);
             v[V_SLICE_1 + i % s->strips] += sense * gk_reported(s, i);
-            touches |= s->force[i] > 0.0;
+            touches |= gk_solve_touches(s, i);
         }
         pairs += touches;
+        if (touches) touched[engaged->place[p].flank] = 1;
     }
     v[V_FORCE_DRIVE] = side[0];
     v[V_FORCE_COAST] = side[1];
     v[V_MESH_FORCE] = side[0] - side[1];
     v[V_PAIRS] = pairs;
     v[V_CONTACT] = side[0] > 0.0 ? (side[1] > 0.0 ? 2 : 1) : side[1] > 0.0 ? -1 : 0;
+    if (gk_film_on(s)) v[V_CONTACT] = touched[0] ? (touched[1] ? 2 : 1) : touched[1] ? -1 : 0;
+    v[V_FILM_LOSS] = data->meshing[e].squeezed;
     v[V_IMPACTS] = (double)data->meshing[e].impacts;
     v[V_OPEN_TIME] = data->meshing[e].open_time;
 }

@@ -24,7 +24,7 @@ static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h
     int touches = 0;
     for (int i = 0; i < s->contacts; i++) {
         side[engaged->place[s->place_of[i]].flank] += gk_solve_mean(s, i);
-        touches |= s->force[i] > 0.0;
+        touches |= gk_solve_touches(s, i);
     }
     for (int i = s->contacts; i < s->n; i++)
         if (s->joint_of[i] == JOINT_PORT) tally->port[s->port_of[i]] -= gk_solve_mean(s, i) * h;

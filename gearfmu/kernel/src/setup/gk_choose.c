@@ -88,6 +88,12 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
     if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
     gk_outcome outcome = choose_contact(model, data, setup, message);
     if (!outcome) outcome = choose_friction(model, setup, message);
+    if (!outcome && setup->on.film && setup->nodal) {
+        snprintf(message, GK_MESSAGE,
+                 "effect.film stands on lines of contact: use contact line (level paper has nodes), or effect.film = "
+                 "false");
+        return GK_BAD_VALUE;
+    }
     if (outcome || setup->nodal) return outcome;
     if (setup->level == LEVEL_PAPER) {
         setup->on.residual = 0;

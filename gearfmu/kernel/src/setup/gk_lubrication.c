@@ -44,6 +44,7 @@ void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *me
                        .sliding = 1.0,
                        .pitch_sum = 1.0,
                        .pitch_rho = 1.0};
+    mesh->film_cut = v[V_FILM_CUT];
     if (e->kind == MESH_FLAT) return;
     const double sense = e->kind == MESH_INTERNAL ? -1.0 : 1.0, R = gk_base_reach(model, e);
     const double L = sqrt(mesh->distance * mesh->distance - R * R), per = a->r_b / b->r_b; /* speed of B per A's */

@@ -284,7 +284,7 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
     gk_strips_fill(model, setup, mesh);
     gk_law_bounds(model, mesh);
     if (engagement->kind != MESH_FLAT) gk_flank_clearance(model, setup, mesh);
-    if (GK_ON(setup, friction)) gk_lubrication_fill(model, data, mesh);
+    if (GK_ON(setup, friction) || GK_ON(setup, film)) gk_lubrication_fill(model, data, mesh);
     if (setup->nodal) gk_nodal_fill(model, setup, data, mesh);
 }
 

@@ -6,6 +6,8 @@
 #include "model/gk_data.h"
 #include "setup/gk_nodal.h"
 
+#define GK_FILM_REACH 100e-6 /* m: open flanks further apart than this know no film (assumed) */
+
 enum {
     NODES = 88,          /* of a side's table in one pitch */
     CACHE = 4,           /* coefficient sets kept */
@@ -17,7 +19,7 @@ enum {
 
 typedef struct gk_effects {
     int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping,
-        roll_motion, coriolis, centrifugal, gyroscopic, flank_deviations, runout, friction;
+        roll_motion, coriolis, centrifugal, gyroscopic, flank_deviations, runout, friction, film;
 } gk_effects;
 
 /* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
@@ -45,7 +47,8 @@ enum {
     EFFECT_gyroscopic,
     EFFECT_flank_deviations,
     EFFECT_runout,
-    EFFECT_friction
+    EFFECT_friction,
+    EFFECT_film
 };
 #define GK_EFFECT(name) EFFECT_##name
 #define GK_EFFECT_OF(name) GK_EFFECT(name)
@@ -163,6 +166,7 @@ typedef struct gk_mesh { /* an engagement */
     int frame;            /* rotor of the frame, −1: the ground */
     int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
     gk_friction friction;
+    double film_cut; /* roughness: what is added to every gap of the squeeze film, m */
     double action[2]; /* t of the line of action of both flanks at the nominal axes (gk_flank.c) */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     int coasts;                                  /* its flanks sg = −1 are those that carry (gk_kinematics_carrying) */

@@ -1,0 +1,256 @@
+"""Squeeze film in open gaps: exact solutions of a falling body, energy, no tension, rattle with and without, stages, and
+what a stage file says of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from gearfmu.body import ReducedBody, load_bodies, load_stage_bodies
+from gearfmu.errors import ModelError
+from gearfmu.kernel import Kernel
+from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
+from gearfmu.spec.ports import FilmSpec
+from gearfmu.spec.stage import StageSpec, load_stage
+from gearfmu.stage import StageModel, Steady, assemble, simulate
+from gearfmu.stage.film import REACH, film_impulse, film_resistance
+from gearfmu.study.flat import FlatBody, FlatContact, flat_blob
+
+DG4, EM, RK45, CENTRAL = 0.0, 2.0, 3.0, 4.0
+MASS, LOAD, SPEED, START = 100.0, 300.0, 0.06, 105e-6  # reduced mass kg, N, m/s, m
+OIL = {"viscosity": 1e-3, "roughness": 2e-6, "radius": 1.0, "width": 1.0}  # of a flat engagement
+ON = {"effect.film": 1.0, "oil_viscosity": OIL["viscosity"], "film_roughness": OIL["roughness"]}
+
+
+@pytest.fixture(scope="module")
+def pair_free(spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
+    return free_pair(spec, bodies)
+
+
+# ---- a falling body: exact -------------------------------------------------------------------------------------------
+def falling(h: float, integrator: float, settings: Mapping[str, float], compliance: float = 0.0) -> Kernel:
+    """Two free bodies that approach under LOAD. dg4 takes a torque set at the start as growing in the first step: half
+    a step of it is put into the speed."""
+    none, rows = np.zeros(0), np.zeros((1, 0))
+    body = FlatBody(2 * MASS, none, none, rows, np.array([[compliance]]))
+    start = SPEED + (0.5 * LOAD * h / MASS if integrator < RK45 else 0.0)
+    kernel = Kernel(
+        flat_blob("plates", [body, body], FlatContact(gap=START)),
+        {"left.w_start": start, "h": h, "level": 3.0, "integrator": integrator, **settings},
+    )
+    kernel.initialize()
+    kernel.set("left.tau", LOAD)
+    kernel.set("right.tau", -LOAD)
+    return kernel
+
+
+def gap(kernel: Kernel) -> float:
+    return START + kernel.get("right.gear.phi") - kernel.get("left.gear.phi")
+
+
+def reference(end: float) -> object:
+    """m d̈ = −F − c(d) ḋ while the gap closes, to 1e-10."""
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        resisted = film_resistance(y[0], **OIL) * min(y[1], 0.0)
+        return [y[1], (-LOAD - resisted) / MASS]
+
+    done = solve_ivp(rates, (0.0, end), [START, -SPEED], method="Radau", rtol=1e-10, atol=1e-15, dense_output=True,
+                     max_step=1e-5)  # fmt: skip
+    return done.sol
+
+
+@pytest.mark.parametrize(("integrator", "order"), [(DG4, 2), (EM, 2), (CENTRAL, 2), (RK45, None)])
+def test_a_falling_body_sinks_as_the_exact_solution(integrator: float, order: int | None) -> None:
+    """From beyond the reach down to 4 µm: the trajectory converges to the solution of the differential equation."""
+    end, exact, worst = 4e-3, reference(4e-3), []
+    for h in (4e-5, 2e-5, 1e-5):
+        kernel = falling(h, integrator, ON)
+        errors = []
+        for i in range(round(end / h)):
+            kernel.step(i * h, h)
+            errors.append(gap(kernel) - exact((i + 1) * h)[0])  # type: ignore[operator]
+        worst.append(np.abs(errors).max())
+    print(worst, gap(kernel))
+    assert gap(kernel) < 5e-6 and kernel.get("solver.trouble") == 0
+    assert worst[-1] < 3e-9 if order else worst[-1] < 1e-10
+    if order:
+        assert worst[0] / worst[2] > 0.7 * 4**order
+
+
+def test_momentum_and_thickness_are_the_closed_form() -> None:
+    """What the film took is ∫ c dd between the thicknesses, in every step: m Δv + F t = I(d₀) − I(d), exactly. It
+    lies between no oil and oil that reaches without end."""
+    h, taken = 1e-5, []
+    kernel = falling(h, DG4, ON)
+    for i in range(400):
+        kernel.step(i * h, h)
+        speed = kernel.get("left.gear.w") - kernel.get("right.gear.w")
+        momentum = MASS * (SPEED - speed) + LOAD * (i + 1) * h
+        taken.append([gap(kernel), momentum])
+    d, momentum = np.array(taken).T
+    expected = np.array([film_impulse(REACH, **OIL) - film_impulse(min(at, REACH), **OIL) for at in d])
+    print(np.abs(momentum - expected).max(), momentum[-1])
+    assert momentum == pytest.approx(expected, abs=2e-5 * momentum[-1])
+    factor = 3 * math.sqrt(2) * math.pi * OIL["viscosity"]
+    endless = factor * 2 * ((d + OIL["roughness"]) ** -0.5 - (REACH + OIL["roughness"]) ** -0.5)
+    inside = d < 0.9 * REACH
+    assert np.all(momentum[inside] > 0) and np.all(momentum[inside] < endless[inside])
+
+
+def test_force_is_continuous_where_flanks_touch() -> None:
+    """On a soft contact the force goes through the end of the film without a jump: its largest change in a step
+    shrinks with the step."""
+    largest = []
+    for h in (2e-6, 1e-6):
+        thin = {**ON, "oil_viscosity": 2e-4, "effect.contact_damping": 0.0}
+        kernel = falling(h, DG4, thin, compliance=1e-8)
+        force, pairs = [], []
+        for i in range(round(6e-3 / h)):
+            kernel.step(i * h, h)
+            force.append(kernel.get("mesh.force"))
+            pairs.append(kernel.get("mesh.pairs"))
+        touch = int(np.flatnonzero(pairs)[0])
+        assert force[touch - 1] > 0 and min(force) >= 0.0
+        largest.append(np.abs(np.diff(force[touch - 5 : touch + 5])).max())
+    print(largest)
+    assert largest[1] < 0.65 * largest[0]
+
+
+def test_a_film_does_not_pull() -> None:
+    """Bodies that part feel nothing: half-Sommerfeld."""
+    kernel = falling(1e-5, DG4, ON)
+    for i in range(300):
+        kernel.step(i * 1e-5, 1e-5)
+    assert kernel.get("mesh.force") > 0
+    kernel.set("left.tau", -LOAD)
+    kernel.set("right.tau", LOAD)
+    forces, opening = [], []
+    for i in range(300, 1500):
+        before = gap(kernel)
+        kernel.step(i * 1e-5, 1e-5)
+        forces.append(kernel.get("mesh.force"))
+        opening.append(gap(kernel) > before)
+    assert min(forces) == 0.0 and any(opening) and all(f == 0.0 for f, o in zip(forces, opening, strict=True) if o)
+
+
+# ---- gears -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("start", [Rattle(speed=0.3), Rattle(position=0.6, speed=0.3, play=10e-6),
+                                   Rattle(speed=0.2, play=-5e-6), Rattle(position=0.37, load=30.0)])  # fmt: skip
+@pytest.mark.parametrize("damped", [0.0, 1.0])
+def test_energy_balances_and_never_grows(pair_free: FreePair, start: Rattle, damped: float) -> None:
+    """Free rattle, jammed and loaded flanks, in single precision: what is gone stands in the film's loss."""
+    for viscosity in (1e-4, 2e-3, 1e-2):
+        settings = {"effect.film": 1.0, "oil_viscosity": viscosity, "h": 1e-5, "level": 1.0,
+                    "effect.contact_damping": damped, "effect.modal_damping": damped}  # fmt: skip
+        kernel = started(pair_free, start, settings)
+        found = energies(kernel, 1e-5, 0.03)
+        print(viscosity, f"drift {found.drift:.1e}, growth {found.growth:.1e}, trouble {found.trouble}")
+        assert found.drift < 5e-6 and found.growth < 1e-6  # single precision: 5e-7 without a film
+        assert np.diff(found.dissipated).min() > -1e-7 * found.kinetic
+        assert 0 < kernel.get("mesh.film_loss") <= 1.001 * found.dissipated[-1]
+
+
+def test_thicker_oil_leaves_less_rebound(pair_free: FreePair) -> None:
+    left = []
+    for viscosity in (1e-4, 3e-3, 1e-2, 0.1):
+        settings = {"effect.film": 1.0, "oil_viscosity": viscosity, "h": 5e-6, "level": 1.0}
+        kernel = started(pair_free, Rattle(speed=0.2), settings)
+        left.append(1 - energies(kernel, 5e-6, 1e-3).dissipated[-1] / energies(kernel, 5e-6, 5e-6).kinetic)
+    print(left)
+    assert np.all(np.diff(left) < 0)
+
+
+def test_integrators_agree_on_a_light_run(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    model, found = assemble(spec, bodies), {}
+    for integrator, h in ((DG4, 1e-6), (CENTRAL, 1e-6), (RK45, 1e-6)):
+        run = {"level": 1.0, "integrator": integrator, "effect.film": 1.0, "h": h}
+        found[integrator] = simulate(model, Steady(model, 100.0, 1.0), 4e-4, 20e-6, run)["mesh.force"]
+    scale = np.abs(found[RK45]).max()
+    assert found[CENTRAL] == pytest.approx(found[RK45], abs=2e-3 * scale)
+    assert found[DG4] == pytest.approx(found[RK45], abs=0.05 * scale)
+
+
+def test_off_reads_nothing_of_the_oil(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    model, bits = assemble(spec, bodies), []
+    for settings in ({}, {"oil_viscosity": 1.0, "film_roughness": 1e-8}):
+        trace = simulate(model, Steady(model, 100.0, 2.0), 2e-3, 2e-5, {"level": 1.0, **settings})
+        bits.append(trace["mesh.te"].tobytes() + trace["mesh.force"].tobytes())
+        assert trace["mesh.film_loss"][-1] == 0.0
+    assert bits[0] == bits[1]
+
+
+def test_statics_and_the_linearised_stage_know_no_film(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    model, found = assemble(spec, bodies), []
+    for on in (0.0, 1.0):
+        kernel = model.kernel(**{"level": 1.0, "effect.film": on})
+        kernel.prepare()
+        found.append(kernel.transmission(0.01, 100.0).te)
+    assert found[0] == found[1]
+
+
+def test_rattle_hits_less_often_with_oil(pair_free: FreePair) -> None:
+    """Free rattle from ten starts: impacts in 30 ms, mean over the starts."""
+    mean = []
+    for film in ({}, {"effect.film": 1.0, "oil_viscosity": 5e-3}):
+        impacts = []
+        for i in range(10):
+            start = Rattle(position=0.1 * i, speed=0.15 + 0.01 * i)
+            kernel = started(pair_free, start, {"h": 1e-5, "level": 1.0, "effect.contact_damping": 1.0, **film})
+            energies(kernel, 1e-5, 0.03)
+            impacts.append(kernel.get("mesh.impacts"))
+        mean.append(np.mean(impacts))
+    print(mean)
+    assert mean[1] < 0.8 * mean[0]
+
+
+@pytest.fixture(scope="module")
+def helical() -> StageModel:
+    stage = load_stage("helical_demo")
+    return assemble(stage, load_stage_bodies(stage))
+
+
+@pytest.mark.parametrize("torque", [1.0, 100.0])
+def test_a_helical_pair_runs_on_oil(helical: StageModel, torque: float) -> None:
+    run = {"level": 1.0, "effect.film": 1.0, "h": 5e-6}
+    trace = simulate(helical, Steady(helical, 100.0, torque), 2e-3, 20e-6, run)
+    passed = trace["energy.stored"].max()
+    assert trace.meta["outcome"] == "completed" and trace["solver.trouble"][-1] == 0
+    assert trace["mesh.film_loss"][-1] > 0
+    dry = simulate(helical, Steady(helical, 100.0, torque), 2e-3, 20e-6, run | {"effect.film": 0.0})
+    assert abs(trace["energy.residual"][-1]) < 1.2 * abs(dry["energy.residual"][-1]) + 1e-6 * passed
+
+
+@pytest.mark.parametrize("stage", ["two_stage", pytest.param("planetary54", marks=pytest.mark.full)])
+def test_trains_and_sets_run_on_oil(stage: str) -> None:
+    spec = load_stage(stage)
+    model = assemble(spec, load_bodies(spec))
+    kernel = model.kernel(**{"level": 1.0, "effect.film": 1.0})
+    kernel.initialize()
+    first = next(name for name in kernel.variables if name.endswith(".tau"))
+    trouble = 0.0
+    for i in range(50):
+        kernel.set(first, 5.0 * math.sin(2 * math.pi * 500 * i * 2e-5))
+        kernel.step(i * 2e-5, 2e-5)
+        trouble = kernel.get("solver.trouble")
+    lost = [kernel.get(name) for name in kernel.variables if name.endswith(".film_loss")]
+    print(trouble, lost, kernel.get("energy.residual"))
+    assert all(math.isfinite(value) and value >= 0 for value in lost) and trouble <= 5
+
+
+# ---- what a stage says -----------------------------------------------------------------------------------------------
+def test_a_stage_file_turns_the_film_on(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    own = FilmSpec(viscosity=0.05, roughness=2e-6)
+    stage = spec.model_copy(update={"contact": spec.contact.model_copy(update={"film": own})})
+    kernel = assemble(stage, bodies).kernel()
+    found = [kernel.get(name) for name in ("effect.film", "oil_viscosity", "film_roughness")]
+    assert found == [1.0, 0.05, 2e-6]
+
+
+def test_nodal_contact_refuses_the_film(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    with pytest.raises(ModelError, match="lines of contact"):
+        assemble(spec, bodies).kernel(**{"effect.film": 1.0, "level": 4.0}).prepare()
