@@ -59,7 +59,6 @@ def simulate(
     duration: Quantity | None = None,
     step: Quantity = 20e-6,
     settle: Quantity = 0.02,
-    profile: PathLike | Profile | None = None,
     **settings: Any,
 ) -> Trace:
     """Run a stage alone: the outer ends of input and output turn at constant speed, from one to another or along a
@@ -69,15 +68,16 @@ def simulate(
     torque, speed : of the input: "302 N*m", "2000 rpm", or in N·m and rad/s; ("300 rpm", "6000 rpm") is a run-up.
     duration, step : simulated time, time between samples; "0.1 s", or in s. Duration None: of the profile, or 0.1 s.
     settle : from here on the report takes results and spectra.
-    profile : torque, speed or both over time, in place of the arguments: a CSV file with a head like
-        time_[s],torque_[N*m],speed_[rpm] or a `gearfmu.spec.profile.Profile` of arrays in SI.
     settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
+    profile : among the keyword arguments, torque, speed or both over time in place of the arguments: a CSV file with a
+        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.spec.profile.Profile` of arrays in SI.
 
     The trace's meta says the outcome: a run that stops early keeps its samples. Raises ModelError for an unknown
     setting, SpecError for a port that this cannot turn, for a profile that cannot be used and for a torque or a speed
     that is missing or given twice.
     """
-    over_time = profile if profile is None or isinstance(profile, Profile) else read_profile(Path(profile))
+    given = settings.pop("profile", None)
+    profile = given if given is None or isinstance(given, Profile) else read_profile(Path(given))
     start, *end = (
         None if value is None else _si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,))
     )
@@ -88,7 +88,7 @@ def simulate(
         step=_si(step, "s"),
         settle=_si(settle, "s"),
         end_speed=end[0] if end else None,
-        profile=over_time,
+        profile=profile,
     )
     model = model_of(stage)
     return steady_run(model, driven, parameters(model, settings))

@@ -99,7 +99,7 @@ def results(run: Run) -> str:
 def _row(key: str, value: float, names: Sequence[str]) -> str:
     words, channel, unit = result_words(key, names)
     return (
-        f'<tr><td>{escape(words)}</td><td><code class="channel">{escape(channel)}</code></td>'
+        f'<tr><td>{escape(words)}</td><td><code class="channel">{_breaking(channel)}</code></td>'
         f'<td class="n">{value:.4g}</td><td>{unit}</td></tr>'
     )
 
@@ -157,6 +157,11 @@ def octaves(run: Run) -> str:
     return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(
         ("Hz", *(f"{band:g}" for band in bands)), rows
     )
+
+
+def _breaking(channel: str) -> str:
+    """A channel's name that may break behind its dots, not within its words."""
+    return escape(channel).replace(".", ".<wbr>")
 
 
 def facts(summary: Mapping[str, Any]) -> dict[str, str]:

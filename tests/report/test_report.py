@@ -90,7 +90,7 @@ class Links(HTMLParser):
         self.addresses += [
             value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "action", "data")
         ]
-        if tag not in ("meta", "img", "br", "input"):
+        if tag not in ("meta", "wbr", "img", "br", "input"):
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
