@@ -15,7 +15,7 @@ from gearfmu.planning.choice import LEAST_SHARE, MODES, SLICED, STEP, Choice, Kn
 from gearfmu.planning.formulas import Conditions, predicted
 from gearfmu.planning.judge import FAILED, SAFETY, SAFETY_LOSS, error, silent_outputs, trend
 from gearfmu.planning.request import Request
-from gearfmu.planning.search import Bench, Found, Measured, Pair, measurable, pairs, search
+from gearfmu.planning.search import UNSEEN, Bench, Found, Measured, Pair, measurable, pairs, search
 from gearfmu.planning.segments import Part, parts
 from gearfmu.planning.trials import Task, Trial, prime, run_trials
 from gearfmu.planning.windows import GROWN, GROWN_LOST, LONGEST, QUIET, Noise, mesh_frequency, quiet_enough
@@ -200,7 +200,8 @@ class _Made:
     def _lines(self, found: Found, known: Conditions, safety: float) -> Iterator[Line]:
         """A line for every knob, with what the search measured of it."""
         names = [n for n in measurable(self.space.knobs) if n not in found.refused]
-        known_pairs = pairs(self.space, self.bench, found.chosen.choice, names)
+        names.sort(key=lambda name: name not in self.job.force)  # what was asked about is measured in any case
+        known_pairs = pairs(self.space, self.bench, found.chosen.choice, names, UNSEEN + len(self.job.force))
         known_pairs |= {n: (lower, found.tried_from[n]) for n, lower in found.refused.items()}
         for knob in self.space.knobs:
             yield self._line(knob, found, known_pairs.get(knob.name), known, 1.0 / safety)

@@ -177,15 +177,15 @@ def _pruned(space: Space, bench: Bench, now: Measured, most: float, tell: Tell) 
 Pair = tuple[Measured, Measured]
 
 
-def pairs(space: Space, bench: Bench, chosen: Choice, names: Sequence[str]) -> dict[str, Pair]:
+def pairs(space: Space, bench: Bench, chosen: Choice, names: Sequence[str], most: int = UNSEEN) -> dict[str, Pair]:
     """By knob two measured sets that differ by one step of it alone, the poorer first: beside the chosen set where that
-    was measured, else beside another. At most UNSEEN of what was never looked at is measured now, one step up."""
+    was measured, else beside another. At most `most` of what was never looked at is measured now, one step up."""
     found: dict[str, Pair] = {}
     unseen = 0
     for name in names:
         pair = next(iter(_seen(space, bench, chosen, name)), None)
         richer = space.richer(chosen, name)
-        if pair is None and richer is not None and unseen < UNSEEN:
+        if pair is None and richer is not None and unseen < most:
             unseen += 1
             pair = bench.one(chosen), bench.one(richer)
         if pair is not None:

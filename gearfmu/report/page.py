@@ -125,9 +125,9 @@ def details(title: str, *parts: str) -> str:
     return f"<section><details><summary>{escape(title)}</summary>{''.join(parts)}</details></section>"
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; the first column is text, the others numbers, right-aligned."""
-    marks = ["", *[' class="n"'] * (len(header) - 1)]
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = (0,)) -> str:
+    """A table; columns of the numbers `text` are text, the others numbers, right-aligned."""
+    marks = ["" if k in text else ' class="n"' for k in range(len(header))]
     top = "".join(f"<th{mark}>{escape(cell)}</th>" for mark, cell in zip(marks, header, strict=True))
     body = "".join(
         "<tr>" + "".join(f"<td{mark}>{escape(cell)}</td>" for mark, cell in zip(marks, row, strict=True)) + "</tr>"

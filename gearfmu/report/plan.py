@@ -3,14 +3,17 @@ checks. Everything comes from the trace's meta "plan" (gearfmu/planning/run.py);
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from matplotlib.ticker import FixedLocator
 
 from gearfmu.report import page
 from gearfmu.report.style import COLOURS, panels, png, styled
 
 LEAST = 1e-3  # budgets: the smallest error on the chart
+MOST_SHOWN = 4.0  # budgets: the longest bar
+TICKS = tuple(digit * 10.0**power for power in range(-3, 4) for digit in (1, 2, 5))
 HEADER = ("effect", "error if dropped, budgets", "share of a step", "verdict", "why")
 
 
@@ -23,20 +26,20 @@ def plan_sections(plan: Mapping[str, Any] | None) -> list[str]:
 
 def _section(segment: Mapping[str, Any], plan: Mapping[str, Any]) -> str:
     own = [
-        _told(item, kind) for kind in ("trips", "checks") for item in plan[kind] if item["segment"] == segment["name"]
+        _told(item, kind)
+        for kind in ("trips", "checks")
+        for item in plan[kind]
+        if item["segment"] == segment["name"] and not item.get("kept", False)
     ]
     shown = [
         page.note(f"Asked for: {asked(plan['request'])}. 1 is as much as that."),
-        page.table(HEADER, [_row(line) for line in segment["lines"]]),
+        page.table(HEADER, [_row(line) for line in segment["lines"]], text=(0, 3, 4)),
         f"<figure>{_chart(segment)}</figure>",
         page.note(
-            "Left: work–precision. Right: error that one step down makes (blue) and share of a step (grey), each over "
-            "the budget and over the whole step."
+            "Left: work–precision, every set that was tried, the dashed line what is allowed. Middle: what a step down "
+            "of an effect changes. Right: what a step of the stage spends on it."
         ),
-        page.note(
-            f"Predicted {_number(segment['error'])} budgets, bound {_number(segment['bound'])} times "
-            f"{segment['safety']:g}; noise of the full model {_number(segment['noise'])}."
-        ),
+        page.table(("", "budgets"), _numbers(segment, plan["checks"])),
     ]
     return page.section(f"Plan: {segment['name']}, {segment['start']:g} … {segment['end']:g} s", *shown, *own)
 
@@ -48,8 +51,19 @@ def asked(request: Mapping[str, Any]) -> str:
 
 
 def _row(line: Mapping[str, Any]) -> tuple[str, ...]:
-    share = "" if line["share"] is None else f"{100 * line['share']:.1f} %"
+    share = "" if line["share"] is None or line["share"] < 0 else f"{100 * line['share']:.1f} %"
     return line["effect"], _number(line["error"]), share, line["verdict"], f"{line['by']}: {line['reason']}"
+
+
+def _numbers(segment: Mapping[str, Any], checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """Predicted error and bound, spot checks, noise floor."""
+    own = [check for check in checks if check["segment"] == segment["name"]]
+    return [
+        ("predicted error", _number(segment["error"])),
+        (f"bound, times {segment['safety']:g} at most 1", _number(segment["bound"])),
+        *((f"spot check at {c['start']:.4g} s", _number(c["error"]) or "the full model fails") for c in own),
+        ("noise of the full model", _number(segment["noise"])),
+    ]
 
 
 def _told(item: Mapping[str, Any], kind: str) -> str:
@@ -58,8 +72,6 @@ def _told(item: Mapping[str, Any], kind: str) -> str:
             f"Tripwire at {item['time']:.4g} s, {item['wire']}: {item['message']}; on with {item['answer']}."
         )
     text = f"Spot check at {item['start']:.4g} s: {_number(item['error'])} budgets, {item['allowed']:.2g} allowed."
-    if item["kept"]:
-        return page.note(text)
     after = f": the run went back to where the check began, and on with {item['answer']}" if item.get("answer") else ""
     return page.warning(f"{text} The budget is missed there{after}.")
 
@@ -73,11 +85,10 @@ def _chart(segment: Mapping[str, Any]) -> str:
     """Work–precision with the plan on it, and bars of error and price by effect."""
     with styled():
         figure, axes = panels((3.0,), share=False)
-        left = axes[0]
-        left.remove()
-        left, right = figure.subplots(1, 2)
+        axes[0].remove()
+        left, middle, right = figure.subplots(1, 3, width_ratios=(1.5, 1.0, 0.7))
         _precision(left, segment)
-        _bars(right, segment["lines"])
+        _bars(middle, right, segment["lines"])
         return png(figure).replace(
             'alt=""', 'alt="Error bound over price of every set tried; error and price by effect"'
         )
@@ -89,10 +100,12 @@ def _precision(panel: Any, segment: Mapping[str, Any]) -> None:
         place = (point["price"], max(point["bound"], LEAST))
         panel.loglog(*place, "o" if chosen else ".", color=COLOURS[1 if chosen else 0], markersize=8 if chosen else 5)
         if chosen or full:
-            side = {"xytext": (-6, 6), "ha": "right"} if full else {"xytext": (6, 6)}
-            text = "full model, error 0" if full else point["words"]
+            side = {"xytext": (-6, 6), "ha": "right"} if full else {"xytext": (0, -16), "ha": "center"}
+            text = "full model, error 0" if full else "the plan"
             panel.annotate(text, place, textcoords="offset points", fontsize=8, **side)
-    panel.axhline(1.0 / segment["safety"], color=COLOURS[1], linewidth=0.8)
+    panel.axhline(1.0 / segment["safety"], color=COLOURS[1], linewidth=0.8, linestyle="--")
+    prices = [point["price"] for point in segment["points"]]
+    panel.xaxis.set_major_locator(FixedLocator([tick for tick in TICKS if min(prices) / 2 < tick < max(prices) * 2]))
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
@@ -100,14 +113,19 @@ def _precision(panel: Any, segment: Mapping[str, Any]) -> None:
     panel.set_ylabel("error bound, budgets")
 
 
-def _bars(panel: Any, lines: Sequence[Mapping[str, Any]]) -> None:
+def _bars(left: Any, right: Any, lines: Sequence[Mapping[str, Any]]) -> None:
+    """Errors, and shares of a step, of what was a choice."""
     known = [line for line in lines if line["error"] is not None or line["effect"] in ("modes", "slices", "step")]
-    names = [line["effect"] for line in known]
-    error = [min(line["error"] or 0.0, 10.0) for line in known]
-    share = [0.0 if line["share"] is None or math.isnan(line["share"]) else max(line["share"], 0.0) for line in known]
-    places = list(range(len(names)))
-    panel.barh([p - 0.2 for p in places], error, 0.38, color=COLOURS[0])
-    panel.barh([p + 0.2 for p in places], share, 0.38, color="#9aa0a6")
-    panel.set_yticks(places, names)
-    panel.invert_yaxis()
-    panel.set_xlabel("budgets (at most 10 shown), share")
+    places = list(range(len(known)))
+    error = [min(line["error"] or 0.0, MOST_SHOWN) for line in known]
+    share = [100.0 * max(0.0, line["share"] or 0.0) for line in known]
+    left.barh(places, error, 0.6, color=COLOURS[0])
+    left.axvline(1.0, color=COLOURS[1], linewidth=0.8)
+    left.set_yticks(places, [line["effect"] for line in known])
+    left.set_xlabel(f"error, budgets (at most {MOST_SHOWN:g} shown)")
+    right.barh(places, share, 0.6, color="#9aa0a6")
+    right.set_yticks(places, [""] * len(places))
+    right.set_xlim(0.0, 100.0)
+    right.set_xlabel("share of a step, %")
+    for panel in (left, right):
+        panel.invert_yaxis()
