@@ -286,11 +286,13 @@ static void express_limits(gk_glide *glide, const gk_system *s)
 {
     memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
     for (int j = 0; j < s->contacts; j++) {
-        const double ratio = glide->limit[j] * glide->most[j], end = ratio * (s->force[j] + s->end[j] - s->z[j]);
-        const int touches = glide->most_force[j] > 0.0, turns = turns_round(glide, j);
+        const double ratio = glide->limit[j] * glide->most[j], by_z = s->hold[j] ? 0.0 : ratio;
+        const double end = ratio * (s->force[j] + s->end[j]) - by_z * s->z[j];
+        const int touches = glide->most_force[j] > 0.0;
+        const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
         glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
         glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
-        glide->end_by_z[j] = ratio;
+        glide->end_by_z[j] = by_z;
         glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
                           : glide->rolls                      ? 0.5 * ratio * (s->force0[j] + s->begin[j])
                                                               : 0.5 * (glide->start_end[j] + end);
