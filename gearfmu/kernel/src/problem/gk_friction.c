@@ -1,10 +1,9 @@
 /* Friction of the flanks within a step (docs/theory.md, 3.12). Along the profile of gear A every contact has a mean
- * force p̄ = c λ̄, |c| ≤ µ, against the sliding speed w at the end of the step:
- *     p̄ = −µ λ̄ w/ε for |w| < ε, else −µ λ̄ sgn w,    ε = a share of the largest sliding speed on the path of contact
- * less where that would push along the sliding Δs in the step, so that −p̄ Δs ≥ 0. w and Δs are linear in p̄. ε = 0 at
- * standstill: then w = 0 as long as |p̄| < µ λ̄ holds it. The speed at the end, for the mean of a step alone,
- * w₀ + w = 0, would be held by a force that changes its sign from step to step. Solved by active sets, together with
- * the normal forces. */
+ * force p̄ against the sliding Δs in the step. Gears that roll on: p̄ = c λ̄,
+ *     c = −µ Δs/(ε h) for |Δs| < ε h, else −µ sgn Δs,    ε = a share of the largest sliding speed on the path of contact.
+ * Gears that stand or swing about rest: an elastic contact with a slider; it sticks, Δs = 0, as long as friction at the
+ * end of the step, |p₁| ≤ µ (λ₁ + f_d), can hold it, and p̄ is the mean of both ends. Either way −p̄ Δs ≥ 0. Solved by
+ * active sets, together with the normal forces. */
 #include "problem/gk_work.h"
 
 static const double FADES = 0.02;  /* of the largest sliding speed: below it friction fades */
