@@ -1,6 +1,6 @@
 /* Friction of the flanks within a step (docs/theory.md, 3.12). Along the profile of gear A every contact has a mean
  * force p̄ against the sliding Δs in the step. Gears that roll on: p̄ = c λ̄,
- *     c = −µ Δs/(ε h) for |Δs| < ε h, else −µ sgn Δs,    ε = a share of the largest sliding speed on the path of contact.
+ *     c = −µ Δs/(ε h) for |Δs| < ε h, else −µ sgn Δs,    ε = a share of the largest sliding speed on the path.
  * Gears that stand or swing about rest: an elastic contact with a slider; it sticks, Δs = 0, as long as friction at the
  * end of the step, |p₁| ≤ µ (λ₁ + f_d), can hold it, and p̄ is the mean of both ends. Either way −p̄ Δs ≥ 0. Solved by
  * active sets, together with the normal forces. */
@@ -272,9 +272,9 @@ static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n,
 
 /* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
  * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
- * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears that
- * roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the last
- * round. */
+ * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears
+ * that roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the
+ * last round. */
 /* would the mean of both ends push along the sliding? Then there is none. */
 static int turns_round(const gk_glide *glide, int j)
 {
