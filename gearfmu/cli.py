@@ -27,7 +27,10 @@ VERBS = {
         "Check finite elements made elsewhere, fit the involutes; writes nothing.",
     ),
     "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
-    "efficiency": ("gearfmu.commands.efficiency:efficiency", "What the mesh of a pair loses to friction of its flanks."),
+    "efficiency": (
+        "gearfmu.commands.efficiency:efficiency",
+        "What the mesh of a pair loses to friction of its flanks.",
+    ),
     "modes": ("gearfmu.commands.modes:modes", "Modes of a body: frequencies, nodal diameters, pictures, .vtu files."),
     "frf": ("gearfmu.commands.frf:frf", "Reduction methods judged by the transfer matrix of a body."),
     "export": ("gearfmu.commands.fmus:export", "Export a stage as an FMU."),

@@ -1,10 +1,9 @@
 /* Friction of the flanks within a step (docs/theory.md, 3.12). Along the profile of gear A every contact has a mean
- * force p̄ = c λ̄, |c| ≤ µ, against the sliding speed w at the end of the step:
- *     p̄ = −µ λ̄ w/ε for |w| < ε, else −µ λ̄ sgn w,    ε = a share of the largest sliding speed on the path of contact
- * less where that would push along the sliding Δs in the step, so that −p̄ Δs ≥ 0. w and Δs are linear in p̄. ε = 0 at
- * standstill: then w = 0 as long as |p̄| < µ λ̄ holds it. The speed at the end, for the mean of a step alone,
- * w₀ + w = 0, would be held by a force that changes its sign from step to step. Solved by active sets, together with
- * the normal forces. */
+ * force p̄ against the sliding Δs in the step. Gears that roll on: p̄ = c λ̄,
+ *     c = −µ Δs/(ε h) for |Δs| < ε h, else −µ sgn Δs,    ε = a share of the largest sliding speed on the path.
+ * Gears that stand or swing about rest: an elastic contact with a slider; it sticks, Δs = 0, as long as friction at the
+ * end of the step, |p₁| ≤ µ (λ₁ + f_d), can hold it, and p̄ is the mean of both ends. Either way −p̄ Δs ≥ 0. Solved by
+ * active sets, together with the normal forces. */
 #include "problem/gk_work.h"
 
 static const double FADES = 0.02;  /* of the largest sliding speed: below it friction fades */
@@ -273,9 +272,9 @@ static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n,
 
 /* Friction as a linear function of the forces in the step: p̄ = fixed + Σ by_z z, at the end of the step end_fixed +
  * end_by_z z + end_by_mean p̄. At a limit the end is µ (λ₁ + f_d), below it what makes Δs = −ε h p̄/(µ λ̄). The mean is
- * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears that
- * roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the last
- * round. */
+ * that of both ends, p̄ = ½ (p₀ + p₁), plus what a dashpot takes where the contact sticks, (τ/h) (p₁ − p₀); of gears
+ * that roll on it has the coefficient of the end. What forces at the end of the step are more than z is taken from the
+ * last round. */
 /* would the mean of both ends push along the sliding? Then there is none. */
 static int turns_round(const gk_glide *glide, int j)
 {
@@ -286,11 +285,13 @@ static void express_limits(gk_glide *glide, const gk_system *s)
 {
     memset(glide->by_z, 0, (size_t)(s->contacts * s->stride) * sizeof *glide->by_z);
     for (int j = 0; j < s->contacts; j++) {
-        const double ratio = glide->limit[j] * glide->most[j], end = ratio * (s->force[j] + s->end[j] - s->z[j]);
-        const int touches = glide->most_force[j] > 0.0, turns = turns_round(glide, j);
+        const double ratio = glide->limit[j] * glide->most[j], by_z = s->hold[j] ? 0.0 : ratio;
+        const double end = ratio * (s->force[j] + s->end[j]) - by_z * s->z[j];
+        const int touches = glide->most_force[j] > 0.0;
+        const int turns = turns_round(glide, j) || (!touches && s->force0[j] > 0.0);
         glide->held[j] = touches && !glide->limit[j] && (glide->rolls || glide->most_end[j] > 0.0);
         glide->by_z[j * s->stride + j] = turns ? 0.0 : 0.5 * ratio;
-        glide->end_by_z[j] = ratio;
+        glide->end_by_z[j] = by_z;
         glide->fixed[j] = glide->held[j] || !touches || turns ? 0.0
                           : glide->rolls                      ? 0.5 * ratio * (s->force0[j] + s->begin[j])
                                                               : 0.5 * (glide->start_end[j] + end);

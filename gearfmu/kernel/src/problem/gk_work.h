@@ -75,8 +75,8 @@ typedef struct gk_glide {
     double most_force[MAX_STRIDE],              /* times the mean normal force; */
         most_end[MAX_STRIDE];                   /* the one at the end */
     double share[MAX_STRIDE];                   /* of the mean friction that is there at the end */
-    signed char limit[MAX_STRIDE], held[MAX_STRIDE]; /* ±1: at that limit; 1: below it */
-    int rolls;                                       /* the gears do: friction fades, it does not stick */
+    signed char limit[MAX_STRIDE], held[MAX_STRIDE];    /* ±1: at that limit; 1: below it */
+    int rolls;                                          /* the gears do: friction fades, it does not stick */
     double fixed[MAX_STRIDE], *by_z;                    /* mean friction as a function of z, (contacts, stride) */
     double end_fixed[MAX_STRIDE], end_by_z[MAX_STRIDE], /* friction at the end as a function of z and its mean */
         end_by_mean[MAX_STRIDE];
@@ -85,8 +85,8 @@ typedef struct gk_glide {
     double start[MAX_STRIDE], start_end[MAX_STRIDE]; /* friction at the start: in the states; of all the normal force */
     double mean[MAX_STRIDE], ratio[MAX_STRIDE];      /* in the step; over the mean normal force */
     double step[MAX_STRIDE], end[MAX_STRIDE], last[MAX_STRIDE]; /* as z, λ + f_d and λ of the normal forces are used */
-    double slid[MAX_STRIDE];  /* sliding in the step */
-    double damps[MAX_STRIDE]; /* relaxation time of a contact that sticks over h */
+    double slid[MAX_STRIDE];                                    /* sliding in the step */
+    double damps[MAX_STRIDE];                                   /* relaxation time of a contact that sticks over h */
     double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
 } gk_glide;
 
