@@ -237,6 +237,19 @@ static int bursts(const gk_island *island, double defect)
     return 0;
 }
 
+/* a step that cannot be balanced with films goes without them */
+static int dry(const gk_island *island)
+{
+    int dried = 0;
+    for (int m = 0; m < island->count; m++) {
+        gk_system *s = island->member[m];
+        if (!gk_film_on(s)) continue;
+        s->films = 0, dried = 1;
+        gk_solve_settle(s);
+    }
+    return dried;
+}
+
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
  * quasi-static part's energy change equal its work. Contacts that hardly move cannot repay what the steps before left:
  * then the defect waits, as it does in a step without change of status. */
@@ -264,9 +277,14 @@ void gk_balance_solve(const gk_island *island)
     }
     gk_balance_plain(island);
     balance b = defect_of_all(island);
-    if (b.defect < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
+    if (b.defect - due_of(island) < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
+    balance own = b;
+    own.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
+    if (own.defect > 0.0 && open_balance(&own, steady) && dry(island)) {
+        gk_balance_solve(island);
+        return;
+    }
     leave(island, &b);
-    b.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
-    if (open_balance(&b, steady))
+    if (open_balance(&own, steady))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }
