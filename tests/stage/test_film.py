@@ -1,5 +1,5 @@
-"""Squeeze film in open gaps: exact solutions of a falling body, energy, no tension, rattle with and without, stages, and
-what a stage file says of it."""
+"""Squeeze film in open gaps: exact solutions of a falling body, energy, no tension, rattle with and without, stages,
+and what a stage file says of it."""
 
 from __future__ import annotations
 

@@ -57,8 +57,7 @@ static balance defect(const gk_system *s)
         const double change = gap_change(s, i);
         b.defect += share(s, i) * change;
         b.rounding += 4e-16 * (fabs(s->force0[i]) + fabs(s->force[i])) * fabs(change); /* a contact that only grazes */
-        if (gk_film_sinks(s, i))
-            b.rounding += 1e-15 * (fabs(s->force0[i]) + fabs(s->force[i])) * s->film->open[i];
+        if (gk_film_sinks(s, i)) b.rounding += 1e-15 * (fabs(s->force0[i]) + fabs(s->force[i])) * s->film->open[i];
     }
     return b;
 }
@@ -81,7 +80,8 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
 {
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++)
-        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
+        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i],
+        late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
