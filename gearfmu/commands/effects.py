@@ -164,6 +164,7 @@ def _film(spec: Any, mesh: Any) -> str:
     if mesh.film is None:
         return "none is stated: it costs nothing"
     from gearfmu.stage.film import REACH, film_impulse
+    from gearfmu.stage.meshes import mesh_geometry
 
     pair = mesh_geometry(spec, mesh)
     a, b = (gear.r_b for gear in pair.gears)

@@ -21,8 +21,8 @@ from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.fields import order_sections
-from gearfmu.stage.flanks import deviation_sections
 from gearfmu.stage.film import film_starts
+from gearfmu.stage.flanks import deviation_sections
 from gearfmu.stage.friction import along_rows, friction_starts
 from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees

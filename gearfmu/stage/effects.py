@@ -345,7 +345,8 @@ EFFECTS: tuple[Effect, ...] = (
     _switched(
         "film",
         title="squeeze film in open gaps",
-        formula="f = −c(d) ḋ while flanks approach, c = 3√2 π η b R^(3/2) [(d + r)^(−3/2) − (H + r)^(−3/2)], H = 100 µm",
+        formula="f = −c(d) ḋ while flanks approach, c = 3√2 π η b R^(3/2) [(d + r)^(−3/2) − (H + r)^(−3/2)], "
+        "H = 100 µm",
         equation="2.9, 3.13 (eqs. 8q to 8s, 17p to 17r)",
         matters=(
             "light-load rattle, reversal, engagement: it takes the momentum ∫ c dd of an approach, and flanks that "

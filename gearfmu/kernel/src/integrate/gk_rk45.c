@@ -58,11 +58,12 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
-    engaged->places = setup->on.roll_motion
-                          ? gk_flank_find(model, setup, mesh, engaged->pose, GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : gk_max(meshing->reach, 50e-6),
-                                          engaged->position, engaged->place)
-                          : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
-                                          engaged->place);
+    engaged->places =
+        setup->on.roll_motion
+            ? gk_flank_find(model, setup, mesh, engaged->pose,
+                            GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : gk_max(meshing->reach, 50e-6),
+                            engaged->position, engaged->place)
+            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
     gk_rows_form(setup, work, e);

@@ -173,10 +173,12 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
     const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
-    engaged->places =
-        GK_ON(setup, roll_motion)
-            ? gk_flank_find(model, setup, mesh, engaged->pose, GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : meshing->reach, engaged->position, engaged->place)
-            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
+    engaged->places = GK_ON(setup, roll_motion)
+                          ? gk_flank_find(model, setup, mesh, engaged->pose,
+                                          GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : meshing->reach,
+                                          engaged->position, engaged->place)
+                          : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
+                                          engaged->place);
     if (engaged->places < 0) return engaged->places = 0, GK_DIVERGED;
     for (int p = 0; p < engaged->places; p++) {
         engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);

@@ -58,8 +58,7 @@ static balance defect(const gk_system *s)
         const double change = gap_change(s, i);
         b.defect += share(s, i) * change;
         b.rounding += 4e-16 * (fabs(s->force0[i]) + fabs(s->force[i])) * fabs(change); /* a contact that only grazes */
-        if (gk_film_sinks(s, i))
-            b.rounding += 1e-15 * (fabs(s->force0[i]) + fabs(s->force[i])) * s->film->open[i];
+        if (gk_film_sinks(s, i)) b.rounding += 1e-15 * (fabs(s->force0[i]) + fabs(s->force[i])) * s->film->open[i];
     }
     return b;
 }
@@ -82,7 +81,8 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
 {
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++)
-        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i], late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
+        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i],
+        late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
@@ -238,6 +238,19 @@ static int bursts(const gk_island *island, double defect)
     return 0;
 }
 
+/* a step that cannot be balanced with films goes without them */
+static int dry(const gk_island *island)
+{
+    int dried = 0;
+    for (int m = 0; m < island->count; m++) {
+        gk_system *s = island->member[m];
+        if (!gk_film_on(s)) continue;
+        s->films = 0, dried = 1;
+        gk_solve_settle(s);
+    }
+    return dried;
+}
+
 /* Solves the step: contacts first; where a contact changed status (or the law is curved) the scalar α that makes the
  * quasi-static part's energy change equal its work. Contacts that hardly move cannot repay what the steps before left:
  * then the defect waits, as it does in a step without change of status. */
@@ -265,9 +278,14 @@ void gk_balance_solve(const gk_island *island)
     }
     gk_balance_plain(island);
     balance b = defect_of_all(island);
-    if (b.defect < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
+    if (b.defect - due_of(island) < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
+    balance own = b;
+    own.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
+    if (own.defect > 0.0 && open_balance(&own, steady) && dry(island)) {
+        gk_balance_solve(island);
+        return;
+    }
     leave(island, &b);
-    b.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
-    if (open_balance(&b, rubs ? RUBBED_BALANCE : steady))
+    if (open_balance(&own, rubs ? RUBBED_BALANCE : steady))
         for (int m = 0; m < island->count; m++) island->member[m]->limit_reached = 1;
 }

@@ -184,8 +184,8 @@ double gk_film_grows(const gk_system *s, const double *p, const double *linear, 
     for (int i = 0; i < s->contacts; i++) {
         if (!s->active[i] || film->sinks[i] == 0.0 || !(film->left[i] > 0.0)) continue;
         const double sinks = film->yields[i] * p[i];
-        sum += p[i] * (sunk_by(s, i) + s->delta[i] - film->delta0[i] + 0.5 * deflected(s, i)) +
-               s->force[i] * sinks + 0.5 * (s->force[i] - s->force0[i]) * linear[i];
+        sum += p[i] * (sunk_by(s, i) + s->delta[i] - film->delta0[i] + 0.5 * deflected(s, i)) + s->force[i] * sinks +
+               0.5 * (s->force[i] - s->force0[i]) * linear[i];
         *square += p[i] * (sinks + 0.5 * linear[i]);
     }
     return sum;
@@ -195,7 +195,6 @@ double gk_film_grows(const gk_system *s, const double *p, const double *linear, 
 double gk_film_power(const gk_system *s)
 {
     double sum = 0.0;
-    for (int i = 0; i < s->contacts; i++)
-        sum += gk_min(s->force[i], s->film->closes[i]) * s->film->speed[i];
+    for (int i = 0; i < s->contacts; i++) sum += gk_min(s->force[i], s->film->closes[i]) * s->film->speed[i];
     return sum;
 }

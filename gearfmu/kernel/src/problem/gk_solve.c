@@ -214,8 +214,9 @@ static void newton(gk_system *s)
 static int violated(const gk_system *s, int i)
 {
     if (is_contact(s, i))
-        return s->active[i] ? s->force[i] < 0.0
-                            : gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < (gk_film_on(s) ? s->film->left[i] : 0.0);
+        return s->active[i]
+                   ? s->force[i] < 0.0
+                   : gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < (gk_film_on(s) ? s->film->left[i] : 0.0);
     if (!is_clutch(s, i)) return 0;
     if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
     return s->bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0; /* friction must oppose slip */

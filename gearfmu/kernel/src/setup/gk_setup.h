@@ -166,7 +166,7 @@ typedef struct gk_mesh { /* an engagement */
     int frame;            /* rotor of the frame, −1: the ground */
     int joint_spin[2][2]; /* inertia and disc of its ports among them, −1: none */
     gk_friction friction;
-    double film_cut; /* roughness: what is added to every gap of the squeeze film, m */
+    double film_cut;  /* roughness: what is added to every gap of the squeeze film, m */
     double action[2]; /* t of the line of action of both flanks at the nominal axes (gk_flank.c) */
     double clearance, clearance_slope, distance; /* gaps of both flanks together at the nominal centre distance */
     int coasts;                                  /* its flanks sg = −1 are those that carry (gk_kinematics_carrying) */
