@@ -19,7 +19,7 @@ demo: $(VENV)/.base
 
 ## make test        gates of form (make lint), then the fast tests
 test: lint
-	$(RUN) -m pytest -n $(JOBS) -rs
+	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
 
 ## make test-full   all tests, the slow ones too
 test-full: $(STAMP)

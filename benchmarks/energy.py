@@ -52,7 +52,7 @@ COLUMNS = (
     "limit",
     "growth",
     "changes",
-    "trouble",
+    "retried_steps",
 )
 
 
@@ -122,7 +122,7 @@ def row(pair: FreePair, name: str, case: Case, chosen: tuple[str, int, int, floa
     """One line of the table. chosen: build, law, slices, step; run: libraries, starts, duration, level."""
     build, law, slices, h = chosen
     parameters = {"level": LEVELS[run["level"]], "h": h, "slices": slices, "effect.hertz": law, **case.parameters}
-    worst: dict[str, float] = {"drift": 0.0, "growth": -np.inf, "changes": 0, "trouble": 0}
+    worst: dict[str, float] = {"drift": 0.0, "growth": -np.inf, "changes": 0, "retried_steps": 0}
     for seed in range(run["starts"]):
         kernel = started(pair, random_start(case.start, seed), parameters, run["libraries"][build])
         try:
@@ -132,7 +132,7 @@ def row(pair: FreePair, name: str, case: Case, chosen: tuple[str, int, int, floa
             continue
         worst["drift"], worst["growth"] = max(worst["drift"], found.drift), max(worst["growth"], found.growth)
         worst["changes"] += found.changes
-        worst["trouble"] += found.trouble
+        worst["retried_steps"] += found.retried_steps
     limit = case.limit if case.limit is not None else FLOAT if build == "shipped" else CURVED if law else DOUBLE
     return {
         "test": case.test,
@@ -158,7 +158,9 @@ def keeps(case: Case, line: Mapping) -> bool:
     grow."""
     if case.at_least:
         return line["drift"] > case.at_least
-    return line["drift"] <= line["limit"] and not line["trouble"] and (case.test != "T9" or line["growth"] <= GROWTH)
+    return (
+        line["drift"] <= line["limit"] and not line["retried_steps"] and (case.test != "T9" or line["growth"] <= GROWTH)
+    )
 
 
 def kept(file: Path, anew: list[str]) -> list[dict[str, object]]:
@@ -210,7 +212,7 @@ def shown(case: Case, line: Mapping) -> bool:
         f"{1e6 * line['h_s']:5.1f} µs  "
         f"drift {line['drift']:.1e} ({'>' if case.at_least else '≤'} {line['limit']:.0e})  growth "
         f"{line['growth']:.1e}  "
-        f"{line['changes']:6d} changes {line['trouble']:3d} trouble{'' if good else '   ← NOT KEPT'}",
+        f"{line['changes']:6d} changes {line['retried_steps']:3d} retried{'' if good else '   ← NOT KEPT'}",
         flush=True,
     )
     return good

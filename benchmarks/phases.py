@@ -101,7 +101,7 @@ def profile(library: Path) -> list[dict[str, object]]:
                 "share": round(value / sum(cycles.values()), 4),
                 "n_dyn": int(kernel.get("solver.n_dyn")),
                 "h_s": kernel.get("solver.h"),
-                "rounds": round(kernel.get("solver.rounds") / steps, 3),
+                "iterations": round(kernel.get("solver.iterations") / steps, 3),
                 "flops": round(counted.get(phase, (0, 0))[0]),
                 "bytes": round(counted.get(phase, (0, 0))[1]),
             }

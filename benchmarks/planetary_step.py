@@ -47,7 +47,7 @@ def measure(model: StageModel, level: float, h: float, end: float) -> list[float
         spent = timed(partial(kernel.step, chunk * CHUNK, CHUNK))
         if chunk >= WARM:
             best = min(best, spent / (kernel.get("solver.steps") - before))
-    tangents = kernel.get("solver.rounds") / kernel.get("solver.steps") / len(model.stage.engagements)
+    tangents = kernel.get("solver.iterations") / kernel.get("solver.steps") / len(model.stage.engagements)
     return [kernel.get("solver.n_dyn"), len(model.blob) / 1e6, prepare, initialise, best * 1e6, best / h, tangents]
 
 

@@ -87,7 +87,7 @@ FACTS = (
     "energy.residual",
     "solver.n_dyn",
     "solver.h",
-    "solver.trouble",
+    "solver.retried_steps",
     "solver.steps",
     "solver.status",
 )

@@ -21,7 +21,7 @@ TORQUES = (
     "{}.tau",
     "{}.w",
 )  # whose coupling error is the run's: the torque of the input shaft, in a chain or in the port; or its speed
-COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "trouble": "solver.trouble"}
+COUNTS = {"n_dyn": "solver.n_dyn", "internal_steps": "solver.steps", "retried_steps": "solver.retried_steps"}
 
 
 def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, ChannelError] | None) -> dict[str, Any]:

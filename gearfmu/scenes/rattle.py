@@ -51,15 +51,15 @@ class Energies:
     """Of one run, sampled at every internal step from the first one on.
 
     total (n,): stored energy minus work of the ports, J; dissipated (n,), J; kinetic: at the start, J;
-    changes: number of samples at which another set of tooth pairs carried load; trouble: steps the solver had trouble
-    with; gamma_lowered: whether the step was above the accuracy limit.
+    changes: number of samples at which another set of tooth pairs carried load; retried_steps: steps left
+    unsolved; gamma_lowered: whether the step was above the accuracy limit.
     """
 
     total: np.ndarray
     dissipated: np.ndarray
     kinetic: float
     changes: int
-    trouble: int
+    retried_steps: int
     gamma_lowered: bool
     stored: np.ndarray = field(repr=False)
 
@@ -158,7 +158,7 @@ def energies(kernel: Kernel, h: float, duration: float) -> Energies:
         dissipated,
         kinetic,
         changes,
-        int(kernel.get("solver.trouble")),
+        int(kernel.get("solver.retried_steps")),
         bool(int(kernel.get("solver.status")) & 8),
         stored,
     )

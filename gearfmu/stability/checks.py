@@ -36,8 +36,8 @@ def judged(
     """The finding of a recorded run of any stage: finite everywhere, energy balance closed, no step unsolved, and the
     scene's own complaints. penetration: m."""
     found = lost(record)
-    found |= {"trouble": float(record["solver.trouble"][-1]), "status": float(record["solver.status"][-1])}
-    said = [*common(record, energy), *at_most("number of steps left unsolved", found["trouble"], 0), *complaints]
+    found |= {"retried_steps": float(record["solver.retried_steps"][-1]), "status": float(record["solver.status"][-1])}
+    said = [*common(record, energy), *at_most("number of steps left unsolved", found["retried_steps"], 0), *complaints]
     outcome = record.outcome
     if outcome != COMPLETED:
         outcome = f"{outcome}@{record.time[-1]:.6g}"

@@ -33,7 +33,7 @@ class Watched:
         return (
             *(f"{mesh}.{name}" for mesh in self.meshes for name in MESH),
             *(f"energy.{name}" for name in ("stored", "work", "dissipated")),
-            *(f"solver.{name}" for name in ("steps", "trouble", "status", "h")),
+            *(f"solver.{name}" for name in ("steps", "retried_steps", "status", "h")),
             *(f"{gear}.gear.{name}" for gear in self.gears for name in ("phi", "x", "y", "w")),
             *self.more,
         )

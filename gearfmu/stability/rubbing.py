@@ -48,7 +48,9 @@ def rubbing_light_load(case: Case) -> Finding:
     variant, frequency, periods = Variant(ports=(DRIVEN, LOOSE)), 53.0, 20
     pair = geometry(variant)
     inputs, start = swinging(1500 * RPM, frequency, SWING, DRAG)
-    made = run(kernel(model(variant), case, {**start, **FRICTION}), inputs, (periods + 5) / frequency, 1 / frequency / 188)
+    made = run(
+        kernel(model(variant), case, {**start, **FRICTION}), inputs, (periods + 5) / frequency, 1 / frequency / 188
+    )
     steady = made.after((5 - 1e-6) / frequency)
     torque = mean_torque(steady, pair) * pair.gears[1].r_b / pair.gears[0].r_b
     said = near("mean torque of the mesh on the wheel, its impulse,", torque, DRAG, 0.02)

@@ -23,13 +23,14 @@ STEP = 2e-5  # s
 @dataclass(frozen=True)
 class Efficiency:
     """Of one run at constant load. power: of the input, W; lost: mean friction power of the run over whole pitches, W;
-    coefficient: mean coefficient of friction of the loaded contacts; loss_factor: H_V; trouble: steps left unsolved."""
+    coefficient: mean coefficient of friction of the loaded contacts; loss_factor: H_V;
+    retried_steps: steps left unsolved."""
 
     power: float
     lost: float
     coefficient: float
     loss_factor: float
-    trouble: int
+    retried_steps: int
 
     @property
     def closed(self) -> float:
@@ -51,7 +52,7 @@ class Efficiency:
             "tooth loss factor H_V": self.loss_factor,
             "mesh loss P mu H_V (W)": self.closed,
             "mesh efficiency by H_V": 1.0 - self.closed / self.power,
-            "unsolved steps": float(self.trouble),
+            "unsolved steps": float(self.retried_steps),
         }
 
 
@@ -94,5 +95,5 @@ def mesh_efficiency(
         float(last - first) / span,
         float(trace["mesh.friction_ratio"][settled].mean()),
         loss_factor(pair),
-        int(trace["solver.trouble"][-1]),
+        int(trace["solver.retried_steps"][-1]),
     )

@@ -75,9 +75,9 @@ def test_a_change_leaves_no_debt_of_energy(drive: Steady) -> None:
     first, kernel = begun(drive, level=1.0, h=5e-6), drive.model.kernel(level=2.0, h=5e-6)
     kernel.adopt(first)
     run(kernel, drive, BEFORE, BEFORE + 20)
-    rounds = kernel.get("solver.rounds")
+    rounds = kernel.get("solver.iterations")
     run(kernel, drive, BEFORE + 20, BEFORE + 120)
-    assert kernel.get("solver.rounds") - rounds < 1.5 * 100 * STEP / 5e-6  # a debt costs 35 iterations a step
+    assert kernel.get("solver.iterations") - rounds < 1.5 * 100 * STEP / 5e-6  # a debt costs 35 iterations a step
 
 
 def test_states_that_cannot_be_taken_over_are_refused(drive: Steady) -> None:

@@ -138,7 +138,7 @@ def test_judges_hear_what_is_wrong(calm: record.Record) -> None:
     deeper = calm["pinion.gear.phi"] + np.where(calm.time > 0.00995, 60e-6 / pair.gears[0].r_b, 0.0)
     sunk = dict(calm.values) | {"pinion.gear.phi": deeper}
     assert "overlap by 102.0 µm at 0.01 s" in checks.finding(replace(calm, values=sunk), pair).complaints[0]
-    unsolved = dict(calm.values) | {"solver.trouble": np.where(calm.time > 0.005, 1.0, 0.0)}
+    unsolved = dict(calm.values) | {"solver.retried_steps": np.where(calm.time > 0.005, 1.0, 0.0)}
     assert "left unsolved is 1" in checks.finding(replace(calm, values=unsolved), pair).complaints[0]
     assert checks.finding(calm, pair, ["too quiet"]).outcome == "failed"
     assert checks.finding(replace(calm, outcome="diverged"), pair).outcome == "diverged@0.01"

@@ -158,7 +158,7 @@ def swing(
         kernel.step(i * h, h)
         seen.append([kernel.get(name) for name in ("pinion.gear.phi", "mesh.friction_loss")])
     phi, lost = np.array(seen).T
-    assert kernel.get("mesh.pairs") == 1 and len(expected) > 10 and kernel.get("solver.trouble") == 0
+    assert kernel.get("mesh.pairs") == 1 and len(expected) > 10 and kernel.get("solver.retried_steps") == 0
     turns = extremes(phi, 0.005 * abs(expected[1] - expected[0]))
     late = -steps // 10
     return Swings(expected, turns, float(phi[late:].mean()), float((lost[-1] - lost[late]) / lost[-1]))
@@ -320,7 +320,7 @@ def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: StageSpec, bodi
     run loses less, but not by a tenth."""
     found = mesh_efficiency(assemble(spec, bodies), 302.0, 200.0, {"level": 0.0, "friction_coefficient": 0.05})
     print(found.columns())
-    assert found.coefficient == pytest.approx(0.05, rel=0.02) and found.trouble == 0
+    assert found.coefficient == pytest.approx(0.05, rel=0.02) and found.retried_steps == 0
     assert found.lost == pytest.approx(found.closed, rel=0.1)
     assert 0.98 < found.efficiency < 1.0
 

@@ -18,13 +18,13 @@ FAST = 1.0
 
 @dataclass(frozen=True)
 class Powers:
-    """Means over a settled window, W: what the shafts do not give on, dissipation, friction by mesh; trouble: steps the
-    solver left unsolved."""
+    """Means over a settled window, W: what the shafts do not give on, dissipation, friction by mesh; retried_steps:
+    steps that the solver left unsolved."""
 
     missing: float
     dissipated: float
     rubbed: np.ndarray
-    trouble: float
+    retried_steps: float
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def driven(blob: bytes, coefficient: float) -> Powers:
         rows[-1] += [kernel.get(f"{mesh}.friction_loss") for mesh in ALL_MESHES]
     first, last, span = np.array(rows[SETTLED]), np.array(rows[-1]), (RUN - 1 - SETTLED) * STEP
     work, stored, dissipated, *rubbed = (last - first) / span
-    return Powers(work - stored, dissipated, np.array(rubbed), kernel.get("solver.trouble"))
+    return Powers(work - stored, dissipated, np.array(rubbed), kernel.get("solver.retried_steps"))
 
 
 def test_every_mesh_of_a_set_loses_and_the_ports_bring_it_in(blob: bytes) -> None:
@@ -57,6 +57,6 @@ def test_every_mesh_of_a_set_loses_and_the_ports_bring_it_in(blob: bytes) -> Non
     assert np.all(found.rubbed > 0)
     assert found.missing == pytest.approx(found.dissipated, abs=2e-4 * passed)
     assert 0.005 < found.rubbed.sum() / passed < 0.015 and found.rubbed.sum() < found.dissipated
-    assert found.trouble < 0.01 * RUN * 3
+    assert found.retried_steps < 0.01 * RUN * 3
     doubled = driven(blob, 0.1)
     assert doubled.rubbed.sum() == pytest.approx(2 * found.rubbed.sum(), rel=0.06)

@@ -132,18 +132,18 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     static const fmi2CallbackFunctions none;
     const fmi2CallbackFunctions *environment = functions ? functions : &none;
     (void)visible;
-    const char *trouble = !instanceName || !*instanceName ? "the instance name is empty"
-                          : fmuType != fmi2CoSimulation   ? "only co-simulation is offered"
-                                                          : NULL;
-    face *f = trouble ? NULL
-                      : face_create(instanceName, fmuGUID, fmuResourceLocation, environment, loggingOn != fmi2False);
+    const char *fault = !instanceName || !*instanceName ? "the instance name is empty"
+                        : fmuType != fmi2CoSimulation   ? "only co-simulation is offered"
+                                                        : NULL;
+    face *f = fault ? NULL
+                    : face_create(instanceName, fmuGUID, fmuResourceLocation, environment, loggingOn != fmi2False);
     fmi2Component c = f ? publish(f) : NULL;
     if (f && !c) {
         face_destroy(f);
-        trouble = "too many instances in this process";
+        fault = "too many instances in this process";
     }
-    if (trouble)
-        face_log(environment, instanceName ? instanceName : "", LOG_ALWAYS, LOG_ERROR, "fmi2Instantiate: %s", trouble);
+    if (fault)
+        face_log(environment, instanceName ? instanceName : "", LOG_ALWAYS, LOG_ERROR, "fmi2Instantiate: %s", fault);
     return c;
 }
 
@@ -368,7 +368,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     if (outcome == GK_OK) {
         f->last_good = end;
         f->step_status = fmi2OK;
-        face_warn_of_trouble(f);
+        face_warn_of_retries(f);
         return fmi2OK;
     }
     if (!given_up(outcome))

@@ -100,7 +100,7 @@ fmi2Status face_get(face *f, int type, const fmi2ValueReference references[], si
                     int *integers);
 fmi2Status face_set(face *f, int type, const fmi2ValueReference references[], size_t count, const double *reals,
                     const int *integers);
-void face_warn_of_trouble(face *f);
+void face_warn_of_retries(face *f);
 unsigned char *face_align(void *block); /* up to the next multiple of FACE_ALIGNMENT */
 void *face_allocate(const fmi2CallbackFunctions *environment, size_t size);
 void face_release(const fmi2CallbackFunctions *environment, void *block);

@@ -314,7 +314,7 @@ fmi2Status face_set(face *f, int type, const fmi2ValueReference references[], si
     return fmi2OK;
 }
 
-void face_warn_of_trouble(face *f)
+void face_warn_of_retries(face *f)
 {
     double status = 0;
     if (!(f->logged & LOG_WARNING) || gk_get(f->model, f->data, f->status_reference, &status) != GK_OK ||

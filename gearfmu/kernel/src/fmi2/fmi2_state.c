@@ -101,7 +101,7 @@ void face_state_write(const face_state *state, void *bytes)
 }
 
 /* what is wrong with a head that came from outside, or NULL */
-static const char *head_trouble(const face *f, const face_head *head, const unsigned char *bytes, size_t size)
+static const char *head_fault(const face *f, const face_head *head, const unsigned char *bytes, size_t size)
 {
     if (memcmp(head->magic, MAGIC, sizeof MAGIC)) return "these bytes are not a saved state of a gearfmu FMU";
     if (memcmp(head->hash, gk_model_hash(f->model), sizeof head->hash)) return "this state belongs to another model";
@@ -116,7 +116,7 @@ static const char *head_trouble(const face *f, const face_head *head, const unsi
     return zero == 0 && head->stop_defined <= 1 && head->reserved == 0 ? NULL : "a time is not finite";
 }
 
-static const char *kernel_trouble(const face *f, const face_state *state, gk_data *data, gk_setup *setup, gk_work *work)
+static const char *kernel_fault(const face *f, const face_state *state, gk_data *data, gk_setup *setup, gk_work *work)
 {
     char message[GK_MESSAGE] = "";
     size_t bytes = state->head.bytes;
@@ -129,7 +129,7 @@ static const char *kernel_trouble(const face *f, const face_state *state, gk_dat
 }
 
 /* do the kernel's checks accept the settings and the bytes? in memory of their own: the instance stays as it is */
-static const char *deep_trouble(const face *f, const face_state *state)
+static const char *deep_fault(const face *f, const face_state *state)
 {
     size_t data_size = (gk_data_size(f->model) + FACE_ALIGNMENT - 1) / FACE_ALIGNMENT * FACE_ALIGNMENT;
     size_t setup_size = (gk_setup_size(f->model) + FACE_ALIGNMENT - 1) / FACE_ALIGNMENT * FACE_ALIGNMENT;
@@ -138,27 +138,27 @@ static const char *deep_trouble(const face *f, const face_state *state)
     gk_data *data = (gk_data *)(void *)face_align(block);
     gk_setup *setup = (gk_setup *)(void *)((unsigned char *)data + data_size);
     gk_work *work = (gk_work *)(void *)((unsigned char *)setup + setup_size);
-    const char *trouble = kernel_trouble(f, state, data, setup, work);
+    const char *fault = kernel_fault(f, state, data, setup, work);
     face_release(&f->environment, block);
-    return trouble;
+    return fault;
 }
 
 fmi2Status face_state_read(face *f, const void *bytes, size_t size, face_state **state)
 {
     face_head head;
-    const char *trouble = "there are fewer bytes than the head of a state has";
+    const char *fault = "there are fewer bytes than the head of a state has";
     if (size >= sizeof head) {
         memcpy(&head, bytes, sizeof head);
-        trouble = head_trouble(f, &head, bytes, size);
+        fault = head_fault(f, &head, bytes, size);
     }
-    if (trouble) return REFUSE(f, "fmi2DeSerializeFMUstate: %s", trouble);
+    if (fault) return REFUSE(f, "fmi2DeSerializeFMUstate: %s", fault);
     face_state *fresh = NULL;
     if (!make_room(f, &fresh, size)) return REFUSE(f, "no memory for a saved state of %zu bytes", size);
     memcpy(&fresh->head, bytes, size);
-    trouble = deep_trouble(f, fresh);
-    if (trouble) {
+    fault = deep_fault(f, fresh);
+    if (fault) {
         face_state_free(f, fresh);
-        return REFUSE(f, "fmi2DeSerializeFMUstate: %s", trouble);
+        return REFUSE(f, "fmi2DeSerializeFMUstate: %s", fault);
     }
     if (*state) face_state_free(f, *state);
     *state = fresh;

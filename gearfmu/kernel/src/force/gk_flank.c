@@ -368,8 +368,8 @@ static void take_deviations(const pair *q, const gk_place *p, int strip, tooth_f
     for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
 }
 
-/* every strip by itself, in the middle of its part that carries; 0 when none comes within `reach` */
-static int strips_of(const pair *q, tooth_flanks *f, const double roll[2], double reach, gk_place *place)
+/* every strip by itself, in the middle of its part that carries; 0 when none comes within `search_distance` */
+static int strips_of(const pair *q, tooth_flanks *f, const double roll[2], double search_distance, gk_place *place)
 {
     const flank_side *s = f->side;
     place->gap = OPEN;
@@ -382,11 +382,11 @@ static int strips_of(const pair *q, tooth_flanks *f, const double roll[2], doubl
         p->gap += q->mesh->cosine * q->mesh->lead[s->flank][i];
         place->gap = gk_min(place->gap, p->gap);
     }
-    return place->gap < reach;
+    return place->gap < search_distance;
 }
 
-/* one tooth pair; 0 when it does not come within `reach` */
-static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, gk_place *p)
+/* one tooth pair; 0 when it does not come within `search_distance` */
+static int tooth_pair(const pair *q, const flank_side *s, int k, double search_distance, gk_place *p)
 {
     tooth_flanks f = {s, {s->base[0] + k * s->pitch[0], s->base[1] + s->step * k * s->pitch[1]}, 0.0, {NULL, NULL}};
     double roll[2] = {s->roll[0] + s->sg * k * s->p_b, s->roll[1] + s->step * s->sg * k * s->p_b};
@@ -396,7 +396,7 @@ static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, g
     p->number[0] = k, p->number[1] = s->shift + s->step * k;
     for (int i = 0; i < 2; i++) p->tooth[i] = modulo(p->number[i], q->gear[i]->z);
     if (q->gear[0]->index || q->gear[1]->index) f.closer = misplace(q, s->sg, p, f.beta, roll);
-    if (q->setup->spatial) return strips_of(q, &f, roll, reach, p);
+    if (q->setup->spatial) return strips_of(q, &f, roll, search_distance, p);
     take_deviations(q, p, 0, &f);
     p->point[0].share = 1.0;
     p->point[0].roll[0] = roll[0], p->point[0].roll[1] = roll[1];
@@ -405,7 +405,7 @@ static int tooth_pair(const pair *q, const flank_side *s, int k, double reach, g
     if (!section(q, &f, &p->point[0], glides ? &t : NULL)) return 0;
     if (glides) glide(q, s->sg, &t, 0.0, &p->point[0]);
     p->gap = p->point[0].gap;
-    return p->gap < reach;
+    return p->gap < search_distance;
 }
 
 /* moves the gaps of a place along their gradients */
@@ -419,21 +419,21 @@ void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[PO
     }
 }
 
-static int find_side(const pair *q, const gk_mesh *mesh, const flank_side *s, double reach,
+static int find_side(const pair *q, const gk_mesh *mesh, const flank_side *s, double search_distance,
                      const gk_position position[2], gk_place *place, int room)
 {
     double ends[2];
     int found = 0;
     const double leaning = q->setup->spatial ? LEAN : 0.0;
-    if (!(s->gap - mesh->protrusion - leaning < reach))
+    if (!(s->gap - mesh->protrusion - leaning < search_distance))
         return 0; /* the whole side is open: it costs this one comparison */
     if (!teeth(q, s, ends)) return -1;
     for (int k = (int)gk_floor(ends[0]) + 1; k <= (int)gk_floor(ends[1]) && found < room; k++)
-        if (tooth_pair(q, s, k, reach, &place[found]) && in_tables(mesh, position, &place[found])) found++;
+        if (tooth_pair(q, s, k, search_distance, &place[found]) && in_tables(mesh, position, &place[found])) found++;
     return found;
 }
 
-static int find_flat(const pair *q, double reach, gk_position position[2], gk_place *p)
+static int find_flat(const pair *q, double search_distance, gk_position position[2], gk_place *p)
 {
     memset(p, 0, sizeof *p);
     memset(position, 0, 2 * sizeof *position);
@@ -443,7 +443,7 @@ static int find_flat(const pair *q, double reach, gk_position position[2], gk_pl
         at->gap = p->gap, at->curvature = at->share = 1.0;
         at->gradient[PHIA] = -1.0, at->gradient[PHIB] = 1.0;
     }
-    return p->gap < reach;
+    return p->gap < search_distance;
 }
 
 /* t of both flanks where the gears stand without load: not cut at ±π, so that both count teeth alike */
@@ -477,18 +477,18 @@ void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *m
 }
 
 /* no coast flank can be near, by the gaps of the drive flanks */
-static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *drive, double a, double reach)
+static int coast_is_open(const pair *q, const gk_mesh *mesh, const flank_side *drive, double a, double search_distance)
 {
     const double apart = a - mesh->distance, sum = mesh->clearance + mesh->clearance_slope * apart;
     return sum - drive->gap - mesh->protrusion - (q->setup->spatial ? LEAN : 0.0) >
-           reach + SURE + BENDS * apart * apart / mesh->distance;
+           search_distance + SURE + BENDS * apart * apart / mesh->distance;
 }
 
 /* `gk_flank_find` where both toothings stand */
-static int find(const pair *q, double reach, gk_position position[2], gk_place *place)
+static int find(const pair *q, double search_distance, gk_position position[2], gk_place *place)
 {
     const double *pose = q->pose;
-    if (q->e->kind == MESH_FLAT) return find_flat(q, reach, position, place);
+    if (q->e->kind == MESH_FLAT) return find_flat(q, search_distance, position, place);
     const double R = reach_of(q);
     double d[2];
     apart(q, d);
@@ -497,27 +497,29 @@ static int find(const pair *q, double reach, gk_position position[2], gk_place *
     const flank_side drive = side_of(q, 0);
     place_sides(q, q->mesh, &drive, position);
     const int both = GK_ON(q->setup, coast_flank);
-    const int found = both || !q->mesh->coasts ? find_side(q, q->mesh, &drive, reach, position, place, MAX_PAIRS) : 0;
+    const int found = both || !q->mesh->coasts
+                          ? find_side(q, q->mesh, &drive, search_distance, position, place, MAX_PAIRS)
+                          : 0;
     if (found < 0 || !(both || q->mesh->coasts)) return found;
-    if (coast_is_open(q, q->mesh, &drive, sqrt(a2), reach)) return found;
+    if (coast_is_open(q, q->mesh, &drive, sqrt(a2), search_distance)) return found;
     const flank_side coast = side_of(q, 1);
-    const int back = find_side(q, q->mesh, &coast, reach, position, place + found, MAX_PAIRS - found);
+    const int back = find_side(q, q->mesh, &coast, search_distance, position, place + found, MAX_PAIRS - found);
     return back < 0 ? -1 : found + back;
 }
 
-/* All tooth pairs whose undeformed gap is below `reach` at the given poses, and where the sides stand in their
+/* All tooth pairs whose undeformed gap is below `search_distance` at the given poses, and where the sides stand in their
  * tables; −1 when the poses are meaningless. Without coast flanks those that carry when the first port drives the
  * stage. The spins of a flat engagement are translations. */
-int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
-                  gk_position position[2], gk_place *place)
+int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
+                  double search_distance, gk_position position[2], gk_place *place)
 {
     pair q = pair_of(model, setup, mesh, pose);
     double moved[POSE], turn[POSE];
-    if (!GK_HAS(runout) || !mesh->runs_out) return find(&q, reach, position, place);
+    if (!GK_HAS(runout) || !mesh->runs_out) return find(&q, search_distance, position, place);
     memcpy(moved, pose, sizeof moved);
     gk_runout_move(model, setup, q.e, moved, turn);
     q.pose = moved;
-    const int found = find(&q, reach, position, place);
+    const int found = find(&q, search_distance, position, place);
     for (int i = 0; i < found; i++)
         for (int s = 0; s < (setup->spatial ? GK_STRIPS(setup) : 1); s++) {
             gk_runout_turn(turn, place[i].point[s].gradient);

@@ -430,11 +430,11 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
                              const gk_real *const speed[], double *spin_rate)
 {
     gk_engaged *engaged = &work->engaged[e];
-    const int still = !GK_ON(setup, roll_motion);
+    const int frozen = !GK_ON(setup, roll_motion);
     nodal_pair p = {.model = model, .setup = setup, .e = &model->engagement[e], .mesh = &setup->mesh[e]};
     p.ground = work->ground_trial;
-    p.pose = still ? data->meshing[e].still : engaged->pose;
-    for (int d = 0; d < POSE && still; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
+    p.pose = frozen ? data->meshing[e].frozen : engaged->pose;
+    for (int d = 0; d < POSE && frozen; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
     gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p.rate);
     take_runout(&p);
     for (int c = 0; c < 2; c++)
@@ -456,7 +456,7 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
 /* takes the strips' own forces out of the problem of an engagement, which joints are left in: they only report */
 void gk_nodal_leave(gk_system *s)
 {
-    for (int i = 0; i < s->contacts; i++) s->g[i] = 1.0, s->force0[i] = s->dash0[i] = s->end0[i] = 0.0;
+    for (int i = 0; i < s->contacts; i++) s->g[i] = 1.0, s->force0[i] = s->damper0[i] = s->end0[i] = 0.0;
 }
 
 /* adds the forces of nodal contact at the trial state to modal forces, ground forces and rates of the spins' speeds */

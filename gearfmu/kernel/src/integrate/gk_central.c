@@ -99,7 +99,7 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
     gk_rk45_angles(model, work, data);
     for (int e = 0; e < model->engagements; e++) { /* reported force: that of the end */
         gk_system *s = &work->engaged[e].system;
-        data->rounds += s->rounds;
+        data->iterations += s->iterations;
         memcpy(s->force0, s->z, sizeof s->force0);
     }
     data->steps++;

@@ -13,11 +13,11 @@ int gk_memory_find(const gk_meshing *meshing, gk_key key)
     return -1;
 }
 
-/* λ0 without dashpots: massless deflection and energy at the start; linear: forces of the step are (mix4) */
+/* λ0 without dashpots: quasi-static deflection and energy at the start; linear: forces of the step are (mix4) */
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {
     const int quads = s->stride / 4, whole = s->contacts / 4, joints = quads - whole; /* quads with joints in them */
-    s->limit_reached = s->rounds = s->dashpots = s->dashpots_stand = 0;
+    s->limit_reached = s->iterations = s->dashpots = s->dashpots_stand = 0;
     s->alpha = 0.0;
     gk_clear(s->direction, quads);
     gk_clear(s->delta + 4 * whole, joints); /* links know no local law */
@@ -39,7 +39,7 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
     for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
 }
 
-/* The start of the step as this step's compliance sees it: massless deflection and energy under λ0, gaps g0 = s0 − C′λ0
+/* The start of the step as this step's compliance sees it: quasi-static deflection and energy under λ0, gaps g0 = s0 − C′λ0
  * − δ(λ0); then the first guess of status and forces */
 void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s)
 {
@@ -50,10 +50,10 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
     s->rubbing = 0.0;
     recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
     for (int i = 0; i < s->n; i++) {
-        const int acted = s->dash0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
+        const int acted = s->damper0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);
         s->beta[i] = acted ? 0.25 * (3.0 + GK_MEMORY) : 0.5;
-        s->tail[i] = acted ? -0.25 * (1.0 - GK_MEMORY) * s->dash0[i] - GK_MEMORY * s->end0[i] : 0.0;
-        s->g0[i] = -gk_solve_massless(s, i);
+        s->tail[i] = acted ? -0.25 * (1.0 - GK_MEMORY) * s->damper0[i] - GK_MEMORY * s->end0[i] : 0.0;
+        s->g0[i] = -gk_solve_quasi_static(s, i);
         s->hold[i] = 0;
     }
     for (int i = 0; i < s->contacts; i++) {
@@ -79,8 +79,8 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
         gk_solve_settle(s);
     else
         gk_solve_begin_dashpots(s);
-    s->owed = data->meshing[e].owed;
-    s->due = gk_clamp(s->owed, -PAYABLE * s->stored0, PAYABLE * s->stored0);
+    s->energy_error = data->meshing[e].energy_error;
+    s->energy_correction = gk_clamp(s->energy_error, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
 void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
@@ -97,8 +97,8 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
         deepest = gk_max(deepest, -engaged->place[p].gap);
         for (int strip = 0; strip < GK_STRIPS(s); strip++, i++) {
             m->force[strip] = s->force[i];
-            m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-            m->dash[strip] = s->dash[i];
+            m->gap[strip] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
+            m->damper[strip] = s->damper[i];
             m->end[strip] = s->end[i];
             if (GK_ON(setup, friction)) m->ratio[strip] = engaged->glide->ratio[i];
             if (GK_ON(setup, hertz) && s->force[i] > s->law[i / 4].high[i % 4] * s->width[i])
@@ -107,9 +107,10 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
     }
     for (int i = s->contacts; i < s->n; i++)
         data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){
-            s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i], s->dash[i], s->end[i]};
-    meshing->reach = 20e-6 + 0.5 * deepest;           /* neighbours of a loaded tooth follow its deflection in part */
-    meshing->owed = meshing->adopted ? 0.0 : s->owed; /* what the change of setup took or gave is no debt */
+            s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i], s->damper[i], s->end[i]};
+    meshing->search_distance = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
+    meshing->energy_error = meshing->adopted ? 0.0
+                                             : s->energy_error; /* what the change of setup took or gave is no debt */
     meshing->adopted = 0;
 }
 

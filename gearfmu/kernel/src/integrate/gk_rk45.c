@@ -1,5 +1,5 @@
 /* rk45: Dormand–Prince 5(4) with ode45's error control (relative 1e-6, absolute 1e-9 of the largest state of its kind),
- * the paper's way, as a reference and for level paper. Explicit in the dynamic coordinates; the massless part is solved
+ * the paper's way, as a reference and for level paper. Explicit in the dynamic coordinates; the quasi-static part is solved
  * in every evaluation: g + C λ + δ(λ) = 0. Local error per step ~h⁵; step limited by stability at the highest mode. */
 #include "integrate/gk_integrate.h"
 
@@ -58,12 +58,13 @@ static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, c
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
-    engaged->places =
-        setup->on.roll_motion
-            ? gk_flank_find(model, setup, mesh, engaged->pose,
-                            GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : gk_max(meshing->reach, 50e-6),
-                            engaged->position, engaged->place)
-            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
+    engaged->places = setup->on.roll_motion
+                          ? gk_flank_find(model, setup, mesh, engaged->pose,
+                                          GK_ON(setup, film) ? gk_max(meshing->search_distance, GK_FILM_REACH)
+                                                             : gk_max(meshing->search_distance, 50e-6),
+                                          engaged->position, engaged->place)
+                          : gk_frozen_find(model, setup, mesh, meshing->frozen, engaged->pose, engaged->position,
+                                           engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
     gk_rows_form(setup, work, e);
@@ -247,7 +248,8 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
-            if (s->kind[i] == ROW_TORQUE) data->angle[s->port_of[i]] = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+            if (s->kind[i] == ROW_TORQUE)
+                data->angle[s->port_of[i]] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
     }
 }
 

@@ -515,7 +515,7 @@ static void spread(rest *r)
         for (int l = 0; l < mesh->spins; l++)
             for (int i = 0; i < s->n; i++)
                 if (s->kind[i] != ROW_CLUTCH) data->f[mesh->spin[l]] += s->rigid[l][i] * s->force[i];
-        gk_rows_pose(r->model, setup, e, data->x, work->rest_ground, data->meshing[e].still);
+        gk_rows_pose(r->model, setup, e, data->x, work->rest_ground, data->meshing[e].frozen);
     }
 }
 

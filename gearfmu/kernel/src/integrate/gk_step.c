@@ -61,7 +61,7 @@ static void express(const gk_model *model, const gk_setup *setup, gk_work *work,
     for (int d = 0; d < setup->spins; d++) data->v[d] += lead * setup->inverse_inertia[d] * data->f_rate[d];
     for (int d = 0; d < setup->spins; d++)
         data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_inertia[d] * data->f[d];
-    data->ledger.baseline += dynamic_energy(model, setup, data, k) - before;
+    data->energy.baseline += dynamic_energy(model, setup, data, k) - before;
     data->state_h = k->h;
     data->state_gamma = k->gamma;
 }
@@ -175,10 +175,11 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
     gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
     engaged->places = GK_ON(setup, roll_motion)
                           ? gk_flank_find(model, setup, mesh, engaged->pose,
-                                          GK_ON(setup, film) ? gk_max(meshing->reach, GK_FILM_REACH) : meshing->reach,
+                                          GK_ON(setup, film) ? gk_max(meshing->search_distance, GK_FILM_REACH)
+                                                             : meshing->search_distance,
                                           engaged->position, engaged->place)
-                          : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position,
-                                          engaged->place);
+                          : gk_frozen_find(model, setup, mesh, meshing->frozen, engaged->pose, engaged->position,
+                                           engaged->place);
     if (engaged->places < 0) return engaged->places = 0, GK_DIVERGED;
     for (int p = 0; p < engaged->places; p++) {
         engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
@@ -301,7 +302,7 @@ static double correct_ground(const gk_model *model, const gk_setup *setup, gk_wo
         f4[i] = next[i];
     }
     const double taken = damped ? 0.5 * ((sum[0] + sum[2]) + (sum[1] + sum[3])) : 0.0;
-    data->ledger.work += work->pressed + gk_frame_press(model, setup, k, data, v);
+    data->energy.work += work->pressed + gk_frame_press(model, setup, k, data, v);
     gk_frame_turn(setup, k, data, 1, v);
     return taken + damp_supports(model, setup, k, v);
 }
@@ -354,19 +355,19 @@ static void correct(const gk_model *model, const gk_setup *setup, gk_work *work,
         if (!n || e < 0) continue;
         const gk_real *bv_left = finish_speeds(model, setup, work, data, k, g);
         if (GK_ON(setup, modal_damping))
-            data->ledger.dissipated += correct_damped(setup, work, k, g, bv_left, q);
+            data->energy.dissipated += correct_damped(setup, work, k, g, bv_left, q);
         else /* what rounding gave or took */
-            work->engaged[e].system.owed -= correct_undamped(setup, work, k, g, bv_left, q);
+            work->engaged[e].system.energy_error -= correct_undamped(setup, work, k, g, bv_left, q);
         memcpy(q + 2 * n, work->next[g], (size_t)n * sizeof *q);
     }
-    data->ledger.dissipated += correct_ground(model, setup, work, data, k);
+    data->energy.dissipated += correct_ground(model, setup, work, data, k);
     correct_spins(model, setup, work, data, k);
 }
 
-static void feed(gk_ledger *ledger, double work)
+static void feed(gk_energy *energy, double work)
 {
-    ledger->work += work;
-    ledger->through += fabs(work);
+    energy->work += work;
+    energy->through += fabs(work);
 }
 
 /* What ports brought in and what dampers and clutches took in this step. A damper takes −½ η_d·Δgap; what its force
@@ -382,18 +383,18 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
             data->locked[port] = s->active[i];
             continue;
         }
-        taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->dash[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
+        taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->damper[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
         held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
         if (s->kind[i] == ROW_TORQUE) {
-            const double angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
-            feed(&data->ledger, mean * (angle - data->angle[port]));
+            const double angle = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
+            feed(&data->energy, mean * (angle - data->angle[port]));
             data->angle[port] = angle;
         } else if (s->joint_of[i] == JOINT_PORT) {
-            feed(&data->ledger, mean * (work->outer[port] - work->outer_before[port]));
+            feed(&data->energy, mean * (work->outer[port] - work->outer_before[port]));
         }
     }
-    data->ledger.dissipated += taken - (held - s->held0);
-    if (work->another) data->ledger.baseline += s->stored0 + s->held0;
+    data->energy.dissipated += taken - (held - s->held0);
+    if (work->another) data->energy.baseline += s->stored0 + s->held0;
     return gk_solve_stored(s) + held;
 }
 
@@ -426,9 +427,9 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
 static double account_friction(const gk_work *work, gk_data *data, int e)
 {
     const gk_glide *glide = work->engaged[e].glide;
-    data->ledger.dissipated += glide->taken;
+    data->energy.dissipated += glide->taken;
     data->meshing[e].rubbed += glide->taken;
-    if (work->another) data->ledger.baseline += glide->held0;
+    if (work->another) data->energy.baseline += glide->held0;
     return gk_friction_held(glide, &work->engaged[e].system);
 }
 
@@ -436,22 +437,22 @@ static double account_friction(const gk_work *work, gk_data *data, int e)
 static void account_film(const gk_work *work, gk_data *data, int e)
 {
     const double lost = gk_film_on(&work->engaged[e].system) ? gk_film_lost(&work->engaged[e].system) : 0.0;
-    data->ledger.dissipated += lost;
+    data->energy.dissipated += lost;
     data->meshing[e].squeezed += lost;
 }
 
 static void settle_accounts(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
-    const double before = data->ledger.massless;
-    data->ledger.massless = 0.0;
-    if (work->another) data->ledger.baseline -= before;
+    const double before = data->energy.quasi_static;
+    data->energy.quasi_static = 0.0;
+    if (work->another) data->energy.baseline -= before;
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
-        data->ledger.massless += account(model, work, data, s);
-        if (GK_ON(setup, friction)) data->ledger.massless += account_friction(work, data, e);
+        data->energy.quasi_static += account(model, work, data, s);
+        if (GK_ON(setup, friction)) data->energy.quasi_static += account_friction(work, data, e);
         if (GK_ON(setup, film)) account_film(work, data, e);
-        data->rounds += s->rounds;
-        if (s->limit_reached) data->trouble++, data->status |= STATUS_LIMIT;
+        data->iterations += s->iterations;
+        if (s->limit_reached) data->retried++, data->status |= STATUS_LIMIT;
     }
 }
 
@@ -484,7 +485,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     GK_LAP(work, PHASE_SYSTEM);
     if ((outcome = solve_all(model, setup, work, data, k)) != GK_OK) return outcome;
     GK_LAP(work, PHASE_SOLVE);
-    data->ledger.dissipated += damped;
+    data->energy.dissipated += damped;
     correct(model, setup, work, data, k);
     GK_LAP(work, PHASE_CORRECT);
     settle_accounts(model, setup, work, data);
@@ -502,5 +503,5 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
  * what dampers hold */
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {
-    return dynamic_energy(model, setup, data, k) + data->ledger.massless;
+    return dynamic_energy(model, setup, data, k) + data->energy.quasi_static;
 }

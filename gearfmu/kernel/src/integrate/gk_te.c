@@ -9,7 +9,7 @@ static double driven_angle(const gk_model *model, const gk_work *work, int port)
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
             if (s->port_of[i] == port && s->joint_of[i] == JOINT_PORT)
-                angle = gk_solve_end_gap(s, i) + gk_solve_massless(s, i);
+                angle = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
     }
     return angle;
 }

@@ -22,7 +22,7 @@
 #define gk_flank_find gk_flank_find_avx2
 #define gk_flank_move gk_flank_move_avx2
 #define gk_flank_clearance gk_flank_clearance_avx2
-#define gk_still_find gk_still_find_avx2
+#define gk_frozen_find gk_frozen_find_avx2
 #define gk_nodal_leave gk_nodal_leave_avx2
 #define gk_nodal_press gk_nodal_press_avx2
 #define gk_rows_pose gk_rows_pose_avx2
@@ -113,7 +113,7 @@
 #include "force/gk_law.c"
 #include "setup/gk_flow.c"
 #include "force/gk_flank.c"
-#include "force/gk_still.c"
+#include "force/gk_frozen.c"
 #include "force/gk_rows.c"
 #include "setup/gk_moves.c"
 #include "problem/gk_compliance.c"

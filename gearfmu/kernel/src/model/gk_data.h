@@ -38,21 +38,21 @@ typedef struct gk_key {
 
 typedef struct gk_memory { /* what a tooth pair remembers from the last step */
     gk_key key;
-    double force[MAX_SLICES], gap[MAX_SLICES]; /* λ0; s0 */
-    double dash[MAX_SLICES], end[MAX_SLICES];  /* η_d of the last step, f_d at its end */
-    double ratio[MAX_SLICES];                  /* friction over normal force */
+    double force[MAX_SLICES], gap[MAX_SLICES];  /* λ0; s0 */
+    double damper[MAX_SLICES], end[MAX_SLICES]; /* η_d of the last step, f_d at its end */
+    double ratio[MAX_SLICES];                   /* friction over normal force */
 } gk_memory;
 
 typedef struct gk_meshing { /* an engagement */
     double
-        still[POSE];  /* poses of both gears at the start: where all is taken that depends on position when roll_motion
+        frozen[POSE]; /* poses of both gears at the start: where all is taken that depends on position when roll_motion
                          is off */
-    double reach;     /* how far to look for contacts */
-    double open_time; /* without any contact */
-    double rubbed;    /* energy lost to friction */
-    double squeezed;  /* energy lost to the squeeze film */
+    double search_distance;   /* how far to look for contacts */
+    double open_time;         /* without any contact */
+    double rubbed;            /* energy lost to friction */
+    double squeezed;          /* energy lost to the squeeze film */
     double rolling, unsteady; /* speed of gear A and its deviation from that, means over the last millisecond */
-    double owed;              /* defect of energy that the balance of contacts tolerated so far */
+    double energy_error;      /* defect of energy that the balance of contacts tolerated so far */
     double pitch_angle, pitch_time,
         pitch_impulse; /* of the tooth pitch that passes: where it began, what it gathered */
     int64_t impacts;
@@ -66,14 +66,14 @@ typedef struct gk_motion {
 } gk_motion;
 
 typedef struct gk_joint_state {
-    double force, dash, end;
+    double force, damper, end;
 } gk_joint_state; /* λ0 (clutch: the constant torque of the last step), damper force of the last step and at its end */
 
-typedef struct gk_ledger {
+typedef struct gk_energy {
     double work, dissipated, baseline;
-    double massless; /* energy of the quasi-static part at the end of the last step */
-    double through;  /* that passed the ports, in whichever direction */
-} gk_ledger;
+    double quasi_static; /* energy of the quasi-static part at the end of the last step */
+    double through;      /* that passed the ports, in whichever direction */
+} gk_energy;
 
 struct gk_data {
     uint64_t magic;
@@ -95,8 +95,8 @@ struct gk_data {
     double expressed_h, expressed_gamma; /* the last step that was made */
     double table_h;                      /* the internal step with tables of its own: that of the run's first
                                                    communication step */
-    gk_ledger ledger;
-    int64_t steps, rounds, trouble;
+    gk_energy energy;
+    int64_t steps, iterations, retried;
     int64_t amplitudes; /* where those of observed gears stand, in doubles from `oscillator` on */
     gk_meshing meshing[MAX_ENGAGEMENTS];
     double oscillator[]; /* ground group: q (n), v (n), f (n), double; then of every gear group q, v, f, gk_real; then

@@ -1,5 +1,5 @@
 /* The one scalar of a step that keeps its energy (docs/theory.md, eq. 12; discrete gradient after Gonzalez 1996): η =
- * α·direction on the rows that close or open, α such that the massless part's energy changes by what the forces do to
+ * α·direction on the rows that close or open, α such that the quasi-static part's energy changes by what the forces do to
  * the gaps. */
 #include "problem/gk_system.h"
 
@@ -24,12 +24,12 @@ static int open_balance(const balance *b, double tolerance)
     return !(fabs(b->defect) <= tolerance * b->scale + b->rounding);
 }
 
-/* change of the gap over the step as the energy balance sees it: what a given torque does to the massless part is work
- * from outside and counts with its massless displacement alone */
+/* change of the gap over the step as the energy balance sees it: what a given torque does to the quasi-static part is work
+ * from outside and counts with its quasi-static displacement alone */
 static double gap_change(const gk_system *s, int i)
 {
-    const int massless = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
-    return (massless ? -gk_solve_massless(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
+    const int rests = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
+    return (rests ? -gk_solve_quasi_static(s, i) : gk_solve_end_gap(s, i)) - s->g0[i];
 }
 
 static double share(const gk_system *s, int i)
@@ -46,7 +46,7 @@ static int takes_part(const gk_system *s, int i)
  * add up */
 static balance defect(const gk_system *s)
 {
-    balance b = {s->due - s->stored0 + s->rubbing, 0.0, 0.0, fabs(s->stored0), 0.0};
+    balance b = {s->energy_correction - s->stored0 + s->rubbing, 0.0, 0.0, fabs(s->stored0), 0.0};
     if (gk_film_on(s)) b.defect += gk_film_lost(s);
     for (int i = 0; i < s->n; i++) {
         if (!takes_part(s, i)) continue;
@@ -64,7 +64,7 @@ static balance defect(const gk_system *s)
 }
 
 /* p = dλ/dα and w_d = dη_d/dα */
-static void sensitivity(const gk_system *s, double *p, double *dash)
+static void sensitivity(const gk_system *s, double *p, double *damper)
 {
     double moved[MAX_STRIDE], path[MAX_STRIDE];
     gk_solve_times(s, s->D, s->direction, moved);
@@ -72,17 +72,17 @@ static void sensitivity(const gk_system *s, double *p, double *dash)
     gk_tangent_solve(s, p);
     gk_solve_path(s, p, path);
     for (int i = 0; i < s->n; i++) {
-        dash[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
+        damper[i] = s->gain[i] * (path[i] + s->slope[i] * p[i]) + s->pull[i] * p[i];
     }
 }
 
 /* expansion of Δ in α along the solved direction */
-static void expand(const gk_system *s, const double *p, const double *dash, balance *b)
+static void expand(const gk_system *s, const double *p, const double *damper, balance *b)
 {
     double yields[MAX_STRIDE], path[MAX_STRIDE], w[MAX_STRIDE], late[MAX_STRIDE], moved[MAX_STRIDE], lag[MAX_STRIDE];
     for (int i = 0; i < s->n; i++)
-        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + dash[i],
-        late[i] = s->late[i] * dash[i] + s->held[i] * p[i];
+        w[i] = (1.0 + gk_film_lift(s, i)) * p[i] + s->direction[i] + damper[i],
+        late[i] = s->late[i] * damper[i] + s->held[i] * p[i];
     gk_solve_times(s, s->A, p, yields);
     gk_solve_path(s, p, path);
     gk_solve_times(s, s->D, w, moved);
@@ -90,11 +90,11 @@ static void expand(const gk_system *s, const double *p, const double *dash, bala
     for (int i = 0; i < s->n; i++) {
         const double lift = gk_film_lift(s, i), direct = (1.0 + lift) * p[i] + s->direction[i];
         if (s->kind[i] == ROW_CLUTCH || (!takes_part(s, i) && direct == 0.0)) continue;
-        const double massless = yields[i] + path[i] + s->slope[i] * p[i];
+        const double quasi_static = yields[i] + path[i] + s->slope[i] * p[i];
         const int rests = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;
-        const double gap = rests ? -massless : moved[i] + lag[i];
-        b->c1 += s->force[i] * massless + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
-        b->c2 += 0.5 * p[i] * massless + 0.5 * direct * gap;
+        const double gap = rests ? -quasi_static : moved[i] + lag[i];
+        b->c1 += s->force[i] * quasi_static + 0.5 * direct * gap_change(s, i) + share(s, i) * gap;
+        b->c2 += 0.5 * p[i] * quasi_static + 0.5 * direct * gap;
     }
     if (!gk_film_on(s)) return;
     for (int i = 0; i < s->contacts; i++) yields[i] += path[i];
@@ -157,16 +157,16 @@ void gk_balance_plain(const gk_island *island)
 /* the step is balanced but for b: the next ones make that good; the first member keeps the account */
 static int leave(const gk_island *island, const balance *b)
 {
-    for (int m = 0; m < island->count; m++) island->member[m]->owed -= island->member[m]->due;
-    island->member[0]->owed += b->defect;
+    for (int m = 0; m < island->count; m++) island->member[m]->energy_error -= island->member[m]->energy_correction;
+    island->member[0]->energy_error += b->defect;
     return 1;
 }
 
 /* what the steps before left to this one */
-static double due_of(const gk_island *island)
+static double energy_correction_of(const gk_island *island)
 {
     double sum = 0.0;
-    for (int m = 0; m < island->count; m++) sum += island->member[m]->due;
+    for (int m = 0; m < island->count; m++) sum += island->member[m]->energy_correction;
     return sum;
 }
 
@@ -197,13 +197,13 @@ static double kept_within(bracket *ends, double alpha, double defect, double mov
 /* α by Newton on the quadratic; 0 when the limit of iterations is reached or no direction is left */
 static int find_alpha(const gk_island *island, balance b)
 {
-    double p[MAX_STRIDE], dash[MAX_STRIDE];
+    double p[MAX_STRIDE], damper[MAX_STRIDE];
     bracket ends = {0};
     for (int round = 0; round < GK_ENERGY_LIMIT; round++) {
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
-            sensitivity(s, s->along, dash);
-            expand(s, s->along, dash, &b);
+            sensitivity(s, s->along, damper);
+            expand(s, s->along, damper, &b);
         }
         const double root = root_of(&b);
         if (!(fabs(root) > 0.0)) return 0;
@@ -278,9 +278,10 @@ void gk_balance_solve(const gk_island *island)
     }
     gk_balance_plain(island);
     balance b = defect_of_all(island);
-    if (b.defect - due_of(island) < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
+    if (b.defect - energy_correction_of(island) < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
     balance own = b;
-    own.defect -= due_of(island); /* where nothing touches, what is owed waits: the step itself is judged */
+    own.defect -= energy_correction_of(
+        island); /* where nothing touches, what is owed waits: the step itself is judged */
     if (own.defect > 0.0 && open_balance(&own, steady) && dry(island)) {
         gk_balance_solve(island);
         return;

@@ -317,7 +317,7 @@ void gk_couple_recall(gk_coupled *c)
             s->outer[i] = 0.0;
             if (s->kind[i] == ROW_CLUTCH) continue;
             const int entered = i < s->contacts && !s->recalled[i];
-            s->g0[i] = entered ? gk_max(s->g[i], -gk_solve_massless(s, i)) : s->g0[i] - s->beyond[i];
+            s->g0[i] = entered ? gk_max(s->g[i], -gk_solve_quasi_static(s, i)) : s->g0[i] - s->beyond[i];
             s->stored0 += 0.5 * s->force0[i] * s->beyond[i];
         }
     }

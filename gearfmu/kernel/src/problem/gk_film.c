@@ -63,7 +63,7 @@ void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h)
     clear(&setup->mesh[e], s);
     film->step = h;
     for (int i = 0; i < s->contacts; i++) {
-        const double open = s->g0[i] + gk_solve_massless(s, i);
+        const double open = s->g0[i] + gk_solve_quasi_static(s, i);
         if (!s->recalled[i] || !(open > TOUCHES) || !(open < THIN * GK_FILM_REACH)) continue;
         film->factor[i] = factor(&setup->mesh[e], s, i);
         film->open[i] = film->left[i] = open;
@@ -151,7 +151,7 @@ static double deflected(const gk_system *s, int i)
 /* as the gaps of the step say, so that the balance has no defect but that of its contacts */
 static double sunk_by(const gk_system *s, int i)
 {
-    return s->active[i] ? s->film->open[i] - gk_solve_end_gap(s, i) - gk_solve_massless(s, i) : 0.0;
+    return s->active[i] ? s->film->open[i] - gk_solve_end_gap(s, i) - gk_solve_quasi_static(s, i) : 0.0;
 }
 
 /* What a film takes in the step: its mean force over what it sinks, and what is lost because the force at the end is

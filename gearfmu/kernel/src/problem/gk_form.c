@@ -27,7 +27,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
             s->place_of[n] = p;
             s->force0[n] = memory->force[i];
             s->end0[n] = memory->end[i];
-            s->dash0[n] = memory->dash[i];
+            s->damper0[n] = memory->damper[i];
             s->damping[n] = damping * width;
             s->bound[n] = 0.0;
             s->weight[n] = width * slice;
@@ -49,7 +49,7 @@ static void list_joint(const gk_setup *setup, const gk_data *data, double h, gk_
     s->weight[s->n] = 1.0;
     s->force0[s->n] = clutch ? 0.0 : state->force;
     s->end0[s->n] = state->end;
-    s->dash0[s->n] = state->dash;
+    s->damper0[s->n] = state->damper;
     s->damping[s->n] = 2.0 * setup->joint[port][joint].damping / h;
     s->bound[s->n] = clutch ? 2.0 * data->shaft[port][V_CAPACITY] : 0.0;
     s->width[s->n] = s->per_width[s->n] = 0.0;
@@ -70,7 +70,7 @@ static void list_rows(const gk_model *model, const gk_setup *setup, const gk_dat
             if (setup->joint[mesh->port[p]][joint].live) list_joint(setup, data, h, s, mesh->port[p], joint);
     s->stride = (s->n + 3) / 4 * 4;
     for (int i = s->n; i < s->n + 4 && i < MAX_STRIDE; i++)
-        s->g[i] = s->force0[i] = s->dash0[i] = s->end0[i] = s->damping[i] = s->width[i] = s->per_width[i] = 0.0;
+        s->g[i] = s->force0[i] = s->damper0[i] = s->end0[i] = s->damping[i] = s->width[i] = s->per_width[i] = 0.0;
 }
 
 /* ---- gaps -------------------------------------------------------------------------------------------------------- */

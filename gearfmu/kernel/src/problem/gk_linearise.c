@@ -66,10 +66,11 @@ static int form(const gk_model *model, const gk_setup *setup, gk_work *work, con
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     gk_rows_pose(model, setup, e, data->x, gk_ground_seen(data), engaged->pose);
-    engaged->places =
-        GK_ON(setup, roll_motion)
-            ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->reach, engaged->position, engaged->place)
-            : gk_still_find(model, setup, mesh, meshing->still, engaged->pose, engaged->position, engaged->place);
+    engaged->places = GK_ON(setup, roll_motion)
+                          ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->search_distance,
+                                          engaged->position, engaged->place)
+                          : gk_frozen_find(model, setup, mesh, meshing->frozen, engaged->pose, engaged->position,
+                                           engaged->place);
     if (engaged->places < 0) return engaged->places = 0;
     for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
     gk_rows_form(setup, work, e);

@@ -86,7 +86,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
 {
 #define OF(array) ((gk_quad *)s->array)
     for (int q = 0; q < quads; q++) {
-        OF(squeeze)[q] = OF(linear)[q] + OF(delta)[q];
+        OF(approach)[q] = OF(linear)[q] + OF(delta)[q];
         gk_quad force = OF(force)[q];
         if (films) {
             const gk_quad closes = OF(film->closes)[q], sinks = OF(film->sinks)[q];
@@ -94,9 +94,10 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
             OF(film->lift)[q] = GK_CHOOSE(force < closes, sinks, GK_ALL(0.0));
             force += sinks * (carried - OF(force0)[q]);
         }
-        OF(dash)[q] = OF(gain)[q] * (OF(squeeze)[q] - OF(squeeze0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
-        OF(end)[q] = OF(late)[q] * OF(dash)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
-        OF(eta)[q] = s->alpha * OF(direction)[q] + OF(dash)[q];
+        OF(damper)
+        [q] = OF(gain)[q] * (OF(approach)[q] - OF(approach0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
+        OF(end)[q] = OF(late)[q] * OF(damper)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
+        OF(eta)[q] = s->alpha * OF(direction)[q] + OF(damper)[q];
         OF(z)[q] = force + OF(eta)[q] - OF(begin)[q];
     }
 #undef OF
@@ -126,10 +127,10 @@ void gk_solve_begin(gk_system *s)
     const int quads = s->stride / 4;
     gk_solve_path(s, s->force, s->linear);
     for (int q = 0; q < quads; q++) {
-        ((gk_quad *)s->squeeze)[q] = ((gk_quad *)s->linear)[q] + ((gk_quad *)s->delta)[q];
-        ((gk_quad *)s->squeeze0)[q] = ((gk_quad *)s->squeeze)[q];
+        ((gk_quad *)s->approach)[q] = ((gk_quad *)s->linear)[q] + ((gk_quad *)s->delta)[q];
+        ((gk_quad *)s->approach0)[q] = ((gk_quad *)s->approach)[q];
         ((gk_quad *)s->z)[q] = ((gk_quad *)s->force)[q] - ((gk_quad *)s->begin)[q];
-        ((gk_quad *)s->dash)[q] = ((gk_quad *)s->end)[q] = ((gk_quad *)s->lag)[q] = (gk_quad){0};
+        ((gk_quad *)s->damper)[q] = ((gk_quad *)s->end)[q] = ((gk_quad *)s->lag)[q] = (gk_quad){0};
     }
     for (int i = s->n - s->clutches; i < s->n; i++)
         s->z[i] = s->active[i] ? s->force[i] : s->slip[i - s->n + s->clutches];
@@ -148,9 +149,9 @@ static void residual(const gk_system *s, double *r)
 {
     const gk_quad *outer = (const gk_quad *)s->outer, *beyond = (const gk_quad *)s->beyond;
     const gk_quad *g = (const gk_quad *)s->g, *Dz = (const gk_quad *)s->Dz, *lag = (const gk_quad *)s->lag,
-                  *Al = (const gk_quad *)s->Al, *squeeze = (const gk_quad *)s->squeeze, *on = (const gk_quad *)s->on;
+                  *Al = (const gk_quad *)s->Al, *approach = (const gk_quad *)s->approach, *on = (const gk_quad *)s->on;
     for (int q = 0; q < s->stride / 4; q++)
-        ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + squeeze[q] + outer[q] + beyond[q]) * on[q];
+        ((gk_quad *)r)[q] = -(g[q] + Dz[q] + lag[q] + Al[q] + approach[q] + outer[q] + beyond[q]) * on[q];
     if (!gk_film_on(s)) return;
     for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)r)[q] += ((gk_quad *)s->film->left)[q] * on[q];
 }
@@ -216,7 +217,7 @@ static int violated(const gk_system *s, int i)
     if (is_contact(s, i))
         return s->active[i]
                    ? s->force[i] < 0.0
-                   : gk_solve_end_gap(s, i) + gk_solve_massless(s, i) < (gk_film_on(s) ? s->film->left[i] : 0.0);
+                   : gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i) < (gk_film_on(s) ? s->film->left[i] : 0.0);
     if (!is_clutch(s, i)) return 0;
     if (s->active[i]) return fabs(s->z[i]) > s->bound[i];
     return s->bound[i] > 0.0 && s->z[i] * gk_solve_end_gap(s, i) > 0.0; /* friction must oppose slip */
@@ -248,7 +249,7 @@ static int limit_dashpots(gk_system *s)
     for (int i = 0; i < s->contacts; i++) {
         signed char clip = 2, hold = 0;
         if (s->damping[i] > 0.0 && (s->active[i] || s->force0[i] > 0.0)) {
-            const double free = s->damping[i] * (s->squeeze[i] - s->squeeze0[i]), limit = s->force0[i] + s->force[i];
+            const double free = s->damping[i] * (s->approach[i] - s->approach0[i]), limit = s->force0[i] + s->force[i];
             clip = towards(s->clip[i], beyond(free, limit));
             hold = s->active[i] ? towards(s->hold[i],
                                           beyond(s->beta[i] * gk_clamp(free, -limit, limit) + s->tail[i], s->force[i]))
@@ -303,7 +304,7 @@ void gk_solve_clear(gk_system *s)
     if (stale) gk_solve_settle(s);
 }
 
-/* stored energy of the massless part at the present λ: ½ λᵀ(A + P)λ + Σ Φ(λ) */
+/* stored energy of the quasi-static part at the present λ: ½ λᵀ(A + P)λ + Σ Φ(λ) */
 double gk_solve_stored(const gk_system *s)
 {
     double sum = 0.0;

@@ -31,7 +31,7 @@ typedef struct gk_system {
     gk_row_kind kind[MAX_ROWS];
     int port_of[MAX_ROWS], joint_of[MAX_ROWS]; /* −1 for contacts */
     int place_of[MAX_CONTACTS];
-    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_STRIDE], dash0[MAX_STRIDE], end0[MAX_STRIDE], lag0[MAX_STRIDE];
+    double g[MAX_STRIDE], g0[MAX_ROWS], force0[MAX_STRIDE], damper0[MAX_STRIDE], end0[MAX_STRIDE], lag0[MAX_STRIDE];
     double damping[MAX_STRIDE];                      /* 2c/h of the row's damper */
     double bound[MAX_ROWS], slip[MAX_JOINTS];        /* clutch: |z| ≤ bound; z of a slipping one, by clutch */
     double weight[MAX_ROWS];                         /* slices that a row stands for: η is shared out per slice */
@@ -43,7 +43,7 @@ typedef struct gk_system {
     double *J, *L, *B;          /* (stride, stride) by columns: tangent of the active rows, then its upper factor; lower
                                          factor; what a damper's force does, D + late·A */
     double inverse[MAX_STRIDE]; /* of the pivots */
-    double force[MAX_STRIDE], dash[MAX_STRIDE], eta[MAX_STRIDE],
+    double force[MAX_STRIDE], damper[MAX_STRIDE], eta[MAX_STRIDE],
         z[MAX_STRIDE];                /* λ, η_d, η = η_d + α·direction, λ + η */
     unsigned char active[MAX_STRIDE]; /* in the equations: closed contact, bilateral row, sticking clutch */
     signed char clip[MAX_STRIDE],
@@ -60,18 +60,19 @@ typedef struct gk_system {
     double end[MAX_STRIDE],
         begin[MAX_STRIDE]; /* f_d; mix4, whose forces are linear in the step: f_d at its start, which
                                                   the prediction contains; else 0 */
-    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];               /* D z, Aλ, A f_d */
-    double linear[MAX_STRIDE], squeeze[MAX_STRIDE], squeeze0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
+    double Dz[MAX_STRIDE], Al[MAX_STRIDE], lag[MAX_STRIDE];                 /* D z, Aλ, A f_d */
+    double linear[MAX_STRIDE], approach[MAX_STRIDE], approach0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at λ: δ, δ′, ∫ λ dδ; 0 in joints */
     double slope[MAX_STRIDE];                                           /* δ′ in the tangent */
-    double stored0;   /* energy of the quasi-static part at the start of the step */
-    double held0;     /* energy that the dampers' force holds in Q at the start */
-    double owed, due; /* defect of energy that the steps before left; what of it this step should make good */
-    double rubbing;   /* what friction leaves of that energy in the step (gk_friction_defect) */
-    int rounds, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
-    int dashpots_stand;                      /* where they are: no search for what limits them */
-    int films;                               /* rows whose gap is open at the start of the step, with oil in it */
-    struct gk_film *film;                    /* with the squeeze film */
+    double stored0;           /* energy of the quasi-static part at the start of the step */
+    double held0;             /* energy that the dampers' force holds in Q at the start */
+    double energy_error;      /* defect of energy that the steps before left */
+    double energy_correction; /* what of it this step should make good */
+    double rubbing;           /* what friction leaves of that energy in the step (gk_friction_defect) */
+    int iterations, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
+    int dashpots_stand;                          /* where they are: no search for what limits them */
+    int films;                                   /* rows whose gap is open at the start of the step, with oil in it */
+    struct gk_film *film;                        /* with the squeeze film */
     double outer[MAX_STRIDE],
         beyond[MAX_STRIDE];           /* what other engagements of the island do: to the gaps in the step; as
                                                      deflection at once */
@@ -146,7 +147,10 @@ static inline double gk_solve_mean(const gk_system *s, int i)
 {
     return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]);
 } /* force of a row in the step */
-static inline double gk_solve_massless(const gk_system *s, int i) { return s->Al[i] + s->squeeze[i] + s->beyond[i]; }
+static inline double gk_solve_quasi_static(const gk_system *s, int i)
+{
+    return s->Al[i] + s->approach[i] + s->beyond[i];
+}
 /* gk_tangent.c */
 void gk_tangent_factorise(gk_system *s);
 void gk_tangent_solve(const gk_system *s, double *x);

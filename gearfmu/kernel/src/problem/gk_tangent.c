@@ -94,7 +94,7 @@ void gk_tangent_factorise(gk_system *s)
 {
     for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)s->slope)[q] = ((gk_quad *)s->yield)[q] * ((gk_quad *)s->on)[q];
     GK_SIZED(s->stride / 4, factorise, s)
-    s->rounds++;
+    s->iterations++;
 }
 
 GK_INLINE void forward(const gk_system *s, double *x, const int quads, const int block)

@@ -151,15 +151,15 @@ struct gk_work {
 /* gk_flank.c */
 void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
 void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
-int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose, double reach,
-                  gk_position position[2], gk_place *place);
+int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
+                  double search_distance, gk_position position[2], gk_place *place);
 /* gk_nodal.c */
 void gk_nodal_leave(gk_system *s);
 void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                     const gk_real *const speed[], double spin_rate[]);
-/* gk_still.c */
-int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *still,
-                  const double *pose, gk_position position[2], gk_place *place);
+/* gk_frozen.c */
+int gk_frozen_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *frozen,
+                   const double *pose, gk_position position[2], gk_place *place);
 /* gk_choose.c */
 gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
 int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g);

@@ -28,7 +28,7 @@ static void take_contacts(const passage *c, int e)
 {
     const gk_system *s = &c->work->engaged[e].system;
     gk_meshing *meshing = &c->data->meshing[e];
-    meshing->owed = 0.0;
+    meshing->energy_error = 0.0;
     meshing->adopted = 1;
     if (c->old->strips != c->setup->strips) meshing->pairs = 0;
     for (int p = 0, i = 0; p < meshing->pairs; p++)
@@ -48,7 +48,7 @@ static void take_head(const passage *c)
     c->data->state_h = c->data->state_gamma = c->data->expressed_h = c->data->expressed_gamma = 0.0;
     c->data->table_h = c->data->rk_h = 0.0;
     c->data->steps = 0;
-    c->data->ledger = (gk_ledger){0};
+    c->data->energy = (gk_energy){0};
     for (int e = 0; e < c->model->engagements; e++) take_contacts(c, e);
 }
 

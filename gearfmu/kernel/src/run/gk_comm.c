@@ -124,7 +124,7 @@ static gk_outcome advance(const gk_model *model, const gk_setup *setup, gk_work 
     set_ports(model, work, data, c, tau, h);
     gk_outcome outcome = setup->step(model, setup, work, data, h, gk_limit_gamma(setup, work, data, h));
     if (outcome == GK_OK || gk_scheme_of(setup->integrator)->is_explicit) return outcome;
-    data->trouble++;
+    data->retried++;
     memcpy(work->outer, before, sizeof before);
     if (depth < HALVINGS) {
         outcome = advance(model, setup, work, data, c, tau, 0.5 * h, depth + 1);
@@ -233,8 +233,8 @@ static int all_small(const double *v, size_t count)
 
 static int good_meshing(const gk_meshing *m)
 {
-    int good = m->pairs >= 0 && m->pairs <= MAX_PAIRS && all_small(m->still, POSE) && gk_finite(m->reach) &&
-               gk_finite(m->open_time) && gk_finite(m->squeezed) && gk_finite(m->owed) &&
+    int good = m->pairs >= 0 && m->pairs <= MAX_PAIRS && all_small(m->frozen, POSE) && gk_finite(m->search_distance) &&
+               gk_finite(m->open_time) && gk_finite(m->squeezed) && gk_finite(m->energy_error) &&
                all_small(&m->pitch_angle, 1) && all_small(&m->pitch_time, 1) && all_small(&m->pitch_impulse, 1);
     for (int p = 0; good && p < m->pairs; p++)
         good = (m->memory[p].key.flank == 0 || m->memory[p].key.flank == 1) &&

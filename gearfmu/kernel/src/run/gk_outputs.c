@@ -143,11 +143,11 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     for (int e = 0; e < model->engagements; e++) data->mesh[e][V_TE] = transmission_error(model, data, e);
     gk_amplitudes(model, setup, work, data);
     for (int g = 0; g < model->gears; g++) dynamic += setup->modal[g].count;
-    v[V_WORK] = data->ledger.work;
-    v[V_DISSIPATED] = data->ledger.dissipated;
+    v[V_WORK] = data->energy.work;
+    v[V_DISSIPATED] = data->energy.dissipated;
     v[V_STEPS] = (double)data->steps;
-    v[V_ROUNDS] = (double)data->rounds;
-    v[V_TROUBLE] = (double)data->trouble;
+    v[V_ITERATIONS] = (double)data->iterations;
+    v[V_RETRIED] = (double)data->retried;
     const int lowered = h > 0.0 && gk_scheme_of(setup->integrator)->corrected &&
                         gk_limit_gamma(setup, work, data, h) < 1.0;
     v[V_STATUS] = data->status | (lowered ? STATUS_GAMMA : 0);
@@ -169,18 +169,18 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
 {
     double *v = data->stage;
     if (gk_scheme_of(setup->integrator)->is_explicit) { /* keeps no account of works: no balance */
-        data->ledger.massless = stored(model, work);
+        data->energy.quasi_static = stored(model, work);
         v[V_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(model, setup, work, data, h)
                                                    : gk_step_energy(model, setup, data, &work->explicit_rows);
         return 1;
     }
     const double energy = gk_step_energy(model, setup, data,
                                          gk_flow_for(model, setup, work, data->state_h, data->state_gamma));
-    if (first) data->ledger.baseline = energy - data->ledger.work + data->ledger.dissipated;
+    if (first) data->energy.baseline = energy - data->energy.work + data->energy.dissipated;
     v[V_ENERGY] = energy;
-    v[V_RESIDUAL] = energy - data->ledger.baseline - data->ledger.work + data->ledger.dissipated;
-    const double there = energy + fabs(data->ledger.work) + data->ledger.dissipated;
-    return gk_finite(energy) && !(fabs(v[V_RESIDUAL]) > BROKEN * there + LEAK * data->ledger.through + 1e-6);
+    v[V_RESIDUAL] = energy - data->energy.baseline - data->energy.work + data->energy.dissipated;
+    const double there = energy + fabs(data->energy.work) + data->energy.dissipated;
+    return gk_finite(energy) && !(fabs(v[V_RESIDUAL]) > BROKEN * there + LEAK * data->energy.through + 1e-6);
 }
 
 /* ---- over a communication step ----------------------------------------------------------------------------------- */

@@ -112,7 +112,7 @@ static int tabulated(const gk_node *n, int first, int second, double *out)
 }
 
 /* −C_fs κ C_sf + Σ W Wᵀ/Ω² over the ground oscillators that are not dynamic, between two points */
-static double through_ground(const gk_node *n, int i, int j, const double *still)
+static double through_ground(const gk_node *n, int i, int j, const double *yields)
 {
     const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
     const double *kappa = n->model->ground[set].kappa, *a = n->support + (size_t)i * supports;
@@ -120,18 +120,18 @@ static double through_ground(const gk_node *n, int i, int j, const double *still
     double sum = 0.0;
     for (int s = 0; s < supports; s++)
         if (a[s] != 0.0) sum -= a[s] * dot(kappa + s * supports, n->support + (size_t)j * supports, supports);
-    for (int k = 0; k < reads; k++) sum += x[k] * y[k] * still[k];
+    for (int k = 0; k < reads; k++) sum += x[k] * y[k] * yields[k];
     return sum;
 }
 
 /* 1/Ω² of the ground oscillators that the gear reads and that are not dynamic, 0 of the others */
-static void flexibility_of_still(const gk_node *n, double *still)
+static void quasi_static_flexibility(const gk_node *n, double *yields)
 {
     const gk_base *base = &n->setup->base;
     const int32_t *list = n->gear->ground[base->set].list;
     for (int k = 0; k < n->gear->ground[base->set].reads; k++) {
         const double omega = n->model->ground[base->set].omega[list[k]];
-        still[k] = base->slot[list[k]] >= 0 ? 0.0 : 1.0 / (omega * omega);
+        yields[k] = base->slot[list[k]] >= 0 ? 0.0 : 1.0 / (omega * omega);
     }
 }
 
@@ -150,7 +150,7 @@ static double carried_halfway(const gk_node *n, int at, int i, int j)
 
 /* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its
  * damper is parallel to. Halfway to the next node: what makes the parabola there right. */
-static void store_block(const gk_node *n, int at, int halfway, const double *still, int p, int q)
+static void store_block(const gk_node *n, int at, int halfway, const double *yields, int p, int q)
 {
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
@@ -162,7 +162,7 @@ static void store_block(const gk_node *n, int at, int halfway, const double *sti
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = 2 * (size_t)i * columns + (size_t)j, mirrored = 2 * (size_t)j * columns + (size_t)i;
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
-        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, i, j, still);
+        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, i, j, yields);
         const double all = (near ? cell[c] : stored) + ground;
         if (halfway) {
             const double middle = all - carried_halfway(n, at, i, j);
@@ -175,10 +175,10 @@ static void store_block(const gk_node *n, int at, int halfway, const double *sti
     }
 }
 
-static void store_residual(const gk_node *n, int at, int halfway, const double *still)
+static void store_residual(const gk_node *n, int at, int halfway, const double *yields)
 {
     for (int p = 0; p < n->side->candidates; p++)
-        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, still, p, q);
+        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, yields, p, q);
 }
 
 /* Compliance of one tooth by a table without offsets, between two points */
@@ -207,7 +207,7 @@ static double carried_by(const gk_node *n, const double *a, const double *b, int
 
 /* What is not dynamic yields along the normal and along the profile per force along the profile. One tooth by its own
  * table; of others what stored modes carry. */
-static void store_along_residual(const gk_node *n, int at, const double *still)
+static void store_along_residual(const gk_node *n, int at, const double *yields)
 {
     const gk_side *side = n->side;
     const gk_gear *gear = n->gear;
@@ -225,7 +225,7 @@ static void store_along_residual(const gk_node *n, int at, const double *still)
             double normal = sign * carried_by(n, a, t, from, to), along = sign * carried_by(n, s, t, from, to);
             if (same)
                 normal += own * one_tooth(n, gear->along_normal, i, j), along += one_tooth(n, gear->along_own, i, j);
-            for (int k = 0; k < reads; k++) normal += x[k] * v[k] * still[k], along += u[k] * v[k] * still[k];
+            for (int k = 0; k < reads; k++) normal += x[k] * v[k] * yields[k], along += u[k] * v[k] * yields[k];
             const size_t to_table = ((size_t)at * n->points + (size_t)i) * (size_t)side->columns + (size_t)j;
             side->along.normal[to_table] = (gk_real)normal;
             side->along.own[to_table] = (gk_real)along;
@@ -233,7 +233,7 @@ static void store_along_residual(const gk_node *n, int at, const double *still)
 }
 
 /* rows along the profile of what is dynamic, and what friction puts on supports at once */
-static void store_along(const gk_node *n, int at, const double *still)
+static void store_along(const gk_node *n, int at, const double *yields)
 {
     const gk_side *side = n->side;
     const gk_modal *m = &n->setup->modal[side->gear];
@@ -258,13 +258,13 @@ static void store_along(const gk_node *n, int at, const double *still)
                 moves[base->slot[list[k]] - from] = row[k] - rigid[k];
             else if (n->setup->on.residual)
                 for (int s = 0; s < supports; s++)
-                    moved[s] += row[k] * still[k] * ground->support_rows[s * ground->n + list[k]];
+                    moved[s] += row[k] * yields[k] * ground->support_rows[s * ground->n + list[k]];
         for (int s = 0; s < supports; s++) held[s] = dot(ground->kappa + s * supports, moved, supports);
     }
 }
 
 /* flank to bore angle and to supports, beside what dynamic oscillators carry */
-static void store_joints(const gk_node *n, int at, const double *still)
+static void store_joints(const gk_node *n, int at, const double *yields)
 {
     const gk_side *side = n->side;
     const gk_base *base = &n->setup->base;
@@ -277,7 +277,7 @@ static void store_joints(const gk_node *n, int at, const double *still)
         double turned = n->port[i];
         for (int s = 0; s < supports; s++) moved[s] = fs[s];
         for (int k = 0; k < reads; k++) {
-            const double w = row[k] * still[k];
+            const double w = row[k] * yields[k];
             if (w == 0.0) continue;
             for (int s = 0; s < supports; s++) moved[s] += w * ground->support_rows[s * ground->n + list[k]];
             if (n->side->port_of >= 0) turned += w * ground->port_rows[n->side->port_of * ground->n + list[k]];
@@ -347,21 +347,21 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
 {
     gk_side *side = &setup->mesh[e].side[which];
     gk_node n = gk_node_begin(model, setup, work->columns, e, side);
-    double still[MAX_GROUND];
+    double yields[MAX_GROUND];
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
-    flexibility_of_still(&n, still);
+    quasi_static_flexibility(&n, yields);
     for (int at = 0; at <= side->nodes; at++) {
         gk_node_gather(&n, (double)at / side->nodes);
         store_rows(&n, at);
         if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
-        if (setup->on.residual) store_residual(&n, at, 0, still);
-        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, still);
-        if (GK_ON(setup, friction)) store_along(&n, at, still);
-        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, still);
+        if (setup->on.residual) store_residual(&n, at, 0, yields);
+        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, yields);
+        if (GK_ON(setup, friction)) store_along(&n, at, yields);
+        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, yields);
     }
     for (int at = 0; at < side->nodes && setup->on.residual; at++) {
         gk_node_gather(&n, (at + 0.5) / side->nodes);
-        store_residual(&n, at, 1, still);
+        store_residual(&n, at, 1, yields);
     }
     if (!setup->on.elastic || n.e->kind == MESH_FLAT)
         memset(side->ground, 0, nodes * points * (size_t)setup->base.width[side->gear] * sizeof *side->ground);

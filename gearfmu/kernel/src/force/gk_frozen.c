@@ -3,17 +3,17 @@
  * the scheme's invariant (docs/theory.md, eq. 11) must hold exactly. */
 #include "problem/gk_work.h"
 
-static const double STILL_REACH =
+static const double FROZEN_RANGE =
     0.4e-3; /* m: every flank that the motion of a test can close is among the places all the time */
 
-/* All places at the poses `still`, their gaps moved on to `pose` along the gradients; −1 when the poses are
+/* All places at the poses `frozen`, their gaps moved on to `pose` along the gradients; −1 when the poses are
  * meaningless */
-int gk_still_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *still,
-                  const double *pose, gk_position position[2], gk_place *place)
+int gk_frozen_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *frozen,
+                   const double *pose, gk_position position[2], gk_place *place)
 {
-    const int found = gk_flank_find(model, setup, mesh, still, STILL_REACH, position, place);
+    const int found = gk_flank_find(model, setup, mesh, frozen, FROZEN_RANGE, position, place);
     double moved[POSE];
-    for (int d = 0; d < POSE; d++) moved[d] = pose[d] - still[d];
+    for (int d = 0; d < POSE; d++) moved[d] = pose[d] - frozen[d];
     for (int p = 0; p < found; p++) gk_flank_move(setup, &place[p], moved);
     return found;
 }
