@@ -347,7 +347,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="squeeze film in open gaps",
         formula="f = −c(d) ḋ while flanks approach, c = 3√2 π η b R^(3/2) [(d + r)^(−3/2) − (H + r)^(−3/2)], "
         "H = 100 µm",
-        equation="2.9, 3.13 (eqs. 8q to 8s, 17p to 17r)",
+        equation="2.9, 3.13 (eqs. 8q to 8s, 17q to 17s)",
         matters=(
             "light-load rattle, reversal, engagement: it takes the momentum ∫ c dd of an approach, and flanks that "
             "bring less do not touch (`gearfmu effects` prints it); nothing where flanks stay closed. Off "

@@ -280,8 +280,7 @@ void gk_balance_solve(const gk_island *island)
     balance b = defect_of_all(island);
     if (b.defect - energy_correction_of(island) < 0.0 && bursts(island, b.defect)) b.defect = 0.0;
     balance own = b;
-    own.defect -= energy_correction_of(
-        island); /* where nothing touches, what is owed waits: the step itself is judged */
+    own.defect -= energy_correction_of(island); /* what earlier steps left may wait: the step itself is judged */
     if (own.defect > 0.0 && open_balance(&own, steady) && dry(island)) {
         gk_balance_solve(island);
         return;
