@@ -7,7 +7,7 @@ Pair with relief, 302 N·m (tip corners 80 N·m), 2000 rpm, one mesh period, h =
 under 600 N·m at 85 rad/s of the carrier; friction on helical_demo;
 settings of each effect in gearfmu/stage/effects.py. Needs valgrind and cc.
 Prints a table and writes gearfmu/stage/effects_cost.csv, where
-docs/effects.md takes it from; with EFFECT only those rows are measured again. Aim (issue 3): off costs at most 5 %
+docs/effects.md takes it from; with EFFECT only those rows are measured again. Aim: off costs at most 5 %
 more than without.
 """
 

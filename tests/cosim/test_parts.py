@@ -202,7 +202,8 @@ def test_the_drivetrain_of_the_page_loads_and_starts_with_a_clutch_that_slips(
     tmp_path: Path, pair: GeneralStage
 ) -> None:
     page = (Path(__file__).resolve().parents[2] / "docs" / "howto-scene.md").read_text(encoding="utf-8")
-    scene, seen = scene_of(tmp_path, page.split("```toml\n")[2].partition("```")[0]), {}
+    block = next(text for text in page.split("```toml\n") if text.startswith('name = "two_machines"'))
+    scene, seen = scene_of(tmp_path, block.partition("```")[0]), {}
     start = start_of(scene, pair, rest_at({"pinion": 0.0, "wheel": 0.0}, seen))
     i, friction = -1.5, 20.0  # N·m: the machine, slower by 26.7 rad/s, holds the flange back
     assert start.speed == pytest.approx({"motor": 100.0, "flange": 100.0 / i, "machine": -40.0})

@@ -56,7 +56,7 @@ def test_every_switch_of_the_table_of_effects_is_a_knob() -> None:
     model = stage_model(scene)
     there = {variable.name for variable in model.kernel_variables()}
     switched = {e.name for e in EFFECTS if e.off_setting and set(e.off_setting) <= there}
-    without = {"friction"}  # this stage says nothing of friction: it is off, and no choice
+    without = {"friction", "film"}  # this stage says nothing of them: they are off, and no choice
     assert {knob.name for knob in space(scene, model).knobs} == (switched - without) | {"step"}
 
 

@@ -29,6 +29,7 @@ def test_nothing_is_written_beyond_the_buffers(monkeypatch: pytest.MonkeyPatch, 
         return buffer, address
 
     monkeypatch.setattr(instance, "aligned", guarded)
+    instance._opened.cache_clear()  # models that are open already have their buffers
     spec = load_stage("helical_demo")
     kernel = assemble(spec, [of_few_modes(body) for body in load_stage_bodies(spec)]).kernel(level=level, slices=10.0)
     kernel.initialize()

@@ -507,8 +507,8 @@ static int find(const pair *q, double search_distance, gk_position position[2], 
     return back < 0 ? -1 : found + back;
 }
 
-/* All tooth pairs whose undeformed gap is below `search_distance` at the given poses, and where the sides stand in their
- * tables; −1 when the poses are meaningless. Without coast flanks those that carry when the first port drives the
+/* All tooth pairs whose undeformed gap is below `search_distance` at the given poses, and where the sides stand in
+ * their tables; −1 when the poses are meaningless. Without coast flanks those that carry when the first port drives the
  * stage. The spins of a flat engagement are translations. */
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
                   double search_distance, gk_position position[2], gk_place *place)

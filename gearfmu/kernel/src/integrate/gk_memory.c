@@ -39,8 +39,8 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
     for (int i = 0; i < s->n; i++) s->held0 += s->lag0[i] * (s->force0[i] + 0.5 * s->end0[i]);
 }
 
-/* The start of the step as this step's compliance sees it: quasi-static deflection and energy under λ0, gaps g0 = s0 − C′λ0
- * − δ(λ0); then the first guess of status and forces */
+/* The start of the step as this step's compliance sees it: quasi-static deflection and energy under λ0, gaps
+ * g0 = s0 − C′λ0 − δ(λ0); then the first guess of status and forces */
 void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s)
 {
     const gk_engaged *engaged = &work->engaged[e];

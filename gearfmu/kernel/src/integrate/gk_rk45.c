@@ -1,6 +1,7 @@
 /* rk45: Dormand–Prince 5(4) with ode45's error control (relative 1e-6, absolute 1e-9 of the largest state of its kind),
- * the paper's way, as a reference and for level paper. Explicit in the dynamic coordinates; the quasi-static part is solved
- * in every evaluation: g + C λ + δ(λ) = 0. Local error per step ~h⁵; step limited by stability at the highest mode. */
+ * the paper's way, as a reference and for level paper. Explicit in the dynamic coordinates; the quasi-static part is
+ * solved in every evaluation: g + C λ + δ(λ) = 0. Local error per step ~h⁵; step limited by stability at the highest
+ * mode. */
 #include "integrate/gk_integrate.h"
 
 static const double RELATIVE = 1e-6, SMALLEST = 1e-12, POSITION = 1e-10, SPEED = 1e-6;

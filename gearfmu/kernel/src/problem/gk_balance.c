@@ -1,6 +1,6 @@
 /* The one scalar of a step that keeps its energy (docs/theory.md, eq. 12; discrete gradient after Gonzalez 1996): η =
- * α·direction on the rows that close or open, α such that the quasi-static part's energy changes by what the forces do to
- * the gaps. */
+ * α·direction on the rows that close or open, α such that the quasi-static part's energy changes by what the forces do
+ * to the gaps. */
 #include "problem/gk_system.h"
 
 #ifndef GK_ENERGY_LIMIT /* rounds of the search for α; a test builds a kernel with none */
@@ -24,8 +24,8 @@ static int open_balance(const balance *b, double tolerance)
     return !(fabs(b->defect) <= tolerance * b->scale + b->rounding);
 }
 
-/* change of the gap over the step as the energy balance sees it: what a given torque does to the quasi-static part is work
- * from outside and counts with its quasi-static displacement alone */
+/* change of the gap over the step as the energy balance sees it: what a given torque does to the quasi-static part is
+ * work from outside and counts with its quasi-static displacement alone */
 static double gap_change(const gk_system *s, int i)
 {
     const int rests = (s->active[i] && !gk_film_sinks(s, i)) || s->kind[i] == ROW_TORQUE;

@@ -79,8 +79,8 @@ static void yielding(const double *S, const double *damping, int n, double *X)
 /* a row that no spring carries has no part in the limit */
 static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING; }
 
-/* C (n, n): compliance of the quasi-static part with all contacts closed under the line load `full`, Q (n, stride) without
- * the κ part; with dashpots what yields to a force of alternating sign */
+/* C (n, n): compliance of the quasi-static part with all contacts closed under the line load `full`, Q (n, stride)
+ * without the κ part; with dashpots what yields to a force of alternating sign */
 void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C)
 {
     const int n = s->n, strips = s->strips;
