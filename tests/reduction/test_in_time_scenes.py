@@ -1,16 +1,19 @@
-"""Scenes of the time-domain comparison (benchmarks/in_time): contact points, and what their tables say."""
+"""Scenes of the time-domain comparison (benchmarks/in_time): contact points, ranking of reductions, CalculiX and the
+kernel beside the finite elements."""
 
 from __future__ import annotations
 
-import csv
 import importlib
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from gearfmu.body import reduce_stage
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh.mesh import rotated
 from gearfmu.geometry.planetary import PlanetaryGeometry
@@ -61,44 +64,77 @@ def test_backlash_is_shared_by_both_flanks(modules: SimpleNamespace) -> None:
     assert 0 < area < 1e-3 and np.all(scene.points.area > 0)
 
 
-def rows(name: str) -> list[dict[str, str]]:
-    with (FOLDER / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+@lru_cache
+def scene_of(name: str) -> tuple[Any, dict[Any, Any]]:
+    """A scene of the comparison and the bodies reduced for it so far."""
+    study = importlib.import_module("compare").STUDIES[name]
+    return study.make(study.meshes), {}
 
 
-def error(scene: str, carrier: str, gears: str, channel: str) -> float:
-    (row,) = [
-        row
-        for row in rows("errors.csv")
-        if (row["scene"], row["carrier"], row["gears"], row["half_step"]) == (scene, carrier, gears, "False")
-        and row["channel"].startswith(channel)
-    ]
-    return float(row["error"])
+@lru_cache
+def run_of(scene: str, carrier: str, gears: str) -> dict[str, np.ndarray]:
+    """Channels of a scene whose bodies are reduced like this, or "whole"."""
+    compare, (made_scene, made) = importlib.import_module("compare"), scene_of(scene)
+    return compare.integrated(made_scene, compare.STUDIES[scene].scheme, compare.Run(carrier, gears), made)
 
 
-def test_tables_say_what_the_paper_says() -> None:
-    """Carrier: Krylov and Rubin on the finite elements, modal truncation beside them. Gears: 400 eigenmodes are good
-    for speeds and not for forces, unless the static residual is there."""
+def error_of(scene: str, carrier: str, gears: str, channel: str) -> float:
+    """Error of a channel, over its rms, against the unreduced scene."""
+    reference, found = run_of(scene, "whole", "whole"), run_of(scene, carrier, gears)
+    (name,) = [name for name in reference if name.startswith(channel)]
+    return float(importlib.import_module("channels").errors(reference[name], found[name])[0])
+
+
+@pytest.mark.full
+def test_reductions_of_the_carrier_rank_as_in_the_paper(modules: SimpleNamespace) -> None:
+    """Krylov and Rubin agree with the finite elements; modal truncation errs a thousand times as much."""
     found = {
-        name: error("carrier_planet", f"{name} 120", "rubin 60", "bolt deflection")
+        name: error_of("carrier_planet", f"{name} 120", "rubin 60", "bolt deflection")
         for name in ("modal", "craig_bampton", "rubin", "krylov")
     }
     assert max(found["rubin"], found["krylov"]) < 1e-3 * found["modal"] and found["craig_bampton"] < 1e-3
-    assert error("carrier_planet", "whole", "rubin 60", "bolt deflection") < 1e-8
-    paper = {c: error("hammering", "krylov 120", "modal 400", c) for c in ("mesh force", "planet speed", "sun speed")}
+    assert error_of("carrier_planet", "whole", "rubin 60", "bolt deflection") < 1e-8
+
+
+@pytest.mark.full
+def test_eigenmodes_of_gears_suffice_for_speeds_and_not_for_forces(modules: SimpleNamespace) -> None:
+    """400 modes of a gear, as in the paper; with the static residual forces are right, too."""
+    run = ("hammering", "krylov 120", "modal 400")
+    paper = {channel: error_of(*run, channel) for channel in ("mesh force", "planet speed", "sun speed")}
     assert paper["planet speed"] < 0.02 and paper["sun speed"] < 0.05 and paper["mesh force"] > 0.1
-    assert error("hammering", "krylov 120", "modal 400 + residual", "mesh force") < 0.1 * paper["mesh force"]
+    residual = error_of("hammering", "krylov 120", "modal 400 + residual", "mesh force")
+    assert residual < 0.1 * paper["mesh force"]
 
 
-def test_calculix_goes_the_same_way() -> None:
-    """Both windows in CalculiX: every channel within 1e-4 of its rms (measured: its printed digits)."""
-    found = rows("window.csv")
-    assert {row["scene"] for row in found} == {"carrier_planet", "hammering"} and len(found) == 11
-    assert all(float(row["largest"]) < 1e-4 for row in found), found
+@pytest.mark.full
+def test_calculix_goes_the_same_way(modules: SimpleNamespace) -> None:
+    """CalculiX's columns of both windows, our side integrated here: every channel within 1e-4 of its rms (CalculiX
+    prints as many digits)."""
+    window, tables = importlib.import_module("window"), importlib.import_module("tables")
+    count = 0
+    for name, make in window.SCENES.items():
+        scene, mark = make(window.MESHES), " | CalculiX"
+        stored = tables.read_columns(FOLDER / f"window_{name}.csv")
+        theirs = {key.removesuffix(mark): column for key, column in stored.items() if key.endswith(mark)}
+        ours = window.channels(scene, window.integrate(scene.assembly, window.SCHEMES[name]))
+        found = window.differences(name, ours, theirs)
+        print(found)
+        assert all(row["largest"] < 1e-4 for row in found)
+        count += len(found)
+    assert count == 11
 
 
-def test_kernel_carries_the_impact_of_the_finite_elements() -> None:
-    """Level full: peak within 5 %, impulse within 1 % of the unreduced gears."""
-    found = {row["model"]: (float(row["peak_N"]), float(row["impulse_mNs"])) for row in rows("kernel.csv")}
-    assert found["kernel, level full"][0] == pytest.approx(found["finite elements"][0], rel=0.05)
-    assert found["kernel, level full"][1] == pytest.approx(found["finite elements"][1], rel=0.01)
+@pytest.mark.full
+def test_kernel_carries_the_impact_of_the_finite_elements(modules: SimpleNamespace, tmp_path: Path) -> None:
+    """Level full against the stored force of the unreduced gears: peak within 5 %, impulse within 1 %."""
+    kernel, tables = importlib.import_module("kernel"), importlib.import_module("tables")
+    reference = tables.read_columns(FOLDER / "curves_kernel.csv")["finite elements"]
+    spec = load_stage(FOLDER / "pair" / "stage.toml")
+    bodies = reduce_stage(spec, tmp_path)
+    parameters = {"level": kernel.FULL, "integrator": kernel.DG4, "h": kernel.SAMPLE}
+    exact, found = (
+        kernel.facts(reference, force) for force in (reference, kernel.kernel_force(spec, bodies, parameters))
+    )
+    print(exact, found)
+    assert found["peak_N"] == pytest.approx(exact["peak_N"], rel=0.05)
+    assert found["impulse_mNs"] == pytest.approx(exact["impulse_mNs"], rel=0.01)

@@ -62,9 +62,9 @@ def spun(free: StageModel, parameters: Mapping[str, float], duration: float = 20
 
 
 def turned(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Time (s) for which the torque has been acting, from the middle of its first internal step on, and the wheel's
-    angle (rad) in excess of its first speed, in the sense of the torque."""
-    return np.maximum(trace.time - START - 0.5e-6, 0.0), -trace["wheel.gear.phi"] - SPEED * trace.time
+    """Time (s) for which the torque has been acting, and the wheel's angle (rad) in excess of its first speed, in the
+    sense of the torque."""
+    return np.maximum(trace.time - START, 0.0), -trace["wheel.gear.phi"] - SPEED * trace.time
 
 
 def test_elastic(plain: StageModel, hand: Pair) -> None:
@@ -186,7 +186,7 @@ def test_contact_damping(free: StageModel, hand: Pair, damping: float) -> None:
     switches = {"effect.contact_damping": float(damping > 0), "effect.hertz": 0.0, "contact_damping": damping or 15e3,
                 "effect.tip_contact": 0.0}  # fmt: skip
     trace = simulate(free, _load_step(wheel[1] / pinion[1]), 1e-3, 2e-6, {"h": 1e-6, **APART, **STIFF, **switches})
-    y, time = trace["mesh.te"], trace.time - 0.5e-6
+    y, time = trace["mesh.te"], trace.time
     phase, decay = omega * math.sqrt(1 - zeta**2) * time, np.exp(-zeta * omega * time)
     step = (force[1] - force[0]) / stiffness
     ring = decay * (np.cos(phase) + zeta / math.sqrt(1 - zeta**2) * np.sin(phase))

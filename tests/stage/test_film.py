@@ -34,14 +34,12 @@ def pair_free(spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
 
 # ---- a falling body: exact -------------------------------------------------------------------------------------------
 def falling(h: float, integrator: float, settings: Mapping[str, float], compliance: float = 0.0) -> Kernel:
-    """Two free bodies that approach under LOAD. dg4 takes a torque set at the start as growing in the first step: half
-    a step of it is put into the speed."""
+    """Two free bodies that approach under LOAD."""
     none, rows = np.zeros(0), np.zeros((1, 0))
     body = FlatBody(2 * MASS, none, none, rows, np.array([[compliance]]))
-    start = SPEED + (0.5 * LOAD * h / MASS if integrator < RK45 else 0.0)
     kernel = Kernel(
         flat_blob("plates", [body, body], FlatContact(gap=START)),
-        {"left.w_start": start, "h": h, "level": 3.0, "integrator": integrator, **settings},
+        {"left.w_start": SPEED, "h": h, "level": 3.0, "integrator": integrator, **settings},
     )
     kernel.initialize()
     kernel.set("left.tau", LOAD)

@@ -75,6 +75,14 @@ static int overlaps(const gk_model *model, const gk_work *work)
     return 0;
 }
 
+/* a given torque is not that of the last step */
+static int torque_jumps(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data)
+{
+    for (int p = 0; p < model->ports; p++)
+        if (setup->given_torque[p] && work->torque[p] != data->joint[p][JOINT_PORT].force) return 1;
+    return 0;
+}
+
 /* One step of length h. GK_OK, or GK_DIVERGED / GK_PENETRATION with data unchanged. γ has no meaning here. */
 gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                            double gamma)
@@ -83,8 +91,9 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
     (void)gamma;
     for (int p = 0; p < model->ports; p++) work->outer_speed[p] = (work->outer[p] - work->outer_before[p]) / h;
     memcpy(outer, work->outer, sizeof outer);
-    if (!(data->rk_h >
-          0.0)) { /* the first step: what stands where accelerations belong are the forces of the equilibrium */
+    /* In the first step forces of the equilibrium take the place of accelerations. A torque that is given anew acts from
+     * the start of the step. */
+    if (!(data->rk_h > 0.0) || torque_jumps(model, setup, work, data)) {
         approach(model, setup, work, data, 0.0);
         if (!gk_rk45_evaluate(model, setup, work, data, 0, work->outer_before)) return GK_DIVERGED;
         arrive(model, setup, work, data, 0.0);

@@ -188,6 +188,15 @@ static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_w
     return GK_OK;
 }
 
+/* A torque that is given anew acts from the start of the step: its mean in the step is the new value, so that the force
+ * at the end that a prediction with the old one needs is as far beyond it (docs/theory.md, 3.3) */
+static void find_jumps(const gk_setup *setup, const gk_work *work, gk_system *s)
+{
+    if (gk_scheme_of(setup->integrator)->linear_force) return; /* mix4: forces are linear in the step */
+    for (int i = s->contacts; i < s->n; i++)
+        if (s->kind[i] == ROW_TORQUE) s->jump[i] = work->torque[s->port_of[i]] - s->force0[i];
+}
+
 /* Tip corners off: did a pair that carried load end with its flank? */
 static int flank_ended(const gk_meshing *meshing, const gk_engaged *engaged, int strips)
 {
@@ -387,7 +396,8 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
         held += s->lag[i] * (s->force[i] + 0.5 * s->end[i]);
         if (s->kind[i] == ROW_TORQUE) {
             const double angle = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
-            feed(&data->energy, mean * (angle - data->angle[port]));
+            const double yielded = gk_solve_quasi_static(s, i) + s->g0[i];
+            feed(&data->energy, mean * (angle - data->angle[port]) - 0.5 * s->jump[i] * yielded);
             data->angle[port] = angle;
         } else if (s->joint_of[i] == JOINT_PORT) {
             feed(&data->energy, mean * (work->outer[port] - work->outer_before[port]));
@@ -479,6 +489,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     for (int e = 0; e < model->engagements; e++) {
         gk_form_system(model, setup, data, k, work, e);
         if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
+        find_jumps(setup, work, &work->engaged[e].system);
         gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
         if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
     }

@@ -460,7 +460,7 @@ double gk_friction_defect(const gk_glide *glide, const gk_system *s)
         const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
         const double moved = glide->end[j] - glide->start_end[j];
         for (int i = 0; i < s->n; i++)
-            sum -= gap[i] * (gk_solve_mean(s, i) * moved +
+            sum -= gap[i] * (gk_solve_static_mean(s, i) * moved +
                              glide->mean[j] * (s->force[i] + s->end[i] - s->force0[i] - s->end0[i]));
         for (int k = 0; k < s->contacts; k++) sum -= glide->mean[k] * own[k] * moved;
     }

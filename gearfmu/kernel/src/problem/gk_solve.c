@@ -98,7 +98,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
         [q] = OF(gain)[q] * (OF(approach)[q] - OF(approach0)[q]) + OF(pull)[q] * (OF(force0)[q] + OF(force)[q]);
         OF(end)[q] = OF(late)[q] * OF(damper)[q] + OF(rest)[q] + OF(held)[q] * OF(force)[q];
         OF(eta)[q] = s->alpha * OF(direction)[q] + OF(damper)[q];
-        OF(z)[q] = force + OF(eta)[q] - OF(begin)[q];
+        OF(z)[q] = force + OF(eta)[q] - OF(begin)[q] + OF(jump)[q];
     }
 #undef OF
     for (int i = s->n - s->clutches; i < s->n; i++)

@@ -54,7 +54,8 @@ typedef struct gk_system {
     double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
         held[MAX_STRIDE]; /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
                              η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), f_d = late·η_d + rest + held·λ1 */
-    int dashpots;         /* any of them */
+    double jump[MAX_STRIDE]; /* of a given torque, at the start of the step; else 0 */
+    int dashpots;            /* any of them */
     double direction[MAX_STRIDE], alpha;
     double last[MAX_STRIDE]; /* forces at the end that the next prediction is made with */
     double end[MAX_STRIDE],
@@ -147,6 +148,10 @@ static inline double gk_solve_mean(const gk_system *s, int i)
 {
     return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]);
 } /* force of a row in the step */
+static inline double gk_solve_static_mean(const gk_system *s, int i)
+{
+    return gk_solve_mean(s, i) - 0.5 * s->jump[i];
+} /* mean of the forces at its start and end, before a given torque jumps: that which does work on what is quasi-static */
 static inline double gk_solve_quasi_static(const gk_system *s, int i)
 {
     return s->Al[i] + s->approach[i] + s->beyond[i];
