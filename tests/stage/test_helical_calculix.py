@@ -43,8 +43,8 @@ def compared(bodies: list[Any], table: str) -> list[dict[str, Any]]:
 
 
 def test_on_one_layer_an_element(bodies: list[Any]) -> None:
-    """Mean transmission error within 4 %. Share of the load that a layer carries, of the largest share: within 3 % where
-    all lines of contact cross the whole width, within 9 % where a line ends at the pinion's tip edge. At the wheel's
+    """Mean transmission error within 4 %. Share of the load on a layer, of the largest share: within 3 % where all
+    lines of contact cross the whole width, within 9 % where a line ends at the pinion's tip edge. At the wheel's
     tip edge, position 0, CalculiX's layers are too coarse (30 %, next test)."""
     rows = compared(bodies, "helical.csv")
     assert {"parallel", "tilted"} == {row["load"][0] for row in rows}
