@@ -92,7 +92,7 @@ def test_a_planned_run_is_checked_from_its_own_states(made: Plan) -> None:
     trace = run_planned(made)
     assert trace.meta["outcome"] == "ok" and not trace.meta["plan"]["trips"]
     assert all(check["kept"] for check in trace.meta["plan"]["checks"]) and trace.meta["plan"]["checks"]
-    assert "Spot check" in plan_sections(trace.meta["plan"])[0]
+    assert "spot check at" in plan_sections(trace.meta["plan"])[0]
 
 
 def test_a_segment_that_loses_contact_trips_and_goes_on_with_the_coast_flank(made_by_hand: Plan) -> None:
