@@ -59,6 +59,7 @@ CASES = {
     "T2 ten slices": Case(parameters={"slices": 10.0}),
     "T3 under 20 N·m": Case(torque=20.0, knock=(0.0, 0.5)),
     "T3 under 600 N·m": Case(torque=600.0, knock=(0.0, 2.0), changes=0),
+    "T3 struck under 600 N·m": Case(torque=600.0, knock=(0.0, 20.0), changes=100),
     "T4 jammed 1 µm": Case(backlash=-1e-6, knock=(0.0, 0.5)),
     "T4 jammed 20 µm": Case(backlash=-20e-6, knock=(0.0, 0.5), changes=0),
     "T5 supports 1e10 N/m": Case(variant=STIFF),
@@ -157,7 +158,7 @@ def test_invariant_holds_in_double(double_library: Path, name: str, carrier: flo
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(("edits", "name"), [(FEW_SWEEPS, "T3 under 600 N·m"), (WITHOUT_ETA, "T1 one slice")])
+@pytest.mark.parametrize(("edits", "name"), [(FEW_SWEEPS, "T3 struck under 600 N·m"), (WITHOUT_ETA, "T1 one slice")])
 def test_controls_are_seen_to_fail(tmp_path: Path, edits: dict[str, str], name: str) -> None:
     """T7: a single sweep over the eight engagements. T8: without the scalar."""
     found = energies(started(CASES[name], STANDING, library=variant(tmp_path, "control", edits)), STEPS, H)
