@@ -113,7 +113,7 @@ def test_torque_on_the_input_over_mesh_force(model: StageModel, mesh: str) -> No
     place = place_of(model, mesh)
     assert abs(place.lever) == pytest.approx(16 * R_SUN, rel=1e-12)
     assert place.most == pytest.approx(model.spec.torque_max * model.spec.set.load_sharing)
-    assert loaded_te(model, [TORQUE], 2, mesh=mesh).stiffness.min() > 0
+    assert loaded_te(model, [TORQUE], 2, mesh=mesh).stage_stiffness.min() > 0
 
 
 def test_mean_mesh_force_holds_the_torque(ideal: SetTeResult) -> None:
@@ -152,7 +152,7 @@ def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: 
     with the torque."""
     result = set_te(model, [0.0, 60.0, TORQUE], 2)
     assert np.allclose(result.te[0], -spec.set.backlash * math.cos(spec.set.pressure_angle), atol=0.15e-6)
-    assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stiffness > 0)
+    assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stage_stiffness > 0)
     other = set_te(model, [-TORQUE], 2)
     assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh
 
