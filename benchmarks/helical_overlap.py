@@ -139,7 +139,7 @@ def row(overlap: float) -> dict[str, Any]:
         "helix_angle_deg": f"{math.degrees(spec.pair.helix_angle):.3f}",
         "contact_ratio": f"{pair.contact_ratio:.4f}",
     }
-    for load, te, stiffness in zip(LINE_LOADS, result.te, result.stiffness, strict=True):
+    for load, te, stiffness in zip(LINE_LOADS, result.te, result.mesh_stiffness, strict=True):
         name = f"{1e-3 * load:g}_N_per_mm"
         found[f"te_mean_um_{name}"] = f"{1e6 * te.mean():.4f}"
         found[f"te_peak_to_peak_um_{name}"] = f"{1e6 * np.ptp(te):.4f}"

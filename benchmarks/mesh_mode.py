@@ -30,7 +30,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     bodies = load_stage_bodies(spec)
     model = assemble(spec, bodies)
     result = loaded_te(model, [torque], positions=64, rigid_bearings=True)
-    stiffness, pairs = result.stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
+    stiffness, pairs = result.mesh_stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()
     gears = PairGeometry.of(spec).gears
     path = own_path(model, torque)
     mass = np.array([v for b, g in zip(bodies, gears, strict=True) for v in (b.mass, b.inertia[2, 2] / g.r_b**2)])

@@ -26,7 +26,10 @@ VERBS = {
         "gearfmu.commands.imports:import_",
         "Check finite elements made elsewhere, fit the involutes; writes nothing.",
     ),
-    "te": ("gearfmu.commands.te:te", "Quasi-static loaded transmission error, load shares and mesh stiffness."),
+    "te": (
+        "gearfmu.commands.te:te",
+        "Quasi-static loaded transmission error, load shares, stiffness of mesh and stage.",
+    ),
     "efficiency": (
         "gearfmu.commands.efficiency:efficiency",
         "What the mesh of a pair loses to friction of its flanks.",

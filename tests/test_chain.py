@@ -53,12 +53,14 @@ def test_te_writes_the_table_of_the_harris_map(tmp_path: Path) -> None:
         "te", "fzg_c", "--torque", "302 N*m", "--torque", "100 N*m", "--positions", 8, "--rigid-bearings", "--out", out
     )
     rows = list(csv.reader(out.open(encoding="utf-8")))
-    assert rows[0][:5] == ["torque_Nm", "position", "te_um", "mesh_stiffness_N_per_um", "share_1"]
+    stiffness = ["mesh_stiffness_N_per_um", "stage_stiffness_N_per_um"]
+    assert rows[0][:6] == ["torque_Nm", "position", "te_um", *stiffness, "share_1"]
     data = np.array(rows[1:], dtype=float)
     assert data[:, 0].tolist() == [302.0] * 8 + [100.0] * 8
     assert data[:8, 1].tolist() == [i / 8 for i in range(8)]
     assert np.all(data[:, 2] > 0) and np.all(data[:8, 2] > data[8:, 2]) and np.all(data[:, 3] > 0)
-    assert np.allclose(data[:, 4:].sum(axis=1), 1, atol=1e-9)
+    assert np.array_equal(data[:, 3], data[:, 4]), "with rigid bearings the stage is its mesh"
+    assert np.allclose(data[:, 5:].sum(axis=1), 1, atol=1e-9)
     assert (tmp_path / "te.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -68,14 +70,16 @@ def test_te_is_zero_without_load(tmp_path: Path) -> None:
     assert np.abs(data[:, 2]).max() < 1e-5 and np.all(data[:, 3] > 50) and "0.0 N·m: mean" in shown
 
 
-def test_te_tells_the_stiffness_of_the_mesh_alone_beside_that_with_bearings(tmp_path: Path) -> None:
+def test_te_names_mesh_and_stage_stiffness_alike_in_table_and_on_the_console(tmp_path: Path) -> None:
     order = ("te", "fzg_c", "--torque", "302 N*m", "--positions", 4, "--out", tmp_path / "te.csv")
     alone, both = (
-        [float(number) for number in re.findall(r"([0-9.]+) N/µm", gearfmu(*order, *more))]
-        for more in (("--rigid-bearings",), ())
+        {name: float(number) for name, number in re.findall(r"(mesh|stage) stiffness ([0-9.]+) N/µm", shown)}
+        for shown in (gearfmu(*order, *more) for more in (("--rigid-bearings",), ()))
     )
-    with_bearings = np.genfromtxt(tmp_path / "te.csv", delimiter=",", names=True)["mesh_stiffness_N_per_um"].mean()
-    assert both == [*alone, pytest.approx(with_bearings, abs=0.06)] and with_bearings < 0.6 * alone[0]
+    table = np.genfromtxt(tmp_path / "te.csv", delimiter=",", names=True)
+    written = {name: table[f"{name}_stiffness_N_per_um"].mean() for name in ("mesh", "stage")}
+    assert both == pytest.approx(written, abs=0.06)
+    assert alone == {"mesh": both["mesh"]} and both["stage"] < 0.6 * both["mesh"]
 
 
 def test_export_and_validate(tmp_path: Path) -> None:

@@ -145,6 +145,11 @@ def test_help_shows_units_as_the_options_take_them(verb: str, capsys: pytest.Cap
     assert code == 0 and units and [to_si(f"1 {unit}", unit) for unit in units] == [1.0] * len(units)
 
 
+def test_inspect_knows_a_stage_by_its_own_name_as_te_does(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call("inspect", "fzg_c_relief", capsys=capsys)
+    assert code == 0 and out == call("inspect", "fzg_c/stage_relief", capsys=capsys)[1]
+
+
 def test_inspect_tells_quantities_with_units_and_json_in_si(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call("inspect", "fzg_c/stage_relief", capsys=capsys)
     told = ("torque_max   600 N*m", "pressure_angle   20 deg", "speed_max    6000 rpm", "tip_diameter     82.46 mm")

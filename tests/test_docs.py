@@ -51,6 +51,35 @@ def test_every_claim_names_what_shows_it() -> None:
         assert all(known) and (known or names and names[0].startswith(("make ", "gearfmu "))), claim
 
 
+def test_a_tolerance_of_a_claim_stands_in_its_test() -> None:
+    """`within 2.5e-4` in docs/validation.md is a number of a test file named beside it."""
+    rows = re.findall(r"^\| (.+) \| (.+) \|$", (ROOT / "docs" / "validation.md").read_text(encoding="utf-8"), re.M)
+    checked = 0
+    for claim, shown in rows:
+        wanted = {float(number) for number in re.findall(r"within (\d[\d.]*e-\d+)", claim)}
+        files = re.findall(r"`(tests/[\w/]+\.py)", shown)
+        if not files or not wanted:
+            continue
+        text = "".join((ROOT / name).read_text(encoding="utf-8") for name in files)
+        assert wanted <= {float(number) for number in re.findall(r"\b\d[\d.]*e-\d+", text)}, claim
+        checked += len(wanted)
+    assert checked >= 3
+
+
+def test_every_theme_of_decisions_is_listed_once_with_its_newest_record() -> None:
+    """Likewise notes; and no decision has two records of the same heading."""
+    text, headings = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8"), []
+    rows = re.findall(r"^\| \[.+\]\((\S+)\) \| (\d+) \| ([\d-]+): (.+) \|$", text, flags=re.MULTILINE)
+    pages = [path for folder in ("decisions", "notes") for path in (ROOT / "docs" / folder).glob("*.md")]
+    assert sorted(row[0] for row in rows) == sorted(f"{page.parent.name}/{page.name}" for page in pages)
+    for page, count, day, newest in rows:
+        found = re.findall(r"^## (.+)\n\n\*([\d-]+)", (ROOT / "docs" / page).read_text(encoding="utf-8"), flags=re.M)
+        assert (int(count), newest, day) == (len(found), *found[0]), page
+        assert day == max(record for _, record in found), page
+        headings += [heading for heading, _ in found]
+    assert len(headings) == len(set(headings))
+
+
 def test_every_page_is_in_the_site() -> None:
     """The navigation of mkdocs.yml holds the pages of docs/, and those that the site takes from outside."""
     listed = re.findall(r"- ([\w/-]+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), flags=re.MULTILINE)

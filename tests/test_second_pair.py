@@ -63,7 +63,7 @@ def test_a_second_pair_from_its_numbers_to_a_running_fmu(tmp_path: Path) -> None
     force = LOAD / pair.gears[0].r_b
     pairs = (result.shares[0] > 1e-6).sum(axis=1).mean()
     print(
-        f"te {1e6 * result.te.mean():.1f} µm, stiffness {1e-6 * result.stiffness.mean():.0f} N/µm, "
+        f"te {1e6 * result.te.mean():.1f} µm, stiffness {1e-6 * result.mesh_stiffness.mean():.0f} N/µm, "
         f"{pairs:.2f} pairs carry"
     )
     assert 9e9 < force / result.te.max() / 18e-3 < 18e9  # N/m², secant of one pair about 14 N/(mm µm)

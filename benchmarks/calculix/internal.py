@@ -127,7 +127,7 @@ def solved(pair: Pair, torque: float, position: int, work: Path) -> dict[str, An
     load, problem, deck, seconds = first_solved(NUDGES, attempt)
     base = np.array([gear.r_b for gear in pair.mesh.gears])
     force, ring = 2 * np.abs(torques(problem, deck.with_suffix(".dat"))) / base  # both halves of the width
-    te = load.te + (torque / base[0] - force) / pair.ours.stiffness[number, position]
+    te = load.te + (torque / base[0] - force) / pair.ours.mesh_stiffness[number, position]
     return {
         "torque_Nm": f"{torque:g}",
         "position": f"{position / POSITIONS:.6f}",

@@ -89,7 +89,7 @@ def solved(spec: StageSpec, ours: TeResult, place: Place, work: Path) -> dict[st
 
     load, solution = first_solved(NUDGES, attempt)
     force, wheel = solution.line_load[0] * width
-    te = load.te + (torque / pair.gears[0].r_b - force) / ours.stiffness[row, position]
+    te = load.te + (torque / pair.gears[0].r_b - force) / ours.mesh_stiffness[row, position]
     return {
         "torque_Nm": f"{torque:g}",
         "position": f"{position / POSITIONS:.6f}",

@@ -42,8 +42,9 @@ def te(
     pitches : teeth of gear A for deviations that differ from tooth to tooth.
     settings : of the kernel (docs/variables.md): slices=10, **{"effect.hertz": False}.
 
-    Of a pair or a train a TeResult: te (T, P) m, mesh stiffness (T, P) N/m, shares of the tooth pairs; of a planetary
-    set a SetTeResult with the load sharing of its planets. Raises SimulationError where there is no equilibrium.
+    Of a pair or a train a TeResult: te (T, P) m, mesh_stiffness and stage_stiffness (T, P) N/m, without and with shafts
+    and bearings, shares of the tooth pairs; of a planetary set a SetTeResult with stage_stiffness
+    and load sharing. Raises SimulationError where there is no equilibrium.
     """
     model, wanted = model_of(stage), [torques] if isinstance(torques, (str, float, int)) else list(torques)
     values, known = [_si(torque, "N*m") for torque in wanted], parameters(model, settings)

@@ -82,23 +82,19 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 
 
 def _shipped(name: Path) -> Path:
-    """File of a shipped stage or scene of that name; an error that names them when there is none."""
-    from gearfmu.errors import GearfmuError
-    from gearfmu.spec.library import library_roots, shipped_stages
+    """File of a shipped scene, or of a stage as `find_stage` knows it; an error that names all when there is none."""
+    from gearfmu.errors import GearfmuError, SpecError
+    from gearfmu.spec.library import find_stage, shipped_stages
     from gearfmu.spec.scene import SHIPPED, shipped_scenes
 
-    stages, scenes = shipped_stages(), shipped_scenes()
+    scenes = shipped_scenes()
     if str(name) in scenes:
         return SHIPPED / f"{name}.toml"
-    found = [
-        path
-        for root in library_roots()
-        for path in (root / name / "stage.toml", root / f"{name}.toml")
-        if path.is_file()
-    ]
-    if not found:
-        raise GearfmuError(f"{name}: no such file; shipped are {', '.join([*stages, *scenes])}")
-    return found[0]
+    try:
+        return find_stage(name)
+    except SpecError:
+        known = ", ".join([*shipped_stages(), *scenes])
+        raise GearfmuError(f"{name}: no such file; shipped are {known}") from None
 
 
 def _hdf5(path: Path) -> dict[str, Any]:

@@ -53,7 +53,8 @@ from gearfmu.commands.shared import Quantity
 )
 def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **where: Any) -> None:
     """Loaded transmission error of STAGE over one pitch or more, output held: te_um = 1e6·(r_bA φ_A + r_bB φ_B) of
-    every mesh.
+    every mesh. Mesh stiffness is that of the mesh alone, bores held on their axes; stage stiffness that with shafts and
+    bearings.
 
     Of a planetary set te_um = 1e6·r_b,s (φ_s − (1 + z_r/z_s) φ_c) over one mesh period, and how its planets share the
     load at sun and ring: normal force over the mean of all planets, and the mesh load factor K_γ (ISO 6336-1).
@@ -69,15 +70,13 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
     meshes = [mesh.name for mesh in model.stage.engagements]
     for mesh in meshes:
         result = loaded_te(model, list(torques), mesh=mesh, **where)
-        firm = where | {"rigid_bearings": True}
-        held = result if where["rigid_bearings"] else loaded_te(model, list(torques), mesh=mesh, **firm)
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
         write_columns(path, result.columns())
         picture = path.with_suffix(".png")
         write_plot(result, picture)
         if len(meshes) > 1:
             click.echo(mesh)
-        _tell(result, held)
+        _tell(result, where["rigid_bearings"])
         click.echo(f"{path}, {picture}")
     _draw_flanks(model, out)
     warn_of_limits(model, torques)
@@ -125,11 +124,11 @@ def set_te_lines(result: Any, load_sharing: float) -> list[str]:
     """Of a set: for every torque the error, K_γ at sun and ring, and the mean share of each planet."""
     lines = []
     for torque, row, stiffness, factor, sharing in zip(
-        result.torque, result.te, result.stiffness, result.load_factor, result.sharing, strict=True
+        result.torque, result.te, result.stage_stiffness, result.load_factor, result.sharing, strict=True
     ):
         lines.append(
-            f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, stiffness at "
-            f"the sun's base circle {1e-6 * stiffness.mean():.1f} N/µm"
+            f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
+            f"stage stiffness at the sun's base circle {1e-6 * stiffness.mean():.1f} N/µm"
         )
         for gear, most, shares in zip(("sun", "ring"), factor, sharing.mean(axis=0), strict=True):
             means = " ".join(f"{share:.3f}" for share in shares)
@@ -138,11 +137,13 @@ def set_te_lines(result: Any, load_sharing: float) -> list[str]:
     return lines
 
 
-def _tell(result: Any, held: Any) -> None:
-    """One line a torque; held: the same with rigid bearings."""
-    for torque, row, mesh, stiffness in zip(result.torque, result.te, held.stiffness, result.stiffness, strict=True):
-        with_bearings = "" if held is result else f", with the bearings {1e-6 * stiffness.mean():.1f} N/µm"
+def _tell(result: Any, rigid_bearings: bool) -> None:
+    """One line a torque; with rigid bearings the stage has the stiffness of its mesh."""
+    for torque, row, mesh, stage in zip(
+        result.torque, result.te, result.mesh_stiffness, result.stage_stiffness, strict=True
+    ):
+        with_bearings = f", stage stiffness {1e-6 * stage.mean():.1f} N/µm (with shafts and bearings)"
         click.echo(
             f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
-            f"mesh stiffness (bores held) {1e-6 * mesh.mean():.1f} N/µm{with_bearings}"
+            f"mesh stiffness {1e-6 * mesh.mean():.1f} N/µm{'' if rigid_bearings else with_bearings}"
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from gearfmu.modes.deformed import DeformedGear, deformed_gear
 from gearfmu.report import deformation as drawn
-from gearfmu.report import mesh_cycle, picture, plots, plots_nvh, plots_runup, plots_set, runup
+from gearfmu.report import mesh_cycle, picture, plots, plots_nvh, plots_runup, plots_set
 from gearfmu.report.chart import Plot
 from gearfmu.report.metrics import MetricsError
 from gearfmu.report.moving import View, moving_view
@@ -95,13 +94,12 @@ def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
     if run.stage is not None:
         makers += [partial(picture.deformed_pair, trace, run.stage, mesh, run.bodies or ()) for mesh in names]
     makers += deformed
-    gathered = _run_up(run)
-    if gathered is not None:
-        makers += [partial(make, gathered) for make in plots_runup.FIGURES]
+    if run.run_up is not None:
+        makers += [partial(make, run.run_up) for make in plots_runup.FIGURES]
     else:
         makers.append(lambda: plots_nvh.force_spectrum(trace, window, run.angles))
     makers += [partial(plots_nvh.order_cuts, trace, mesh, angle) for mesh, angle in run.angles.items()]
-    if gathered is None:
+    if run.run_up is None:
         makers.append(lambda: plots_nvh.force_spectrogram(trace, run.angles))
     return makers
 
@@ -109,10 +107,9 @@ def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
 def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
     """A planetary set: its planets side by side instead of mesh by mesh."""
     trace, window = run.trace, run.window
-    gathered = runup.run_up_of_set(trace, own, window, run.spec, run.bodies)
     over_frequency: list[Maker] = [lambda: plots_set.spectrum(trace, own, window)]
-    if gathered is not None:
-        over_frequency = [partial(make, gathered) for make in plots_runup.FIGURES]
+    if run.run_up is not None:
+        over_frequency = [partial(make, run.run_up) for make in plots_runup.FIGURES]
     return [
         lambda: plots_set.speeds(trace, own),
         lambda: plots.torque_and_slip(trace),
@@ -140,16 +137,6 @@ def _statics(run: Run, groups: Sequence[Sequence[str]]) -> list[Maker]:
     for mesh, loads in run.loads.items():
         makers.append(partial(mesh_cycle.contact_pattern, run.trace, run.stage, mesh, loads))
     return makers
-
-
-def _run_up(run: Run) -> runup.RunUp | None:
-    """The run-up of a pair or train, with its resonances where the stage is at hand; None for no run-up."""
-    if not run.known:
-        return None
-    found, first = runup.run_up_of_meshes(run.trace, run.known, run.window), next(iter(run.known))
-    if found is None or run.stage is None or f"{first}.force" not in found.signals:
-        return found
-    return replace(found, resonances=runup.resonances(found, first, run.spec, run.bodies or ()))
 
 
 def _set_pair(run: Run, own: PlanetSet) -> list[Maker]:

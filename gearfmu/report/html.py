@@ -21,6 +21,7 @@ from gearfmu.stage.deformation import Deformation
 from gearfmu.stage.trace import Trace, TraceError, write_columns
 
 NVH = ("spectrum", "orders", "spectrogram")
+RUN_UP = ("spectrogram_speed", "orders_map", "orders_speed")
 SOUND, LEAST_SAMPLES = "data/sound.wav", 1000
 
 
@@ -69,7 +70,8 @@ def _sound(run: Run, missing: list[str]) -> Sound | None:
 def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sound | None) -> str:
     summary = run.summary
     about = " · ".join(str(summary[key]) for key in ("description", "started") if summary.get(key))
-    over_frequency = [plot for plot in made if plot.name.startswith(NVH)]
+    over_speed = [plot for plot in made if plot.name in RUN_UP]
+    over_frequency = [plot for plot in made if plot.name.startswith(NVH) and plot.name not in RUN_UP]
     others = [plot for plot in made if not plot.name.startswith(NVH)]
     octaves = sections.octaves(run)
     view = turning(run)
@@ -79,13 +81,15 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sou
         page.tiles(sections.tiles(run)),
         page.facts(sections.facts(summary)),
         *[page.warning(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("warnings") or ()],
-        page.contents(_links(others, over_frequency)),
+        page.contents(_links(over_speed, others, over_frequency)),
         *([page.section("Not shown", *[page.note(reason) for reason in missing])] if missing else []),
+        *(sections.warned(run.trace) if over_speed else []),
+        *[page.figure(plot) for plot in over_speed],
         *([page.stage_view("The deformed stage, turning", view.caption)] if view is not None else []),
         *(sections.planets(run) or [page.section("Results", sections.results(run), name="results")]),
         *plan_sections(run.trace.meta.get("plan")),
         *[page.figure(plot) for plot in others],
-        *sections.warned(run.trace),
+        *([] if over_speed else sections.warned(run.trace)),
         *([page.section("Octave bands", octaves, name="octaves")] if octaves else []),
         *[page.figure(plot) for plot in over_frequency],
         *([page.section("Sound", player(sound, SOUND), name="sound")] if sound is not None else []),
@@ -97,9 +101,10 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sou
     return page.page(f"{run.title} – {run.stage_name}", body, made, view)
 
 
-def _links(others: Sequence[Plot], over_frequency: Sequence[Plot]) -> dict[str, str]:
+def _links(over_speed: Sequence[Plot], others: Sequence[Plot], over_frequency: Sequence[Plot]) -> dict[str, str]:
     """Links to the first of the parts of the page that there are."""
-    found = {"results": "Results"}
+    found = {over_speed[0].name: "Run-up"} if over_speed else {}
+    found |= {"results": "Results"}
     for start, words in (
         ("deformed", "Deformation"), ("torque", "Torques and speeds"), ("mesh_cycle", "Mesh cycle"),
         ("contact", "Contact pattern"), ("bearing", "Bearing forces"),

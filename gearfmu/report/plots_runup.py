@@ -10,7 +10,6 @@ from gearfmu.report.names import shown
 from gearfmu.report.plots import RPM
 from gearfmu.report.plots_nvh import heat_of
 from gearfmu.report.runup import PICKUP, RunUp, Signal
-from gearfmu.report.signals import GEAR_PHI, GEAR_SPEED
 
 SHOWN_DB = 60
 BINS = 160  # windows of the frequency map over the run
@@ -189,7 +188,7 @@ def _ticks(run: RunUp, speed: np.ndarray) -> list[Mark]:
 def _speed_at(run: RunUp, centres: np.ndarray, width: float) -> np.ndarray:
     """Mean speed (rad/s) over windows of `width` s around times (s) after the beginning of the part: what the shaft
     turns in them, free of its vibration."""
-    time, angle = run.part.time - run.part.time[0], run.part[f"{run.shaft}{GEAR_PHI}"]
+    time, angle = run.part.time - run.part.time[0], run.turning.angle
     ends = [np.clip(centres + side * width, 0.0, time[-1]) for side in (-0.5, 0.5)]
     turned = np.interp(ends[1], time, angle) - np.interp(ends[0], time, angle)
     return np.asarray(np.abs(turned) / (ends[1] - ends[0]))
@@ -197,7 +196,7 @@ def _speed_at(run: RunUp, centres: np.ndarray, width: float) -> np.ndarray:
 
 def _fastest(run: RunUp) -> float:
     """Hz."""
-    return float(np.abs(run.part[f"{run.shaft}{GEAR_SPEED}"]).max()) / (2 * np.pi)
+    return float(run.turning.speed.max()) / (2 * np.pi)
 
 
 FIGURES = (frequency_maps, order_maps, order_levels)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from gearfmu.report.mesh_cycle import static_loads
 from gearfmu.report.metrics import MetricsError, sample_step
 from gearfmu.report.plots_set import PlanetSet, planet_set
+from gearfmu.report.runup import RunUp, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings, mesh_angles, meshes, window_of_interest
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
@@ -74,6 +75,18 @@ class Run:
     def loads(self) -> dict[str, FlankLoads]:
         """Statics under the run's mean load by engagement."""
         return self.statics[0]
+
+    @cached_property
+    def run_up(self) -> RunUp | None:
+        """The run-up within the window, that of a pair or train with its resonances where the stage is at hand; None
+        where no shaft gathers speed (or loses it) steadily."""
+        if self.planets is not None:
+            return run_up_of_set(self.trace, self.planets, self.window, self.spec, self.bodies)
+        found = run_up_of_meshes(self.trace, self.known, self.window) if self.known else None
+        first = next(iter(self.known), "")
+        if found is None or self.stage is None or f"{first}.force" not in found.signals:
+            return found
+        return replace(found, resonances=resonances(found, first, self.spec, self.bodies or ()))
 
     @property
     def title(self) -> str:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import make_lsq_spline
 
 from gearfmu.errors import SimulationError
 from gearfmu.modes.linear import stage_modes
@@ -22,7 +23,8 @@ from gearfmu.stage.place import place_of
 from gearfmu.stage.trace import Trace
 
 LEAST_RANGE = 0.3  # of the mean speed, that the shaft gathers in a run-up
-BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive
+BACKWARD = 0.02  # of it: what it may lose on the way, wobble of the drive below one swing per revolution
+LEAST_SAMPLES = 5  # between two knots of the spline that follows the angle
 SLOWEST = 0.02  # of it: slower than that there are no orders
 WHOLE = 0.01  # a mesh frequency over the carrier's that is so near a whole number is that
 SET_ORDERS, PAIR_ORDERS, TRAIN_ORDERS = 3, 6, 4  # mesh orders shown
@@ -54,13 +56,61 @@ class Signal:
 
 
 @dataclass(frozen=True)
+class Turning:
+    """Rotation of a shaft without its vibration: angle (n,) rad, growing where the shaft turns in its own sense, and
+    speed (n,) rad/s, positive likewise."""
+
+    angle: np.ndarray
+    speed: np.ndarray
+
+    @staticmethod
+    def of(time: np.ndarray, angle: np.ndarray) -> Turning:
+        """Rotation in the recorded angle (n,) rad at time (n,) s.
+
+        A cubic spline with one knot per revolution is fitted to the angle by least squares. It follows swings that
+        take two revolutions or more; those of one revolution and less, which teeth excite, stay out.
+        """
+        angle = angle if angle[-1] > angle[0] else -angle
+        path = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(angle)))))
+        knots = _apart(np.searchsorted(path, np.arange(2 * np.pi, path[-1], 2 * np.pi)), time.size)
+        if time.size <= LEAST_SAMPLES:
+            return Turning(angle, np.gradient(angle, time))
+        ends = np.repeat(time[[0, -1]], 4)
+        fitted = make_lsq_spline(time, angle, np.concatenate((ends[:4], time[knots], ends[4:])))
+        return Turning(fitted(time), fitted(time, 1))
+
+    @property
+    def steady(self) -> bool:
+        """Does the shaft gather speed, or lose it, steadily and without standing still?"""
+        speed = self.speed
+        gained, most = speed[-1] - speed[0], max(float(speed.mean()), 1e-9)
+        against = speed - np.maximum.accumulate(speed) if gained > 0 else np.minimum.accumulate(speed) - speed
+        return bool(
+            abs(gained) >= LEAST_RANGE * most and against.min() >= -BACKWARD * most and speed.min() >= SLOWEST * most
+        )
+
+
+def _apart(places: np.ndarray, count: int) -> list[int]:
+    """Those of ascending `places` that have LEAST_SAMPLES of `count` samples from each to the next and to the ends."""
+    kept = [0]
+    for place in places.tolist():
+        if place - kept[-1] >= LEAST_SAMPLES and count - place > LEAST_SAMPLES:
+            kept.append(place)
+    return kept[1:]
+
+
+@dataclass(frozen=True)
 class RunUp:
-    """Part of a trace in which a shaft gathers speed (or loses it) steadily. families: mesh frequency over the shaft's
-    of every mesh, one of a pair or set; signals by name; resonances: natural frequencies of the linearised stage that
-    its transmission error drives, Hz; others: speeds of other shafts over this one's, by name."""
+    """Part of a trace in which a shaft gathers speed (or loses it) steadily, and the shaft's rotation in it.
+
+    families: mesh frequency over the shaft's of every mesh, one of a pair or set; signals by name; resonances: natural
+    frequencies of the linearised stage that its transmission error drives, Hz; others: speeds of other shafts over
+    this one's, by name.
+    """
 
     part: Trace
     shaft: str
+    turning: Turning
     families: Mapping[str, float]
     signals: Mapping[str, Signal]
     resonances: tuple[float, ...] = ()
@@ -86,8 +136,7 @@ class RunUp:
     @cached_property
     def orders(self) -> dict[str, metrics.OrderMap]:
         """The order map of every signal."""
-        angle, time = self.part[f"{self.shaft}{GEAR_PHI}"], self.part.time
-        angle = angle if angle[-1] > angle[0] else -angle
+        time, angle = self.part.time, self.turning.angle
         return {
             name: metrics.order_map(time, own.values, angle, self.highest, averaged=own.averaged)
             for name, own in self.signals.items()
@@ -103,17 +152,18 @@ def run_up_of_set(
     if any(f"{name}{GEAR_SPEED}" not in part for name in names) or f"{own.carrier}{GEAR_PHI}" not in part:
         return None
     speeds = {name: part[f"{name}{GEAR_SPEED}"] for name in names}
-    speed = np.abs(speeds[own.carrier])
-    if not _gathers(speed):
+    turning = Turning.of(part.time, part[f"{own.carrier}{GEAR_PHI}"])
+    if not turning.steady:
         return None
-    each = float(np.mean(np.abs(own.meshing.relative(speeds)))) / float(speed.mean()) * own.meshing.teeth
+    carrier = float(np.mean(np.abs(speeds[own.carrier])))
+    each = float(np.mean(np.abs(own.meshing.relative(speeds)))) / carrier * own.meshing.teeth
     each = round(each) if abs(each - round(each)) < WHOLE else each
     signals = _signals(part, own, each)
     velocity = None if spec is None or not bodies else rim_velocity(part, own, spec, bodies)
     if velocity is not None:
         beside = {k: passing_orders(k * each, len(own.planets)) for k in range(1, SET_ORDERS + 1)}
         signals = {PICKUP: Signal(velocity, "m/s", 1e-9, beside)} | signals
-    return RunUp(part, own.carrier, {"": each}, signals) if signals else None
+    return RunUp(part, own.carrier, turning, {"": each}, signals) if signals else None
 
 
 def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window) -> RunUp | None:
@@ -122,10 +172,11 @@ def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window)
     part, rotors = trace.window(window.start, window.end), [meshing.rotor for meshing in known.values()]
     if any(meshing.carrier is not None for meshing in known.values()):
         return None
-    if any(f"{gear}{end}" not in part for gear in rotors for end in (GEAR_SPEED, GEAR_PHI)):
+    if any(f"{gear}{GEAR_PHI}" not in part for gear in rotors):
         return None
     first = rotors[0]
-    if not _gathers(np.abs(part[f"{first}{GEAR_SPEED}"])):
+    turning = Turning.of(part.time, part[f"{first}{GEAR_PHI}"])
+    if not turning.steady:
         return None
     turned = {gear: float(np.ptp(part[f"{gear}{GEAR_PHI}"][[0, -1]])) for gear in _rotors(part)}
     families = {mesh: own.teeth * turned[own.rotor] / turned[first] for mesh, own in known.items()}
@@ -137,7 +188,7 @@ def run_up_of_meshes(trace: Trace, known: Mapping[str, Meshing], window: Window)
         names = _loudest_bearings(part)
     names += [f"{mesh}.force" for mesh in known]
     signals = {name: _force(part, name) for name in names if name in part or f"{name}_mean" in part}
-    return RunUp(part, first, families, signals, orders_shown=shown, others=others) if signals else None
+    return RunUp(part, first, turning, families, signals, orders_shown=shown, others=others) if signals else None
 
 
 def _rotors(part: Trace) -> list[str]:
@@ -167,15 +218,6 @@ def resonances(run: RunUp, mesh: str, spec: Any, bodies: Sequence[Any]) -> tuple
         return ()
     strong = np.any(loud(found), axis=1)
     return tuple(float(f) for f in found.frequency.mean(axis=0)[strong])
-
-
-def _gathers(speed: np.ndarray) -> bool:
-    """Does a shaft gather speed, or lose it, steadily and without standing still?"""
-    gained, most = speed[-1] - speed[0], max(float(speed.mean()), 1e-9)
-    against = speed - np.maximum.accumulate(speed) if gained > 0 else np.minimum.accumulate(speed) - speed
-    return bool(
-        abs(gained) >= LEAST_RANGE * most and against.min() >= -BACKWARD * most and speed.min() >= SLOWEST * most
-    )
 
 
 def _force(part: Trace, name: str) -> Signal:

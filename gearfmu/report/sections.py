@@ -145,7 +145,9 @@ def warned(trace: Trace) -> list[str]:
 
 
 def octaves(run: Run) -> str:
-    """Table of octave-band levels; "" without any."""
+    """Table of octave-band levels; "" without any, and of a run-up, whose levels change with its speed."""
+    if run.run_up is not None:
+        return ""
     try:
         levels = plots_nvh.octave_table(run.trace, run.window)
     except MetricsError:

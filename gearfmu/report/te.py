@@ -1,5 +1,5 @@
-"""Picture of a loaded transmission error: one curve a torque (Harris map), and the mesh stiffness below; of a
-planetary set also how its planets share the load."""
+"""Picture of a loaded transmission error: one curve a torque (Harris map), stiffness of mesh and stage below; of
+a planetary set also how its planets share the load."""
 
 from __future__ import annotations
 
@@ -12,16 +12,21 @@ from gearfmu.report.style import panels, styled
 
 
 def write_plot(result: Any, path: Path) -> None:
-    """Write a TeResult, te (T, P) m and stiffness (T, P) N/m over position (P,) in pitches, as PNG or what the
-    suffix says."""
+    """Write a TeResult, te (T, P) m, mesh_stiffness (full lines) and stage_stiffness (broken lines), (T, P) N/m, over
+    position (P,) in pitches, as PNG or what the suffix says. mesh_stiffness None: of a planetary set, stage alone."""
     with styled():
         figure, (upper, lower) = panels((2.6, 1.9))
-        for torque, error, stiffness in zip(result.torque, result.te, result.stiffness, strict=True):
+        for torque, error in zip(result.torque, result.te, strict=True):
             upper.plot(result.position, 1e6 * error, label=f"{torque:.4g} N·m", marker=".", ms=2.5)
-            lower.plot(result.position, 1e-6 * stiffness, marker=".", ms=2.5)
+        for name, line in (("mesh stiffness", "-"), ("stage stiffness", "--")):
+            curves = getattr(result, name.replace(" ", "_"))
+            for k, stiffness in enumerate(() if curves is None else curves):
+                lower.plot(result.position, 1e-6 * stiffness, f"C{k}{line}", label="" if k else name)
+        lower.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
         upper.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=6, borderaxespad=0.1)
         upper.set_ylabel("transmission error in µm")
-        lower.set_ylabel("mesh stiffness in N/µm")
+        lower.set_ylabel("stiffness in N/µm")
+        lower.set_ylim(0, None)
         lower.set(xlabel="position in pitches", xlim=(0, math.ceil(result.position[-1])))
         with written_whole(path) as temporary:
             figure.savefig(temporary, dpi=150)

@@ -126,9 +126,11 @@ def _table(
 
 
 def _absent(kind: Any, place: tuple[str, ...], field: FieldInfo) -> Iterator[str]:
-    """An optional table that is not there, as comments."""
+    """An optional table that is not there, as comments; tables in it have one more comment sign."""
     yield f"\n# [{'.'.join(place)}]  # {field.description}"
-    yield from (f"# {line}" for line in _table(kind, {}, place, {}) if not line.startswith("\n"))
+    for line in _table(kind, {}, place, {}):
+        above = "\n" if line.startswith("\n") else ""
+        yield f"{above}# {line.removeprefix(above)}"
 
 
 def _line(key: str, field: FieldInfo, raw: dict[str, Any]) -> str:

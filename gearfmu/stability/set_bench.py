@@ -93,7 +93,7 @@ def thin_ring() -> tuple[RingSpec, ReducedBody]:
 
 @lru_cache(maxsize=2)
 def set_model(variant: SetVariant) -> StageModel:
-    """The assembled set of a variant (110 MB)."""
+    """The assembled set of a variant, a model of some 100 MB."""
     sun, planet, ring, carrier = set_bodies()
     return assemble(set_spec(variant), [sun, planet, thin_ring()[1] if variant.thin else ring, carrier])
 

@@ -157,7 +157,7 @@ def _at_rest(mesh: str) -> tuple[float, float, float, tuple[float, float]]:
     engagement = next(m for m in stage.engagements if m.name == mesh)
     shape = mesh_shape(stage, engagement)
     backlash = float(engagement.backlash * np.cos(shape.alpha_wt))
-    deepest, yields = float(_depth(found.te[0], backlash).max()), float(1.0 / found.stiffness.min())
+    deepest, yields = float(_depth(found.te[0], backlash).max()), float(1.0 / found.stage_stiffness.min())
     return deepest, yields, backlash, (shape.gears[0].r_b, shape.gears[1].r_b)
 
 

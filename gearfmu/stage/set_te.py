@@ -28,14 +28,14 @@ GEARS = ("sun", "ring")  # whose meshes with the planets share the load
 
 @dataclass(frozen=True)
 class SetTeResult:
-    """torque (T,) N·m · position (P,) in mesh periods · te (T, P) m · stiffness (T, P) N/m, tangent d(T_s/r_bs)/dte ·
-    sharing (T, P, 2, N): normal force of each planet over the mean of all, at the sun and at the ring · force (T, P, 2)
-    N, that mean."""
+    """torque (T,) N·m · position (P,) in mesh periods · te (T, P) m · stage_stiffness (T, P) N/m, tangent
+    d(T_s/r_bs)/dte of all meshes with carrier and bearings · sharing (T, P, 2, N): normal force of each planet over the
+    mean of all, at the sun and at the ring · force (T, P, 2) N, that mean."""
 
     torque: np.ndarray
     position: np.ndarray
     te: np.ndarray
-    stiffness: np.ndarray
+    stage_stiffness: np.ndarray
     sharing: np.ndarray
     force: np.ndarray
 
@@ -49,9 +49,9 @@ class SetTeResult:
         return mesh_harmonics(self.te, count, int(self.position[-1]) + 1)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """The table of the result, torques one below the other: torque_Nm, position, te_um, stiffness_N_per_um,
+        """The table of the result, torques one below the other: torque_Nm, position, te_um, stage_stiffness_N_per_um,
         sun_force_N and ring_force_N of the mean planet, sun_share_1 …, ring_share_1 …"""
-        found = common_columns(self) | {"stiffness_N_per_um": 1e-6 * self.stiffness.ravel()}
+        found = common_columns(self) | {"stage_stiffness_N_per_um": 1e-6 * self.stage_stiffness.ravel()}
         found |= {f"{gear}_force_N": self.force[:, :, g].ravel() for g, gear in enumerate(GEARS)}
         for g, gear in enumerate(GEARS):
             found |= {f"{gear}_share_{k + 1}": self.sharing[:, :, g, k].ravel() for k in range(self.sharing.shape[3])}

@@ -23,8 +23,9 @@ SHARES = 4
 
 @dataclass(frozen=True)
 class TeResult:
-    """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · stiffness (T, P) N/m, tangent
-    dF/dte with F along the line of action
+    """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · mesh_stiffness (T, P) N/m of the
+    mesh alone, tangent dF/dte with F along the line of action and the bores held on their axes · stage_stiffness (T, P)
+    N/m, the same tangent with shafts and bearings; with rigid bearings it is the mesh stiffness
     · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come
     into mesh: a pair keeps its column through the pitch, sorted by tooth number.
     """
@@ -32,7 +33,8 @@ class TeResult:
     torque: np.ndarray
     position: np.ndarray
     te: np.ndarray
-    stiffness: np.ndarray
+    mesh_stiffness: np.ndarray
+    stage_stiffness: np.ndarray
     shares: np.ndarray
 
     def harmonics(self, count: int = 5) -> np.ndarray:
@@ -46,8 +48,10 @@ class TeResult:
 
     def columns(self) -> dict[str, np.ndarray]:
         """The table of the result, torques one below the other: torque_Nm, position, te_um, mesh_stiffness_N_per_um,
-        share_1 …"""
-        found = common_columns(self) | {"mesh_stiffness_N_per_um": 1e-6 * self.stiffness.ravel()}
+        stage_stiffness_N_per_um, share_1 …"""
+        found = common_columns(self)
+        for name in ("mesh_stiffness", "stage_stiffness"):
+            found[f"{name}_N_per_um"] = 1e-6 * getattr(self, name).ravel()
         return found | {f"share_{k + 1}": self.shares[:, :, k].ravel() for k in range(self.shares.shape[2])}
 
 
@@ -87,24 +91,22 @@ def loaded_te(
     name of the engagement, the first when None. parameters: of the kernel, e.g. slices=10.
     SimulationError(no_equilibrium), which names the limit of the torque, where there is none.
     """
-    held = {"effect.bearings": 0.0} if rigid_bearings else {}
-    kernel, place = statics_of(model, **held, **parameters), place_of(model, mesh)
+    held = statics_of(model, **{**parameters, "effect.bearings": 0.0})
+    kernel, place = held if rigid_bearings else statics_of(model, **parameters), place_of(model, mesh)
     position, least = np.arange(pitches * positions) / positions, LEAST * place.most
-    te, stiffness, shares = (
-        np.empty((len(torques), position.size)),
-        np.empty((len(torques), position.size)),
-        np.zeros((len(torques), position.size, SHARES)),
-    )
+    te, alone, whole = np.empty((3, len(torques), position.size))
+    shares = np.zeros((len(torques), position.size, SHARES))
     for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         at = -part * place.pitch
         with limit_named(model, torque):
             state = kernel.transmission(at, carried, place.number)
             tangent = _tangent(kernel, at, carried, place.number)
+            firm = tangent if kernel is held else _tangent(held, at, carried, place.number)
         te[i, j] = state.te + (torque - carried) / tangent
-        stiffness[i, j] = tangent / place.lever
+        alone[i, j], whole[i, j] = firm / place.lever, tangent / place.lever
         shares[i, j] = _shares(state, int(part))
-    return TeResult(np.asarray(torques, float), position, te, stiffness, shares)
+    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares)
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:

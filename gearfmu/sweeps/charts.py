@@ -55,12 +55,14 @@ def _harris(table: SweepTable, path: Path) -> Path:
     some = np.flatnonzero(rows)[np.argsort(table[TORQUE][rows])]
     chosen = some[np.unique(np.linspace(0, some.size - 1, min(some.size, MOST_CURVES)).round().astype(int))]
     parts = [_curve(table.curves, row) for row in chosen]
-    te, stiffness = (next(n for n in table.curves if n.endswith(end)) for end in ("te_um", "stiffness_N_per_um"))
+    ends = ("te_um", "mesh_stiffness_N_per_um", "stage_stiffness_N_per_um")
+    te, mesh, stage = ([part[n] for n in table.curves if n.endswith(end) for part in parts] for end in ends)
     result: Any = SimpleNamespace(
         torque=table[TORQUE][chosen],
         position=parts[0]["position"],
-        te=np.array([1e-6 * part[te] for part in parts]),
-        stiffness=np.array([1e6 * part[stiffness] for part in parts]),
+        te=1e-6 * np.array(te[: len(parts)]),
+        mesh_stiffness=1e6 * np.array(mesh[: len(parts)]) if mesh else None,
+        stage_stiffness=1e6 * np.array(stage[: len(parts)]),
     )
     write_plot(result, path)
     return path

@@ -25,8 +25,9 @@ POSITIONS = 41
 
 
 def te_row(model: StageModel, values: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Row and curve of a transmission error. te_mean_um, te_pp_um (peak to peak), te_order_1_um … (rms), mean of the
-    mesh stiffness; of several meshes with the mesh's name before; of a set K_gamma at sun and ring."""
+    """Row and curve of a transmission error. te_mean_um, te_pp_um (peak to peak), te_order_1_um … (rms), means of
+    mesh stiffness and stage stiffness; of several meshes with the mesh's name before; of a set stage stiffness alone,
+    and K_gamma at sun and ring."""
     own = _own(TE, values)
     settings: dict[str, Any] = _settings(TE, model, values)
     torque, positions = own["torque"], int(own.get("positions", POSITIONS))
@@ -105,8 +106,11 @@ def _settings(what: str, model: StageModel, values: Mapping[str, Any]) -> dict[s
 
 
 def _te_numbers(result: Any, before: str) -> dict[str, float]:
-    te, stiffness = 1e6 * result.te[0], 1e-6 * result.stiffness[0]
-    found = {"te_mean_um": te.mean(), "te_pp_um": np.ptp(te), "mesh_stiffness_mean_N_per_um": stiffness.mean()}
+    te = 1e6 * result.te[0]
+    found = {"te_mean_um": te.mean(), "te_pp_um": np.ptp(te)}
+    for name, values in result.columns().items():
+        if name.endswith("stiffness_N_per_um"):
+            found[name.replace("_N_per", "_mean_N_per")] = values.mean()
     found |= {f"te_order_{k + 1}_um": 1e6 * h for k, h in enumerate(result.harmonics(ORDERS)[0])}
     return {before + name: float(value) for name, value in found.items()}
 

@@ -11,11 +11,12 @@ import pytest
 import gearfmu as gf
 from gearfmu import report
 from gearfmu.body import load_bodies
+from gearfmu.cli import outcome
 from gearfmu.report.metrics import MetricsError, order_map
 from gearfmu.report.plots_runup import crossings
 from gearfmu.report.plots_set import planet_set
 from gearfmu.report.ring_pickup import _modal_velocity, velocity_of
-from gearfmu.report.runup import PICKUP, passing_orders, resonances, run_up_of_meshes, run_up_of_set
+from gearfmu.report.runup import PICKUP, Turning, passing_orders, resonances, run_up_of_meshes, run_up_of_set
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import Steady, assemble, simulate
@@ -131,15 +132,17 @@ def test_a_mode_under_a_ramp_moves_as_the_closed_form_says() -> None:
     assert np.allclose(_modal_velocity(t, STEP, omega, _Mode, 0), exact, rtol=0.0, atol=1e-12 * np.abs(exact).max())
 
 
-def pair_sweep() -> Trace:
-    """A pair of 16 teeth on the pinion: order 1 of the mesh, louder where it meets 800 Hz."""
+def pair_sweep(swing: float = 0.0) -> Trace:
+    """A pair of 16 teeth on the pinion: order 1 of the mesh, louder where it meets 800 Hz. swing: of the pinion's speed
+    in that resonance, over its mean."""
     angle = 2.0 * ANGLE
     frequency = 16 * 2.0 * SPEED / (2 * np.pi)
     loud = 1.0 / np.abs(1 - (frequency / 800.0) ** 2 + 0.06j * frequency / 800.0)
     force = 1000.0 + 20.0 * loud * np.cos(16.0 * angle)
+    swung = angle + swing / 16 * loud / loud.max() * np.sin(16.0 * angle)
     channels = {
-        "pinion.gear.w": Channel(2.0 * SPEED, "rad/s"),
-        "pinion.gear.phi": Channel(angle, "rad"),
+        "pinion.gear.w": Channel(np.gradient(swung, TIME), "rad/s"),
+        "pinion.gear.phi": Channel(swung, "rad"),
         "mesh.force": Channel(force, "N"),
         "bearing.pinion.fx": Channel(0.3 * force, "N"),
         "bearing.pinion.fy": Channel(0.9 * force, "N"),
@@ -162,6 +165,53 @@ def test_the_run_up_of_a_pair_has_its_maps_over_the_pinions_speed(tmp_path: Path
     assert 16 * peak / (2 * np.pi) == pytest.approx(800.0, rel=0.03)
     marked = crossings(replace(own, resonances=(800.0,)))
     assert marked[0] == (1, 800.0, pytest.approx(3000.0)) and [order for order, *_ in marked] == [1, 2, 3, 4, 5, 6]
+
+
+def test_the_rotation_of_a_shaft_is_its_angle_without_the_swing_of_a_mesh_resonance() -> None:
+    trace = pair_sweep(0.3)
+    assert np.diff(trace["pinion.gear.w"]).min() < -0.02 * 2.0 * SPEED.mean(), "the recorded speed swings"
+    found = Turning.of(TIME, trace["pinion.gear.phi"])
+    assert found.steady
+    assert np.abs(found.angle - 2.0 * ANGLE).max() < 0.1 * 0.3 / 16
+    assert np.abs(found.speed / (2.0 * SPEED) - 1).max() < 0.01
+    backwards = Turning.of(TIME, -trace["pinion.gear.phi"])
+    assert np.array_equal(backwards.angle, found.angle) and np.array_equal(backwards.speed, found.speed)
+
+
+def test_a_swing_that_takes_several_revolutions_stays_in_the_rotation() -> None:
+    slow = 2.0 * ANGLE + 0.1 * np.sin(2.0 * ANGLE / 4)
+    found = Turning.of(TIME, slow)
+    assert np.abs(found.angle - slow).max() < 0.01
+    short = Turning.of(TIME[:5], slow[:5])
+    assert short.speed == pytest.approx(2.0 * SPEED[:5], rel=0.05), "five samples have their differences"
+
+
+def test_a_swinging_speed_neither_hides_the_run_up_nor_makes_orders_of_its_own(tmp_path: Path) -> None:
+    """An order of constant amplitude keeps its line; over the recorded angle it would have others 16 orders away."""
+    trace = pair_sweep(0.3)
+    trace = replace(trace, channels=trace.channels | {"mesh.force": Channel(np.cos(96.0 * ANGLE), "N")})
+    own = run_up_of_meshes(trace, known_meshings(trace), Window(0.0, DURATION, "here"))
+    assert own is not None
+    found = own.orders["mesh.force"]
+    assert found.amplitude[:, found.order == 48.0].ravel() == pytest.approx(np.sqrt(0.5), rel=1e-2)
+    assert np.nanmax(found.amplitude[:, np.abs(found.order - 48.0) > 1.0]) < 5e-3
+    report.write(trace, trace.meta, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    sections = [part.split('"')[0] for part in text.split('<section id="')[1:]]
+    assert sections[:4] == ["spectrogram_speed", "orders_map", "orders_speed", "results"]
+    assert "octaves" not in sections and "spectrum" not in sections
+
+
+def test_the_command_of_a_run_up_shows_its_orders_through_the_mesh_resonance(tmp_path: Path) -> None:
+    command = ["simulate", "fzg_c/stage_relief", "--torque", "302 N*m", "--speed", "3900 rpm"]
+    assert outcome([*command, "--end-speed", "5700 rpm", "--duration", "0.2 s", "--out", str(tmp_path)]) == 0
+    trace = Trace.load(tmp_path / "trace.h5").window(0.02)
+    speed = np.abs(trace["pinion.gear.w"])
+    lost = np.max(np.maximum.accumulate(speed) - speed) / speed.mean()
+    print(f"the pinion's own speed falls by up to {lost:.1%} of its mean on the way up")
+    assert lost > 0.03, "it swings in the mesh resonance"
+    made = {path.stem for path in (tmp_path / "data").glob("*.csv")}
+    assert {"spectrogram_speed", "orders_map", "orders_speed"} <= made and "spectrum" not in made
 
 
 def test_orders_are_loudest_where_they_meet_the_linearised_stage() -> None:

@@ -47,6 +47,23 @@ def test_shown_defaults_are_the_defaults(tmp_path: Path) -> None:
     assert load_stage(path) == before
 
 
+@pytest.mark.parametrize(("like", "gear"), [("fzg_c", "gears.pinion"), ("planetary54", "ring")])
+def test_an_optional_table_within_another_has_its_heading(tmp_path: Path, like: str, gear: str) -> None:
+    """What a reader takes the comment signs from is the stage with that table."""
+    path = new_stage("mine", like, tmp_path)
+    text = path.read_text(encoding="utf-8")
+    for comment, table in (("# ", "lead"), ("# # ", "lead.end_relief")):
+        start = text.index(f"\n{comment}[{gear}.{table}]")
+        end = text.index("\n\n", start)
+        part = re.sub(f"^{comment}", "", text[start:end], flags=re.M).replace("# crowning", "crowning")
+        part = part.replace('# amount = "… m"', 'amount = "9 um"').replace('# length = "… m"', 'length = "1 mm"')
+        text = text[:start] + part + text[end:]
+    path.write_text(text, encoding="utf-8")
+    found = load_stage(path)
+    lead = found.ring.lead if like == "planetary54" else found.gears[0].lead
+    assert lead.end_relief.amount == pytest.approx(9e-6) and lead.end_relief.length == 1e-3
+
+
 def test_an_existing_file_is_never_touched(tmp_path: Path) -> None:
     path = new_stage("mine", "fzg_c", tmp_path)
     path.write_text("mine", encoding="utf-8")

@@ -4,6 +4,7 @@ loaded one lies as far from that of nominal flanks."""
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -162,23 +163,21 @@ def test_the_phase_of_an_eccentricity_is_that_of_its_angle(spec: StageSpec, bodi
     assert np.abs(te - te.mean() - expected).max() < 0.1e-6
 
 
-def test_mesh_orders_get_sidebands_at_the_shaft_order(spec: StageSpec, bodies: list[ReducedBody]) -> None:
-    """Contact moves along the line of action by what te moves: the mesh order of amplitude A gets the phase 2π e/p_b
-    sin(φ + …) and so the sidebands A J₁(2π e/p_b). Its amplitude goes up and down with the centre distance too, which
-    adds on one side what it takes on the other: their mean is that of the closed form."""
-    e, pair = 200e-6, PairGeometry.of(spec)
-    assert pair.base_pitch > 10 * e
+def test_sidebands_of_mesh_orders_are_those_that_the_page_says(spec: StageSpec, bodies: list[ReducedBody]) -> None:
+    """They are no phase modulation by e: the mean of both sides over A_k J₁(2πk e/p_b), as docs/theory.md has it. The
+    amplitude goes with the centre distance, and of the ends of a pair's path one alone moves."""
+    e, base_pitch = 20e-6, PairGeometry.of(spec).base_pitch
     eccentric = assemble(changed(spec, {"eccentricity": Eccentricity(amount=e)}), bodies)
-    plain = assemble(spec, bodies)
-    lines, nominal = orders(revolution(eccentric, 16, 16, 302.0)), orders(revolution(plain, 16, 16, 302.0))
-    left, mesh, right = lines[15:18]
-    closed = nominal[16] * j1(2 * math.pi * e / pair.base_pitch)
-    print(
-        f"mesh order {1e6 * mesh:.3f} µm of {1e6 * nominal[16]:.3f}, sidebands {1e6 * left:.4f}, {1e6 * right:.4f}, "
-        f"closed form {1e6 * closed:.4f} µm"
-    )
-    assert max(nominal[15], nominal[17]) < 1e-12 and mesh == pytest.approx(nominal[16], rel=0.05)
-    assert (left + right) / 2 == pytest.approx(closed, rel=0.05) and left != pytest.approx(right, rel=0.1)
+    lines, nominal = (orders(revolution(model, 16, 32, 302.0)) for model in (eccentric, assemble(spec, bodies)))
+    assert max(nominal[15], nominal[17]) < 1e-12 and lines[16] == pytest.approx(nominal[16], rel=0.01)
+    page = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
+    said = re.search(r"is ([\d.]+), ([\d.]+) and ([\d.]+) times that product at mesh orders 1, 2 and 3", page)
+    assert said is not None
+    for k, number in enumerate(said.groups(), start=1):
+        closed = nominal[16 * k] * j1(2 * math.pi * k * e / base_pitch)
+        found = (lines[16 * k - 1] + lines[16 * k + 1]) / 2 / closed
+        print(f"mesh order {k}: mean of the side bands {found:.3f} times the phase modulation's")
+        assert found == pytest.approx(float(number), rel=0.03)
 
 
 def test_a_run_shows_the_shaft_order_of_the_closed_form(spec: StageSpec, bodies: list[ReducedBody]) -> None:

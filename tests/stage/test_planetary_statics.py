@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,16 @@ def test_without_coast_flanks_the_set_is_driven_through_those_that_carry(name: s
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
+def test_the_how_to_has_what_te_says(ideal: SetTeResult) -> None:
+    """docs/howto-planetary.md: transmission error at level rigid to 0.1 µm, K_gamma of ideal pins to its digits."""
+    page = (Path(__file__).parents[2] / "docs" / "howto-planetary.md").read_text(encoding="utf-8")
+    said = re.search(r"`planetary54` at 600 N·m is −([\d.]+) µm at `rigid`", page)
+    factors = re.search(r"\| ideal pins \| ([\d.]+) / ([\d.]+) \|", page)
+    assert said is not None and factors is not None
+    assert 1e6 * ideal.te.mean() == pytest.approx(-float(said[1]), abs=0.1)
+    assert ideal.load_factor[0] == pytest.approx([float(number) for number in factors.groups()], abs=1e-3)
+
+
 def force(kernel: Kernel, name: str) -> np.ndarray:
     return np.array([kernel.get(f"{name}.f{direction}") for direction in "xyz"])
 
@@ -113,7 +124,7 @@ def test_torque_on_the_input_over_mesh_force(model: StageModel, mesh: str) -> No
     place = place_of(model, mesh)
     assert abs(place.lever) == pytest.approx(16 * R_SUN, rel=1e-12)
     assert place.most == pytest.approx(model.spec.torque_max * model.spec.set.load_sharing)
-    assert loaded_te(model, [TORQUE], 2, mesh=mesh).stiffness.min() > 0
+    assert loaded_te(model, [TORQUE], 2, mesh=mesh).stage_stiffness.min() > 0
 
 
 def test_mean_mesh_force_holds_the_torque(ideal: SetTeResult) -> None:
@@ -152,7 +163,7 @@ def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: 
     with the torque."""
     result = set_te(model, [0.0, 60.0, TORQUE], 2)
     assert np.allclose(result.te[0], -spec.set.backlash * math.cos(spec.set.pressure_angle), atol=0.15e-6)
-    assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stiffness > 0)
+    assert np.all(np.diff(result.te, axis=0) < -5e-6) and np.all(result.stage_stiffness > 0)
     other = set_te(model, [-TORQUE], 2)
     assert np.allclose(other.te, -result.te[2], atol=2e-6)  # flanks of the other side, another phase of the mesh
 

@@ -63,7 +63,7 @@ def test_unloaded_te_is_zero_where_unmodified_flanks_just_touch(plain: StageMode
     everywhere."""
     result = loaded_te(plain, [0.0, 302.0], 64, rigid_bearings=rigid_bearings)
     assert np.abs(result.te[0]).max() < 1e-11 and result.te[1].min() > 2e-5
-    assert np.all(result.stiffness[0] > 0.4 * result.stiffness[1])
+    assert np.all(result.stage_stiffness[0] > 0.4 * result.stage_stiffness[1])
 
 
 def test_unloaded_te_of_a_relieved_pair_is_the_gap_of_the_nearest_flanks(
@@ -123,7 +123,18 @@ def test_tangent_stiffness_is_the_slope_of_force_over_te(plain: StageModel, pair
     slope = 0.02 * LOAD / pair.gears[0].r_b / (result.te[2] - result.te[0])
     same_pairs = np.all((result.shares[0] > 0) == (result.shares[2] > 0), axis=1)
     assert same_pairs.sum() > 8
-    assert np.allclose(result.stiffness[1][same_pairs], slope[same_pairs], rtol=1e-3)
+    assert np.allclose(result.stage_stiffness[1][same_pairs], slope[same_pairs], rtol=1e-3)
+
+
+def test_bearings_are_a_spring_behind_the_mesh(plain: StageModel, spec: StageSpec) -> None:
+    """1/k of the stage = 1/k of the mesh + Σ 1/k of the bearings, where both have the same pairs in contact; the mesh
+    stiffness is that of held axes."""
+    soft, held = (loaded_te(plain, [LOAD], 16, rigid_bearings=rigid) for rigid in (False, True))
+    assert np.array_equal(soft.mesh_stiffness, held.stage_stiffness)
+    assert np.array_equal(held.mesh_stiffness, held.stage_stiffness)
+    behind = 1 / soft.stage_stiffness - 1 / soft.mesh_stiffness
+    expected = sum(1 / gear.bearing.stiffness for gear in spec.gears)
+    assert np.median(behind) == pytest.approx(expected, rel=2e-2)
 
 
 def test_bearings_add_their_compliance(plain: StageModel, spec: StageSpec, pair: PairGeometry) -> None:

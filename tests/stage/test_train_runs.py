@@ -190,7 +190,7 @@ def test_every_mesh_of_a_train_has_its_transmission_error(two_stage) -> None:
     found = {mesh: loaded_te(two_stage, [100.0, 200.0], 3, mesh=mesh) for mesh in ("stage1", "stage2")}
     assert found["stage1"].te.min() > 0 > found["stage2"].te.max()
     assert all(np.all(np.diff(np.abs(result.te), axis=0) > 0) for result in found.values())
-    assert all(np.all(result.stiffness > 0) for result in found.values())
+    assert all(np.all(result.mesh_stiffness > 0) for result in found.values())
     with pytest.raises(ModelError, match="it has stage1, stage2"):
         loaded_te(two_stage, [100.0], 3, mesh="stage3")
 

@@ -32,6 +32,10 @@ def test_a_point_has_the_numbers_of_the_function_for_one(harris: gf.SweepTable) 
     assert harris["torque_Nm"][good].tolist() == [80.0, 302.0]
     assert harris["te_mean_um"][good] == pytest.approx(1e6 * one.te.mean(axis=1), rel=1e-12)
     assert harris["te_order_1_um"][good] == pytest.approx(1e6 * one.harmonics(1)[:, 0], rel=1e-12)
+    for name in ("mesh_stiffness", "stage_stiffness"):
+        values = 1e-6 * getattr(one, name)
+        assert harris[f"{name}_mean_N_per_um"][good] == pytest.approx(values.mean(axis=1), rel=1e-8)
+        assert harris.curves[f"{name}_N_per_um"] == pytest.approx(values.ravel(), rel=1e-8)
     assert harris.curves["te_um"] == pytest.approx(1e6 * one.te.ravel(), rel=1e-12)
 
 
