@@ -59,7 +59,7 @@ CASES = {
     "T2 ten slices": Case(parameters={"slices": 10.0}),
     "T3 under 20 N·m": Case(torque=20.0, knock=(0.0, 0.5)),
     "T3 under 600 N·m": Case(torque=600.0, knock=(0.0, 2.0), changes=0),
-    "T3 struck under 600 N·m": Case(torque=600.0, knock=(0.0, 20.0), changes=100),
+    "T3 struck under 600 N·m": Case(torque=600.0, knock=(0.0, 20.0), changes=40),
     "T4 jammed 1 µm": Case(backlash=-1e-6, knock=(0.0, 0.5)),
     "T4 jammed 20 µm": Case(backlash=-20e-6, knock=(0.0, 0.5), changes=0),
     "T5 supports 1e10 N/m": Case(variant=STIFF),
