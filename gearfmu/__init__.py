@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gearfmu.api.models import assemble, load, load_scene, reduce
     from gearfmu.api.plans import plan, run_plan
     from gearfmu.api.results import compare, convert, export, write_report
-    from gearfmu.api.runs import drive, run, simulate, te, wound_up
+    from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
     from gearfmu.stage.model import StageModel
@@ -43,6 +43,7 @@ __all__ = [
     "TeResult",
     "Trace",
     "assemble",
+    "assemble_in_scene",
     "compare",
     "convert",
     "drive",
@@ -63,7 +64,7 @@ _HOMES = {
     "api.models": ("assemble", "load", "load_scene", "reduce"),
     "api.plans": ("plan", "run_plan"),
     "api.results": ("compare", "convert", "export", "write_report"),
-    "api.runs": ("drive", "run", "simulate", "te", "wound_up"),
+    "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),
     "stage.model": ("StageModel",),

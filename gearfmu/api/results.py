@@ -12,6 +12,7 @@ from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, Stage, load, model_of
 from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError
+from gearfmu.fmu.opened import read_fmu
 from gearfmu.report import write
 from gearfmu.report.run import Run
 from gearfmu.stage import Trace
@@ -62,13 +63,12 @@ def write_report(
     """
     trace = trace if isinstance(trace, Trace) else Trace.load(trace)
     summary = {**trace.meta, "sound": trace.chosen([sound])[0]} if sound is not None else trace.meta
-    named = stage or stage_of(trace.meta)
-    if not named:
+    if not (stage or stage_of(trace.meta)):
         return write(trace, summary, Path(out))
     try:
-        spec = load(named) if isinstance(named, (str, os.PathLike)) else named
+        spec, bodies = stage_and_bodies(trace.meta, stage)
         deformation = recorded_deformation(trace, Path(home or out))
-        return write(trace, summary, Path(out), spec, load_bodies(spec), deformation)
+        return write(trace, summary, Path(out), spec, bodies, deformation)
     except GearfmuError as error:
         tell(f"the report goes without the deformed pair: {error}")
         return write(trace, summary, Path(out))
@@ -98,8 +98,7 @@ def _run(source: Trace | PathLike) -> Run:
     """A trace with its stage and bodies where they can be read."""
     trace = source if isinstance(source, Trace) else Trace.load(trace_file(source))
     try:
-        spec = load(stage_of(trace.meta) or "")
-        return Run(trace, trace.meta, spec, load_bodies(spec))
+        return Run(trace, trace.meta, *stage_and_bodies(trace.meta))
     except GearfmuError:
         return Run(trace, trace.meta)
 
@@ -126,6 +125,21 @@ def stage_of(meta: Mapping[str, Any]) -> str | None:
     told."""
     path = meta.get("stage_path")
     return path if path and Path(path).is_file() else meta.get("stage")
+
+
+def stage_and_bodies(meta: Mapping[str, Any], stage: PathLike | Stage | None = None) -> tuple[Any, Sequence[Any]]:
+    """The stage of a run and its reduced bodies. meta : of the run's trace or deformation. stage : of the run where it
+    is known; else that of the FMU that was run, with the bodies beside the stage file that `stage_of` names.
+    GearfmuError where there is none such, or where the FMU is another by now."""
+    named = stage or stage_of(meta) or ""
+    own = load(named) if isinstance(named, (str, os.PathLike)) else named
+    path = meta.get("fmu_path")
+    if stage or not path:
+        return own, load_bodies(own)
+    opened = read_fmu(path)
+    if opened.model.hash != (meta.get("model") or meta["hashes"]["model"]):
+        raise GearfmuError(f"{path} was exported again since the run: run again, or name the stage")
+    return opened.with_bodies(own)
 
 
 def recorded_deformation(trace: Trace, home: Path) -> Deformation | None:

@@ -14,7 +14,7 @@ from gearfmu.spec.expand import as_general
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.profile import Profile, read_profile
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.stage import Steady, TeResult, Trace, loaded_te
+from gearfmu.stage import StageModel, Steady, TeResult, Trace, loaded_te
 from gearfmu.stage import simulate as simulate_model
 from gearfmu.stage.set_te import SetTeResult, set_te
 from gearfmu.stage.simulate import Inputs
@@ -126,24 +126,54 @@ def run(
     out : folder of trace.h5, summary.json and the FMU; nothing is written when None.
     stage : another one than the scene's, by name or path or `load`ed (with changes).
     unit : "fmu", exported for this run; "kernel", the same kernel without it: the same bits; or the path of an FMU
-        exported earlier.
+        exported earlier: the stage that it was exported from is run, in place of the scene's, and refused where it
+        does not fit the scene, or is not `stage`.
     verify : run again at half the communication step and estimate the coupling error.
     progress : called with the part that is done, 0 … 1.
 
     The trace's meta is the summary, with the outcome: "ok", or what stopped the run. Raises SpecError, BodyError,
     FmuError and CouplingError where the run cannot begin.
     """
+    spec, own = _scene_and_stage(scene, stage)
+    folder = None if out is None else Path(out)
+    if unit not in ("fmu", "kernel"):
+        staged = Staged.of_fmu(spec, Path(unit), own)
+        return cosim.run(staged, folder, verify=verify, progress=progress)
+    return cosim.run(_staged(spec, own, (), progress), folder, str(unit), verify=verify, progress=progress)
+
+
+def assemble_in_scene(
+    scene: PathLike | SceneSpec,
+    stage: PathLike | Stage | None = None,
+    observe: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> StageModel:
+    """The model of a stage as a scene needs it: with the shafts and the chains of the scene's drivetrain for ports, and
+    the motion of the gears that the scene records as outputs. Exported, it is the FMU to `run` in that scene.
+
+    scene, stage, progress : as in `run`. observe : as in `assemble`, further gears.
+
+    Raises SpecError, MeshError, BodyError, ModelError.
+    """
+    return _staged(*_scene_and_stage(scene, stage), observe, progress).model
+
+
+def _scene_and_stage(scene: PathLike | SceneSpec, stage: PathLike | Stage | None) -> tuple[SceneSpec, Stage | None]:
+    """The scene with the name of the chosen stage, and that stage; None for the scene's own."""
     spec = scene if isinstance(scene, SceneSpec) else load_scene(scene)
-    chosen = spec.stage.name if stage is None else stage
-    own = load(chosen) if isinstance(chosen, (str, os.PathLike)) else chosen
-    if stage is not None:
-        name = str(chosen) if isinstance(chosen, (str, os.PathLike)) else str(chosen.source)
-        spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": name})})
+    if stage is None:
+        return spec, None
+    named = isinstance(stage, (str, os.PathLike))
+    own = load(stage) if isinstance(stage, (str, os.PathLike)) else stage
+    choice = spec.stage.model_copy(update={"name": str(stage) if named else str(own.source)})
+    return spec.model_copy(update={"stage": choice}), own
+
+
+def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progress: Progress | None) -> Staged:
+    """The scene with the model of the stage, of its own when None; bodies that are missing are made."""
+    own = load(scene.stage.name) if own is None else own
     as_general(own)
-    staged = Staged.of(spec, own, reduce(own, progress=progress))
-    fmu = None if unit in ("fmu", "kernel") else Path(unit)
-    kind = "fmu" if fmu is not None else str(unit)
-    return cosim.run(staged, None if out is None else Path(out), kind, fmu, verify, progress)
+    return Staged.of(scene, own, reduce(own, progress=progress), observe)
 
 
 def _si(value: Quantity, unit: str) -> float:

@@ -12,10 +12,14 @@ PORT_KINDS = ("spring", "torque", "fixed")
 
 
 @click.command()
-@click.argument("stage")
+@click.argument("stage", required=False)
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; <stage>.fmu when not given.")
 @click.option(
     "--port", "ports", multiple=True, metavar="SHAFT=KIND", help="Another kind of port: pinion=torque; may repeat."
+)
+@click.option(
+    "--scene",
+    help="A SCENE that the FMU is to run in: it gets the shafts of the scene's drivetrain. Without STAGE the scene's.",
 )
 @click.option(
     "--runtime",
@@ -53,15 +57,21 @@ PORT_KINDS = ("spring", "torque", "fixed")
     help="The file terminalsAndIcons.xml, which some importers read wrongly: docs/howto-fmu.md.",
 )
 @click.option("--sources", is_flag=True, help="Also the C sources of the binary and how to build it.")
-def export(
-    stage: str, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], observe: tuple[str, ...], **how: Any
-) -> None:
+def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], **how: Any) -> None:
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
-    from gearfmu.commands.models import model_of
+    from gearfmu.commands.models import model_in_scene, model_of
     from gearfmu.commands.settings import parameters
 
-    model = model_of(stage, port_kinds(ports), observe=observe)
+    scene, observe = how.pop("scene"), how.pop("observe")
+    if scene is not None:
+        if ports:
+            raise click.UsageError("--scene decides the ports: leave --port away")
+        model = model_in_scene(scene, stage, observe)
+    elif stage is None:
+        raise click.UsageError("name a STAGE, or a scene with --scene")
+    else:
+        model = model_of(stage, port_kinds(ports), observe=observe)
     model = model.with_starts(parameters(model, starts, "--start"))
     path, runtime = out or Path(f"{model.spec.name}.fmu"), how["runtime"]
     fmu.export(model, path, **how)

@@ -26,6 +26,14 @@ def model_of(
     return assemble(with_port_kinds(spec, port_kinds or {}), bodies, observe=observe)
 
 
+def model_in_scene(scene: str, stage: str | None, observe: Sequence[str] = ()) -> StageModel:
+    """`api.assemble_in_scene` of STAGE, the scene's own when None."""
+    from gearfmu.api.runs import assemble_in_scene
+
+    with reducing() as progress:
+        return assemble_in_scene(scene, stage, observe, progress)
+
+
 def bodies_of(stage: str) -> tuple[Any, list[Any]]:
     """The spec of STAGE and its bodies (`api.reduce`)."""
     from gearfmu.api.models import load, reduce

@@ -42,10 +42,13 @@ def _list(context: click.Context, option: Any, wanted: bool) -> None:
     help="Through the exported FMU or the same kernel without it.",
 )
 @click.option(
-    "--fmu", "fmu_path", type=click.Path(path_type=Path), help="An FMU exported earlier; exported anew when not given."
+    "--fmu",
+    "fmu_path",
+    type=click.Path(path_type=Path),
+    help="An FMU exported earlier, which brings its stage; the scene's stage is exported anew when not given.",
 )
 @click.option("--verify", is_flag=True, help="Run again at half the communication step and report the coupling error.")
-@click.option("--stage", help="Another STAGE than the scene's.")
+@click.option("--stage", help="Another STAGE than the scene's; with --fmu the one that the FMU must be of.")
 @click.option("--step", type=Quantity("s"), help="Another communication step than the scene's: 20 us for spectra.")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the shipped scenes."
@@ -54,6 +57,8 @@ def run(scene: str | None, out: Path | None, stage: str | None, step: float | No
     """Run SCENE and write trace.h5, summary.json and report.html."""
     from gearfmu.spec.scene import load_scene
 
+    if how["fmu_path"] is not None and how["unit"] == "kernel":
+        raise click.UsageError("--fmu is run as an FMU: leave --unit kernel away")
     if how["plan_path"] is not None:
         if scene is not None or stage is not None or step is not None or how["verify"]:
             raise click.UsageError("--plan names scene, stage and step itself, and verifies by spot checks: give none")
@@ -61,15 +66,13 @@ def run(scene: str | None, out: Path | None, stage: str | None, step: float | No
     if scene is None:
         raise click.UsageError("name a SCENE, or a plan with --plan")
     spec = load_scene(scene)
-    if stage is not None:
-        spec = spec.model_copy(update={"stage": spec.stage.model_copy(update={"name": stage})})
     spec = spec if step is None else with_step(spec, step)
-    return run_scene(spec, out or Path("out") / spec.name, unit=_unit(how), verify=how["verify"])
+    return run_scene(spec, out or Path("out") / spec.name, stage=stage, unit=_unit(how), verify=how["verify"])
 
 
 def _unit(how: dict[str, Any]) -> Any:
     """ "kernel", "fmu" or the path of an FMU."""
-    return how["fmu_path"] if how["fmu_path"] is not None and how["unit"] == "fmu" else how["unit"]
+    return how["unit"] if how["fmu_path"] is None else how["fmu_path"]
 
 
 @click.command()
@@ -139,11 +142,13 @@ def demo(out: Path) -> int:
 @click.option("--out", type=OUT, help="Folder of the files; FOLDER/deformation when not given.")
 def deformed(path: Path, stage: str | None, out: Path | None) -> None:
     """Write the gears that a run recorded deformed, FOLDER/deformation.h5, as .vtu with a .pvd for ParaView."""
+    from gearfmu.api.results import stage_and_bodies
     from gearfmu.stage.deformation import FILE_NAME, Deformation
 
     found = Deformation.load(path / FILE_NAME if path.is_dir() else path)
     home = path if path.is_dir() else path.parent
-    for written in write_deformed(found, out or home / "deformation", stage or str(found.meta["stage"])):
+    own = stage_and_bodies(found.meta, stage)
+    for written in write_deformed(found, out or home / "deformation", *own):
         click.echo(written)
 
 
@@ -182,17 +187,21 @@ def with_step(scene: Any, step: float) -> Any:
 
 def run_scene(scene: Any, out: Path, **options: Any) -> int:
     """Run the SceneSpec, write everything into `out`, print the outcome; 0 when the run reached its end, else 1."""
-    from gearfmu.api.results import recorded_deformation
+    from gearfmu.api.results import recorded_deformation, stage_and_bodies
     from gearfmu.api.runs import run as run_it
+    from gearfmu.errors import GearfmuError
 
     with progress_bar(scene.name) as progress:
         trace = run_it(scene, out, progress=progress, **options)
     if scene.deformation is not None and scene.deformation.vtu:
         found = recorded_deformation(trace, out)
         assert found is not None
-        for path in write_deformed(found, out / "deformation", scene.stage.name):
-            click.echo(path)
-    return finish(trace, out, scene.stage.name)
+        try:
+            for path in write_deformed(found, out / "deformation", *stage_and_bodies(trace.meta)):
+                click.echo(path)
+        except GearfmuError as error:
+            _tell(f"no .vtu of the deformed gears: {error}")
+    return finish(trace, out, None)
 
 
 def run_plan(path: Path, out: Path | None, unit: Any) -> int:
@@ -206,12 +215,12 @@ def run_plan(path: Path, out: Path | None, unit: Any) -> int:
     with progress_bar(plan.scene) as progress:
         trace = run_it(plan, folder, progress, unit)
     click.echo(run_text(trace.meta["plan"]))
-    return finish(trace, folder, trace.meta["stage"])
+    return finish(trace, folder, None)
 
 
 def finish(trace: Any, out: Path, stage: str | None) -> int:
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
-    else 1."""
+    else 1. stage : as of `api.write_report`."""
     from gearfmu.report.results import REACHED_THE_END
 
     trace.save(out / "trace.h5")
@@ -227,18 +236,16 @@ def finish(trace: Any, out: Path, stage: str | None) -> int:
     return 0 if meta["outcome"] in REACHED_THE_END else 1
 
 
-def write_deformed(deformation: Any, folder: Path, stage: str) -> list[Path]:
-    """.vtu files of every gear of a Deformation in `folder`; the paths of their .pvd."""
-    from gearfmu.body import load_bodies
+def write_deformed(deformation: Any, folder: Path, spec: Any, reduced: Any) -> list[Path]:
+    """.vtu files of every gear of a Deformation in `folder`; the paths of their .pvd. spec, reduced : the stage and its
+    bodies."""
     from gearfmu.modes.deformed import deformed_gear
     from gearfmu.modes.vtu import write_series
     from gearfmu.spec.expand import as_general
-    from gearfmu.spec.stage import load_stage
     from gearfmu.stage.meshes import tooth_phases
     from gearfmu.stage.observed import gear_bodies
 
-    spec = load_stage(stage)
-    bodies = gear_bodies(spec, load_bodies(spec))
+    bodies = gear_bodies(spec, reduced)
     phases = tooth_phases(as_general(spec))
     gears = [deformed_gear(name, bodies[name], motion, phases[name]) for name, motion in deformation.gears.items()]
     return [write_series(gear, deformation.time, folder) for gear in gears]

@@ -16,6 +16,7 @@ from gearfmu.cosim.accuracy import ChannelError, Window, coupling_errors
 from gearfmu.cosim.coupled import OK, CoupledRun, Plan, Progress, Result, run_coupled
 from gearfmu.cosim.drivetrain import build, stage_joints, stage_ports, stage_signals, stage_start
 from gearfmu.cosim.frames import FramePlan, frame_plan
+from gearfmu.cosim.given_fmu import fitted, of_scene
 from gearfmu.cosim.kernel_unit import KernelUnit
 from gearfmu.cosim.masters import Cut, Wiring
 from gearfmu.cosim.parts import part_network, part_ports
@@ -27,6 +28,7 @@ from gearfmu.cosim.summary import summary
 from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
+from gearfmu.fmu.opened import read_fmu
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.scene import SceneSpec, load_scene
@@ -42,19 +44,38 @@ WHOLE = Wiring()
 
 @dataclass(frozen=True)
 class Staged:
-    """A scene with the model of its stage, whose ports are those that the scene's drivetrain needs."""
+    """A scene with the model of its stage, whose ports are those that the scene's drivetrain needs. fmu : the FMU that
+    the model was taken from, None for one that was assembled; remarks : in what the FMU's ports differ."""
 
     scene: SceneSpec
     model: StageModel
+    fmu: Path | None = None
+    remarks: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, scene: SceneSpec, spec: Any = None, bodies: Sequence[Any] | None = None) -> Staged:
-        """spec : of the stage, as the file that the scene names when None; bodies : of `load_bodies(spec)` when None.
+    def of(
+        cls, scene: SceneSpec, spec: Any = None, bodies: Sequence[Any] | None = None, observe: Sequence[str] = ()
+    ) -> Staged:
+        """spec : of the stage, as the file that the scene names when None; bodies : of `load_bodies(spec)` when None;
+        observe : gears whose motion is an output, beside those that the scene records deformed.
         SpecError, BodyError and ModelError as `load_stage`, `load_bodies` and `assemble`."""
         spec = load_stage(scene.stage.name) if spec is None else spec
-        observe = scene.deformation.gears if scene.deformation is not None else ()
+        recorded = scene.deformation.gears if scene.deformation is not None else ()
         bodies = load_bodies(spec) if bodies is None else bodies
-        return cls(scene, assemble(in_drivetrain(scene, spec), bodies, observe=observe))
+        return cls(
+            scene, assemble(in_drivetrain(scene, spec), bodies, observe=list(dict.fromkeys([*recorded, *observe])))
+        )
+
+    @classmethod
+    def of_fmu(cls, scene: SceneSpec, path: str | Path, spec: Any = None) -> Staged:
+        """The scene with the stage that an FMU was exported from: nothing is read of the scene's stage but its kind.
+
+        spec : the stage that the FMU must be of, when given; else it must be of the kind of the scene's. FmuError for a
+        file that is no FMU of ours, SpecError with everything that does not fit the scene."""
+        opened = read_fmu(path)
+        scene = of_scene(scene, opened, spec)
+        scene, remarks = fitted(scene, opened, in_drivetrain)
+        return cls(scene, opened.model, opened.path, remarks)
 
 
 def run(
@@ -67,7 +88,8 @@ def run(
 ) -> Trace:
     """Run a scene (or the scene file or shipped scene of that name; or one whose stage is assembled already).
 
-    unit : "fmu" (exported into out_dir, or taken from fmu_path, which must have the scene's ports) or "kernel".
+    unit : "fmu" (exported into out_dir) or "kernel". fmu_path : an FMU exported earlier, whose stage is run in place of
+    the scene's (`Staged.of_fmu`).
     verify : run again with half the communication step and estimate the coupling error. progress : told the done
     fraction 0 … 1. Writes trace.h5 and summary.json into out_dir, and deformation.h5 where the scene has
     [deformation]. The trace's meta is the summary: outcome "ok" or the name of what stopped the run, last good time,
@@ -76,9 +98,9 @@ def run(
     """
     if unit not in ("fmu", "kernel"):
         raise CouplingError(f"no unit {unit!r}; choose fmu or kernel")
-    staged = scene if isinstance(scene, Staged) else Staged.of(load_scene(scene) if isinstance(scene, str) else scene)
-    scene, model = staged.scene, staged.model
-    with stage_source(model, unit if fmu_path is None or unit == "kernel" else fmu_path, out_dir) as source:
+    staged = scene if isinstance(scene, Staged) else _staged(scene, fmu_path)
+    scene = staged.scene
+    with stage_source(staged, unit, out_dir) as source:
         first = _part(progress, 0.0, 1.0 / 3.0 if verify else 1.0)
         result = run_once(scene, source, first, frames=frame_plan(scene))
         errors = (
@@ -86,7 +108,8 @@ def run(
             if verify and result.outcome == OK
             else None
         )
-        meta = summary(scene, source, result, errors)
+        meta = summary(scene, source, result, errors) | origin(staged)
+        meta["warnings"] = [*staged.remarks, *meta["warnings"]]
         if result.frames is not None and out_dir is not None:
             meta["deformation"] = FILE_NAME
             frames = result.frames.frames(gear_hashes(source.model), _frame_meta(meta))
@@ -98,15 +121,24 @@ def run(
     return trace
 
 
+def _staged(scene: SceneSpec | str, fmu_path: str | Path | None) -> Staged:
+    spec = load_scene(scene) if isinstance(scene, str) else scene
+    return Staged.of(spec) if fmu_path is None else Staged.of_fmu(spec, fmu_path)
+
+
+def origin(staged: Staged) -> dict[str, Any]:
+    """For a trace's meta: the FMU that the stage was taken from, where it was."""
+    return {} if staged.fmu is None else {"fmu_path": str(staged.fmu.resolve())}
+
+
 def stage_model(scene: SceneSpec) -> StageModel:
     """The scene's stage with the ports that its drivetrain needs, assembled from the bodies beside the stage file."""
     return Staged.of(scene).model
 
 
 def _frame_meta(meta: dict[str, Any]) -> dict[str, Any]:
-    return {name: meta[name] for name in ("scene", "description", "stage", "level")} | {
-        "model": meta["hashes"]["model"]
-    }
+    told = ("scene", "description", "stage", "level", "fmu_path")
+    return {name: meta[name] for name in told if name in meta} | {"model": meta["hashes"]["model"]}
 
 
 def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec | GeneralStage:
@@ -123,11 +155,12 @@ def in_drivetrain(scene: SceneSpec, spec: StageSpec | GeneralStage) -> StageSpec
 
 
 @contextmanager
-def stage_source(model: StageModel, unit: str | Path, out_dir: str | Path | None) -> Iterator[Source]:
-    """Where the stage of a run comes from. unit: "kernel", "fmu" (exported into out_dir, a temporary folder when None)
-    or the path of an FMU."""
-    if unit != "fmu":
-        yield Source(model, None if unit == "kernel" else Path(unit))
+def stage_source(staged: Staged, unit: str, out_dir: str | Path | None) -> Iterator[Source]:
+    """Where the stage of a run comes from. unit: "kernel", or "fmu": the one that was given, else exported into out_dir
+    (a temporary folder when None)."""
+    model = staged.model
+    if unit == "kernel" or staged.fmu is not None:
+        yield Source(model, None if unit == "kernel" else staged.fmu)
         return
     with tempfile.TemporaryDirectory(prefix="gearfmu-") as folder:
         yield Source(model, fmu.export(model, Path(out_dir or folder) / f"{model.name}.fmu"))

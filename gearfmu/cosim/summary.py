@@ -12,7 +12,6 @@ from gearfmu.cosim.accuracy import ChannelError
 from gearfmu.cosim.coupled import Result
 from gearfmu.cosim.source import Source
 from gearfmu.kernel.binding import status_words
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.turning import meshings
 
@@ -81,9 +80,7 @@ def _accuracy(source: Source, result: Result, errors: dict[str, ChannelError] | 
 
 
 def _origin(scene: SceneSpec, source: Source) -> dict[str, Any]:
-    spec = source.model.spec
-    names = [gear.name for gear in spec.gears] + (["carrier"] if isinstance(spec, PlanetarySpec) else [])
-    hashes = {f"body {name}": text for name, text in zip(names, source.model.body_hashes, strict=True)}
+    hashes = {f"body {name}": text for name, text in source.model.bodies.items()}
     hashes |= {"scene": scene.hash, "model": source.model.hash}
     if source.fmu_path is not None:
         hashes["fmu"] = hashlib.sha256(source.fmu_path.read_bytes()).hexdigest()

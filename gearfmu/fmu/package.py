@@ -8,38 +8,25 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import Protocol
 
 from gearfmu.errors import FmuError
 from gearfmu.files import written_whole
 from gearfmu.fmu.description import Identity, model_description
 from gearfmu.fmu.documentation import licences, page
 from gearfmu.fmu.source_code import build_description, compiled, source_files
+from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, stage_file
 from gearfmu.fmu.terminals import terminals_and_icons
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.build import host_platform, library_path
+from gearfmu.stage.model import StageModel
 
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
-MODEL_FILE = "resources/model.gkb"
 RUNTIMES = ("native", "python")
 LONGEST_NAME = 40
 
 
-class Model(Protocol):
-    """What export needs of a stage model (gearfmu.stage.StageModel): its name, its bytes and their hash."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def blob(self) -> bytes: ...
-
-    @property
-    def hash(self) -> str: ...
-
-
 def export(
-    model: Model,
+    model: StageModel,
     path: str | Path,
     runtime: str = "native",
     platforms: Sequence[str] = ("host",),
@@ -93,7 +80,7 @@ def content_identifier(name: str, contents: Sequence[bytes]) -> str:
     return f"{'_' if plain[0].isdigit() else ''}{plain}_{digest.hexdigest()[:12]}"
 
 
-def _native_files(model: Model, libraries: Mapping[str, Path], with_sources: bool) -> dict[str, bytes]:
+def _native_files(model: StageModel, libraries: Mapping[str, Path], with_sources: bool) -> dict[str, bytes]:
     binaries = {name: path.read_bytes() for name, path in libraries.items()}
     code = source_files() if with_sources else {}
     identifier = content_identifier(model.name, [model.blob, *binaries.values(), *code.values()])
@@ -106,7 +93,7 @@ def _native_files(model: Model, libraries: Mapping[str, Path], with_sources: boo
     return files
 
 
-def _python_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, bytes]:
+def _python_files(model: StageModel, libraries: Mapping[str, Path]) -> dict[str, bytes]:
     """pythonfmu's binary loads resources/<slavemodule>.py; the module's name carries the content hash, else two FMUs in
     one process would share the first one's module."""
     frame = _pythonfmu_folder()
@@ -128,14 +115,14 @@ def _python_files(model: Model, libraries: Mapping[str, Path]) -> dict[str, byte
     return files
 
 
-def _common_files(model: Model, identifier: str, native: bool, sources: tuple[str, ...] = ()) -> dict[str, bytes]:
+def _common_files(model: StageModel, identifier: str, native: bool, sources: tuple[str, ...] = ()) -> dict[str, bytes]:
     variables = list(Kernel(model.blob).variables.values())
     identity = Identity(
         model.name,
         identifier,
         model.hash,
         metadata.version("gearfmu"),
-        getattr(getattr(model, "spec", None), "description", ""),
+        model.spec.description,
         native,
         sources,
     )
@@ -145,6 +132,7 @@ def _common_files(model: Model, identifier: str, native: bool, sources: tuple[st
         "documentation/index.html": page(identity, variables).encode(),
         **{f"documentation/licenses/{name}": text.encode() for name, text in licences(native).items()},
         MODEL_FILE: model.blob,
+        STAGE_FILE: stage_file(model),
     }
 
 

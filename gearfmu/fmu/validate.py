@@ -20,6 +20,7 @@ from lxml import etree
 
 from gearfmu.errors import FmuError, Problem
 from gearfmu.fmu.probes import CHECKS
+from gearfmu.fmu.stage_file import MODEL_FILE, STAGE_FILE, read_stage_file
 from gearfmu.fmu.symbols import exported_symbols
 from gearfmu.kernel.build import SUFFIX, fmi_headers, host_platform
 
@@ -31,8 +32,8 @@ TERMINALS_SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3Termina
 def validate(path: str | Path) -> list[Problem]:
     """All problems of the FMU at `path`; an empty list when there are none.
 
-    Checks the XML against schema and rules (fmpy), units, start values, terminals, exported symbols and, when there is
-    a binary for this machine, its answers to right and wrong calls in a process of its own.
+    Checks the XML against schema and rules (fmpy), units, start values, terminals, stage, exported symbols and, when
+    there is a binary for this machine, its answers to right and wrong calls in a process of its own.
     Raises FmuError when the file cannot be read as an FMU at all."""
     file = Path(path)
     with tempfile.TemporaryDirectory(prefix="gearfmu-validate-") as work:
@@ -60,7 +61,7 @@ def _unpack(file: Path, folder: Path) -> Path:
 def _contents(folder: Path, description: ModelDescription) -> list[tuple[str, str, str]]:
     if description.coSimulation is None or not description.fmiVersion.startswith("2."):
         return [("modelDescription.xml", f"FMI {description.fmiVersion}", "only FMI 2.0 co-simulation is looked at")]
-    found = [finding for check in (_units, _terminals, _binaries) for finding in check(folder, description)]
+    found = [finding for check in (_units, _terminals, _stage, _binaries) for finding in check(folder, description)]
     if (folder / "binaries" / host_platform()).is_dir():
         found += _answers(folder)
     return found
@@ -90,6 +91,22 @@ def _terminals(folder: Path, description: ModelDescription) -> Iterator[tuple[st
     for member in tree.iter("TerminalMemberVariable"):
         if member.get("variableName") not in known:
             yield f"{file.name}: {member.get('variableName')}", "is no variable of the FMU", EXPORT_AGAIN
+
+
+def _stage(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:
+    """An FMU of ours says which stage it is, and means the model beside it."""
+    if not (folder / MODEL_FILE).is_file():
+        return
+    if not (folder / STAGE_FILE).is_file():
+        yield STAGE_FILE, "is missing", f"scenes refuse an FMU that does not name its stage: {EXPORT_AGAIN}"
+        return
+    try:
+        named = read_stage_file((folder / STAGE_FILE).read_bytes(), "")["hashes"]["model"]
+    except FmuError as error:
+        yield "", "", str(error)
+        return
+    if named != description.guid:
+        yield f"{STAGE_FILE}: hashes.model", named, f"the guid is {description.guid}: {EXPORT_AGAIN}"
 
 
 def _binaries(folder: Path, description: ModelDescription) -> Iterator[tuple[str, str, str]]:

@@ -87,7 +87,8 @@ class Segment:
 @dataclass(frozen=True)
 class Plan:
     """scene: name or path; identity: digest of all that decides the plan; step: communication step, s; request: as in
-    `Request.plain`; cost: of planning, in runs of the full model over the window."""
+    `Request.plain`; cost: of planning, in runs of the full model over the window; model: hash of the model it was made
+    for, empty in plans of former versions."""
 
     scene: str
     identity: str
@@ -97,6 +98,7 @@ class Plan:
     cost: float = math.nan
     cpu: float = math.nan
     notes: tuple[str, ...] = field(default=())
+    model: str = ""
 
     def save(self, path: Path) -> Path:
         """Write plan.toml, whole or not at all; returns the path."""

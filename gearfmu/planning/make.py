@@ -63,7 +63,10 @@ def make(job: Job, name: str) -> Plan:
         made = _Made(job, part)
         segments.append(made.segment())
         cpu, unit = cpu + made.bench.cpu, unit + made.bench.full.run
-    return Plan(name, job.identity, job.scene.coupling.step, job.request.plain, tuple(segments), cpu / unit, cpu)
+    asked = job.request.plain
+    return Plan(
+        name, job.identity, job.scene.coupling.step, asked, tuple(segments), cpu / unit, cpu, model=job.model.hash
+    )
 
 
 class _Made:

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.cosim.coupled import OK, CoupledRun, Saved
-from gearfmu.cosim.scene_run import stage_model, stage_source
-from gearfmu.errors import SimulationError
+from gearfmu.cosim.scene_run import Staged, origin, stage_model, stage_source
+from gearfmu.errors import Problem, SimulationError, SpecError
 from gearfmu.planning.book import Plan, Segment
 from gearfmu.planning.choice import Choice
 from gearfmu.planning.road import Road
@@ -31,6 +31,7 @@ from gearfmu.stage import Trace
 from gearfmu.stage.trace import Channel
 
 LEG = 5e-3  # s
+UNITS = ("kernel", "fmu")
 MOST_TRIPS = 8  # in one leg
 MOST_REPLANS = 3  # in one segment
 
@@ -78,6 +79,19 @@ def planned_scene(plan: Plan) -> SceneSpec:
     return scene.model_copy(update={"coupling": coupling})
 
 
+def planned_stage(plan: Plan, fmu: Path | None = None) -> Staged:
+    """The stage of a plan in its scene; with an FMU, the FMU's. SpecError for an FMU of another model than the plan was
+    made for: its effects and errors were measured with that."""
+    scene = planned_scene(plan)
+    if fmu is None:
+        return Staged.of(scene)
+    staged = Staged.of_fmu(scene, fmu)
+    if staged.model.hash != (plan.model or stage_model(scene).hash):
+        remedy = f"the plan of {plan.scene} was made for another model: take `gearfmu export --scene {plan.scene}`"
+        raise SpecError([Problem(str(fmu), f"stage {staged.model.name}", staged.model.hash[:12], remedy)])
+    return staged
+
+
 def run_planned(
     plan: Plan,
     out: Path | None = None,
@@ -90,13 +104,12 @@ def run_planned(
     verify : two spot checks a segment: the full model from states of the run against the plan from the same states.
     unit : "kernel", "fmu" (exported into `out`) or the path of an FMU exported earlier.
     """
-    scene = planned_scene(plan)
-    model = stage_model(scene)
-    with stage_source(model, unit, out) as source:
-        road = Road(scene, model, source.fmu_path)
+    staged = planned_stage(plan, None if unit in UNITS else Path(unit))
+    with stage_source(staged, "fmu" if staged.fmu is not None else str(unit), out) as source:
+        road = Road(staged.scene, staged.model, source.fmu_path)
         spots = SpotChecks(plan, road) if verify else None
         done = _Runner(road, plan.segments, spots, progress).go()
-        trace = done.trace(_meta(road, done))
+        trace = done.trace(_meta(road, done) | origin(staged))
     events = {name: [asdict(item) for item in getattr(done, name)] for name in ("trips", "checks")}
     trace.meta["plan"] = strict(asdict(plan) | events)
     if out is not None:

@@ -131,10 +131,13 @@ def read_toml(path: Path) -> dict[str, Any]:
     raise SpecError([Problem(str(path), "", "", remedy)])
 
 
-def validate(kind: type[SpecType], raw: Any, file: str) -> tuple[SpecType | None, list[Problem]]:
-    """`raw` tables of `file` as an object of class `kind`, or None and everything that is wrong with them."""
+def validate(
+    kind: type[SpecType], raw: Any, file: str, from_file: bool = True
+) -> tuple[SpecType | None, list[Problem]]:
+    """`raw` tables of `file` as an object of class `kind`, or None and everything that is wrong with them. from_file :
+    whether quantities need their units; else they may be SI numbers."""
     try:
-        return kind.model_validate(raw, context=FROM_FILE), []
+        return kind.model_validate(raw, context=FROM_FILE if from_file else None), []
     except ValidationError as error:
         return None, [_problem(kind, raw, file, entry) for entry in error.errors(include_url=False)]
 

@@ -41,6 +41,12 @@ class StageModel:
         return shafts_of(self.stage)
 
     @property
+    def bodies(self) -> dict[str, str]:
+        """Hash of every reduced body that the model was made from, by name: of a set sun, planet, ring, carrier."""
+        names = [gear.name for gear in self.spec.gears] + ["carrier"] * isinstance(self.spec, PlanetarySpec)
+        return dict(zip(names, self.body_hashes, strict=True))
+
+    @property
     def pair(self) -> StageSpec:
         """The spec of a stage that is written as one pair. ModelError for any other."""
         if not isinstance(self.spec, StageSpec):

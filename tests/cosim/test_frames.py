@@ -90,5 +90,8 @@ def test_a_run_leaves_its_deformation_beside_the_trace(tmp_path: Path) -> None:
 def test_an_fmu_that_does_not_tell_is_refused(tmp_path: Path) -> None:
     model = stage_model(closure())
     path = fmu.export(model, tmp_path / "pair.fmu")
+    asked = closure(gears=("wheel",), times=(1e-3,))
+    with pytest.raises(SpecError, match=r"pair.fmu: observed gears = none.*--observe wheel"):
+        cosim.run(asked, fmu_path=path)
     with pytest.raises(CouplingError, match="--observe wheel"):
-        cosim.run(closure(gears=("wheel",), times=(1e-3,)), fmu_path=path)
+        run_once(asked, Source(model), frames=frame_plan(asked))

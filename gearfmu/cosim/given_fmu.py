@@ -1,0 +1,120 @@
+"""An FMU in a scene: whether its stage is one for the scene, and whether its ports are those that the scene needs.
+
+The shafts at the cut belong to the stage, so an FMU brings its own. Where their stiffness or damping differs from the
+scene's, the run takes the FMU's, at its start too, and says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from gearfmu.errors import Problem, SpecError
+from gearfmu.fmu.opened import OpenedFmu
+from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.stage import load_stage
+
+UNITS = {"k": "N*m/rad", "c": "N*m*s/rad", "inertia": "kg*m^2", "disc_inertia": "kg*m^2"}
+UNITS |= {"shaft_k": UNITS["k"], "shaft_c": UNITS["c"]}
+RIG = ("pinion_shaft", "wheel_shaft")  # of the test rig: input, output
+
+
+def of_scene(scene: SceneSpec, opened: OpenedFmu, own: Any = None) -> SceneSpec:
+    """The scene with the stage of an FMU. own : the stage that it must be, when given; else it must be of the kind of
+    the scene's stage, where that can be read. SpecError that names FMU and stage."""
+    if own is not None:
+        if problems := opened.problems_of(own):
+            raise SpecError(problems)
+        return scene
+    usual = _usual(scene)
+    if usual is not None and usual.kind != opened.model.spec.kind:
+        remedy = (
+            f"scene {scene.name} is made for a stage of kind {usual.kind}, {scene.stage.name}: choose a scene for this "
+            f"kind, or name the FMU's stage beside the FMU (--stage) to run it here all the same"
+        )
+        raise SpecError(
+            [Problem(str(opened.path), f"kind of stage {opened.model.name}", opened.model.spec.kind, remedy)]
+        )
+    if usual is not None and not opened.problems_of(usual):
+        return scene
+    return scene.model_copy(update={"stage": scene.stage.model_copy(update={"name": opened.model.name})})
+
+
+def fitted(
+    scene: SceneSpec, opened: OpenedFmu, in_drivetrain: Callable[[SceneSpec, Any], Any]
+) -> tuple[SceneSpec, tuple[str, ...]]:
+    """The scene with the FMU's shafts, and in words what is other there than the scene says. in_drivetrain : gives a
+    stage the ports that the scene needs. SpecError with every port that does not fit, and every gear that
+    the scene records and the FMU does not show."""
+    export = f"export it with `gearfmu export {opened.model.name} --scene SCENE`"
+    problems = list(_recording(scene, opened, export))
+    own: Mapping[str, PortSpec] = opened.model.spec.ports
+    try:
+        wanted: Mapping[str, PortSpec] = in_drivetrain(scene, opened.model.spec).ports
+    except SpecError as error:
+        remedy = f"stage {opened.model.name} does not fit scene {scene.name}: choose another scene or FMU"
+        ports = Problem(str(opened.path), "ports", ", ".join(own), remedy)
+        raise SpecError([ports, *error.problems, *problems]) from error
+    problems += [found for name in own for found in _misfits(scene, opened, name, wanted[name], export)]
+    if problems:
+        raise SpecError(problems)
+    remarks = [text for name in own for text in _others(name, own[name], wanted[name])]
+    if not remarks:
+        return scene, ()
+    head = f"{opened.path} keeps its own shafts, which are not those of scene {scene.name} ({export})"
+    return _with_shafts(scene, opened), (f"{head}: {'; '.join(remarks)}",)
+
+
+def _usual(scene: SceneSpec) -> Any:
+    """The stage that the scene names, None where it cannot be read: a run with an FMU does not need it."""
+    try:
+        return load_stage(scene.stage.name)
+    except SpecError:
+        return None
+
+
+def _recording(scene: SceneSpec, opened: OpenedFmu, export: str) -> Iterator[Problem]:
+    gears = scene.deformation.gears if scene.deformation is not None else ()
+    missing = [gear for gear in gears if gear not in opened.observed]
+    if missing:
+        shown = ", ".join(opened.observed) or "none"
+        remedy = f"scene {scene.name} records how {', '.join(missing)} moves: {export}, or with --observe {missing[0]}"
+        yield Problem(str(opened.path), "observed gears", shown, remedy)
+
+
+def _misfits(scene: SceneSpec, opened: OpenedFmu, name: str, wanted: PortSpec, export: str) -> Iterator[Problem]:
+    own = opened.model.spec.ports[name]
+    if own.kind != wanted.kind:
+        remedy = f"scene {scene.name} needs a port of kind {wanted.kind}: {export}"
+        yield Problem(str(opened.path), f"ports.{name}.kind", own.kind, remedy)
+    elif (own.chain is None) != (wanted.chain is None):
+        remedy = f"scene {scene.name} needs a port {'without' if wanted.chain is None else 'with'} a chain: {export}"
+        yield Problem(str(opened.path), f"ports.{name}.chain", "none" if own.chain is None else "there", remedy)
+
+
+def _others(name: str, own: PortSpec, wanted: PortSpec) -> Iterator[str]:
+    """Numbers of a spring port, with its chain, that differ."""
+    if own.kind != "spring":
+        return
+    for field, unit in UNITS.items():
+        first, second = (getattr(port, field, None) or getattr(port.chain, field, 0.0) for port in (own, wanted))
+        if first != second:
+            yield f"ports.{name}.{field} {first:g} {unit}, in the scene {second:g} {unit}"
+
+
+def _with_shafts(scene: SceneSpec, opened: OpenedFmu) -> SceneSpec:
+    """The scene with the stiffness and damping of the FMU's ports, where its start follows from them."""
+    shafts, ports = opened.model.shafts, opened.model.spec.ports
+    if scene.test_rig is not None:
+        ends = dict(zip(RIG, (ports[shafts.input], ports[shafts.output]), strict=True))
+        numbers = {f"{end}_stiffness": port.k for end, port in ends.items()}
+        numbers |= {f"{end}_damping": port.c for end, port in ends.items()}
+        return scene.model_copy(update={"test_rig": scene.test_rig.model_copy(update=numbers)})
+    if (parts := scene.drivetrain) is not None:
+        held = {
+            name: part.model_copy(update={"stiffness": ports[name].k, "damping": ports[name].c})
+            for name, part in parts.ports.items()
+        }
+        return scene.model_copy(update={"drivetrain": parts.model_copy(update={"ports": held})})
+    return scene
