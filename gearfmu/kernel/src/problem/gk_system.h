@@ -52,7 +52,7 @@ typedef struct gk_system {
     double beta[MAX_STRIDE],
         tail[MAX_STRIDE]; /* of a damper that acts: f_d = β η_d + what the last step leaves of it */
     double on[MAX_STRIDE], gain[MAX_STRIDE], pull[MAX_STRIDE], late[MAX_STRIDE], rest[MAX_STRIDE],
-        held[MAX_STRIDE]; /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
+        held[MAX_STRIDE];    /* the same as numbers (gk_solve_status): 1 in the equations, else 0;
                              η_d = gain·(change of Pλ + δ) + pull·(λ0 + λ1), f_d = late·η_d + rest + held·λ1 */
     double jump[MAX_STRIDE]; /* of a given torque, at the start of the step; else 0 */
     int dashpots;            /* any of them */
