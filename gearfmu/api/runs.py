@@ -46,8 +46,9 @@ def te(
     Of a pair or a train a TeResult: te (T, P) m, mesh stiffness (T, P) N/m, shares of the tooth pairs; of a planetary
     set a SetTeResult with the load sharing of its planets. Raises SimulationError where there is no equilibrium.
     """
-    model, wanted = model_of(stage), [torques] if isinstance(torques, (str, float, int)) else list(torques)
-    values, known = [_checked("torque", torque, "torque") for torque in wanted], parameters(model, settings)
+    wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
+    values, model = [_checked("torque", torque, "torque") for torque in wanted], model_of(stage)
+    known = parameters(model, settings)
     if isinstance(model.spec, PlanetarySpec):
         return set_te(model, values, positions, pitches, **known)
     return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, **known)

@@ -28,7 +28,8 @@ class Quantity(click.ParamType):
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """SI value of the text; a usage error when number or unit are missing or of another kind, SpecError out of range."""
+        """SI value of the text; a usage error when number or unit are missing or of another kind, SpecError where it
+        is out of range."""
         if isinstance(value, float):
             return value
         from gearfmu.errors import Problem, SpecError, UnitError

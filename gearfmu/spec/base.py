@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -152,7 +152,15 @@ def validate(kind: type[SpecType], raw: Any, file: str) -> tuple[SpecType | None
     try:
         return kind.model_validate(raw, context=FROM_FILE), []
     except ValidationError as error:
-        return None, [_problem(kind, raw, file, entry) for entry in error.errors(include_url=False)]
+        entries = error.errors(include_url=False)
+        return None, [_problem(kind, raw, file, entry) for entry in entries if not _follows(entry, entries)]
+
+
+def _follows(entry: Any, entries: Sequence[Any]) -> bool:
+    """Whether a list is too short only because the items that are refused do not count."""
+    size = len(entry["loc"])
+    inside = (other for other in entries if len(other["loc"]) > size and other["loc"][:size] == entry["loc"])
+    return entry["type"] == "too_short" and any(inside)
 
 
 def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:

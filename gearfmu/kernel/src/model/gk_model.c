@@ -8,6 +8,7 @@
 #include <string.h>
 
 enum { MODEL_VERSION = 2, MOST_NAME = 64 };
+static const double ROUNDING = 1e-9; /* relative: of numbers that are computed from those of the stage file */
 
 /* what is read with: blob, shape so far, and the first thing that was wrong */
 typedef struct reader {
@@ -40,13 +41,13 @@ static void demand(reader *r, int holds, const char *what)
 
 static int between(double x, double low, double high) { return x >= low && x <= high; }
 
-/* a number of the stage file within its range (gk_ranges.h), or a message that names both */
+/* a number of the stage file within its range (gk_ranges.h), but for rounding, or a message that names both */
 static void demand_range(reader *r, const char *what, double x, double low, double high)
 {
-    if (r->outcome || between(x, low, high)) return;
+    if (r->outcome || between(x, low - ROUNDING * fabs(low), high + ROUNDING * fabs(high))) return;
     snprintf(r->message, GK_MESSAGE,
-             "model blob: %s = %.6g is out of range, from %.6g to %.6g; correct the stage and make the model again", what,
-             x, low, high);
+             "model blob: %s = %.6g is out of range, from %.6g to %.6g; correct the stage and make the model again",
+             what, x, low, high);
     r->outcome = GK_BAD_BLOB;
 }
 #define WITHIN(r, x, RANGE, what) demand_range(r, what, x, GK_LOW_##RANGE, GK_HIGH_##RANGE)
