@@ -40,7 +40,7 @@ class Quantity(click.ParamType):
         except UnitError as error:
             self.fail(str(error), param, ctx)
         if refusal := self.range.refusal(number):
-            field = "" if param is None else str(param.name).rstrip("s") if param.multiple else str(param.name)
+            field = "" if param is None else param.opts[0].lstrip("-")
             raise SpecError([Problem("", field, str(value), refusal)])
         return number
 
