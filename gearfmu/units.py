@@ -17,6 +17,8 @@ _UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
 _SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ": "µ"})
 _PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
 _NEWTON_METRE = re.compile(r"\b([kM]?)Nm\b")
+_IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi)}
+_SCALES = {"m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)), "s": ((1.0, "s", 1.0), (1e-3, "ms", 1e3), (0.0, "µs", 1e6))}
 
 
 def to_si(text: object, unit: str) -> float:
@@ -29,6 +31,8 @@ def to_si(text: object, unit: str) -> float:
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
         raise UnitError(f'expected a quantity such as "1 {unit}"')
     if not isinstance(text, str):
+        if not math.isfinite(text):
+            raise UnitError(f'not a finite number: write it like "1.5 {unit}"')
         raise UnitError(f'the unit is missing: write "{text:g} {unit}" or another unit of the same kind')
     match = _NUMBER.match(text)
     if not match:
@@ -40,6 +44,19 @@ def to_si(text: object, unit: str) -> float:
     if not math.isfinite(value):
         raise UnitError("the value is not finite")
     return float(f"{value:.15g}")
+
+
+def quantity_text(value: float, unit: str) -> str:
+    """An SI number of this unit as text: lengths in mm or µm, times in s, ms or µs, angles in degrees, speeds in
+    rpm."""
+    if unit in _SCALES:
+        scales = _SCALES[unit]
+        _, unit, factor = next((scale for scale in scales if abs(value) >= scale[0]), scales[0]) if value else scales[0]
+        value *= factor
+    elif unit in _IN:
+        unit, factor = _IN[unit]
+        value *= factor
+    return f"{value:.6g} {unit}".rstrip()
 
 
 def _plain_unit(text: str) -> str:

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from gearfmu import cosim
 from gearfmu.api.models import AnyStage, PathLike, Progress, Stage, load, load_scene, model_of, reduce
 from gearfmu.cosim.scene_run import Staged
+from gearfmu.ranges import in_range, range_of
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.profile import Profile, read_profile
@@ -46,8 +47,9 @@ def te(
     and bearings, shares of the tooth pairs; of a planetary set a SetTeResult with stage_stiffness
     and load sharing. Raises SimulationError where there is no equilibrium.
     """
-    model, wanted = model_of(stage), [torques] if isinstance(torques, (str, float, int)) else list(torques)
-    values, known = [_si(torque, "N*m") for torque in wanted], parameters(model, settings)
+    wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
+    values, model = [_checked("torque", torque, "torque") for torque in wanted], model_of(stage)
+    known = parameters(model, settings)
     if isinstance(model.spec, PlanetarySpec):
         return set_te(model, values, positions, pitches, **known)
     return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
@@ -103,13 +105,19 @@ def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 
     stage, duration, step, settings : as in `simulate`.
     """
     model = model_of(stage)
-    return simulate_model(model, inputs, _si(duration, "s"), _si(step, "s"), parameters(model, settings))
+    return simulate_model(
+        model,
+        inputs,
+        _checked("duration", duration, "duration"),
+        _checked("step", step, "step"),
+        parameters(model, settings),
+    )
 
 
 def wound_up(stage: AnyStage, torque: Quantity, speed: Quantity) -> Steady:
     """Inputs over time with which input and output of a stage turn at constant speed, wound up by the torque: a
     function of time (s) that gives values by input name."""
-    return Steady(model_of(stage), _si(speed, "rad/s"), _si(torque, "N*m"))
+    return Steady(model_of(stage), _checked("speed", speed, "speed"), _checked("torque", torque, "torque"))
 
 
 def run(
@@ -174,6 +182,11 @@ def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progres
     own = load(scene.stage.name) if own is None else own
     as_general(own)
     return Staged.of(scene, own, reduce(own, progress=progress), observe)
+
+
+def _checked(field: str, value: Quantity, name: str) -> float:
+    """`_si` of a number in the range of that name; SpecError where it is not."""
+    return in_range(field, _si(value, range_of(name).unit), name)
 
 
 def _si(value: Quantity, unit: str) -> float:

@@ -10,8 +10,8 @@ from gearfmu.commands.shared import Quantity, echo_pairs
 
 @click.command()
 @click.argument("stage")
-@click.option("--torque", required=True, type=Quantity("N*m"), help='Torque on the input, "302 N*m".')
-@click.option("--speed", required=True, type=Quantity("rad/s"), help='Speed of the input, "2000 rpm".')
+@click.option("--torque", required=True, type=Quantity("torque"), help='Torque on the input, "302 N*m".')
+@click.option("--speed", required=True, type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
 @click.option("--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches.")
 def efficiency(stage: str, torque: float, speed: float, pitches: int) -> None:
     """Efficiency of the mesh of the pair STAGE at constant load: mean friction power of a run over whole pitches, and

@@ -170,7 +170,7 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
 
 def in_units(found: Any, key: str = "") -> Any:
     """Numbers whose unit the name does not tell as text with it, here in what follows from a stage and in bodies."""
-    from gearfmu.spec.shown import quantity_text
+    from gearfmu.units import quantity_text
 
     if isinstance(found, dict):
         return {name: in_units(value, key if name in ("sun_planet", "planet_ring") else name)

@@ -36,7 +36,12 @@ HEADER = ("method", "n", "max error", "at Hz", "median", "+ residual", "loaded",
 @click.option("--size", type=click.IntRange(1), default=120, show_default=True, help="Vectors n, rigid modes aside.")
 @click.option("--tolerance", type=float, help="Instead of --size: the largest relative error allowed over the band.")
 @click.option(
-    "--band", nargs=2, type=Quantity("Hz"), default=(50.0, 10e3), show_default="50 Hz to 10 kHz", help="From, to."
+    "--band",
+    nargs=2,
+    type=Quantity("frequency"),
+    default=(50.0, 10e3),
+    show_default="50 Hz to 10 kHz",
+    help="From, to.",
 )
 @click.option(
     "--damping", type=click.FloatRange(0), default=0.01, show_default=True, help="Damping ratio of both models."

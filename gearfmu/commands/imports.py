@@ -14,7 +14,7 @@ from gearfmu.commands.shared import Quantity, echo_pairs
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("stage", required=False)
 @click.argument("gear", required=False)
-@click.option("--length", type=Quantity("m"), required=True, help='One length unit of the file: "1 mm".')
+@click.option("--length", type=Quantity("length_unit"), required=True, help='One length unit of the file: "1 mm".')
 @click.option(
     "--axis", type=click.Choice(["x", "y", "z"]), default="z", show_default=True, help="Axis of the gear in the file."
 )

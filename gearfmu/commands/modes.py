@@ -31,7 +31,7 @@ COUPLED = (
 @click.option("--uncoupled", is_flag=True, help="The carrier of a set without the couplings of its bolts and bore.")
 @click.option(
     "--torque",
-    type=Quantity("N*m"),
+    type=Quantity("torque"),
     help='Without --body: torque on the input, "302 N*m"; default: what torque_max allows.',
 )
 @click.option(

@@ -20,7 +20,7 @@ from gearfmu.commands.shared import Quantity, progress_bar
 @click.option("--band", nargs=2, required=True, metavar="LOW HIGH", help='Where it is judged, "200 Hz" "5 kHz".')
 @click.option("--budget", help='Largest error of the levels in the band, "1 dB".')
 @click.option("--waveform", help='Largest error of the waveforms in the band after a common delay, "5 %".')
-@click.option("--step", type=Quantity("s"), help="Another communication step than the scene's.")
+@click.option("--step", type=Quantity("step"), help="Another communication step than the scene's.")
 @click.option(
     "--may-drop", "force", multiple=True, metavar="EFFECT",
     help="An effect that may be left out though it costs little: coast_flank; may repeat.",

@@ -12,10 +12,11 @@ if TYPE_CHECKING:
 
 def parameters(model: StageModel, settings: tuple[str, ...], option: str = "--set") -> dict[str, float]:
     """Kernel parameters by name from "level=fast" or "slices=10", given to `option`; a usage error for what the model
-    does not know."""
+    does not know, SpecError for numbers out of range."""
     from gearfmu.errors import ModelError
     from gearfmu.stage import steady
 
+    model.kernel_variables()  # a model that the kernel refuses is not the option's fault
     pairs = (text.partition("=") for text in settings)
     try:
         return steady.parameters(model, {name: value for name, _, value in pairs})

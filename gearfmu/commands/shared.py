@@ -13,10 +13,14 @@ Progress = Callable[..., None]
 
 
 class Quantity(click.ParamType):
-    """An option such as "302 N*m": a number with a unit of the given kind, handed on in SI."""
+    """An option such as "302 N*m": a number with a unit of the given kind, handed on in SI. name: its range
+    (`gearfmu.ranges`)."""
 
-    def __init__(self, unit: str) -> None:
-        self.unit = unit
+    def __init__(self, name: str) -> None:
+        from gearfmu.ranges import range_of
+
+        self.range = range_of(name)
+        self.unit = unit = self.range.unit
         self.name = f'"<number> {unit}"'
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
@@ -24,16 +28,21 @@ class Quantity(click.ParamType):
         return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """SI value of the text; a usage error when number or unit are missing or of another kind."""
+        """SI value of the text; a usage error when number or unit are missing or of another kind, SpecError where it
+        is out of range."""
         if isinstance(value, float):
             return value
-        from gearfmu.errors import GearfmuError
+        from gearfmu.errors import Problem, SpecError, UnitError
         from gearfmu.units import to_si
 
         try:
-            return to_si(value, self.unit)
-        except GearfmuError as error:
+            number = to_si(value, self.unit)
+        except UnitError as error:
             self.fail(str(error), param, ctx)
+        if refusal := self.range.refusal(number):
+            field = "" if param is None else param.opts[0].lstrip("-")
+            raise SpecError([Problem("", field, str(value), refusal)])
+        return number
 
 
 @contextmanager

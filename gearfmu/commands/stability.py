@@ -18,7 +18,7 @@ class StepSize(Quantity):
     name = '"default|half|quarter|<number> s"'
 
     def __init__(self) -> None:
-        super().__init__("s")
+        super().__init__("internal_step")
         self.name = StepSize.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

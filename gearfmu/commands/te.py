@@ -20,7 +20,7 @@ from gearfmu.commands.shared import Quantity
     "torques",
     multiple=True,
     required=True,
-    type=Quantity("N*m"),
+    type=Quantity("torque"),
     help='Torque on the input, "302 N*m"; "0 N*m" for the unloaded stage; may repeat.',
 )
 @click.option(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -19,6 +19,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.ranges import Range, range_of
 from gearfmu.units import to_si
 
 if sys.version_info >= (3, 11):
@@ -42,44 +43,50 @@ SpecType = TypeVar("SpecType", bound=Spec)
 
 @dataclass(frozen=True)
 class Quantity:
-    """Annotation of a float field: its SI unit, its bounds (SI) and words that may stand instead of a number.
+    """Annotation of a float field: the name of its range (`gearfmu.ranges`), which says unit and limits, and words that
+    may stand instead of a number.
 
-    `Annotated[float, Quantity("m", above=0)]` takes "82.46 mm" from a file and 0.08246 from Python. An empty unit
-    means a plain number.
+    `Annotated[float, Quantity("module")]` takes "4.5 mm" from a file and 0.0045 from Python. An empty unit means a
+    plain number.
     """
 
-    unit: str = ""
-    above: float | None = None
-    at_least: float | None = None
-    below: float | None = None
-    at_most: float | None = None
+    name: str
     words: tuple[str, ...] = ()
+
+    @property
+    def range(self) -> Range:
+        """Limits, SI unit and remedy."""
+        return range_of(self.name)
+
+    @property
+    def unit(self) -> str:
+        """The SI unit."""
+        return self.range.unit
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
         return core_schema.with_info_plain_validator_function(self._read)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        if not self.unit:
-            limits = {
-                "exclusiveMinimum": self.above,
-                "minimum": self.at_least,
-                "exclusiveMaximum": self.below,
-                "maximum": self.at_most,
-            }
-            return {"type": "number", **{key: value for key, value in limits.items() if value is not None}}
-        number = {"type": "string", "pattern": _NUMBER_PATTERN, "unit": self.unit, "examples": [f"1 {self.unit}"]}
+        own = self.range
+        if not own.unit:
+            return {"type": "number", "minimum": own.low, "maximum": own.high}
+        limits = f"{own.shown(own.low)} to {own.shown(own.high)}"
+        number = {
+            "type": "string", "pattern": _NUMBER_PATTERN, "unit": own.unit, "range": limits,
+            "examples": [f"1 {own.unit}"],
+        }  # fmt: skip
         return {"anyOf": [number, {"enum": list(self.words)}]} if self.words else number
 
     def _read(self, value: Any, info: core_schema.ValidationInfo) -> float | str:
         if isinstance(value, str) and value in self.words:
             return value
+        words = "".join(f' or "{word}"' for word in self.words)
         try:
             number = self._number(value, bool((info.context or {}).get("from_file")))
         except UnitError as error:
-            words = "".join(f' or "{word}"' for word in self.words)
             raise refuse(f"{error}{words}") from error
-        if message := self._out_of_bounds(number):
-            raise refuse(message)
+        if message := self.range.refusal(number):
+            raise refuse(f"{message}{words}")
         return number
 
     def _number(self, value: Any, from_file: bool) -> float:
@@ -92,19 +99,28 @@ class Quantity:
             return float(value)
         return to_si(value, self.unit)
 
-    def _out_of_bounds(self, value: float) -> str:
-        checks = (
-            (self.above, lambda limit: value > limit, "greater than"),
-            (self.at_least, lambda limit: value >= limit, "at least"),
-            (self.below, lambda limit: value < limit, "less than"),
-            (self.at_most, lambda limit: value <= limit, "at most"),
-        )
-        failed = [
-            f"{words} {limit:g} {self.unit}".rstrip()
-            for limit, holds, words in checks
-            if limit is not None and not holds(limit)
-        ]
-        return f"must be {' and '.join(failed)}" if failed else ""
+
+@dataclass(frozen=True)
+class Whole:
+    """Annotation of an integer field: the name of its range (`gearfmu.ranges`)."""
+
+    name: str
+
+    @property
+    def range(self) -> Range:
+        """Limits and remedy."""
+        return range_of(self.name)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        return core_schema.no_info_after_validator_function(self._checked, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        return {**handler(schema), "minimum": int(self.range.low), "maximum": int(self.range.high)}
+
+    def _checked(self, value: int) -> int:
+        if message := self.range.refusal(value):
+            raise refuse(message)
+        return value
 
 
 Text = Annotated[str, Strict()]
@@ -139,7 +155,15 @@ def validate(
     try:
         return kind.model_validate(raw, context=FROM_FILE if from_file else None), []
     except ValidationError as error:
-        return None, [_problem(kind, raw, file, entry) for entry in error.errors(include_url=False)]
+        entries = error.errors(include_url=False)
+        return None, [_problem(kind, raw, file, entry) for entry in entries if not _follows(entry, entries)]
+
+
+def _follows(entry: Any, entries: Sequence[Any]) -> bool:
+    """Whether a list is too short only because the items that are refused do not count."""
+    size = len(entry["loc"])
+    inside = (other for other in entries if len(other["loc"]) > size and other["loc"][:size] == entry["loc"])
+    return entry["type"] == "too_short" and any(inside)
 
 
 def field_path(raw: Any, loc: tuple[str | int, ...]) -> str:

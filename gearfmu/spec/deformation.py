@@ -10,7 +10,7 @@ from pydantic import Field
 from gearfmu.errors import Problem
 from gearfmu.spec.base import Name, Quantity, Spec, Switch
 
-Time = Annotated[float, Quantity("s", at_least=0)]
+Time = Annotated[float, Quantity("time")]
 MOST_FRAMES = 2000
 
 
@@ -20,7 +20,7 @@ class DeformationChoice(Spec):
 
     gears: Annotated[tuple[Name, ...], Field(min_length=1, description="names of gears, e.g. ring")]
     times: tuple[Time, ...] = Field(default=(), description="the report shows a picture of each")
-    every: Annotated[float, Quantity("s", above=0)] | None = Field(
+    every: Annotated[float, Quantity("step")] | None = Field(
         default=None, description="from one frame of the film to the next"
     )
     vtu: Switch = Field(default=False, description="also write every frame for ParaView, as .vtu with a .pvd")

@@ -11,10 +11,10 @@ from pydantic import Field
 from gearfmu.spec.base import Quantity, Spec
 
 ASSUMED = "assumed"
-Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
-Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
-Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
-Amplitude = Annotated[float, Quantity("N*m", at_least=0)]
+Inertia = Annotated[float, Quantity("inertia")]
+Stiffness = Annotated[float, Quantity("torsional_stiffness")]
+Damping = Annotated[float, Quantity("torsional_damping")]
+Amplitude = Annotated[float, Quantity("amplitude")]
 
 
 def _value(default: Any, meaning: str, source: str = ASSUMED) -> Any:
@@ -53,23 +53,25 @@ class PassengerCar(Spec):
         2.52e4, "wheel gear to final drive", "computed: solid steel, G = 79.3 GPa, d = 30 mm, l = 0.25 m"
     )
     output_shaft_damping: Damping = _value(0.6, "output shaft", "assumed: 2 % of critical")
-    final_drive_ratio: Annotated[float, Quantity(above=0)] = _value(4.0, "final drive, rigid")
+    final_drive_ratio: Annotated[float, Quantity("gear_ratio")] = _value(4.0, "final drive, rigid")
     final_drive_inertia: Inertia = _value(0.01, "final drive and differential, referred to the output shaft")
     half_shaft_stiffness: Stiffness = _value(
         1.01e4, "both half shafts, at the road wheels", "computed: 2 × solid steel, G = 79.3 GPa, d = 25 mm, l = 0.6 m"
     )
     half_shaft_damping: Damping = _value(8.0, "both half shafts, at the road wheels", "assumed: 3 % of critical")
     road_wheel_inertia: Inertia = _value(0.9, "one road wheel with tyre and brake disc")
-    road_wheel_radius: Annotated[float, Quantity("m", above=0)] = _value(0.3, "rolling radius")
-    tyre_slip_stiffness: Annotated[float, Quantity("N", above=0)] = _value(
+    road_wheel_radius: Annotated[float, Quantity("wheel_radius")] = _value(0.3, "rolling radius")
+    tyre_slip_stiffness: Annotated[float, Quantity("tyre_stiffness")] = _value(
         1.0e5, "longitudinal force per unit slip, both driven tyres; a linear damper at the scene's initial speed"
     )
-    vehicle_mass: Annotated[float, Quantity("kg", above=0)] = _value(1400.0, "vehicle with two persons")
-    drag_area: Annotated[float, Quantity("m^2", at_least=0)] = _value(0.65, "drag coefficient times frontal area")
-    rolling_resistance: Annotated[float, Quantity(at_least=0)] = _value(0.012, "rolling resistance coefficient")
-    air_density: Annotated[float, Quantity("kg/m^3", at_least=0)] = _value(1.225, "air at sea level, 15 °C", "ISO 2533")
-    gravity: Annotated[float, Quantity("m/s^2", at_least=0)] = _value(9.80665, "standard gravity", "ISO 80000-3")
-    engine_torque: Annotated[float, Quantity("N*m")] = _value(120.0, "mean torque")
+    vehicle_mass: Annotated[float, Quantity("vehicle_mass")] = _value(1400.0, "vehicle with two persons")
+    drag_area: Annotated[float, Quantity("drag_area")] = _value(0.65, "drag coefficient times frontal area")
+    rolling_resistance: Annotated[float, Quantity("rolling_resistance")] = _value(
+        0.012, "rolling resistance coefficient"
+    )
+    air_density: Annotated[float, Quantity("air_density")] = _value(1.225, "air at sea level, 15 °C", "ISO 2533")
+    gravity: Annotated[float, Quantity("gravity")] = _value(9.80665, "standard gravity", "ISO 80000-3")
+    engine_torque: Annotated[float, Quantity("torque")] = _value(120.0, "mean torque")
     order_2: Amplitude = _value(150.0, "torque amplitude, engine order 2 (firing order of four cylinders, four-stroke)")
     order_4: Amplitude = _value(45.0, "torque amplitude, engine order 4")
     order_6: Amplitude = _value(15.0, "torque amplitude, engine order 6")
@@ -84,7 +86,7 @@ class TestRig(Spec):
 
     __test__ = False  # not a test class, whatever its name
 
-    torque: Annotated[float, Quantity("N*m")] = _value(..., "mean torque of the drive on the pinion", "scene")
+    torque: Annotated[float, Quantity("torque")] = _value(..., "mean torque of the drive on the pinion", "scene")
     drive_inertia: Inertia = _value(0.02, "rotor of the drive")
     speed_droop: Damping = _value(14.0, "controller of the drive", "assumed: half of critical")
     pinion_shaft_stiffness: Stiffness = _value(

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, TypeVar
 
 from gearfmu.errors import Problem
 from gearfmu.geometry.reference import ReferenceGear
+from gearfmu.ranges import kernel_limits
 from gearfmu.spec.flanks import Toothing
 from gearfmu.spec.layers import Layers
 from gearfmu.spec.topography import read_topography
@@ -61,6 +63,12 @@ def _reliefs(gear: Any, shape: Any) -> Found:
             shape.s_a if field == "tip_relief" else shape.s_form
         ):
             yield f"{field}.start_roll", relief.start_roll, f"outside the flank: from {_mm(low)} to {_mm(high)}"
+            continue
+        steepest = kernel_limits()["RELIEF"][1]
+        end = shape.s_a if field == "tip_relief" else shape.s_form
+        if relief.amount > steepest * (end - relief.start_roll) ** 2:
+            least = _mm(math.sqrt(relief.amount / steepest))
+            yield f"{field}.start_roll", relief.start_roll, f"too near the end of the flank: at least {least} from it"
 
 
 def _pitches(gear: Any, shape: ReferenceGear) -> Found:
@@ -81,6 +89,9 @@ def _pitches(gear: Any, shape: ReferenceGear) -> Found:
     elif single and max(map(abs, single)) > largest:
         remedy = f"more than a twentieth of the module: at most {_mm(largest)}"
         yield "pitch_deviation", max(single, key=abs), remedy
+    elif single and (most := max(accumulate(single), key=abs)) and abs(most) > largest:
+        remedy = f"they sum to more than a twentieth of the module: at most {_mm(largest)}"
+        yield "pitch_deviation", f"sum {_mm(most)}", remedy
 
 
 def with_rolls(gear: Gear, mesh: Any, index: int) -> Gear:

@@ -12,20 +12,22 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import ConfigDict, Field, field_validator
 
-from gearfmu.spec.base import Count, Quantity, Spec, Switch, Text
-from gearfmu.spec.lead import Depth, Deviation, LeadSpec, Length, ReliefKind
+from gearfmu.spec.base import Count, Quantity, Spec, Switch, Text, Whole
+from gearfmu.spec.lead import Depth, LeadSpec, ReliefKind, Slope
 
-Angle = Annotated[float, Quantity("rad")]
-Tilt = Annotated[float, Quantity("rad", at_least=0, at_most=5e-3)]
-Roll = Quantity("m", above=0, words=("outer_single_contact",))
-InnerRoll = Quantity("m", above=0, words=("inner_single_contact",))
+Angle = Annotated[float, Quantity("angle")]
+Tilt = Annotated[float, Quantity("wobble")]
+Relief = Annotated[float, Quantity("relief")]
+Pitch = Annotated[float, Quantity("pitch_deviation")]
+Roll = Quantity("roll", words=("outer_single_contact",))
+InnerRoll = Quantity("roll", words=("inner_single_contact",))
 Part = Literal["pitch", "profile", "helix"]
 
 
 class TipRelief(Spec):
     """Tip relief on both flanks of every tooth."""
 
-    amount: Length = Field(description="relief normal to the involute at the tip diameter")
+    amount: Relief = Field(description="relief normal to the involute at the tip diameter")
     start_roll: Annotated[float, Roll] = Field(
         default=cast(Any, "outer_single_contact"),  # the loader puts the roll in its place
         description='roll length of its beginning, or "outer_single_contact"',
@@ -36,7 +38,7 @@ class TipRelief(Spec):
 class RootRelief(Spec):
     """Root relief on both flanks of every tooth."""
 
-    amount: Length = Field(description="relief normal to the involute where the flank ends at its root (form diameter)")
+    amount: Relief = Field(description="relief normal to the involute where the flank ends at its root (form diameter)")
     start_roll: Annotated[float, InnerRoll] = Field(
         default=cast(Any, "inner_single_contact"),  # the loader puts the roll in its place
         description='roll length of its beginning, or "inner_single_contact"',
@@ -48,7 +50,7 @@ class ProfileSpec(Spec):
     """Modifications along the profile of both flanks of every tooth, over the usable flank from its form diameter to
     its tip."""
 
-    slope: Deviation = Field(
+    slope: Slope = Field(
         default=0.0,
         description="profile slope f_Halpha over the usable flank, none at its middle roll; positive: more material "
         "towards the tip",
@@ -63,11 +65,13 @@ class DeviationClass(Spec):
 
     model_config = ConfigDict(populate_by_name=True)  # `class` is no name in Python
 
-    tolerance_class: Annotated[Count, Field(ge=1, le=11)] = Field(alias="class", description="flank tolerance class A")
-    seed: Annotated[Count, Field(ge=0, le=2**31 - 1)] = Field(
+    tolerance_class: Annotated[Count, Whole("tolerance_class")] = Field(
+        alias="class", description="flank tolerance class A"
+    )
+    seed: Annotated[Count, Whole("seed")] = Field(
         default=1, description="seed of the draw; gears of one seed differ by their names"
     )
-    use: Annotated[float, Quantity(above=0, at_most=1)] = Field(
+    use: Annotated[float, Quantity("share")] = Field(
         default=1.0, description="share of the tolerances that the draw uses up"
     )
     parts: tuple[Part, ...] = Field(
@@ -80,7 +84,9 @@ class DeviationClass(Spec):
 class Eccentricity(Spec):
     """The toothing's axis beside the axis of rotation."""
 
-    amount: Depth = Field(description="distance of the toothing's axis from the axis of rotation at mid-width")
+    amount: Annotated[float, Quantity("eccentricity")] = Field(
+        description="distance of the toothing's axis from the axis of rotation at mid-width"
+    )
     angle: Angle = Field(
         default=0.0, description="direction of the toothing's axis, from tooth 0 (of a ring: space 0) counter-clockwise"
     )
@@ -112,12 +118,12 @@ class Toothing(Spec):
         default=None,
         description="measured or designed flanks: CSV file (docs/howto-flanks.md), path relative to the stage file",
     )
-    index_deviation: dict[Annotated[int, Field(ge=0)], Deviation] = Field(
+    index_deviation: dict[Annotated[int, Whole("tooth_number")], Pitch] = Field(
         default={},
         description="pitch errors: individual index deviation F_pi (ISO 1328-1) by tooth number, or a list of all, arc "
         "on the reference circle, both flanks, positive counter-clockwise",
     )
-    pitch_deviation: tuple[Deviation, ...] = Field(
+    pitch_deviation: tuple[Pitch, ...] = Field(
         default=(),
         description="single pitch deviations f_pi of all pitches, the first from the last tooth to tooth 0; they are "
         "summed to index deviations",

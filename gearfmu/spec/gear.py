@@ -2,55 +2,46 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
-from gearfmu.spec.base import Count, Name, Quantity, Spec, refuse
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Whole, refuse
 from gearfmu.spec.flanks import Toothing
 from gearfmu.spec.imported import ImportSpec
 from gearfmu.spec.lead import Length as Length
 from gearfmu.spec.lead import Misalignment
 
-Size = Annotated[float, Quantity("m", at_least=0)]
-Angle = Annotated[float, Quantity("rad")]
-Factor = Annotated[float, Quantity(above=0)]
-Ratio = Annotated[float, Quantity(at_least=0, below=1)]
-Grading = Annotated[float, Quantity(at_least=0.2, at_most=5)]
+Factor = Annotated[float, Quantity("rack_factor")]
+Ratio = Annotated[float, Quantity("damping_ratio")]
 SurfaceCoupling = Literal["averaging", "rigid"]
 
 
-LARGEST_HELIX_ANGLE = 35  # degrees: steeper flanks are beyond what the sector mesh was made for
-
-
-def _in_range(angle: float) -> float:
-    degrees = math.degrees(angle)
-    if abs(degrees) > LARGEST_HELIX_ANGLE * (1 + 1e-12):
-        raise refuse(
-            f"{degrees:g} degrees is out of range: write the helix angle at the reference circle, from -35 deg to "
-            "35 deg, positive for a right-handed pinion or sun (its mate then is left-handed), 0 deg for spur gears"
-        )
-    return angle
-
-
-HelixAngle = Annotated[float, Quantity("rad"), AfterValidator(_in_range)]
+Module = Annotated[float, Quantity("module")]
+Diameter = Annotated[float, Quantity("diameter")]
+TipDiameter = Annotated[float, Quantity("tip_diameter")]
+FaceWidth = Annotated[float, Quantity("face_width")]
+TipEdge = Annotated[float, Quantity("tip_edge_radius")]
+Backlash = Annotated[float, Quantity("backlash")]
+PressureAngle = Annotated[float, Quantity("pressure_angle")]
+HelixAngle = Annotated[float, Quantity("helix_angle")]
+ProfileShift = Annotated[float, Quantity("profile_shift")]
+Teeth = Annotated[Count, Whole("teeth")]
+ModalDamping = Annotated[float, Quantity("modal_damping")]
 
 
 class PairSpec(Spec):
     """The pair as a whole. Module, pressure angle, profile shift and basic rack are those of the normal section."""
 
-    center_distance: Length = Field(description="centre distance a")
-    normal_module: Length = Field(description="normal module m_n")
-    pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
-        description="normal pressure angle of the basic rack"
-    )
+    center_distance: Annotated[float, Quantity("center_distance")] = Field(description="centre distance a")
+    normal_module: Module = Field(description="normal module m_n")
+    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
     helix_angle: HelixAngle = Field(
         default=0.0,
         description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the pinion is right-handed "
         "and the wheel left-handed",
     )
-    backlash: Size = Field(
+    backlash: Backlash = Field(
         description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
     )
     misalignment: Misalignment | None = Field(
@@ -69,19 +60,19 @@ class RackSpec(Spec):
 class Material(Spec):
     """Linear elastic, isotropic."""
 
-    youngs_modulus: Annotated[float, Quantity("Pa", above=0)] = Field(description="Young's modulus E")
-    poisson_ratio: Annotated[float, Quantity(at_least=0, below=0.49)] = Field(description="Poisson's ratio")
-    density: Annotated[float, Quantity("kg/m^3", above=0)] = Field(description="density")
+    youngs_modulus: Annotated[float, Quantity("youngs_modulus")] = Field(description="Young's modulus E")
+    poisson_ratio: Annotated[float, Quantity("poisson_ratio")] = Field(description="Poisson's ratio")
+    density: Annotated[float, Quantity("density")] = Field(description="density")
 
 
 class Bearing(Spec):
     """Bearing between the bore node and the ground, the same in every direction across the axis."""
 
-    stiffness: Annotated[float, Quantity("N/m", above=0)] = Field(description="radial stiffness")
-    axial: Annotated[float, Quantity("N/m", above=0)] | None = Field(
+    stiffness: Annotated[float, Quantity("bearing_stiffness")] = Field(description="radial stiffness")
+    axial: Annotated[float, Quantity("axial_stiffness")] | None = Field(
         default=None, description="axial stiffness; without it the gear does not move along its axis (spur gears only)"
     )
-    tilt: Annotated[float, Quantity("N*m/rad", above=0)] | None = Field(
+    tilt: Annotated[float, Quantity("tilt_stiffness")] | None = Field(
         default=None, description="stiffness against tilting; without it the gear does not tilt (spur gears only)"
     )
     damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m_body)")
@@ -94,23 +85,25 @@ class MeshSpec(Spec):
     (benchmarks/body_convergence.csv).
     """
 
-    flank: Annotated[Count, Field(ge=2, le=200)] = Field(
+    flank: Annotated[Count, Whole("elements_two")] = Field(
         default=20, description="elements along the flank, equal in arc length"
     )
-    thickness: Annotated[Count, Field(ge=1, le=50)] = Field(default=5, description="elements across half the tooth")
-    root: Annotated[Count, Field(ge=2, le=100)] = Field(
+    thickness: Annotated[Count, Whole("elements")] = Field(default=5, description="elements across half the tooth")
+    root: Annotated[Count, Whole("elements_two")] = Field(
         default=6, description="elements along root fillet and half the root land"
     )
-    rim: Annotated[Count, Field(ge=1, le=100)] = Field(
+    rim: Annotated[Count, Whole("elements")] = Field(
         default=4,
         description="elements from root to bore; more are taken where the rim is too high for the growth below",
     )
-    width: Annotated[Count, Field(ge=1, le=100)] = Field(default=6, description="elements across the face width")
-    thickness_grading: Grading = Field(default=1.6, description="growth of elements from the surface inwards")
-    rim_grading: Annotated[float, Quantity(at_least=1.05, at_most=5)] = Field(
+    width: Annotated[Count, Whole("elements")] = Field(default=6, description="elements across the face width")
+    thickness_grading: Annotated[float, Quantity("grading")] = Field(
+        default=1.6, description="growth of elements from the surface inwards"
+    )
+    rim_grading: Annotated[float, Quantity("rim_grading")] = Field(
         default=1.5, description="largest growth of elements from the root to the bore"
     )
-    scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(
+    scale: Annotated[float, Quantity("scale")] = Field(
         default=1.0, description="factor on all counts; the gradings keep their shape"
     )
 
@@ -126,14 +119,14 @@ class MeshSpec(Spec):
 class BodySpec(Spec):
     """How the gear's body is meshed and reduced; with geometry and material it decides the reduced body."""
 
-    strip_half_width: Length = Field(
+    strip_half_width: Annotated[float, Quantity("strip_half_width")] = Field(
         description="half-width, in arc length, of the load strip on the flank; at least 1.5 Hertz half-widths"
     )
-    modes: Annotated[Count, Field(ge=1, le=2000)] = Field(default=400, description="number of elastic modes stored")
-    roll_points: Annotated[Count, Field(ge=4, le=200)] = Field(
+    modes: Annotated[Count, Whole("modes")] = Field(default=400, description="number of elastic modes stored")
+    roll_points: Annotated[Count, Whole("roll_points")] = Field(
         default=28, description="Chebyshev points along the flank"
     )
-    width_functions: Annotated[Count, Field(ge=1, le=20)] = Field(
+    width_functions: Annotated[Count, Whole("width_functions")] = Field(
         default=5, description="Legendre functions across the face width"
     )
     mesh: MeshSpec = Field(default_factory=MeshSpec, description="element counts")
@@ -145,19 +138,19 @@ class GearSpec(Toothing):
     model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
 
     name: Name = Field(description="name of gear and shaft")
-    teeth: Annotated[Count, Field(ge=6, le=400)] = Field(description="number of teeth z")
-    profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(description="profile shift coefficient x")
-    tip_diameter: Length = Field(description="tip diameter d_a")
-    face_width: Length = Field(description="face width b")
-    bore_diameter: Length = Field(description="diameter of the bore")
+    teeth: Teeth = Field(description="number of teeth z")
+    profile_shift: ProfileShift = Field(description="profile shift coefficient x")
+    tip_diameter: TipDiameter = Field(description="tip diameter d_a")
+    face_width: FaceWidth = Field(description="face width b")
+    bore_diameter: Diameter = Field(description="diameter of the bore")
     bore_coupling: SurfaceCoupling = Field(
         default="averaging",
         description="how the bore meets its node: averaging (RBE3, the bore may deform) or rigid (RBE2, a stiff shaft)",
     )
-    tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
+    tip_edge_radius: TipEdge = Field(default=2e-4, description="radius of the tip edge rounding")
     rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
     material: Material = Field(description="material")
-    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
     bearing: Bearing = Field(description="bearing")
     body: BodySpec = Field(description="mesh and reduction")
     imported: ImportSpec | None = Field(

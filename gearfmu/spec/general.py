@@ -11,25 +11,38 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, refuse
-from gearfmu.spec.gear import Bearing, GearSpec, HelixAngle, Length, Material, Ratio, Size, SurfaceCoupling
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, Whole, refuse
+from gearfmu.spec.gear import (
+    Backlash,
+    Bearing,
+    Diameter,
+    GearSpec,
+    HelixAngle,
+    Length,
+    Material,
+    ModalDamping,
+    Module,
+    PressureAngle,
+    Ratio,
+    SurfaceCoupling,
+)
 from gearfmu.spec.lead import Misalignment
 from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
-from gearfmu.spec.ports import FilmSpec, Frequency, FrictionSpec, LevelSpec, NodalSpec, PortSpec
+from gearfmu.spec.ports import FilmSpec, FrictionSpec, LevelSpec, NodalSpec, PortSpec
 
-Place = Annotated[float, Quantity("m")]
-Spring = Annotated[float, Quantity("N/m", above=0, words=("rigid",))]
-TiltSpring = Annotated[float, Quantity("N*m/rad", above=0, words=("rigid",))]
+Place = Annotated[float, Quantity("place")]
+Axis = Annotated[float, Quantity("axis")]
+RadialSpring = Annotated[float, Quantity("bearing_stiffness", words=("rigid",))]
+AxialSpring = Annotated[float, Quantity("axial_stiffness", words=("rigid",))]
+TiltSpring = Annotated[float, Quantity("tilt_stiffness", words=("rigid",))]
 
 
 class GearBody(GearSpec):
     """A toothed body: a GearSpec with its basic rack's module and angles; what holds it stands in `supports`."""
 
     kind: Literal["gear"] = Field(default="gear", description="kind of body")
-    normal_module: Length = Field(description="normal module m_n")
-    pressure_angle: Annotated[float, Quantity("rad", above=0.17, below=0.62)] = Field(
-        description="normal pressure angle of the basic rack"
-    )
+    normal_module: Module = Field(description="normal module m_n")
+    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
     helix_angle: HelixAngle = Field(
         default=0.0,
         description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed gear, whose "
@@ -51,10 +64,8 @@ class RingBody(RingSpec):
 
     name: Name
     kind: Literal["ring"] = Field(description="kind of body")
-    normal_module: Length = Field(description="normal module m_n")
-    pressure_angle: Annotated[float, Quantity("rad", above=0.17, below=0.62)] = Field(
-        description="normal pressure angle of the basic rack"
-    )
+    normal_module: Module = Field(description="normal module m_n")
+    pressure_angle: PressureAngle = Field(description="normal pressure angle of the basic rack")
     helix_angle: HelixAngle = Field(
         default=0.0,
         description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: a right-handed ring, whose "
@@ -92,8 +103,8 @@ class ShaftSection(Spec):
     """A cylinder of a shaft."""
 
     length: Length = Field(description="length along the axis")
-    outer_diameter: Length = Field(description="outer diameter")
-    bore_diameter: Size = Field(default=0.0, description="diameter of the bore; 0: solid")
+    outer_diameter: Diameter = Field(description="outer diameter")
+    bore_diameter: Annotated[float, Quantity("bore")] = Field(default=0.0, description="diameter of the bore; 0: solid")
 
     @model_validator(mode="after")
     def _hollow(self) -> ShaftSection:
@@ -109,8 +120,10 @@ class ShaftBody(Spec):
     kind: Literal["shaft"] = Field(description="kind of body")
     sections: Annotated[tuple[ShaftSection, ...], Field(min_length=1)] = Field(description="cylinders, in order")
     material: Material = Field(description="material")
-    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
-    stored_to: Frequency = Field(default=150e3, description="modes below are stored, the others are static")
+    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
+    stored_to: Annotated[float, Quantity("stored_to")] = Field(
+        default=150e3, description="modes below are stored, the others are static"
+    )
 
     @property
     def length(self) -> float:
@@ -129,7 +142,7 @@ class CarrierBody(CarrierSpec):
 class RotorSpec(Spec):
     """Bodies that turn together about one axis."""
 
-    axis: tuple[Place, Place] = Field(description="x and y of the axis; of a carried rotor, in the carrier's axes")
+    axis: tuple[Axis, Axis] = Field(description="x and y of the axis; of a carried rotor, in the carrier's axes")
     offset: tuple[Place, Place] = Field(
         default=(0.0, 0.0), description="deviation of the axis from that place: teeth stand as if there were none"
     )
@@ -148,14 +161,14 @@ class EngagementSpec(Spec):
 
     name: Name = Field(description="name of the mesh")
     gears: tuple[Name, Name] = Field(description="gear A, gear B (the ring where there is one)")
-    backlash: Size = Field(
+    backlash: Backlash = Field(
         description="circumferential backlash j_wt of the assembled pair on the working pitch circle"
     )
-    damping: Annotated[float, Quantity("N*s/m^2", at_least=0)] = Field(
+    damping: Annotated[float, Quantity("contact_damping")] = Field(
         description="contact damping per metre of face width"
     )
-    torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(description="largest torque on gear A")
-    speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(description="largest speed of gear A")
+    torque_max: Annotated[float, Quantity("mesh_torque_max")] = Field(description="largest torque on gear A")
+    speed_max: Annotated[float, Quantity("mesh_speed_max")] = Field(description="largest speed of gear A")
     friction: FrictionSpec | None = Field(default=None, description="friction of the flanks; none when absent")
     film: FilmSpec | None = Field(default=None, description="squeeze film in open gaps; none when absent")
     misalignment: Misalignment | None = Field(
@@ -173,8 +186,8 @@ class SupportSpec(Spec):
     to: Name | None = Field(default=None, description="body that holds it; the ground when absent")
     at: Place | None = Field(default=None, description="place along the axis; a gear's mid-width when absent")
     node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
-    radial: Spring | None = Field(default=None, description="stiffness along x and y")
-    axial: Spring | None = Field(default=None, description="stiffness along the axis")
+    radial: RadialSpring | None = Field(default=None, description="stiffness along x and y")
+    axial: AxialSpring | None = Field(default=None, description="stiffness along the axis")
     tilt: TiltSpring | None = Field(default=None, description="stiffness against tilting about x and y")
     torsion: TiltSpring | None = Field(default=None, description="stiffness against twist; between bodies of one rotor")
     damping_ratio: Ratio = Field(
@@ -203,7 +216,7 @@ class GeneralStage(Spec):
     description: Text = Field(default="", description="one line about the stage")
     source: Path
     kind: Literal["general"] = Field(default="general", description="kind of stage")
-    slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
+    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
     nodal: NodalSpec = Field(default_factory=NodalSpec, description="nodal contact, for level paper")
     bodies: dict[Name, Annotated[GearBody | RingBody | ShaftBody | CarrierBody, Field(discriminator="kind")]] = Field(
         description="bodies by name"

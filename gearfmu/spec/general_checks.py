@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from gearfmu.errors import Problem
+from gearfmu.ranges import kernel_limits
 from gearfmu.spec.checks import geometry_problems, millimetres
 from gearfmu.spec.flank_checks import with_rolls
 from gearfmu.spec.gear import PairSpec
@@ -22,7 +23,7 @@ _SAME_RACK = ("normal_module", "pressure_angle")
 
 def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
     """Everything that is wrong with a stage whose single fields can be read."""
-    problems = [Problem(file, *entry) for entry in (*_rotors(stage), *_names(stage))]
+    problems = [Problem(file, *entry) for entry in (*_counts(stage), *_rotors(stage), *_names(stage))]
     known = _what_can_be_judged(stage)
     problems += [Problem(file, *entry) for entry in (*_places(known), *_held(known))]
     for engagement in known.engagements:
@@ -46,6 +47,23 @@ def _what_can_be_judged(stage: GeneralStage) -> GeneralStage:
         "ports": {name: port for name, port in stage.ports.items() if port.body in good},
     }
     return stage.model_copy(update=kept)
+
+
+def _counts(stage: GeneralStage) -> Found:
+    """Numbers of things that the kernel has room for."""
+    directions = {"radial": 2, "axial": 1, "tilt": 2, "torsion": 1}
+    held = sum(n for s in stage.supports for field, n in directions.items() if getattr(s, field) is not None)
+    counts = {
+        "rotors": (len(stage.rotors), "ROTORS", "rotors"),
+        "bodies": (len(stage.gears), "GEARS", "toothed bodies"),
+        "engagements": (len(stage.engagements), "ENGAGEMENTS", "meshes"),
+        "ports": (len(stage.ports), "PORTS", "ports"),
+        "supports": (held, "SUPPORTS", "directions that are held (radial and tilt are two each)"),
+    }
+    for field, (count, row, what) in counts.items():
+        most = int(kernel_limits()[row][1])
+        if count > most:
+            yield field, str(count), f"out of range: the kernel holds at most {most} {what}; leave some away"
 
 
 def _rotors(stage: GeneralStage) -> Found:
@@ -180,7 +198,7 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
         apart = millimetres(abs(places[0] - places[1]))
         remedy = f"{a.name} and {b.name} lie {apart} apart along the axis: give both one place"
         found.append(Problem(file, f"{field}.gears", ", ".join(mesh.gears), remedy))
-    pair = PairSpec(
+    pair = PairSpec.model_construct(
         center_distance=centre_distance(stage, mesh), normal_module=a.normal_module, pressure_angle=a.pressure_angle,
         backlash=mesh.backlash, helix_angle=a.helix_angle,
     )  # fmt: skip

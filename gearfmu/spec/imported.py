@@ -24,7 +24,7 @@ class FilesSpec(Spec):
     so."""
 
     file: Text = Field(description="mesh: .inp, .bdf, .msh or .vtu")
-    length: Annotated[float, Quantity("m", above=0)] = Field(
+    length: Annotated[float, Quantity("length_unit")] = Field(
         description='one length unit of the file, "1 mm" for a mesh in millimetres'
     )
     axis: Literal["x", "y", "z"] = Field(default="z", description="axis of the body in the file")
@@ -34,10 +34,10 @@ class FilesSpec(Spec):
     unknowns: Text = Field(
         default="", description="CalculiX .dof file: node and direction of each row; without it x, y, z node by node"
     )
-    force_unit: Annotated[float, Quantity("N", above=0)] = Field(
+    force_unit: Annotated[float, Quantity("force_unit")] = Field(
         default=1.0, description='one unit of force of the stiffness matrix, "1 N"'
     )
-    mass_unit: Annotated[float, Quantity("kg", above=0)] = Field(
+    mass_unit: Annotated[float, Quantity("mass_unit")] = Field(
         default=1.0, description='one unit of mass of the mass matrix, "1 t" with millimetres, newtons and seconds'
     )
 
@@ -66,7 +66,7 @@ class ImportSpec(FilesSpec):
     bore_coupling: Literal["averaging", "rigid"] = Field(
         default="averaging", description="averaging (RBE3) or rigid (RBE2) master node of the bore"
     )
-    flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
+    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = Field(
         default=5e-6, description="largest distance of a corner node from the best involute"
     )
 
@@ -75,7 +75,7 @@ class RingImportSpec(FilesSpec):
     """The finite elements of a ring, placed by the involute fit of its tooth spaces."""
 
     rim: Text = Field(default="", description="node set of the rim; without it the nodes on the stage's rim diameter")
-    flank_tolerance: Annotated[float, Quantity("m", above=0)] = Field(
+    flank_tolerance: Annotated[float, Quantity("flank_tolerance")] = Field(
         default=5e-6, description="largest distance of a corner node from the best involute"
     )
 

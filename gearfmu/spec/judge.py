@@ -11,11 +11,13 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
-from gearfmu.errors import Problem
+from gearfmu.errors import Problem, UnitError
 from gearfmu.spec.base import FROM_FILE, Quantity, SpecType, fields_at, metadata_of, raw_path, validate
+from gearfmu.units import to_si
 
 _ROUNDS = 4  # a key put right may bring further ones to light
 _MISSING = object()
+_BESIDE_TEETH = ("kg/m^3", "N/m", "N*m/rad", "N*m*s/rad", "N*s/m^2", "kg*m^2", "Hz", "rad/s")  # shape no tooth
 
 
 @dataclass(frozen=True)
@@ -37,9 +39,9 @@ def read_and_judge(
 
 
 def _as_meant(kind: type[SpecType], raw: dict[str, Any]) -> SpecType | None:
-    """The object without keys that nobody knows (a misspelt one under its name), with bare numbers in SI, with the
-    first of the words that are allowed, without optional fields that cannot be read; None where a field that must be
-    there cannot."""
+    """The object without keys that nobody knows (a misspelt one under its name), with bare numbers in SI, with numbers
+    that shape no tooth within their range, with the first of the words that are allowed, without optional fields and
+    tables that cannot be read; None where a field that must be there cannot."""
     tables = copy.deepcopy(raw)
     for _ in range(_ROUNDS):
         try:
@@ -87,10 +89,30 @@ def _put_right(kind: type[SpecType], tables: dict[str, Any], entry: Any) -> bool
     if get_origin(field.annotation) is Literal:
         inside[key] = get_args(field.annotation)[0]
         return True
-    if field.is_required():
-        return False
-    del inside[key]
-    return True
+    if quantity is not None and quantity.unit in _BESIDE_TEETH and (limit := _nearest(quantity, value)) is not None:
+        inside[key] = f"{limit!r} {quantity.unit}"
+        return True
+    return _leave_out(kind, tables, loc)
+
+
+def _nearest(quantity: Quantity, value: Any) -> float | None:
+    """The limit that a number is beyond; None where it is no number."""
+    try:
+        number = to_si(value, quantity.unit)
+    except UnitError:
+        return None
+    return quantity.range.low if number < quantity.range.low else quantity.range.high
+
+
+def _leave_out(kind: type[SpecType], tables: dict[str, Any], loc: tuple[str | int, ...]) -> bool:
+    """Takes away the field, or else the innermost table around it that need not be there."""
+    for depth in range(len(loc), 0, -1):
+        field, (*way, key) = fields_at(kind, loc[: depth - 1]).get(loc[depth - 1]), raw_path(tables, loc[:depth])
+        inside = _at(tables, way)
+        if field is not None and not field.is_required() and isinstance(inside, dict) and key in inside:
+            del inside[key]
+            return True
+    return False
 
 
 def _at(tables: Any, way: list[Any]) -> Any:

@@ -13,10 +13,10 @@ from gearfmu.spec.base import Name, Quantity, Spec
 from gearfmu.spec.shaft_loads import ShaftLoad, Time, law_problems, time_problems
 
 GROUND = "ground"
-Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
-Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
-Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
-Capacity = Annotated[float, Quantity("N*m", at_least=0)]
+Inertia = Annotated[float, Quantity("inertia")]
+Stiffness = Annotated[float, Quantity("torsional_stiffness")]
+Damping = Annotated[float, Quantity("torsional_damping")]
+Capacity = Annotated[float, Quantity("clutch_capacity")]
 
 
 class ClutchSpec(Spec):
@@ -25,7 +25,7 @@ class ClutchSpec(Spec):
     capacity: Annotated[tuple[tuple[Time, Capacity], ...], Field(min_length=1)] = Field(
         description="torque that it transmits when it slips, over time"
     )
-    peak: Annotated[float, Quantity(at_least=1)] = Field(
+    peak: Annotated[float, Quantity("peak")] = Field(
         default=1.0, description="when it sticks it holds up to this many times its capacity"
     )
 
@@ -43,7 +43,7 @@ class InertiaPart(Spec):
     """A rigid inertia."""
 
     inertia: Inertia = Field(description="about its axis")
-    speed: Annotated[float, Quantity("rad/s")] | None = Field(
+    speed: Annotated[float, Quantity("speed")] | None = Field(
         default=None, description="at the start; not needed where shafts or meshes lead to a known speed"
     )
 

@@ -2,53 +2,74 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Text
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Text, Whole
 from gearfmu.spec.flanks import Eccentricity, Toothing
-from gearfmu.spec.gear import Bearing, BodySpec, Factor, HelixAngle, Length, Material, RackSpec, Ratio, Size
+from gearfmu.spec.gear import (
+    Backlash,
+    Bearing,
+    BodySpec,
+    Diameter,
+    FaceWidth,
+    Factor,
+    HelixAngle,
+    Length,
+    Material,
+    ModalDamping,
+    Module,
+    PressureAngle,
+    ProfileShift,
+    RackSpec,
+    Ratio,
+    Teeth,
+    TipDiameter,
+    TipEdge,
+)
 from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
 
-Deviation = Annotated[float, Quantity("m", at_least=-1e-3, at_most=1e-3)]
+PinError = Annotated[float, Quantity("pin_error")]
+Pin = Annotated[int, Whole("pin")]
+Elements = Annotated[Count, Whole("elements")]
+ElementsTwo = Annotated[Count, Whole("elements_two")]
 CouplingKind = Literal["rigid", "averaging"]
 
 
 class SetSpec(Spec):
     """The set as a whole; sun–planet and planet–ring share centre distance, module and pressure angle."""
 
-    planets: Annotated[Count, Field(ge=2, le=12)] = Field(
+    planets: Annotated[Count, Whole("planets")] = Field(
         description="number of planets; equally spaced where `positions` is absent"
     )
-    positions: tuple[Annotated[int, Field(ge=0, le=2000)], ...] | None = Field(
+    positions: tuple[Annotated[int, Whole("position")], ...] | None = Field(
         default=None,
         description="places of the planets in steps of 360 deg/(z_sun + z_ring), the only ones at which their teeth "
         "fit: ascending, the first 0",
     )
-    center_distance: Length = Field(description="distance of planet and sun axes, the radius of the bolt circle")
-    normal_module: Length = Field(description="normal module m_n")
-    pressure_angle: Annotated[float, Quantity("rad", above=math.radians(10), below=math.radians(35))] = Field(
-        description="normal pressure angle"
+    center_distance: Annotated[float, Quantity("center_distance")] = Field(
+        description="distance of planet and sun axes, the radius of the bolt circle"
     )
+    normal_module: Module = Field(description="normal module m_n")
+    pressure_angle: PressureAngle = Field(description="normal pressure angle")
     helix_angle: HelixAngle = Field(
         default=0.0,
         description="helix angle beta at the reference circle, -35 deg to 35 deg; positive: the sun is right-handed, "
         "planets and ring are left-handed",
     )
-    backlash: Size = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")
-    load_sharing: Annotated[float, Quantity(at_least=1, at_most=4)] = Field(
+    backlash: Backlash = Field(description="circumferential backlash j_wt of either mesh on its working pitch circle")
+    load_sharing: Annotated[float, Quantity("load_sharing")] = Field(
         default=1.35, description="mesh load factor K_gamma: most loaded planet over the mean (ISO 6336-1)"
     )
-    pin_errors: dict[Annotated[int, Field(ge=0, le=11)], tuple[Deviation, Deviation]] = Field(
+    pin_errors: dict[Pin, tuple[PinError, PinError]] = Field(
         default={},
         description="deviation of single pins from their places: number of the bolt (planet1 is on bolt 0) → radial, "
         "tangential",
     )
-    planet_eccentricity: dict[Annotated[int, Field(ge=0, le=11)], Eccentricity] = Field(
+    planet_eccentricity: dict[Pin, Eccentricity] = Field(
         default={},
         description="eccentric toothings of single planets: number of the bolt → amount, angle; before that of all",
     )
@@ -60,17 +81,15 @@ class SetGearSpec(Toothing):
     model_config = ConfigDict(populate_by_name=True)  # `import` is no name in Python
 
     name: Name
-    teeth: Annotated[Count, Field(ge=6, le=400)] = Field(description="number of teeth z")
-    profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(
-        default=0.0, description="profile shift coefficient x"
-    )
-    tip_diameter: Length = Field(description="tip diameter d_a")
-    face_width: Length = Field(description="face width b")
-    bore_diameter: Length = Field(description="diameter of the bore")
-    tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
+    teeth: Teeth = Field(description="number of teeth z")
+    profile_shift: ProfileShift = Field(default=0.0, description="profile shift coefficient x")
+    tip_diameter: TipDiameter = Field(description="tip diameter d_a")
+    face_width: FaceWidth = Field(description="face width b")
+    bore_diameter: Diameter = Field(description="diameter of the bore")
+    tip_edge_radius: TipEdge = Field(default=2e-4, description="radius of the tip edge rounding")
     rack: RackSpec = Field(default_factory=RackSpec, description="basic rack")
     material: Material = Field(description="material")
-    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
     body: BodySpec = Field(description="mesh and reduction")
     bearing: Bearing | None = Field(
         default=None,
@@ -84,10 +103,10 @@ class SetGearSpec(Toothing):
 class MountsSpec(Spec):
     """Elastic mounting of the ring: springs between equal patches of its rim and the ground."""
 
-    points: Annotated[Count, Field(ge=3, le=60)] = Field(
+    points: Annotated[Count, Whole("mounts")] = Field(
         description="number of mounts, equally spaced from tooth space 0; a divisor of the number of teeth"
     )
-    stiffness: Annotated[float, Quantity("N/m", above=0)] = Field(
+    stiffness: Annotated[float, Quantity("mount_stiffness")] = Field(
         description="stiffness of one mount, the same in all three directions"
     )
     damping_ratio: Ratio = Field(default=0.03, description="damping ratio D: c = 2 D sqrt(k m), of all mounts together")
@@ -99,20 +118,18 @@ class RingSpec(Toothing):
     model_config = ConfigDict(populate_by_name=True)
 
     name: Name = "ring"
-    teeth: Annotated[Count, Field(ge=12, le=600)] = Field(description="number of teeth z")
-    profile_shift: Annotated[float, Quantity(at_least=-3, at_most=3)] = Field(
-        default=0.0, description="profile shift coefficient x, positive outwards"
-    )
-    tip_diameter: Length = Field(description="tip diameter, the smallest of the ring")
-    rim_diameter: Length = Field(description="outer diameter of the rim")
-    face_width: Length = Field(description="face width b")
-    tip_edge_radius: Size = Field(default=2e-4, description="radius of the tip edge rounding")
+    teeth: Annotated[Count, Whole("ring_teeth")] = Field(description="number of teeth z")
+    profile_shift: ProfileShift = Field(default=0.0, description="profile shift coefficient x, positive outwards")
+    tip_diameter: TipDiameter = Field(description="tip diameter, the smallest of the ring")
+    rim_diameter: Diameter = Field(description="outer diameter of the rim")
+    face_width: FaceWidth = Field(description="face width b")
+    tip_edge_radius: TipEdge = Field(default=2e-4, description="radius of the tip edge rounding")
     dedendum: Factor = Field(default=1.25, description="root depth below the reference circle, factor of m")
     fillet_radius: Factor = Field(
         default=0.3, description="root fillet, an arc tangent to flank and root circle, factor of m"
     )
     material: Material = Field(description="material")
-    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
     mounts: MountsSpec | None = Field(default=None, description="elastic mounts; none when the table is absent")
     body: BodySpec = Field(description="mesh and reduction")
     imported: RingImportSpec | None = Field(
@@ -123,20 +140,14 @@ class RingSpec(Toothing):
 class CarrierMeshSpec(Spec):
     """Element counts of one bolt's sector (20-node hexahedra; half of it, mirrored)."""
 
-    around: Annotated[Count, Field(ge=2, le=60)] = Field(
-        default=4, description="elements around the bolt towards bore and rim, each half side"
-    )
-    sides: Annotated[Count, Field(ge=2, le=60)] = Field(
-        default=4, description="elements around the bolt towards the next bolt"
-    )
-    bolt: Annotated[Count, Field(ge=1, le=30)] = Field(default=4, description="elements from the bolt's core outwards")
-    disc: Annotated[Count, Field(ge=1, le=60)] = Field(default=8, description="elements from the bolt to the edges")
-    plate: Annotated[Count, Field(ge=1, le=60)] = Field(default=6, description="elements through the plate")
-    neck: Annotated[Count, Field(ge=1, le=30)] = Field(
-        default=4, description="elements in the gap between plate and seat"
-    )
-    length: Annotated[Count, Field(ge=1, le=60)] = Field(default=4, description="elements along the planet's seat")
-    scale: Annotated[float, Quantity(above=0, at_most=8)] = Field(default=1.0, description="factor on all counts")
+    around: ElementsTwo = Field(default=4, description="elements around the bolt towards bore and rim, each half side")
+    sides: ElementsTwo = Field(default=4, description="elements around the bolt towards the next bolt")
+    bolt: Elements = Field(default=4, description="elements from the bolt's core outwards")
+    disc: Elements = Field(default=8, description="elements from the bolt to the edges")
+    plate: Elements = Field(default=6, description="elements through the plate")
+    neck: Elements = Field(default=4, description="elements in the gap between plate and seat")
+    length: Elements = Field(default=4, description="elements along the planet's seat")
+    scale: Annotated[float, Quantity("scale")] = Field(default=1.0, description="factor on all counts")
 
     def scaled(self, count: int, least: int = 1) -> int:
         """`count` times the scale, rounded."""
@@ -152,20 +163,22 @@ class CarrierSpec(Spec):
 
     model_config = ConfigDict(populate_by_name=True)
 
-    bore_diameter: Length = Field(description="diameter of the bore")
-    outer_diameter: Length = Field(description="outer diameter of the plate")
+    bore_diameter: Diameter = Field(description="diameter of the bore")
+    outer_diameter: Diameter = Field(description="outer diameter of the plate")
     thickness: Length = Field(description="thickness of the plate")
     gap: Length = Field(description="clearance between the plate and the planets' faces")
-    bolt_diameter: Length = Field(description="diameter of the bolts; their seats are as long as the planets are wide")
+    bolt_diameter: Diameter = Field(
+        description="diameter of the bolts; their seats are as long as the planets are wide"
+    )
     coupling: dict[Name, CouplingKind] = Field(
         default={}, description='how "bore", "bolt0", "bolt1" … are held: rigid (RBE2) or averaging (RBE3)'
     )
     material: Material = Field(description="material")
-    modal_damping: Ratio = Field(default=0.01, description="damping ratio of the elastic modes")
+    modal_damping: ModalDamping = Field(default=0.01, description="damping ratio of the elastic modes")
     method: Literal["krylov", "rubin", "craig_bampton", "modal"] = Field(
         default="krylov", description="method of reduction; every one ends in oscillators"
     )
-    modes: Annotated[Count, Field(ge=24, le=2000)] = Field(default=120, description="number of oscillators stored")
+    modes: Annotated[Count, Whole("carrier_modes")] = Field(default=120, description="number of oscillators stored")
     mesh: CarrierMeshSpec = Field(default_factory=CarrierMeshSpec, description="element counts")
     bearing: Bearing | None = Field(default=None, description="between its bore and the ground; for motion")
     imported: CarrierImportSpec | None = Field(
@@ -184,7 +197,7 @@ class PlanetarySpec(Spec):
     description: Text = Field(default="", description="one line about the stage")
     source: Path
     kind: Literal["planetary_set"] = Field(description="kind of stage")
-    torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(
+    torque_max: Annotated[float, Quantity("torque_max")] = Field(
         description="largest carrier torque the model is made for"
     )
     set: SetSpec = Field(description="the set")
@@ -192,7 +205,7 @@ class PlanetarySpec(Spec):
     planet: SetGearSpec = Field(description="one planet; all are equal")
     ring: RingSpec = Field(description="ring")
     carrier: CarrierSpec = Field(description="carrier")
-    speed_max: Annotated[float, Quantity("rad/s", above=0)] | None = Field(
+    speed_max: Annotated[float, Quantity("speed_max")] | None = Field(
         default=None, description="largest speed of the carrier; for motion"
     )
     contact: ContactSpec | None = Field(default=None, description="tooth contact; for motion")

@@ -18,6 +18,7 @@ from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles, set_geometries, set_geometry
+from gearfmu.ranges import range_of
 from gearfmu.spec.checks import (
     STRIP_PER_HERTZ,
     Found,
@@ -96,7 +97,7 @@ def mesh_torque(spec: PlanetarySpec) -> float:
 def _sun_mesh(file: str, spec: PlanetarySpec) -> list[Problem]:
     """Sun and planet by themselves and as a pair; fields under their names in a set."""
     s = spec.set
-    pair = PairSpec(
+    pair = PairSpec.model_construct(
         center_distance=s.center_distance, normal_module=s.normal_module, pressure_angle=s.pressure_angle,
         helix_angle=s.helix_angle, backlash=s.backlash,
     )  # fmt: skip
@@ -203,7 +204,8 @@ def internal_half_width(gears: tuple[Any, Any], mesh: RingMesh, force: float) ->
 def _assembly(spec: PlanetarySpec, planet: GearGeometry) -> Found:
     teeth, planets, positions = spec.sun.teeth + spec.ring.teeth, spec.set.planets, spec.set.positions
     if positions is None and teeth % planets:
-        fitting = [n for n in range(2, 13) if teeth % n == 0]
+        most = int(range_of("planets").high)
+        fitting = [n for n in range(2, most + 1) if teeth % n == 0]
         nearest = ", ".join(str(round(k * teeth / planets)) for k in range(planets))
         remedy = (
             f"the set cannot be assembled with equally spaced planets: (z_sun + z_ring)/planets = {teeth}/{planets} is "

@@ -6,26 +6,26 @@ from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field, model_validator
 
-from gearfmu.spec.base import Count, Quantity, Spec, refuse
+from gearfmu.spec.base import Count, Quantity, Spec, Whole, refuse
 
-Stiffness = Annotated[float, Quantity("N*m/rad", above=0)]
-Damping = Annotated[float, Quantity("N*m*s/rad", at_least=0)]
-Inertia = Annotated[float, Quantity("kg*m^2", above=0)]
-Frequency = Annotated[float, Quantity("Hz", above=0)]
+Stiffness = Annotated[float, Quantity("torsional_stiffness")]
+Damping = Annotated[float, Quantity("torsional_damping")]
+Inertia = Annotated[float, Quantity("inertia")]
+Cut = Annotated[float, Quantity("cut")]
 
 
 class NodalSpec(Spec):
     """Nodal contact with a penalty stiffness: flank nodes against the deformed flank of the other gear."""
 
-    along: Annotated[Count, Field(ge=2, le=513)] | None = Field(
+    along: Annotated[Count, Whole("nodes")] | None = Field(
         default=None,
         description="nodes along a flank, equally far apart; those of the gear's own mesh, 2 flank + 1, when absent",
     )
-    across: Annotated[Count, Field(ge=2, le=513)] | None = Field(
+    across: Annotated[Count, Whole("nodes")] | None = Field(
         default=None,
         description="nodes across the common face width; those of the gear's own mesh, 2 width + 1, when absent",
     )
-    penalty: Annotated[float, Quantity("N/m^3", above=0, words=("hertz",))] = Field(
+    penalty: Annotated[float, Quantity("penalty", words=("hertz",))] = Field(
         default=cast(Any, "hertz"),  # the assembly puts the stiffness in its place
         description='stiffness per area of flank, or "hertz": with it the contact is as wide as Hertz\'s at torque_max',
     )
@@ -40,13 +40,13 @@ class FrictionSpec(Spec):
     law: Literal["constant", "benedict_kelley", "iso_tr_14179"] = Field(
         default="constant", description="what the coefficient of friction follows"
     )
-    coefficient: Annotated[float, Quantity(at_least=0, at_most=0.5)] = Field(
+    coefficient: Annotated[float, Quantity("friction_coefficient")] = Field(
         default=0.05, description="coefficient of friction of law constant"
     )
-    viscosity: Annotated[float, Quantity("Pa*s", above=0, at_most=10)] = Field(
+    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
         default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth, of the other laws"
     )
-    roughness: Annotated[float, Quantity("m", above=0, at_most=1e-5)] = Field(
+    roughness: Annotated[float, Quantity("flank_roughness")] = Field(
         default=0.4e-6, description="mean roughness Ra of both flanks, of the other laws"
     )
 
@@ -54,10 +54,10 @@ class FrictionSpec(Spec):
 class FilmSpec(Spec):
     """Squeeze film of oil between flanks that approach."""
 
-    viscosity: Annotated[float, Quantity("Pa*s", at_least=1e-4, at_most=10)] = Field(
+    viscosity: Annotated[float, Quantity("oil_viscosity")] = Field(
         default=0.03, description="dynamic viscosity of the oil at the temperature of the teeth"
     )
-    roughness: Annotated[float, Quantity("m", at_least=1e-8, at_most=1e-5)] = Field(
+    roughness: Annotated[float, Quantity("film_roughness")] = Field(
         default=1e-6, description="oil left between flanks that touch by their roughness, added to every gap"
     )
 
@@ -65,8 +65,8 @@ class FilmSpec(Spec):
 class ContactSpec(Spec):
     """Tooth contact."""
 
-    slices: Annotated[Count, Field(ge=1, le=10)] = Field(default=5, description="slices across the face width")
-    damping: Annotated[float, Quantity("N*s/m^2", at_least=0)] = Field(
+    slices: Annotated[Count, Whole("slices")] = Field(default=5, description="slices across the face width")
+    damping: Annotated[float, Quantity("contact_damping")] = Field(
         description="contact damping per metre of face width"
     )
     law: Literal["line"] = Field(default="line", description="contact law")
@@ -106,8 +106,8 @@ class PortSpec(Spec):
 class LevelSpec(Spec):
     """Cut frequencies of the fidelity levels: modes below are dynamic, the others static."""
 
-    fast_cut: Frequency = Field(default=50e3, description="cut frequency of level fast")
-    standard_cut: Frequency = Field(default=120e3, description="cut frequency of level standard")
+    fast_cut: Cut = Field(default=50e3, description="cut frequency of level fast")
+    standard_cut: Cut = Field(default=120e3, description="cut frequency of level standard")
 
     @model_validator(mode="after")
     def _ordered(self) -> LevelSpec:

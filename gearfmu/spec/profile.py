@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.ranges import range_of
 from gearfmu.units import to_si
 
 UNITS = {"time": "s", "torque": "N*m", "speed": "rad/s"}
@@ -127,6 +128,8 @@ class _Reader:
                 value = np.nan
             if name and not np.isfinite(value):
                 self.refuse(f"{where}, {name}", cell.strip(), "expected a finite number")
+            elif name and (refusal := range_of(name).refusal(scale * value)):
+                self.refuse(f"{where}, {name}", range_of(name).shown(scale * value), refusal)
             found[name] = scale * value
         return found
 

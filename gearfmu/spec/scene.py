@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasChoices, Field
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Count, Name, Quantity, Spec, Switch, Text, read_toml, validate
+from gearfmu.spec.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
 from gearfmu.spec.changes import Changes, changed_tables
 from gearfmu.spec.deformation import DeformationChoice, deformation_problems
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
@@ -26,7 +26,6 @@ DRIVES = ("passenger_car", "test_rig", "shaft_loads", "drivetrain")
 Level = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
 Integrator = Literal["dg4", "mix4", "em", "rk45", "central"]
 Contact = Literal["by_level", "line", "nodal"]
-Seconds = Annotated[float, Quantity("s", at_least=0)]
 
 
 class Effects(Spec):
@@ -64,8 +63,8 @@ class StageChoice(Spec):
     level: Level = "standard"
     integrator: Integrator = "dg4"
     contact: Contact = "by_level"
-    slices: Annotated[Count, Field(ge=1, le=10)] = 5
-    h: Seconds = 0.0
+    slices: Annotated[Count, Whole("slices")] = 5
+    h: Annotated[float, Quantity("internal_step")] = 0.0
     effects: Effects = Effects()
 
 
@@ -73,19 +72,19 @@ class CouplingChoice(Spec):
     """Master and communication step; micro_step: largest step of the drivetrain between evaluations of its torques, 0
     for the communication step."""
 
-    step: Annotated[float, Quantity("s", above=0), Field(description="communication step")]
+    step: Annotated[float, Quantity("step"), Field(description="communication step")]
     master: Literal["gs_mean", "jacobi"] = "gs_mean"
-    micro_step: Seconds = 0.0
+    micro_step: Annotated[float, Quantity("micro_step")] = 0.0
 
 
 class StartSpec(Spec):
     """Speeds at the start; pinion_speed, also written input_speed: of the stage's input, its first port; slip: engine
     faster than the pinion by this."""
 
-    pinion_speed: Annotated[float, Quantity("rad/s")] = Field(
+    pinion_speed: Annotated[float, Quantity("speed")] = Field(
         validation_alias=AliasChoices("pinion_speed", "input_speed")
     )
-    slip: Annotated[float, Quantity("rad/s")] = 0.0
+    slip: Annotated[float, Quantity("speed")] = 0.0
 
 
 class SceneSpec(Spec):
@@ -97,8 +96,8 @@ class SceneSpec(Spec):
 
     name: Name
     description: Text
-    duration: Annotated[float, Quantity("s", above=0)]
-    settle: Seconds = 0.0
+    duration: Annotated[float, Quantity("duration")]
+    settle: Annotated[float, Quantity("time")] = 0.0
     stage: StageChoice
     coupling: CouplingChoice
     start: StartSpec

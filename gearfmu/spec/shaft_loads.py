@@ -10,8 +10,8 @@ from pydantic import Field
 from gearfmu.errors import Problem
 from gearfmu.spec.base import Quantity, Spec
 
-Torque = Annotated[float, Quantity("N*m")]
-Time = Annotated[float, Quantity("s", at_least=0)]
+Torque = Annotated[float, Quantity("torque")]
+Time = Annotated[float, Quantity("time")]
 
 
 class ProportionalTorque(Spec):
@@ -19,7 +19,7 @@ class ProportionalTorque(Spec):
     its speed."""
 
     torque: Torque = Field(description="torque at that speed")
-    speed: Annotated[float, Quantity("rad/s")] = Field(description="speed at which the shaft has this torque")
+    speed: Annotated[float, Quantity("speed")] = Field(description="speed at which the shaft has this torque")
 
     @property
     def slope(self) -> float:
@@ -30,16 +30,16 @@ class ProportionalTorque(Spec):
 class AlternatingTorque(Spec):
     """amplitude · sin(2π frequency t)."""
 
-    amplitude: Annotated[float, Quantity("N*m", at_least=0)] = Field(description="of the sine")
-    frequency: Annotated[float, Quantity("Hz", above=0)] = Field(description="of the sine, which begins at zero")
+    amplitude: Annotated[float, Quantity("amplitude")] = Field(description="of the sine")
+    frequency: Annotated[float, Quantity("frequency")] = Field(description="of the sine, which begins at zero")
 
 
 class SpeedControl(Spec):
     """A drive that follows a speed over time: damping · (wanted speed − speed), on top of the other torques."""
 
-    damping: Annotated[float, Quantity("N*m*s/rad", above=0)] = Field(description="torque per deviation of the speed")
+    damping: Annotated[float, Quantity("control_damping")] = Field(description="torque per deviation of the speed")
     over_time: Annotated[
-        tuple[tuple[Time, Annotated[float, Quantity("rad/s")]], ...],
+        tuple[tuple[Time, Annotated[float, Quantity("speed")]], ...],
         Field(min_length=1, description="wanted speed: straight lines through (time, speed), constant outside"),
     ]
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 from gearfmu.spec.base import Quantity, metadata_of
-
-_IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi)}
-_SCALES = {"m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)), "s": ((1.0, "s", 1.0), (1e-3, "ms", 1e3), (0.0, "µs", 1e6))}
+from gearfmu.units import quantity_text
 
 
 def shown(spec: BaseModel) -> dict[str, Any]:
@@ -23,19 +20,6 @@ def shown(spec: BaseModel) -> dict[str, Any]:
         if value is not None:
             found[name] = _of(value, quantity.unit if quantity else "")
     return found
-
-
-def quantity_text(value: float, unit: str) -> str:
-    """An SI number of this unit as text: lengths in mm or µm, times in s, ms or µs, angles in degrees, speeds in
-    rpm."""
-    if unit in _SCALES:
-        scales = _SCALES[unit]
-        _, unit, factor = next((scale for scale in scales if abs(value) >= scale[0]), scales[0]) if value else scales[0]
-        value *= factor
-    elif unit in _IN:
-        unit, factor = _IN[unit]
-        value *= factor
-    return f"{value:.6g} {unit}".rstrip()
 
 
 def _of(value: Any, unit: str) -> Any:

@@ -38,12 +38,10 @@ class StageSpec(Spec):
     description: Text = Field(default="", description="one line about the stage")
     source: Path
     kind: Literal["external_pair"] = Field(default="external_pair", description="kind of stage")
-    torque_max: Annotated[float, Quantity("N*m", above=0)] = Field(
+    torque_max: Annotated[float, Quantity("torque_max")] = Field(
         description="largest pinion torque the model is made for"
     )
-    speed_max: Annotated[float, Quantity("rad/s", above=0)] = Field(
-        description="largest pinion speed the model is made for"
-    )
+    speed_max: Annotated[float, Quantity("speed_max")] = Field(description="largest pinion speed the model is made for")
     pair: PairSpec = Field(description="the pair")
     gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel")
     contact: ContactSpec = Field(description="tooth contact")

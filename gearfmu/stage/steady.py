@@ -10,6 +10,7 @@ import numpy as np
 
 from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Variable
+from gearfmu.ranges import Range, range_of, range_problems
 from gearfmu.spec.profile import Profile
 from gearfmu.spec.turning import require_driven
 from gearfmu.stage.limits import beyond_limits, limit_named
@@ -19,6 +20,26 @@ from gearfmu.stage.simulate import Inputs, Steady, simulate
 from gearfmu.stage.trace import Trace
 
 DURATION = 0.1  # s, of a run whose profile says none
+DRIVE_RANGES = {
+    "torque": "torque",
+    "speed": "speed",
+    "end_speed": "speed",
+    "duration": "duration",
+    "step": "step",
+    "settle": "time",
+}
+PARAMETER_RANGES = {
+    "contact_damping": "contact_damping",
+    "backlash": "backlash_parameter",
+    "contact_penalty": "penalty",
+    "friction_coefficient": "friction_coefficient",
+    "oil_viscosity": "oil_viscosity",
+    "flank_roughness": "flank_roughness",
+    "film_roughness": "film_roughness",
+    "w_start": "speed",
+    "h": "internal_step",
+    "slices": "slices",
+}
 
 
 @dataclass(frozen=True)
@@ -66,7 +87,8 @@ class Drive:
 
 
 def _drive_problems(drive: Drive) -> Iterator[Problem]:
-    profile = drive.profile
+    profile, given = drive.profile, {field: getattr(drive, field) for field in DRIVE_RANGES}
+    yield from range_problems({field: (value, range_of(DRIVE_RANGES[field])) for field, value in given.items()})
     for name in ("torque", "speed"):
         in_profile, given = profile is not None and getattr(profile, name) is not None, getattr(drive, name)
         if given is None and not in_profile:
@@ -80,12 +102,16 @@ def _drive_problems(drive: Drive) -> Iterator[Problem]:
 
 def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, float]:
     """Kernel parameters (docs/variables.md) as numbers, from {"level": "fast", "slices": 10, "effect.hertz": False} or
-    the same as text. ModelError, naming what there is, for a name or value that the model does not know."""
+    the same as text. ModelError, naming what there is, for a name or value that the model does not know; SpecError
+    with every number that is out of range, in the words in which a stage file with that number is refused."""
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     unknown = [name for name in settings if name not in known]
     if unknown:
         raise ModelError(f"'{unknown[0]}' is no parameter; there are {', '.join(known)}")
-    return {name: _number(known[name], value) for name, value in settings.items()}
+    found = {name: _number(known[name], value) for name, value in settings.items()}
+    if problems := range_problems({name: (value, _range(known[name])) for name, value in found.items()}):
+        raise SpecError(problems)
+    return found
 
 
 def steady_run(
@@ -128,6 +154,14 @@ def _require_springs(model: StageModel) -> None:
     if soft:
         remedy = f"'simulate' turns spring ports without a chain; {', '.join(soft)} is another: use 'run' with a scene"
         raise SpecError([Problem(str(model.spec.source), "ports", "", remedy)])
+
+
+def _range(variable: Variable) -> Range:
+    """The range of a parameter, with the remedy of the stage file's field where it is the same number."""
+    last = variable.name.rpartition(".")[2]
+    if not variable.name.startswith("effect.") and last in PARAMETER_RANGES:
+        return range_of(PARAMETER_RANGES[last])
+    return Range(variable.unit, variable.minimum, variable.maximum)
 
 
 def _number(variable: Variable, value: Any) -> float:

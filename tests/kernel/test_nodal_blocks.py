@@ -122,10 +122,10 @@ def test_a_model_without_nodes_says_so() -> None:
 @pytest.mark.parametrize(
     ("damage", "words"),
     [
-        ({"nodes0": np.array([1, 5], np.int32)}, "nodes of a flank are out of range"),
-        ({"nodes1": np.array([9, 10000], np.int32)}, "nodes of a flank are out of range"),
+        ({"nodes0": np.array([1, 5], np.int32)}, "number of nodes of a flank = 1 is out of range"),
+        ({"nodes1": np.array([9, 10000], np.int32)}, "number of nodes of a flank = 10000 is out of range"),
         ({"nodes1": None}, "nodes of a flank are missing"),
-        ({"nodal": np.array([[-1.0, 0.5]])}, "numbers of nodal contact are out of range"),
+        ({"nodal": np.array([[-1.0, 0.5]])}, "penalty of nodal contact, N/m3, = -1 is out of range"),
         ({"nodal": np.array([[1e14, 1.5]])}, "numbers of nodal contact are out of range"),
         ({"nodal": np.array([1e14])}, "nodal has the wrong length"),
     ],

@@ -21,7 +21,7 @@ TORQUES = ["80 N*m", 302.0]
 
 @pytest.fixture(scope="module")
 def harris(tmp_path_factory: pytest.TempPathFactory) -> gf.SweepTable:
-    over = {"torque": TORQUES, RELIEF: ["10 um", "9 mm"], "positions": 8}
+    over = {"torque": TORQUES, RELIEF: ["10 um", "1 mm"], "positions": 8}
     return gf.sweep(STAGE, over, tmp_path_factory.mktemp("harris"), on=1)
 
 
@@ -41,7 +41,7 @@ def test_a_point_has_the_numbers_of_the_function_for_one(harris: gf.SweepTable) 
 
 def test_a_point_that_fails_is_a_row_with_its_reason(harris: gf.SweepTable) -> None:
     assert harris["outcome"].tolist() == ["ok", "SpecError"] * 2
-    assert len(harris.failures) == 2 and "amount = 9 mm: more than a tenth of the module" in harris.failures[0]
+    assert len(harris.failures) == 2 and "amount = 1 mm: more than a tenth of the module" in harris.failures[0]
     assert np.isnan(harris["te_mean_um"][1])
 
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 enum { MODEL_VERSION = 2, MOST_NAME = 64 };
+static const double ROUNDING = 1e-9; /* relative: of numbers that are computed from those of the stage file */
 
 /* what is read with: blob, shape so far, and the first thing that was wrong */
 typedef struct reader {
@@ -40,6 +41,17 @@ static void demand(reader *r, int holds, const char *what)
 
 static int between(double x, double low, double high) { return x >= low && x <= high; }
 
+/* a number of the stage file within its range (gk_ranges.h), but for rounding, or a message that names both */
+static void demand_range(reader *r, const char *what, double x, double low, double high)
+{
+    if (r->outcome || between(x, low - ROUNDING * fabs(low), high + ROUNDING * fabs(high))) return;
+    snprintf(r->message, GK_MESSAGE,
+             "model blob: %s = %.6g is out of range, from %.6g to %.6g; correct the stage and make the model again",
+             what, x, low, high);
+    r->outcome = GK_BAD_BLOB;
+}
+#define WITHIN(r, x, RANGE, what) demand_range(r, what, x, GK_LOW_##RANGE, GK_HIGH_##RANGE)
+
 static uint64_t length_of(const reader *r, int field) { return gk_field_count(r->blob, field, &r->shape); }
 
 /* numbers of a field, none of them beyond ±limit */
@@ -62,12 +74,14 @@ static void read_counts(reader *r, gk_model *m)
     const int32_t *c = take(r, F_MODEL_counts);
     if (!c) return;
     if (c[0] != MODEL_VERSION) return refuse(r, "model version", "is not the one this kernel reads");
-    demand(r,
-           counted(c + 1, 1, MAX_SLICES) && counted(c + 2, 1, MAX_ROTORS) && counted(c + 3, 0, MAX_GEARS) &&
-               counted(c + 4, 0, MAX_ENGAGEMENTS) && counted(c + 5, 0, MAX_PORTS) && counted(c + 6, 0, MAX_SUPPORTS) &&
-               counted(c + 7, 0, MAX_SUPPORTS) && counted(c + 8, 1, MAX_FUNCTIONS) && counted(c + 9, 4, 1000) &&
-               counted(c + 10, 1, SETS),
-           "counts");
+    WITHIN(r, c[1], SLICES, "number of slices");
+    WITHIN(r, c[2], ROTORS, "number of rotors");
+    WITHIN(r, c[3], GEARS, "number of gears");
+    WITHIN(r, c[4], ENGAGEMENTS, "number of engagements");
+    WITHIN(r, c[5], PORTS, "number of ports");
+    WITHIN(r, c[6], SUPPORTS, "number of supported directions");
+    WITHIN(r, c[7], SUPPORTS, "number of dampers");
+    demand(r, counted(c + 8, 1, MAX_FUNCTIONS) && counted(c + 9, 4, 1000) && counted(c + 10, 1, SETS), "counts");
     if (r->outcome) return;
     m->slices = c[1], m->rotors = c[2], m->gears = c[3], m->engagements = c[4], m->ports = c[5], m->supports = c[6];
     m->dampers = c[7], m->functions = c[8], m->rolls = c[9], m->sets = c[10];
@@ -135,16 +149,15 @@ static void read_stage(reader *r, gk_model *m)
     if (r->outcome) return;
     demand(r, m->name[0] && strlen(m->name) <= MOST_NAME, "name");
     m->cut[0] = limits[0], m->cut[1] = limits[1], m->h_max = limits[2], m->period_min = limits[3];
-    demand(r,
-           between(m->cut[0], 0, 1e9) && between(m->cut[1], 0, 1e9) && between(m->h_max, 1e-9, 1e-3) &&
-               between(m->period_min, 1e-9, 1e9),
-           "limits");
+    WITHIN(r, m->cut[0], CUT, "cut frequency of level fast, Hz,");
+    WITHIN(r, m->cut[1], CUT, "cut frequency of level standard, Hz,");
+    demand(r, between(m->h_max, 1e-9, 1e-3) && between(m->period_min, 1e-9, 1e9), "limits");
     for (int i = 0; i < m->functions; i++) {
         demand(r, counted(degree + i, 0, 20), "degrees of the width functions");
         m->degree[i] = degree[i];
     }
     for (int i = 0; i < m->rotors; i++) {
-        demand(r, inertia[i] == 0.0 || between(inertia[i], 1e-12, 1e7), "moments of inertia");
+        if (inertia[i] != 0.0) WITHIN(r, inertia[i], INERTIA, "moment of inertia of a rotor, kg.m2,");
         m->inertia[i] = inertia[i];
     }
     read_frames(r, m);
@@ -157,12 +170,16 @@ static void read_port(reader *r, gk_model *m, int i, const int32_t *kind, const 
     if (r->outcome) return;
     p->rotor = kind[0], p->kind = (gk_port_kind)kind[1], p->chain = kind[2] ? ++m->chains : 0;
     p->k = v[0], p->c = v[1], p->inertia = v[2], p->disc = v[3], p->shaft_k = v[4], p->shaft_c = v[5];
-    if (p->kind != PORT_TORQUE) demand(r, between(p->k, 1e-6, 1e15) && between(p->c, 0, 1e12), "port springs");
-    if (p->chain)
-        demand(r,
-               p->kind == PORT_SPRING && between(p->inertia, 1e-12, 1e7) && between(p->disc, 1e-12, 1e7) &&
-                   between(p->shaft_k, 1e-6, 1e15) && between(p->shaft_c, 0, 1e12),
-               "chains of ports");
+    if (p->kind != PORT_TORQUE) {
+        WITHIN(r, p->k, PORT_STIFFNESS, "stiffness of a port, N.m/rad,");
+        WITHIN(r, p->c, PORT_DAMPING, "damping of a port, N.m.s/rad,");
+    }
+    if (!p->chain) return;
+    demand(r, p->kind == PORT_SPRING, "chains of ports");
+    WITHIN(r, p->inertia, INERTIA, "inertia of a chain, kg.m2,");
+    WITHIN(r, p->disc, INERTIA, "disc inertia of a chain, kg.m2,");
+    WITHIN(r, p->shaft_k, PORT_STIFFNESS, "shaft stiffness of a chain, N.m/rad,");
+    WITHIN(r, p->shaft_c, PORT_DAMPING, "shaft damping of a chain, N.m.s/rad,");
 }
 
 static void read_ports(reader *r, gk_model *m)
@@ -187,13 +204,17 @@ static void read_numbers(reader *r, gk_gear *g)
                           &g->width, &g->local,         &g->strip,        &g->relief, &g->relief_start,
                           &g->edge,  &g->corner_radius, &g->corner_angle, &g->z_mid,  &g->helix};
     for (size_t i = 0; i < sizeof to / sizeof *to; i++) *to[i] = v[i];
+    WITHIN(r, g->r_b, BASE_RADIUS, "base radius of a gear, m,");
+    WITHIN(r, g->width, FACE_WIDTH, "face width of a gear, m,");
+    WITHIN(r, g->strip, STRIP, "half-width of a load strip, m,");
+    WITHIN(r, g->edge, TIP_EDGE, "radius of a tip edge, m,");
+    WITHIN(r, g->relief, RELIEF, "curvature of a tip relief, 1/m,");
+    WITHIN(r, g->z_mid, PLACE, "place of a gear along its axis, m,");
     demand(r,
-           between(g->r_b, 1e-4, 10) && between(g->s_form, 0, 20) && between(g->s_tip, 0, 20) &&
-               fabs(g->s_tip - g->s_form) > 1e-6 && between(g->psi_b, 0, 4) && between(g->phase, -1e3, 1e3) &&
-               between(g->width, 1e-6, 10) && between(g->local, 1e-20, 1) && between(g->strip, 1e-6, 0.1) &&
-               between(g->relief, 0, 1e4) && between(g->relief_start, -1, 20) && between(g->edge, 1e-6, 0.1) &&
-               between(g->corner_radius, 1e-4, 20) && between(g->corner_angle, -10, 10) && between(g->z_mid, -10, 10) &&
-               between(g->helix, -1.2, 1.2),
+           between(g->s_form, 0, 20) && between(g->s_tip, 0, 20) && fabs(g->s_tip - g->s_form) > 1e-6 &&
+               between(g->psi_b, 0, 4) && between(g->phase, -1e3, 1e3) && between(g->local, 1e-20, 1) &&
+               between(g->relief_start, -1, 20) && between(g->corner_radius, 1e-4, 20) &&
+               between(g->corner_angle, -10, 10) && between(g->helix, -1.2, 1.2),
            "gear data");
 }
 
@@ -201,7 +222,8 @@ static void check_modes(reader *r, const gk_gear *g)
 {
     for (int k = 0; k < g->modes && !r->outcome; k++) {
         const int next = k + 1 < g->modes ? g->member[k + 1] : -1, before = k ? g->member[k - 1] : -1;
-        demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "frequencies or damping ratios");
+        demand(r, between(g->omega[k], 1e-3, 1e12), "frequencies");
+        WITHIN(r, g->zeta[k], DAMPING_RATIO, "damping ratio of a gear's mode");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "frequencies", "are not sorted");
         demand(r, counted(g->diameter + k, 0, g->z) && counted(g->member + k, 0, 2), "nodal diameters or members");
         if ((g->member[k] == 1 && next != 2) || (g->member[k] == 2 && before != 1)) refuse(r, "mode pairs", "are torn");
@@ -243,7 +265,7 @@ static void read_nodes(reader *r, gk_gear *g)
 {
     const int32_t *nodes = take(r, F_GEAR_nodes);
     for (int i = 0; nodes && i < 2; i++) {
-        demand(r, counted(nodes + i, 2, MAX_NODES), "nodes of a flank");
+        WITHIN(r, nodes[i], NODES, "number of nodes of a flank");
         if (!r->outcome) g->nodes[i] = nodes[i];
     }
 }
@@ -254,7 +276,8 @@ static void read_nodal(reader *r, gk_model *m)
     const double *v = take(r, F_MODEL_nodal);
     for (int i = 0; v && i < m->engagements && !r->outcome; i++) {
         gk_engagement *e = &m->engagement[i];
-        demand(r, between(v[2 * i], 1e6, 1e22) && between(v[2 * i + 1], 0, 1), "numbers of nodal contact");
+        WITHIN(r, v[2 * i], PENALTY, "penalty of nodal contact, N/m3,");
+        demand(r, between(v[2 * i + 1], 0, 1), "numbers of nodal contact");
         for (int w = 0; w < 2; w++)
             if (!m->gear[e->gear[w]].nodes[0]) refuse(r, "nodes of a flank", "are missing");
         e->penalty = v[2 * i], e->nodes_of_a = v[2 * i + 1];
@@ -264,7 +287,7 @@ static void read_nodal(reader *r, gk_model *m)
 static void read_lead(reader *r, gk_gear *g)
 {
     g->lead = take(r, F_GEAR_lead);
-    for (int k = 0; g->lead && k < 2 * LEADS; k++) demand(r, between(g->lead[k], -1e-3, 1e-3), "leads");
+    for (int k = 0; g->lead && k < 2 * LEADS; k++) WITHIN(r, g->lead[k], FLANK_DEPTH, "depth of a lead, m,");
 }
 
 static void read_flanks(reader *r, gk_gear *g)
@@ -277,10 +300,10 @@ static void read_flanks(reader *r, gk_gear *g)
            "sizes of the deviations of flanks");
     for (int i = 0; i < 3; i++) r->shape.size[SYMBOL_flank_teeth + i] = size && !r->outcome ? (uint64_t)size[i] : 0;
     if (size && !r->outcome) f->teeth = size[0], f->places = size[1], f->rolls = size[2];
-    f->depth = bounded(r, F_GEAR_flank, 1e-2);
+    f->depth = bounded(r, F_GEAR_flank, GK_HIGH_FLANK_DEPTH);
     if (!r->outcome && !size != !f->depth) refuse(r, "deviations of flanks", "are not whole");
     for (int k = 0; f->depth && k < 2 * f->teeth * f->places * f->rolls; k++) f->most = gk_max(f->most, -f->depth[k]);
-    g->runout = bounded(r, F_GEAR_runout, 1e-2);
+    g->runout = bounded(r, F_GEAR_runout, GK_HIGH_RUNOUT);
 }
 
 /* the first of a pair is followed by its second */
@@ -343,8 +366,8 @@ static void read_gear(reader *r, gk_model *m, int i)
     r->shape.gear = i;
     const int32_t *size = take(r, F_GEAR_size);
     if (!size) return;
-    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 1, 1, MAX_TEETH) && counted(size + 2, 0, MAX_MODES),
-           "sizes of a gear");
+    WITHIN(r, size[1], TEETH, "number of teeth");
+    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 2, 0, MAX_MODES), "sizes of a gear");
     if (r->outcome) return;
     g->rotor = size[0], g->z = size[1], g->modes = size[2];
     r->shape.size[SYMBOL_z] = (uint64_t)g->z;
@@ -381,7 +404,7 @@ static void read_ground(reader *r, gk_model *m, int set)
     g->omega = take(r, F_SET_omega_ground), g->zeta = take(r, F_SET_zeta_ground);
     g->rigid_share = bounded(r, F_SET_rigid_share, 1.001);
     g->damper_rows = bounded(r, F_SET_damper_rows, 1e6), g->damper = take(r, F_SET_damper);
-    g->support_rows = bounded(r, F_SET_support_rows, 1e6), g->kappa = bounded(r, F_SET_kappa, 1e16);
+    g->support_rows = bounded(r, F_SET_support_rows, 1e6), g->kappa = bounded(r, F_SET_kappa, 1e17);
     g->support_compliance = bounded(r, F_SET_support_compliance, 1e3);
     g->port_rows = bounded(r, F_SET_port_rows, 1e6);
     g->carried_rows = bounded(r, F_SET_carried_rows, 1e6);
@@ -389,7 +412,8 @@ static void read_ground(reader *r, gk_model *m, int set)
     g->whirl_rows = bounded(r, F_SET_whirl_rows, 1e6);
     if (m->whirls && !g->whirl_rows) refuse(r, "rows of gyroscopic pairs", "are missing");
     for (int k = 0; k < g->n && !r->outcome; k++) {
-        demand(r, between(g->omega[k], 1e-3, 1e12) && between(g->zeta[k], 0, 0.9), "ground oscillators");
+        demand(r, between(g->omega[k], 1e-3, 1e12), "ground oscillators");
+        WITHIN(r, g->zeta[k], DAMPING_RATIO, "damping ratio of a ground oscillator");
         if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "ground oscillators", "are not sorted");
     }
     for (int k = 0; k < m->dampers && !r->outcome; k++)
@@ -415,12 +439,11 @@ static void read_engagement(reader *r, gk_model *m, int i, const int32_t *who, i
     memcpy(e->position, v, sizeof e->position);
     e->backlash = v[4], e->nominal_backlash = v[5], e->damping = v[6], e->force_max = v[7];
     e->tilt[0] = v[8], e->tilt[1] = v[9];
-    demand(r,
-           between(v[0], -100, 100) && between(v[1], -100, 100) && between(v[2], -100, 100) &&
-               between(v[3], -100, 100) && between(e->backlash, -1e-3, 1e-2) &&
-               between(e->nominal_backlash, -1e-2, 1e-2) && between(e->damping, 0, 1e9) &&
-               between(e->force_max, 1e-9, 1e12) && between(v[8], -0.01, 0.01) && between(v[9], -0.01, 0.01),
-           "engagements");
+    for (int k = 0; k < 4; k++) WITHIN(r, v[k], AXIS, "position of a gear, m,");
+    WITHIN(r, e->backlash, BACKLASH, "backlash, m,");
+    WITHIN(r, e->damping, CONTACT_DAMPING, "contact damping, N.s/m2,");
+    for (int k = 0; k < 2; k++) WITHIN(r, e->tilt[k], TILT, "tilt of an axis against that of its mate, rad,");
+    demand(r, between(e->nominal_backlash, -1e-2, 1e-2) && between(e->force_max, 1e-9, 1e12), "engagements");
     const gk_gear *A = &m->gear[e->gear[0]], *B = &m->gear[e->gear[1]];
     const double reach = e->kind == MESH_INTERNAL ? B->r_b - A->r_b : A->r_b + B->r_b;
     if (e->kind != MESH_FLAT && !(squared_distance(e) > 1.0002 * reach * reach))

@@ -2,28 +2,29 @@
 #ifndef GK_MODEL_H
 #define GK_MODEL_H
 #include "base/gk_blob.h"
+#include "model/gk_ranges.h"
 
 #define GK_PI 3.14159265358979323846
 enum {
-    MAX_ROTORS = 24,
-    MAX_GEARS = 16,
-    MAX_ENGAGEMENTS = 12,
-    MAX_PORTS = 16,
-    MAX_SUPPORTS = 64, /* directions */
-    MAX_SLICES = 10,
+    MAX_ROTORS = GK_HIGH_ROTORS,
+    MAX_GEARS = GK_HIGH_GEARS,
+    MAX_ENGAGEMENTS = GK_HIGH_ENGAGEMENTS,
+    MAX_PORTS = GK_HIGH_PORTS,
+    MAX_SUPPORTS = GK_HIGH_SUPPORTS, /* directions */
+    MAX_SLICES = GK_HIGH_SLICES,
     MAX_FUNCTIONS = 8,
     LEADS = 33,       /* places across the face width where a lead is given */
     MAX_STARTS = 64,  /* parameters whose start is not the table's */
     MAX_CARRIED = 32, /* bodies in the axes of turning rotors */
     MAX_WHIRLS = 1000,
     MAX_MODES = 6000,
-    MAX_TEETH = 1000,
+    MAX_TEETH = GK_HIGH_TEETH,
     MAX_GROUND = 2000,
     MAX_OWN = 1000, /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
     OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */
     SETS = 2,       /* of ground oscillators: as supported; with the supports held */
     NAME_LENGTH = 32,
-    MAX_NODES = 513, /* of a flank along or across */
+    MAX_NODES = GK_HIGH_NODES, /* of a flank along or across */
     MAX_FLANK_ROLLS = 1025,
     MAX_FLANK_PLACES = 129
 };
