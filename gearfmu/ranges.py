@@ -147,7 +147,7 @@ _OWN: dict[str, tuple[str, float, float, str]] = {
     ),
     "profile_shift": ("", -3, 3, "a factor of the module, not a length"),
     "center_distance": ("m", 1e-4, 20, _CHECK),
-    "diameter": ("m", 1e-6, 40, _CHECK),
+    "diameter": ("m", 1e-6, 100, _CHECK),
     "bore": ("m", 0, 40, "0 mm for a solid shaft"),
     "length": ("m", 1e-6, 40, _CHECK),
     "rack_factor": ("", 0.01, 5, "a factor of the module, not a length: addendum 1, dedendum 1.25, fillet 0.38"),

@@ -364,7 +364,7 @@ def test_te_over_several_pitches_is_that_of_one_after_the_other(plain: StageMode
     """Of a gear whose teeth are alike: columns of the pairs and harmonics of the mesh too."""
     one, two = (loaded_te(plain, [302.0], 8, pitches=n) for n in (1, 2))
     assert two.position[-1] == pytest.approx(15 / 8) and two.pitches == 2
-    for name in ("te", "stiffness", "shares"):
+    for name in ("te", "mesh_stiffness", "stage_stiffness", "shares"):
         single, double = getattr(one, name), getattr(two, name)
         assert double == pytest.approx(np.concatenate([single, single], axis=1), rel=1e-6, abs=1e-9)
     assert two.harmonics(3) == pytest.approx(one.harmonics(3), rel=1e-6)

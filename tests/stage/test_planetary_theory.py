@@ -163,7 +163,7 @@ def test_shares_with_pin_errors_are_those_of_the_paper_model(
     assert np.ptp(paper) > 0.02 and np.allclose(kernel, paper, atol=1e-4)
 
 
-@pytest.mark.parametrize("stiffness", [1e3, 3.0])
+@pytest.mark.parametrize("stiffness", [1e5, 1e4])
 def test_a_set_with_pin_errors_rests_without_load_however_softly_its_sun_floats(stiffness: float) -> None:
     """Flanks that overlapped push the sun aside, planets turn loosely in their backlash: what is left is the weight of
     the sun's bearing on the teeth, less than stiffness times backlash."""
