@@ -151,7 +151,7 @@ static inline double gk_solve_mean(const gk_system *s, int i)
 static inline double gk_solve_static_mean(const gk_system *s, int i)
 {
     return gk_solve_mean(s, i) - 0.5 * s->jump[i];
-} /* mean of the forces at its start and end, before a given torque jumps: that which does work on what is quasi-static */
+} /* mean of the forces at its start and end, which does the work on what is quasi-static */
 static inline double gk_solve_quasi_static(const gk_system *s, int i)
 {
     return s->Al[i] + s->approach[i] + s->beyond[i];
