@@ -31,6 +31,7 @@ _DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.M)
 _OTHERWISE = re.compile(r"^[ \t]*#[ \t]*(?:else|elif)\b.*?(?=^[ \t]*#[ \t]*endif\b)", re.M | re.S)
 _DEFINE = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)
 _ATTRIBUTE = re.compile(r"__(?:attribute|declspec)(?:__)?\s*\(\((?:[^()]|\([^()]*\))*\)\)")
+_ASSERT = re.compile(r"\bGK_ASSERT\((?:[^()]|\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))*\);")  # not in the product
 _FUNCTION = re.compile(r"\b(\w+)\s*\(")
 _BY_TYPE = re.compile(r"^\s*\w+_function\s+(\w+)\s*;?$")
 _WORD = re.compile(r"\b[A-Za-z_]\w*\b")
@@ -75,7 +76,8 @@ class Source:
     @cached_property
     def functions(self) -> list[Function]:
         """Definitions and declarations at file level, in order."""
-        plain = _ATTRIBUTE.sub("", _DIRECTIVE.sub("", _OTHERWISE.sub(_blank, self.text)))
+        plain = _ASSERT.sub("", _DIRECTIVE.sub("", _OTHERWISE.sub(_blank, self.text)))
+        plain = _ATTRIBUTE.sub("", plain)
         return [function for head, body in _pieces(plain) if (function := _function(head, body)) is not None]
 
     @cached_property

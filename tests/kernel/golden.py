@@ -116,9 +116,10 @@ def digest(scene: Scene, parameters: dict[str, float], library: Path | None = No
     return hashed.hexdigest()[:16]
 
 
-def all_digests(library: Path | None = None) -> dict[str, str]:
-    """Run → digest, with this build of the kernel."""
-    return {name: digest(scene, parameters, library) for name, scene, parameters in runs()} | stage_digests(library)
+def all_digests(library: Path | None = None, part: str = "") -> dict[str, str]:
+    """Run → digest, with this build of the kernel; part: of the names of those that are made."""
+    pairs = {name: digest(scene, parameters, library) for name, scene, parameters in runs() if part in name}
+    return pairs | stage_digests(library, part)
 
 
 def stored() -> dict[str, dict[str, str]]:
@@ -129,18 +130,22 @@ def stored() -> dict[str, dict[str, str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Golden hashes of the kernel's runs.")
     parser.add_argument("--write", action="store_true", help="store what this kernel gives")
+    parser.add_argument("--library", type=Path, help="compare this build of the kernel")
+    parser.add_argument("--only", default="", help="a part of the names of runs to compare")
+    parser.add_argument("--real", choices=REALS, default="float", help="its type of modal rows and states")
     parser.add_argument("--write-models", action="store_true", help="make and store the small models, nothing else")
     chosen = parser.parse_args()
     if chosen.write_models:
         return write_models()
     found = {}
-    for real in REALS:
+    for real in [chosen.real] if chosen.library else REALS:
         with tempfile.TemporaryDirectory() as folder:
-            found[real] = all_digests(build(Path(folder), real=real))
-    if chosen.write:
+            found[real] = all_digests(chosen.library or build(Path(folder), real=real), chosen.only)
+    if chosen.write and not chosen.library and not chosen.only:
         FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
         return
-    other = [f"{real} {name}" for real, of in stored().items() for name, d in of.items() if found[real].get(name) != d]
+    known = {real: {name: d for name, d in stored()[real].items() if chosen.only in name} for real in found}
+    other = [f"{real} {name}" for real in found for name, d in known[real].items() if found[real].get(name) != d]
     print(f"{sum(map(len, found.values()))} runs, {len(other)} moved", *other, sep="\n  ")
     sys.exit(min(len(other), 99))
 

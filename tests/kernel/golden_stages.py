@@ -242,6 +242,6 @@ def cases() -> Iterator[tuple[str, Callable[[str, Path | None], str]]]:
             yield from ((name, digest) for name, (of, *_) in table.items() if of == stage)
 
 
-def stage_digests(library: Path | None = None) -> dict[str, str]:
-    """Case → digest, with this build of the kernel."""
-    return {name: digest(name, library) for name, digest in cases()}
+def stage_digests(library: Path | None = None, part: str = "") -> dict[str, str]:
+    """Case → digest, with this build of the kernel; part: of the names of those that are made."""
+    return {name: digest(name, library) for name, digest in cases() if part in name}
