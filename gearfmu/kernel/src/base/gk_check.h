@@ -1,6 +1,6 @@
-/* Checks of what the code itself guarantees: at the doors of functions that other files call, and in accessors. They are
- * active in builds with -DGK_CHECK and nothing in the product. What comes from outside (blobs, values, saved states) is
- * no matter for GK_ASSERT: it is refused with an outcome. */
+/* Checks of what the code itself guarantees: where functions that other files call begin, and in accessors. They are
+ * active in builds with -DGK_CHECK and absent from the product. Data from outside (blobs, values, saved states) are
+ * refused with an outcome instead. */
 #ifndef GK_CHECK_H
 #define GK_CHECK_H
 #ifdef GK_CHECK

@@ -93,8 +93,8 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
     (void)gamma;
     for (int p = 0; p < model->ports; p++) work->outer_speed[p] = (work->outer[p] - work->outer_before[p]) / h;
     memcpy(outer, work->outer, sizeof outer);
-    /* In the first step forces of the equilibrium take the place of accelerations. A torque that is given anew acts from
-     * the start of the step. */
+    /* In the first step forces of the equilibrium take the place of accelerations. A torque that is given anew acts
+     * from the start of the step. */
     if (!(data->rk_h > 0.0) || torque_jumps(model, setup, work, data)) {
         approach(model, setup, work, data, 0.0);
         if (!gk_rk45_evaluate(model, setup, work, data, 0, work->outer_before)) return GK_DIVERGED;

@@ -170,11 +170,12 @@ static inline double gk_solve_mean(const gk_system *s, int i)
     GK_ASSERT(gk_is_row(s, i));
     return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]);
 } /* force of a row in the step */
+/* mean of the forces at its start and end, before a given torque jumps: that which does work on what is quasi-static */
 static inline double gk_solve_static_mean(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
     return gk_solve_mean(s, i) - 0.5 * s->jump[i];
-} /* mean of the forces at its start and end, before a given torque jumps: that which does work on what is quasi-static */
+}
 static inline double gk_solve_quasi_static(const gk_system *s, int i)
 {
     GK_ASSERT(gk_is_row(s, i));
