@@ -29,6 +29,7 @@ MODELS = {  # name → stage, modes of a body (a set needs more: distant teeth),
     "helical_set": ("helical_set", 36, 2, False),
 }
 ROLLS = 6
+NODES = (9, 5)  # of a flank for nodal contact: along, across
 FRICTION = ("along_rows", "along_normal", "along_own", "along_ground")
 BITS = 16  # of the mantissa that tables keep
 TABLE = 64  # elements: shorter arrays are not rounded
@@ -46,6 +47,7 @@ def make(name: str) -> bytes:
     spec = load_stage(stage)
     bodies = [_small(body, modes, functions) for body in load_bodies(spec)]
     sections = dict(read_blob(assemble(spec, bodies, rolls=ROLLS).blob))
+    sections |= {k: np.array(NODES, np.int32) for k in sections if k.startswith("nodes")}
     kept = {k: v for k, v in sections.items() if friction or not k.startswith(FRICTION)}
     return write_blob({k: _rounded(v) for k, v in kept.items()})
 

@@ -32,12 +32,13 @@ Parameters = dict[str, float]
 
 @dataclasses.dataclass(frozen=True)
 class Stage:
-    """A model and how it is run. speed (rad/s), torque (N·m) by port; swings: relative change of the torques, every
-    so many steps; start: speeds where ports are driven by torques."""
+    """A model and how it is run. speed (rad/s), torque (N·m) by port: speeds of outer ends or at the start of ports
+    driven by torques, which reverse after so many steps; slices: where a run says no other number."""
 
     blob: Callable[[], bytes]
     speed: Mapping[str, float]
     torque: Mapping[str, float]
+    slices: int = 3
     steps: int = 40
     reversed_every: int = 15
 
@@ -45,7 +46,7 @@ class Stage:
         """Loaded, not yet initialised; again: in the memory of the last one of this model, which is no longer used."""
         kernel = _kernel(self.blob(), library) if again else Kernel(self.blob(), None, library)
         kernel._lib.gk_defaults(kernel._model, kernel._data)
-        for name, value in parameters.items():
+        for name, value in ({"slices": self.slices} | dict(parameters)).items():
             kernel.set(name, value)
         for port, speed in self.speed.items():
             if f"{port}.w_start" in kernel.variables:
@@ -124,18 +125,18 @@ RUNS: dict[str, tuple[str, Parameters]] = {
     "helical/explicit": ("helical", {"level": EXPLICIT}),
     "helical/simple": ("helical", {"level": PAPER, "slices": 2.0} | SIMPLE),
     "helical/friction": ("helical", {"level": FAST, "friction_law": 2.0} | FRICTION),
-    "helical/film": ("helical", {"level": FAST, "slices": 3.0} | FILM),
+    "helical/film": ("helical", {"level": FAST} | FILM),
     "deviating/fast": ("deviating", {"level": FAST}),
     "deviating/friction": ("deviating", {"level": RIGID} | FRICTION | FILM),
-    "train/rigid": ("train", {"level": RIGID, "slices": 3.0}),
+    "train/rigid": ("train", {"level": RIGID, "slices": 1.0}),
     "train/standard": ("train", {"level": STANDARD, "slices": 2.0}),
     "train/em": ("train", {"level": FAST, "integrator": EM, "slices": 1.0}),
     "pin_errors/rigid": ("pin_errors", {"level": RIGID, "slices": 1.0}),
-    "pin_errors/fast": ("pin_errors", {"level": FAST, "slices": 2.0}),
+    "pin_errors/fast": ("pin_errors", {"level": FAST, "slices": 1.0}),
     "pin_errors/em": ("pin_errors", {"level": FAST, "integrator": EM, "slices": 1.0} | BARE),
     "pin_errors/friction": ("pin_errors", {"level": RIGID, "slices": 1.0} | FRICTION),
     "pin_errors/film": ("pin_errors", {"level": RIGID, "slices": 1.0} | FILM),
-    "helical_set/rigid": ("helical_set", {"level": RIGID, "slices": 2.0}),
+    "helical_set/rigid": ("helical_set", {"level": RIGID, "slices": 1.0}),
     "helical_set/full": ("helical_set", {"level": FULL, "slices": 1.0}),
     "helical_set/rk45": ("helical_set", {"level": FAST, "integrator": RK45, "slices": 1.0}),
     "pair/film": ("pair", {"level": FAST, "contact_damping": 0.0} | FILM),
@@ -146,7 +147,7 @@ RUNS: dict[str, tuple[str, Parameters]] = {
 ADOPTIONS: dict[str, tuple[str, Parameters, Parameters]] = {
     "adopt/pair": ("pair", {"level": FAST}, {"level": FULL, "slices": 2.0, "integrator": EM}),
     "adopt/helical": ("helical", {"level": RIGID}, {"level": STANDARD, "slices": 4.0} | FRICTION),
-    "adopt/pin_errors": ("pin_errors", {"level": FAST, "slices": 1.0}, {"level": RIGID, "slices": 1.0}),
+    "adopt/train": ("train", {"level": FAST, "slices": 1.0}, {"level": RIGID, "slices": 1.0}),
 }
 STATICS: dict[str, tuple[str, Parameters]] = {
     "statics/pair": ("pair", {"level": FAST}),
