@@ -198,7 +198,7 @@ static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int str
 void gk_node_gather(gk_node *n, double position)
 {
     GK_ASSERT(position >= 0.0 && position <= 1.0);
-    GK_ASSERT(n->points > 0 && n->points <= MAX_CANDIDATES * MAX_SLICES);
+    GK_ASSERT(n->points >= 0 && n->points <= MAX_CANDIDATES * MAX_SLICES);
     const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
     const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
     double ports[MAX_PORTS];
