@@ -55,6 +55,17 @@ def inner_library() -> Path:
     return once("inner", make, probe) / "inner.so"
 
 
+def checked_library(real: str = "float") -> Path:
+    """The kernel with GK_ASSERT: a check that fails ends the process. Not for damaged blobs and states, whose numbers
+    the kernel does not vouch for."""
+    flags = ("cc", "-O1", "-DGK_CHECK", "-Wl,--no-as-needed", "-lm")
+
+    def make(folder: Path) -> None:
+        build_library(real=real, out=folder / "kernel.so", compiler=flags)
+
+    return once(f"checked-{real}", make) / "kernel.so"
+
+
 def sanitized_library() -> Path:
     """The kernel with AddressSanitizer and UBSan."""
     return once("sanitized", lambda folder: build_library(sanitize=True, out=folder / "kernel.so")) / "kernel.so"

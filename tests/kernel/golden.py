@@ -1,9 +1,12 @@
-"""Golden hashes of runs: what a refactoring of the kernel must not move by one bit.
+"""Golden hashes of runs: a refactoring of the kernel must not change one bit of them.
 
-Six scenes on the small pair, at every level and with every integrator, in single and double build. A change of the
-kernel that is meant to change numbers writes them anew, in a commit that says why:
+Six scenes on the small pair, at every level and with every integrator, and all other kinds of stage and calculation
+(golden_stages.py), in single and double build. A change of the kernel that is meant to change numbers writes them anew,
+in a commit that says why:
 
     python tests/kernel/golden.py --write
+
+The stored models of golden_stages.py are written by --write-models (golden_models.py), which changes their hashes too.
 """
 
 from __future__ import annotations
@@ -20,7 +23,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from probes import build  # noqa: E402  (found through the line above)
+from golden_models import write_models  # noqa: E402  (found through the line above)
+from golden_stages import stage_digests  # noqa: E402
+from probes import build  # noqa: E402
 from small_model import pair_blob  # noqa: E402
 
 from gearfmu.kernel import Kernel  # noqa: E402
@@ -111,9 +116,10 @@ def digest(scene: Scene, parameters: dict[str, float], library: Path | None = No
     return hashed.hexdigest()[:16]
 
 
-def all_digests(library: Path | None = None) -> dict[str, str]:
-    """Run → digest, with this build of the kernel."""
-    return {name: digest(scene, parameters, library) for name, scene, parameters in runs()}
+def all_digests(library: Path | None = None, part: str = "") -> dict[str, str]:
+    """Run → digest, with this build of the kernel; part: of the names of those that are made."""
+    pairs = {name: digest(scene, parameters, library) for name, scene, parameters in runs() if part in name}
+    return pairs | stage_digests(library, part)
 
 
 def stored() -> dict[str, dict[str, str]]:
@@ -124,15 +130,22 @@ def stored() -> dict[str, dict[str, str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description="Golden hashes of the kernel's runs.")
     parser.add_argument("--write", action="store_true", help="store what this kernel gives")
+    parser.add_argument("--library", type=Path, help="compare this build of the kernel")
+    parser.add_argument("--only", default="", help="a part of the names of runs to compare")
+    parser.add_argument("--real", choices=REALS, default="float", help="its type of modal rows and states")
+    parser.add_argument("--write-models", action="store_true", help="make and store the small models, nothing else")
     chosen = parser.parse_args()
+    if chosen.write_models:
+        return write_models()
     found = {}
-    for real in REALS:
+    for real in [chosen.real] if chosen.library else REALS:
         with tempfile.TemporaryDirectory() as folder:
-            found[real] = all_digests(build(Path(folder), real=real))
-    if chosen.write:
+            found[real] = all_digests(chosen.library or build(Path(folder), real=real), chosen.only)
+    if chosen.write and not chosen.library and not chosen.only:
         FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
         return
-    other = [f"{real} {name}" for real, of in stored().items() for name, d in of.items() if found[real].get(name) != d]
+    known = {real: {name: d for name, d in stored()[real].items() if chosen.only in name} for real in found}
+    other = [f"{real} {name}" for real in found for name, d in known[real].items() if found[real].get(name) != d]
     print(f"{sum(map(len, found.values()))} runs, {len(other)} moved", *other, sep="\n  ")
     sys.exit(min(len(other), 99))
 

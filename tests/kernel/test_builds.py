@@ -1,14 +1,20 @@
-"""One source, the same bits: whatever the compiler, the optimisation and the contents of uninitialised memory."""
+"""One source, the same bits: whatever the compiler, the optimisation and the contents of uninitialised memory; and with
+GK_ASSERT, of which none fails."""
 
 from __future__ import annotations
 
 import hashlib
+import re
 import struct
+import subprocess
+import sys
 from functools import lru_cache
 from pathlib import Path
 
 import pytest
-from probes import build, compilers
+from builds import checked_library
+from golden import REALS
+from probes import build, compilers, source_folder
 from small_model import pair_blob
 
 from gearfmu.kernel import Kernel
@@ -18,6 +24,8 @@ QUICK = {("gcc", "O0"), ("clang", "O3")}
 VARIANTS = [
     pytest.param(c, f, marks=[] if (c, f) in QUICK else [pytest.mark.full]) for c in compilers() for f in FLAG_SETS
 ]
+CHECKS = 150  # GK_ASSERT in the sources, at least
+QUICK_SCENES, LONG_SCENES = ("pair_loaded", "clutch_closure"), ("clutch_closure_train", "planetary_closure")
 WATCHED = ("mesh.force", "mesh.te", "energy.stored", "energy.residual", "bearing.pinion.fx", "wheel.gear.phi")
 
 
@@ -67,3 +75,46 @@ def test_a_second_run_repeats_the_first(system_library: Path) -> None:
     first = run(system_library, ("chain", "spring"), 0, 60)
     run(system_library, ("torque", "spring"), 0, 30)
     assert run(system_library, ("chain", "spring"), 0, 60) == first
+
+
+# ---- with GK_ASSERT --------------------------------------------------------------------------------------------------
+def apart(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """A Python program of this folder in a process of its own, which a check that fails ends."""
+    here = Path(__file__).parent
+    line = [sys.executable, str(here / str(arguments[0])), *map(str, arguments[1:])]
+    return subprocess.run(line, capture_output=True, text=True)
+
+
+def test_no_check_fails_in_runs_at_level_fast() -> None:
+    done = apart("golden.py", "--library", checked_library(), "--only", "/fast")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("real", REALS)
+def test_no_check_fails_in_golden_runs(real: str) -> None:
+    done = apart("golden.py", "--library", checked_library(real), "--real", real)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("scenes", [QUICK_SCENES, pytest.param(LONG_SCENES, marks=pytest.mark.full)])
+def test_no_check_fails_in_scenes(scenes: tuple[str, ...]) -> None:
+    done = apart("checked_scenes.py", checked_library(), *scenes)
+    assert done.stdout.split("\n")[:-1] == [f"{scene} ok" for scene in scenes], done.stderr
+
+
+def test_a_check_that_fails_ends_the_process_and_says_where() -> None:
+    call = f"import ctypes; ctypes.CDLL({str(checked_library())!r}).gk_model_name(None)"
+    done = subprocess.run([sys.executable, "-c", call], capture_output=True, text=True)
+    assert done.returncode == -6
+    assert re.search(r"model/gk_model\.c:\d+: GK_ASSERT\(model\) failed", done.stderr)
+
+
+def test_the_product_has_no_checks(system_library: Path) -> None:
+    assert b"GK_ASSERT" not in system_library.read_bytes()
+    assert b"GK_ASSERT" in checked_library().read_bytes()
+
+
+def test_doors_and_accessors_are_checked() -> None:
+    files = [*source_folder().rglob("*.c"), *source_folder().rglob("*.h")]
+    assert sum(len(re.findall(r"^ *GK_ASSERT\(", path.read_text("utf-8"), re.M)) for path in files) >= CHECKS

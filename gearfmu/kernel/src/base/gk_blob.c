@@ -1,6 +1,7 @@
 /* The blob: header, table of sections, sections (docs/file-formats.md, "Model blob"). Everything is checked once, here,
  * in the order in which it becomes safe to read: size → header → hash → table → contents. Arithmetic on sizes is 64-bit
  * and compares before it adds. */
+#include "base/gk_check.h"
 #include "base/gk_blob.h"
 #include "base/gk_sha256.h"
 #include <stdarg.h>
@@ -199,6 +200,7 @@ static gk_outcome check_sections(const gk_blob *blob, char message[GK_MESSAGE])
 
 gk_outcome gk_blob_open(gk_blob *blob, const void *bytes, size_t size, char message[GK_MESSAGE])
 {
+    GK_ASSERT(blob && message);
     message[0] = 0;
     *blob = (gk_blob){bytes, size, 0, ""};
     if (bytes == NULL || (uintptr_t)bytes % 8) return refuse(message, "model blob: needs memory aligned to 8 bytes");
@@ -225,13 +227,16 @@ static const void *find(const gk_blob *blob, const char *name, section_type type
 
 const double *gk_blob_f64(const gk_blob *blob, const char *name, uint64_t *count)
 {
+    GK_ASSERT(blob && name && count);
     return find(blob, name, F64, count);
 }
 const int32_t *gk_blob_i32(const gk_blob *blob, const char *name, uint64_t *count)
 {
+    GK_ASSERT(blob && name && count);
     return find(blob, name, I32, count);
 }
 const char *gk_blob_text(const gk_blob *blob, const char *name, uint64_t *count)
 {
+    GK_ASSERT(blob && name && count);
     return find(blob, name, TEXT, count);
 }

@@ -1,6 +1,7 @@
 /* Small arithmetic: numbers without the C library, sums in fixed lanes. */
 #ifndef GK_LANES_H
 #define GK_LANES_H
+#include "base/gk_check.h"
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -19,6 +20,7 @@ static inline double gk_max(double x, double y) { return x > y ? x : y; }
 static inline double gk_min(double x, double y) { return x < y ? x : y; }
 static inline double gk_floor(double x)
 { /* |x| < 2^62 */
+    GK_ASSERT(!(x >= 0x1p62) && !(x <= -0x1p62));
     double whole = (double)(int64_t)x;
     return whole > x ? whole - 1.0 : whole;
 }
@@ -34,7 +36,11 @@ typedef uint64_t gk_unsigned __attribute__((vector_size(4 * sizeof(uint64_t)), m
 #define GK_CHOOSE(where, x, y) ((gk_quad)(((where) & (gk_bits)(x)) | (~(where) & (gk_bits)(y))))
 #define GK_LARGER(x, y) GK_CHOOSE((x) > (y), x, y)
 #define GK_MAGNITUDE(x) ((gk_quad)((gk_bits)(x) & INT64_MAX))
-static inline double gk_largest(const gk_quad *x) { return gk_max(gk_max((*x)[0], (*x)[2]), gk_max((*x)[1], (*x)[3])); }
+static inline double gk_largest(const gk_quad *x)
+{
+    GK_ASSERT(x);
+    return gk_max(gk_max((*x)[0], (*x)[2]), gk_max((*x)[1], (*x)[3]));
+}
 /* calls f(…, quads) with the usual sizes as constants, so that the compiler keeps short rows in registers */
 #define GK_SIZED(quads, f, ...)                                                                                        \
     switch (quads) {                                                                                                   \
@@ -47,6 +53,7 @@ static inline double gk_largest(const gk_quad *x) { return gk_max(gk_max((*x)[0]
 /* zeros in a few quads, as stores instead of a call */
 GK_INLINE void gk_clear(double *x, int quads)
 {
+    GK_ASSERT(quads >= 0 && (x || !quads));
     const gk_quad zero = {0};
     gk_quad *to = (gk_quad *)x;
     switch (quads) {
@@ -83,6 +90,7 @@ GK_INLINE void gk_clear(double *x, int quads)
 /* y += f x over quads `from` … `to` − 1 */
 GK_INLINE void gk_axpy(double f, const double *x, double *y, int from, int to)
 {
+    GK_ASSERT(0 <= from && (from >= to || (x && y)));
     const gk_quad *a = (const gk_quad *)x;
     gk_quad *b = (gk_quad *)y;
     for (int q = from; q < to; q++) b[q] += f * a[q];
@@ -90,6 +98,7 @@ GK_INLINE void gk_axpy(double f, const double *x, double *y, int from, int to)
 
 static inline double gk_dot_quads(const double *x, const double *y, int quads)
 {
+    GK_ASSERT(quads >= 0 && (!quads || (x && y)));
     const gk_quad *a = (const gk_quad *)x, *b = (const gk_quad *)y;
     gk_quad sum = {0};
     for (int q = 0; q < quads; q++) sum += a[q] * b[q];
@@ -104,6 +113,7 @@ typedef gk_real gk_half __attribute__((vector_size(LANES / 2 * sizeof(gk_real)),
 
 static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
 {
+    GK_ASSERT(n >= 0 && n % LANES == 0 && (!n || (a && b)));
     gk_half low = {0}, high = {0};
     const gk_half *x = (const gk_half *)a, *y = (const gk_half *)b;
     for (int k = 0; k < 2 * n / LANES; k += 2) {

@@ -3,6 +3,7 @@
  * rounding error of each carried along as a second double, as in fdlibm (Sun, 1993). The polynomials are our own:
  * Chebyshev interpolation with 60 digits, printed by tests/kernel/minimax.py, where each truncation error stands below
  * 0.1 ulp of the result. Measured worst errors: tests/kernel/test_math.py. */
+#include "base/gk_check.h"
 #include "base/gk_math.h"
 #include <float.h>
 #include <math.h>
@@ -126,6 +127,7 @@ static double reduce_by_half_pi(double x, double *r, double *tail)
 
 void gk_sincos(double x, double *sine, double *cosine)
 {
+    GK_ASSERT(sine && cosine && sine != cosine);
     if (!(magnitude(x) <= 1e9)) {
         *sine = *cosine = NOT_A_NUMBER;
         return;

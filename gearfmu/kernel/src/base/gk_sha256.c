@@ -1,4 +1,5 @@
 /* SHA-256, FIPS 180-4 §4.1.2 (functions), §4.2.2 (constants), §5.1.1 (padding), §6.2.2 (rounds). */
+#include "base/gk_check.h"
 #include "base/gk_sha256.h"
 #include <stdint.h>
 #include <string.h>
@@ -46,6 +47,7 @@ static void compress(uint32_t state[8], const unsigned char *block)
 
 void gk_sha256(const void *bytes, size_t size, unsigned char digest[32])
 {
+    GK_ASSERT(digest && (bytes || !size));
     uint32_t state[8] = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
                          0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
     const unsigned char *p = bytes;

@@ -411,6 +411,7 @@ static int tooth_pair(const pair *q, const flank_side *s, int k, double search_d
 /* moves the gaps of a place along their gradients */
 void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE])
 {
+    GK_ASSERT(setup && place && delta);
     place->gap = INFINITY;
     for (int i = 0; i < (setup->spatial ? GK_STRIPS(setup) : 1); i++) {
         gk_point *p = &place->point[i];
@@ -461,6 +462,7 @@ static const double BENDS = 20.0, SURE = 1e-6; /* of it per centre distance; m *
 
 void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
+    GK_ASSERT(gk_is_engagement(model, mesh->index));
     double pose[POSE] = {0}, d[2], sum[2];
     pair q = pair_of(model, setup, mesh, pose);
     const double step = 1e-5;
@@ -513,6 +515,9 @@ static int find(const pair *q, double search_distance, gk_position position[2], 
 int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
                   double search_distance, gk_position position[2], gk_place *place)
 {
+    GK_ASSERT(gk_is_engagement(model, mesh->index));
+    GK_ASSERT(pose && position && place);
+    GK_ASSERT(search_distance >= 0.0);
     pair q = pair_of(model, setup, mesh, pose);
     double moved[POSE], turn[POSE];
     if (!GK_HAS(runout) || !mesh->runs_out) return find(&q, search_distance, position, place);

@@ -11,6 +11,7 @@ static const double FROZEN_RANGE =
 int gk_frozen_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *frozen,
                    const double *pose, gk_position position[2], gk_place *place)
 {
+    GK_ASSERT(frozen && pose && frozen != pose);
     const int found = gk_flank_find(model, setup, mesh, frozen, FROZEN_RANGE, position, place);
     double moved[POSE];
     for (int d = 0; d < POSE; d++) moved[d] = pose[d] - frozen[d];

@@ -47,6 +47,7 @@ static void set_four(const gk_model *model, const gk_setup *setup, const gk_mesh
 /* the laws of all contacts of a problem, by their curvatures */
 void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s)
 {
+    GK_ASSERT(s->contacts >= 0 && s->contacts <= MAX_CONTACTS);
     for (int i = s->contacts; i % 4; i++) s->curvature[i] = s->curvature[0];
     for (int i = 0; i < s->contacts; i += 4) set_four(model, setup, mesh, s->curvature + i, &s->law[i / 4]);
 }
@@ -54,6 +55,7 @@ void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mes
 /* half-widths at which the logarithm begins and ends */
 void gk_law_bounds(const gk_model *model, gk_mesh *mesh)
 {
+    GK_ASSERT(gk_is_engagement(model, mesh->index));
     const gk_engagement *e = &model->engagement[mesh->index];
     const double widest = gk_min(model->gear[e->gear[0]].strip, model->gear[e->gear[1]].strip) / 1.5;
     mesh->square_high = widest * widest;
@@ -101,6 +103,7 @@ GK_INLINE void law_of_four(const gk_laws *law, const double *force, const double
 /* δ′ of a contact at a force that it does not have */
 double gk_law_slope(const gk_system *s, int i, double force)
 {
+    GK_ASSERT(i >= 0 && i < s->contacts);
     const int first = i / 4 * 4;
     const gk_quad forces = GK_ALL(force);
     double delta[4], yield[4], potential[4];
@@ -112,6 +115,7 @@ double gk_law_slope(const gk_system *s, int i, double force)
 /* the law of every contact at its present λ; what a quad writes beyond the contacts is 0: links have no width */
 void gk_law_apply(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     for (int i = 0; i < s->contacts; i += 4)
         law_of_four(&s->law[i / 4], s->force + i, s->width + i, s->per_width + i, s->delta + i, s->yield + i,
                     s->potential + i);

@@ -456,6 +456,7 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
 /* takes the strips' own forces out of the problem of an engagement, which joints are left in: they only report */
 void gk_nodal_leave(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     for (int i = 0; i < s->contacts; i++) s->g[i] = 1.0, s->force0[i] = s->damper0[i] = s->end0[i] = 0.0;
 }
 
@@ -463,5 +464,6 @@ void gk_nodal_leave(gk_system *s)
 void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                     const gk_real *const speed[], double spin_rate[])
 {
+    GK_ASSERT(setup->nodal && speed && spin_rate);
     for (int e = 0; e < model->engagements; e++) press_engagement(model, setup, work, data, e, speed, spin_rate);
 }

@@ -23,6 +23,8 @@ static void read_rigid(const gk_model *model, const gk_setup *setup, int e, cons
 void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
                   double *pose)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(spin && pose);
     read_rigid(model, setup, e, ground, pose);
     const int frame = setup->mesh[e].frame;
     for (int w = 0; w < 2; w++) {
@@ -54,6 +56,8 @@ static void contact_rows(const gk_setup *setup, const gk_side *side, const gk_re
 
 void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(work->engaged[e].places >= 0 && work->engaged[e].places <= MAX_PAIRS);
     gk_engaged *engaged = &work->engaged[e];
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
@@ -112,6 +116,8 @@ GK_INLINE void ground_rows(const gk_setup *setup, const gk_side *side, const gk_
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
 void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(gk_system_is_sound(&work->engaged[e].system));
     const gk_base *base = &setup->base;
     const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
@@ -133,6 +139,8 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
 /* Fills the rows of the sliding of all contacts: gear groups, ground group, spins; those of the gaps are there */
 void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(work->engaged[e].glide);
     const gk_mesh *mesh = &setup->mesh[e];
     gk_engaged *engaged = &work->engaged[e];
     gk_glide *glide = engaged->glide;
@@ -156,6 +164,7 @@ void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
 /* a gear group's state in the frame of a tooth: what tooth 0 of a state turned back would have */
 void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out)
 {
+    GK_ASSERT(tooth >= 0 && y != out && m->n % (2 * LANES) == 0);
     const int half = m->n / LANES; /* halves of LANES in one half of the lanes */
     const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
     const gk_half *a = (const gk_half *)y, *b = a + half;
@@ -169,6 +178,7 @@ void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *
 /* adds two forces in the frame of a tooth to the group's */
 void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2])
 {
+    GK_ASSERT(tooth >= 0 && m->n % (2 * LANES) == 0);
     const int half = m->n / LANES;
     const gk_half *c = (const gk_half *)m->cosine + tooth * half, *s = (const gk_half *)m->sine + tooth * half;
     for (int k = 0; k < half; k++)
@@ -199,6 +209,8 @@ static void read_rows(const double *rows, int n, int width, const double *x, dou
 /* what the rows of an engagement read of displacements (or speeds) of the ground group */
 void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(read);
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &engaged->system;
     double local[MAX_GROUND + 4 * MAX_ROTORS];
@@ -211,6 +223,8 @@ void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e
 void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
                                double *read)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(engaged->glide && read);
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &engaged->system;
     double local[MAX_GROUND + 4 * MAX_ROTORS];
@@ -223,6 +237,8 @@ void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged,
 void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
                   double *read)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(y && read);
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
     gk_rows_read_ground(setup, engaged, e, ground, read);
@@ -239,6 +255,8 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
 void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
                            const double *ground, double *read)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(read);
     const int each = setup->spatial ? 1 : GK_STRIPS(setup);
     double rigid[POSE];
     read_rigid(model, setup, e, ground, rigid);
@@ -273,6 +291,7 @@ GK_INLINE void bore_column(const gk_side *side, const gk_engaged *engaged, doubl
 /* Fills what moments on ports turn the contacts of an engagement */
 void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
     for (int w = 0; w < 2; w++)
         if (setup->mesh[e].side[w].port_of >= 0)
             GK_STRIPPED(GK_STRIPS(setup), bore_column, &setup->mesh[e].side[w], &work->engaged[e],
@@ -282,6 +301,8 @@ void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e)
 /* adds what the rows' forces do at once between flanks and bores: moments on ports, and what contacts turn the bores */
 void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(x && sum);
     const gk_system *s = &engaged->system;
     for (int i = s->contacts; i < s->n; i++)
         if (gk_rows_at_bore(setup, s, i)) sum->moment[s->port_of[i]] += x[i];
@@ -294,6 +315,8 @@ void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e,
 /* adds what the rows read of it */
 void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores, double *read)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(bores && read);
     const gk_system *s = &engaged->system;
     for (int i = s->contacts; i < s->n; i++)
         if (gk_rows_at_bore(setup, s, i)) read[i] += bores->turned[s->port_of[i]];
@@ -356,6 +379,8 @@ static void push_basis(const gk_setup *setup, gk_work *work, int e, int which, c
 void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
                         gk_real *out_x, gk_real *out_y)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
     pushes p;
     list_pushes(x, y, work->engaged[e].system.contacts, &p);
     push_basis(setup, work, e, which, work->engaged[e].basis[which], &p, out_x, out_y);
@@ -365,6 +390,8 @@ void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, 
 void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
                               gk_real *out_x, gk_real *out_y)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
     pushes p;
     list_pushes(x, y, work->engaged[e].system.contacts, &p);
     push_basis(setup, work, e, which, work->engaged[e].glide->basis[which], &p, out_x, out_y);
@@ -384,12 +411,16 @@ static void read_basis(const gk_setup *setup, gk_work *work, int e, int which, c
 /* adds what their gaps read */
 void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
     read_basis(setup, work, e, which, work->engaged[e].basis[which], y, read);
 }
 
 /* adds what their sliding reads */
 void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
     read_basis(setup, work, e, which, work->engaged[e].glide->basis[which], y, read);
 }
 
@@ -425,6 +456,7 @@ static void ground_forces(const gk_mesh *mesh, const double *ground, const pushe
 void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
                          double *out_x, double *out_y)
 {
+    GK_ASSERT(engaged && engaged->index == e);
     pushes p;
     list_pushes(x, y, engaged->system.n, &p);
     if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged->ground, &p, out_x, out_y);
@@ -434,6 +466,8 @@ void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e
 void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x,
                                const double *y, double *out_x, double *out_y)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(engaged->glide);
     pushes p;
     list_pushes(x, y, engaged->system.contacts, &p);
     if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged->glide->ground, &p, out_x, out_y);
@@ -455,6 +489,7 @@ static void scatter_along(const gk_setup *setup, gk_work *work, int e)
 void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
                      const double *(*y)(const gk_system *))
 {
+    GK_ASSERT(x && y);
     const size_t width = (size_t)setup->base.n * sizeof(double);
     for (int g = 0; g < model->gears; g++) {
         const size_t size = (size_t)GK_LANES(setup, g) * sizeof(gk_real);

@@ -87,6 +87,8 @@ static int torque_jumps(const gk_model *model, const gk_setup *setup, const gk_w
 gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                            double gamma)
 {
+    GK_ASSERT(h > 0.0 && gk_finite(h));
+    GK_ASSERT(setup->magic == GK_SETUP_MAGIC);
     double outer[MAX_PORTS];
     (void)gamma;
     for (int p = 0; p < model->ports; p++) work->outer_speed[p] = (work->outer[p] - work->outer_before[p]) / h;
@@ -121,6 +123,7 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
 double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                          double h)
 {
+    GK_ASSERT(h > 0.0);
     const double *ground = gk_ground_seen(data) + 2 * setup->base.n;
     double sum = 0.0;
     for (int d = 0; d < setup->spins; d++) sum += 2.0 * gk_kinetic(setup, d, data->f[d]);
@@ -266,6 +269,7 @@ static void first_shape(const gk_model *model, const gk_setup *setup, gk_work *w
  * 16a) for the shape that is worst at this h */
 double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
+    GK_ASSERT(setup->integrator == CENTRAL && work);
     double smallest = INFINITY;
     for (int i = 0; i < PLACES_TRIED; i++) {
         double h = FIRST;

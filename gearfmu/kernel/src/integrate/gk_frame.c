@@ -28,6 +28,7 @@ static void turn_pair(const gk_setup *setup, const gk_ground_flow *f, double hal
 /* half a step of all pairs on the speeds of the ground group; back: in the other order */
 void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v)
 {
+    GK_ASSERT(k->h > 0.0 && v);
     const gk_base *base = &setup->base;
     for (int j = 0; j < base->turns; j++) {
         const int i = back ? base->turns - 1 - j : j;
@@ -40,6 +41,7 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
  * Ωh times its rate, with the cosine and sine of Cayley's form. angle: Ωh. */
 void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to)
 {
+    GK_ASSERT(m->turns && m->pairs % LANES == 0);
     const int halves = 2 * m->pairs / LANES;
     const gk_real half = (gk_real)(0.5 * angle);
     const gk_half *rate = (const gk_half *)m->turn_rate, *v = (const gk_half *)from, *w = v + halves;
@@ -54,6 +56,7 @@ void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk
 /* adds the same as accelerations, for explicit integrators */
 void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a)
 {
+    GK_ASSERT(m->turns && v != a);
     for (int i = 0; i < m->pairs; i++) {
         const gk_real twice = (gk_real)(2.0 * speed) * m->turn_rate[i];
         a[i] += twice * v[m->pairs + i];
@@ -66,6 +69,7 @@ void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_r
 double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
                       double *v)
 {
+    GK_ASSERT(k && v);
     const gk_base *base = &setup->base;
     const gk_ground_flow *f = &k->ground;
     double work = 0.0;
@@ -84,6 +88,7 @@ double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coe
 /* adds the centrifugal loads themselves */
 void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force)
 {
+    GK_ASSERT(force);
     const gk_base *base = &setup->base;
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
         if (carries(model, r)) gk_axpy(data->v[r] * data->v[r], base->outward + r * base->n, force, 0, base->n / 4);
@@ -92,6 +97,7 @@ void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *
 /* the accelerations of both, for explicit integrators: speeds of the spins and v of the ground group */
 void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v, double *a)
 {
+    GK_ASSERT(v != a || !setup->base.n);
     const gk_base *base = &setup->base;
     const int n = base->n;
     for (int i = 0; i < base->turns; i++) {

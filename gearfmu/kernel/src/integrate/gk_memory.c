@@ -8,6 +8,7 @@ static const double PAYABLE = 1e-4; /* of the energy of the quasi-static part: w
 /* entry of the memory that a tooth pair has, −1: none */
 int gk_memory_find(const gk_meshing *meshing, gk_key key)
 {
+    GK_ASSERT(meshing->pairs >= 0 && meshing->pairs <= MAX_PAIRS);
     for (int i = 0; i < meshing->pairs; i++)
         if (meshing->memory[i].key.flank == key.flank && meshing->memory[i].key.tooth == key.tooth) return i;
     return -1;
@@ -43,6 +44,8 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
  * g0 = s0 − C′λ0 − δ(λ0); then the first guess of status and forces */
 void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(gk_system_is_sound(s));
     const gk_engaged *engaged = &work->engaged[e];
     int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
@@ -85,6 +88,8 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
 
 void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e)
 {
+    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(engaged->places >= 0 && engaged->places <= MAX_PAIRS);
     const gk_system *s = &engaged->system;
     gk_meshing *meshing = &data->meshing[e];
     double deepest = 0.0;
@@ -117,6 +122,7 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
 /* an engagement without rows */
 void gk_memory_forget(gk_engaged *engaged)
 {
+    GK_ASSERT(engaged);
     engaged->places = 0;
     engaged->system.n = engaged->system.contacts = engaged->system.stride = engaged->system.clutches = 0;
 }

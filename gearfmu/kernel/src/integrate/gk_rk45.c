@@ -20,6 +20,8 @@ static const double ERROR[STAGES] = {71.0 / 57600,      0,          -71.0 / 1669
 /* y ← S c S y on the active rows: what dashpots c on the paths S = P + δ′ make of the rate of λ */
 void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, double *y)
 {
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_ASSERT(y);
     double path[MAX_STRIDE];
     for (int pass = 0; pass < 2; pass++) {
         gk_solve_path(s, y, path);
@@ -136,6 +138,7 @@ static void ground_rates(const gk_model *model, const gk_setup *setup, gk_work *
 int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,
                      const double *outer)
 {
+    GK_ASSERT(i >= 0 && i < STAGES && outer);
     const gk_real *speed[MAX_GEARS];
     double check = 0.0;
     for (int d = 0; d < setup->spins; d++)
@@ -239,6 +242,7 @@ static void keep(const gk_model *model, const gk_setup *setup, const gk_work *wo
 /* what films take in an inner step, by the power at its end: these integrators keep no account but this */
 void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double step)
 {
+    GK_ASSERT(step > 0.0);
     for (int e = 0; e < model->engagements && GK_ON(setup, film); e++)
         data->meshing[e].squeezed += gk_film_power(&work->engaged[e].system) * step;
 }
@@ -246,6 +250,7 @@ void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work
 /* angles of the bores with a given torque, quasi-static part included */
 void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 {
+    GK_ASSERT(model && work && data);
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
@@ -259,6 +264,8 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                         double gamma)
 {
+    GK_ASSERT(h > 0.0 && gk_finite(h));
+    GK_ASSERT(setup->magic == GK_SETUP_MAGIC);
     double from[MAX_PORTS], to[MAX_PORTS], outer[MAX_PORTS];
     double done = 0.0, step = data->rk_h > 0.0 ? gk_min(data->rk_h, h) : 1e-3 * h;
     (void)gamma;

@@ -3,6 +3,7 @@
 
 const gk_scheme *gk_scheme_of(gk_integrator integrator)
 {
+    GK_ASSERT(integrator >= DG4 && integrator <= CENTRAL);
     static const gk_scheme schemes[] = {
         [DG4] = {.corrected = 1},
         [MIX4] = {.linear_force = 1},

@@ -613,6 +613,8 @@ static int search(rest *r)
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                            const gk_boundary *boundary, int bare, int keep)
 {
+    GK_ASSERT(boundary);
+    GK_ASSERT(setup->magic == GK_SETUP_MAGIC);
     rest r = {.model = model, .setup = *setup, .work = work, .data = data, .boundary = boundary};
     find_soft(&r);
     r.force = work->rest, r.move = r.force + r.unknowns, r.tangent = r.move + r.unknowns;

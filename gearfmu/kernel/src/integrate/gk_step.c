@@ -221,8 +221,16 @@ static int all_finite(const gk_system *s)
 }
 
 /* ---- the end of the step ----------------------------------------------------------------------------------------- */
-const double *gk_step_force(const gk_system *s) { return s->force; }
-const double *gk_step_z(const gk_system *s) { return s->z; }
+const double *gk_step_force(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    return s->force;
+}
+const double *gk_step_z(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    return s->z;
+}
 /* forces at the end that the next prediction is made with, where forces are linear in the step */
 static const double *force_with_dampers(const gk_system *s) { return s->last; }
 
@@ -470,6 +478,9 @@ static void settle_accounts(const gk_model *model, const gk_setup *setup, const 
 gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                         double gamma)
 {
+    GK_ASSERT(h > 0.0 && gk_finite(h));
+    GK_ASSERT(gamma >= 0.0 && gamma <= 1.0);
+    GK_ASSERT(setup->magic == GK_SETUP_MAGIC && data->magic == GK_DATA_MAGIC);
     const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
     gk_outcome outcome;
     GK_MARK(work);
@@ -514,5 +525,6 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
  * what dampers hold */
 double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k)
 {
+    GK_ASSERT(k && data);
     return dynamic_energy(model, setup, data, k) + data->energy.quasi_static;
 }

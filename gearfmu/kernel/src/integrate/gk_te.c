@@ -17,6 +17,7 @@ static double driven_angle(const gk_model *model, const gk_work *work, int port)
 gk_outcome gk_rest(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const double *torque,
                    double *phi)
 {
+    GK_ASSERT(torque && phi);
     gk_boundary b[MAX_PORTS];
     for (int p = 0; p < model->ports; p++) b[p] = (gk_boundary){PORT_TORQUE, torque[p], 0.0, 0.0};
     const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, 0);
@@ -38,6 +39,7 @@ static gk_boundary further(const gk_model *model, int p)
 gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double phi_out,
                  double torque, int e, int keep, double *out, int *places)
 {
+    GK_ASSERT(out && places);
     gk_boundary b[MAX_PORTS] = {{PORT_TORQUE, torque, 0.0, 0.0}, {PORT_FIXED, 0.0, phi_out, 0.0}};
     double angle[MAX_ROTORS];
     if (model->ports < 2 || e < 0 || e >= model->engagements) return GK_BAD_CALL;

@@ -1,6 +1,7 @@
 /* The step in wider vectors: the same sources once more, compiled for AVX2, chosen by our own cpuid (the compilers'
  * dispatch does not link everywhere). Sums have fixed lanes and nothing is contracted, so both give the same bits. */
 #if defined(__x86_64__) && defined(__GNUC__)
+#include "base/gk_check.h"
 #include <cpuid.h>
 #include <math.h>
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* Sections of the blob by the table of fields: their names from scope and numbers, their lengths from dimensions. */
 #include "model/gk_fields.h"
+#include "base/gk_check.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -58,15 +59,22 @@ static uint64_t factor(const char **at, const gk_shape *shape)
 
 uint64_t gk_field_count(const gk_blob *blob, int which, const gk_shape *shape)
 {
+    GK_ASSERT(blob && shape && which >= 0 && which < GK_FIELDS);
     uint64_t count = 0;
     section(blob, &TABLE[which], shape, &count);
     return count;
 }
 
-const char *gk_field_name(int which) { return TABLE[which].name; }
+const char *gk_field_name(int which)
+{
+    GK_ASSERT(which >= 0 && which < GK_FIELDS);
+    return TABLE[which].name;
+}
 
 const void *gk_field_find(const gk_blob *blob, int which, const gk_shape *shape, const char **wrong)
 {
+    GK_ASSERT(blob && shape && wrong);
+    GK_ASSERT(which >= 0 && which < GK_FIELDS);
     static const double nothing = 0.0;
     const field *f = &TABLE[which];
     const char *at = f->dimensions;

@@ -485,6 +485,7 @@ static void read_starts(reader *r, gk_model *m)
 
 gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char message[GK_MESSAGE])
 {
+    GK_ASSERT(model && message);
     memset(model, 0, sizeof *model);
     message[0] = 0;
     gk_outcome outcome = gk_blob_open(&model->blob, blob, size, message);
@@ -514,8 +515,16 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
 }
 
 size_t gk_model_size(void) { return sizeof(gk_model); }
-const char *gk_model_name(const gk_model *model) { return model->name; }
-const char *gk_model_hash(const gk_model *model) { return model->blob.hash; }
+const char *gk_model_name(const gk_model *model)
+{
+    GK_ASSERT(model);
+    return model->name;
+}
+const char *gk_model_hash(const gk_model *model)
+{
+    GK_ASSERT(model);
+    return model->blob.hash;
+}
 int gk_abi(void) { return GK_ABI; }
 
 const char *gk_status_text(int bit)

@@ -2,6 +2,7 @@
 #ifndef GK_MODEL_H
 #define GK_MODEL_H
 #include "base/gk_blob.h"
+#include "base/gk_check.h"
 #include "model/gk_ranges.h"
 
 #define GK_PI 3.14159265358979323846
@@ -133,15 +134,22 @@ struct gk_model {
     gk_ground ground[SETS];
 };
 
+/* numbers of an engagement, a gear, a rotor of the model? For GK_ASSERT. */
+static inline int gk_is_engagement(const gk_model *model, int e) { return e >= 0 && e < model->engagements; }
+static inline int gk_is_gear(const gk_model *model, int g) { return g >= 0 && g < model->gears; }
+static inline int gk_is_rotor(const gk_model *model, int r) { return r >= 0 && r < model->rotors; }
+
 /* the frame of an engagement: both gears stand in it */
 static inline int gk_frame_of(const gk_model *model, const gk_engagement *e)
 {
+    GK_ASSERT(e && gk_is_gear(model, e->gear[0]));
     return model->frame[model->gear[e->gear[0]].rotor];
 }
 
 /* the port of a rotor, −1: none */
 static inline int gk_port_on(const gk_model *model, int rotor)
 {
+    GK_ASSERT(gk_is_rotor(model, rotor));
     for (int p = 0; p < model->ports; p++)
         if (model->port[p].rotor == rotor) return p;
     return -1;
@@ -150,6 +158,7 @@ static inline int gk_port_on(const gk_model *model, int rotor)
 /* the port that a gear's flanks feel through bodies: that of its own rotor, else that of its frame's; −1: none */
 static inline int gk_port_of(const gk_model *model, int gear)
 {
+    GK_ASSERT(gk_is_gear(model, gear));
     const int rotor = model->gear[gear].rotor, own = gk_port_on(model, rotor);
     return own >= 0 || model->frame[rotor] < 0 ? own : gk_port_on(model, model->frame[rotor]);
 }
@@ -157,6 +166,7 @@ static inline int gk_port_of(const gk_model *model, int gear)
 /* r_bA + r_bB of an external engagement, r_bB − r_bA of an internal one */
 static inline double gk_base_reach(const gk_model *model, const gk_engagement *e)
 {
+    GK_ASSERT(gk_is_gear(model, e->gear[0]) && gk_is_gear(model, e->gear[1]));
     return model->gear[e->gear[1]].r_b + (e->kind == MESH_INTERNAL ? -1.0 : 1.0) * model->gear[e->gear[0]].r_b;
 }
 #endif

@@ -197,6 +197,7 @@ static void copy(char *out, size_t size, const char *text) { out[append(out, siz
 /* ---- interface --------------------------------------------------------------------------------------------------- */
 int gk_variable_count(const gk_model *model)
 {
+    GK_ASSERT(model);
     int count = 0;
     for (int i = 0; i < ROWS; i++)
         for (int k = 0; k < instances(model, TABLE[i].scope); k++) count += exists(model, &TABLE[i], k);
@@ -228,6 +229,7 @@ static const char *unit_of(const gk_model *model, const gk_row *row, int instanc
 
 gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
 {
+    GK_ASSERT(model && info);
     int instance;
     const gk_row *row = listed(model, index, &instance);
     if (!row) return GK_BAD_VARIABLE;
@@ -247,6 +249,7 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
 
 gk_outcome gk_defaults(const gk_model *model, gk_data *data)
 {
+    GK_ASSERT(model && data);
     const size_t size = gk_data_size(model);
     memset(data, 0, size);
     data->amplitudes = (int64_t)((size - sizeof *data) / sizeof(double)) -
@@ -267,6 +270,7 @@ static int in_range(const gk_row *row, double value)
 
 int gk_start_allowed(const gk_model *model, uint32_t reference, double value)
 {
+    GK_ASSERT(model);
     int instance;
     const gk_row *row = row_of(model, reference, &instance);
     return row && row->causality == GK_PARAMETER && in_range(row, value);
@@ -286,6 +290,8 @@ static gk_outcome acceptable(const gk_model *model, const gk_data *data, uint32_
 gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *references, size_t count,
                        const double *values)
 {
+    GK_ASSERT(model && data && (!count || (references && values)));
+    GK_ASSERT(data->magic == GK_DATA_MAGIC);
     for (size_t i = 0; i < count; i++) {
         gk_outcome outcome = acceptable(model, data, references[i], values[i]);
         if (outcome) return outcome;
@@ -301,6 +307,8 @@ gk_outcome gk_set_many(const gk_model *model, gk_data *data, const uint32_t *ref
 /* values of all variables but parameters, from other data of the same model */
 void gk_vars_take(const gk_model *model, gk_data *data, const gk_data *from)
 {
+    GK_ASSERT(model && data && from && data != from);
+    GK_ASSERT(data->magic == GK_DATA_MAGIC && from->magic == GK_DATA_MAGIC);
     for (int i = 0; i < ROWS; i++)
         for (int k = 0; k < instances(model, TABLE[i].scope); k++)
             if (TABLE[i].causality != GK_PARAMETER)
@@ -315,6 +323,7 @@ gk_outcome gk_set(const gk_model *model, gk_data *data, uint32_t reference, doub
 gk_outcome gk_get_many(const gk_model *model, const gk_data *data, const uint32_t *references, size_t count,
                        double *values)
 {
+    GK_ASSERT(model && data && (!count || (references && values)));
     for (size_t i = 0; i < count; i++) {
         int instance;
         const gk_row *row = row_of(model, references[i], &instance);
@@ -331,6 +340,7 @@ gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference
 
 gk_effects gk_effects_of(const gk_data *data)
 {
+    GK_ASSERT(data && data->magic == GK_DATA_MAGIC);
     const double *v = data->stage;
     const gk_effects on = {v[V_E_ELASTIC] != 0,     v[V_E_RESIDUAL] != 0, v[V_E_LOCAL] != 0,
                            v[V_E_COAST] != 0,       v[V_E_DAMPING] != 0,  v[V_E_RELIEF] != 0,

@@ -150,6 +150,8 @@ static void solve_members(const gk_island *island)
 /* Contacts alone, without the scalar: η is the dampers' */
 void gk_balance_plain(const gk_island *island)
 {
+    GK_ASSERT(island->count >= 0 && island->count <= MAX_ENGAGEMENTS);
+    GK_ASSERT(island->count < 2 || island->sweep);
     for (int m = 0; m < island->count; m++) gk_solve_clear(island->member[m]);
     solve_members(island);
 }
@@ -256,6 +258,8 @@ static int dry(const gk_island *island)
  * then the defect waits, as it does in a step without change of status. */
 void gk_balance_solve(const gk_island *island)
 {
+    GK_ASSERT(island->count >= 0 && island->count <= MAX_ENGAGEMENTS);
+    GK_ASSERT(island->count < 2 || island->sweep);
     const double steady = island->sweep ? COUPLED_BALANCE : STEADY_BALANCE;
     int curved = 0, rubs = 0;
     for (int m = 0; m < island->count; m++) {

@@ -207,6 +207,8 @@ static void take_paths(const gk_setup *setup, gk_engaged *engaged, int e)
 /* D, A and P of the contacts and of the joints' residual; from the tables of the step, or for any step from the rows */
 void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(gk_system_is_sound(&work->engaged[e].system));
     gk_engaged *engaged = &work->engaged[e];
     between_contacts(setup, engaged, e, tables);
     take_paths(setup, engaged, e); /* entry by entry: long before quads of the same rows are read again */
@@ -231,4 +233,8 @@ GK_INLINE void mirror(gk_system *s, const int quads)
 }
 
 /* the upper block rows of D and A */
-void gk_compliance_mirror(gk_system *s) { GK_SIZED(s->stride / 4, mirror, s) }
+void gk_compliance_mirror(gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_SIZED(s->stride / 4, mirror, s)
+}

@@ -290,6 +290,7 @@ static void sweep(const gk_island *island)
 
 gk_island gk_couple_island(gk_coupled *c)
 {
+    GK_ASSERT(c->island >= 0 && c->island < c->setup->islands);
     gk_island island = {.context = c};
     for (int e = 0; e < c->model->engagements; e++)
         if (within(c, e)) island.member[island.count++] = &c->work->engaged[e].system, c->alone = e;
@@ -308,6 +309,7 @@ static void recall_along(const gk_coupled *c)
 /* the start of the step: under λ0 the others deflect too */
 void gk_couple_recall(gk_coupled *c)
 {
+    GK_ASSERT(c->island >= 0 && c->island < c->setup->islands);
     if (GK_ON(c->setup, friction)) recall_along(c);
     part_at_once(c, AT_START);
     for (int e = 0; e < c->model->engagements; e++) {

@@ -58,6 +58,8 @@ static void stand(gk_system *s)
 /* films of engagement e in a step h; the start of the step has been recalled */
 void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(h > 0.0);
     gk_system *s = &work->engaged[e].system;
     gk_film *film = s->film;
     clear(&setup->mesh[e], s);
@@ -81,6 +83,8 @@ void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h)
 /* the same where no time passes, for given rates of the gaps */
 void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(rate);
     gk_system *s = &work->engaged[e].system;
     gk_film *film = s->film;
     clear(&setup->mesh[e], s);
@@ -127,6 +131,8 @@ static void follow_speed(gk_film *film, int i, double x)
 /* thickness of all films by the present forces; after the forces have been settled */
 void gk_film_apply(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_ASSERT(s->film);
     gk_film *film = s->film;
     for (int i = 0; i < s->contacts; i++) {
         if (!(film->factor[i] > 0.0)) continue;
@@ -169,6 +175,8 @@ static double lost(const gk_system *s, int i)
 /* never negative: where strips that hang together would give energy, the balance of the step makes it good */
 double gk_film_lost(const gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_ASSERT(s->film);
     double sum = 0.0;
     for (int i = 0; i < s->contacts; i++)
         if (s->film->sinks[i] != 0.0) sum += lost(s, i);
@@ -179,6 +187,7 @@ double gk_film_lost(const gk_system *s)
  * forces grow by p, deflection without the local law by `linear` */
 double gk_film_grows(const gk_system *s, const double *p, const double *linear, double *square)
 {
+    GK_ASSERT(s->film && p && linear && square);
     const gk_film *film = s->film;
     double sum = 0.0;
     for (int i = 0; i < s->contacts; i++) {
@@ -194,6 +203,7 @@ double gk_film_grows(const gk_system *s, const double *p, const double *linear, 
 /* where no time passes: power of the films that do not touch */
 double gk_film_power(const gk_system *s)
 {
+    GK_ASSERT(s->film);
     double sum = 0.0;
     for (int i = 0; i < s->contacts; i++) sum += gk_min(s->force[i], s->film->closes[i]) * s->film->speed[i];
     return sum;

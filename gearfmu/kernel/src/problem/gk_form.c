@@ -120,6 +120,8 @@ static void gaps(const gk_model *model, const gk_setup *setup, double h, gk_work
 void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *const modal_speed[],
                    const double *ground_speed, const double *speed, double *rate)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(modal_speed && speed && rate);
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &work->engaged[e].system;
     gk_rows_read(setup, work, e, modal_speed, ground_speed, rate);
@@ -134,6 +136,9 @@ void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *c
 void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                     gk_work *work, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(gk_is_engagement(model, e) && k->h > 0.0);
+    GK_ASSERT(work->engaged[e].places >= 0 && work->engaged[e].places <= MAX_PAIRS);
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     list_rows(model, setup, data, k->h, work, e);

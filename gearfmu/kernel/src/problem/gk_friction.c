@@ -201,6 +201,9 @@ static double held(const gk_glide *glide, const gk_system *s, const double *forc
 void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                       gk_work *work, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(k->h > 0.0 && work->engaged[e].glide);
+    GK_ASSERT(gk_system_is_sound(&work->engaged[e].system));
     gk_engaged *engaged = &work->engaged[e];
     gk_glide *glide = engaged->glide;
     gk_system *s = &engaged->system;
@@ -232,6 +235,7 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
 
 double gk_friction_held(const gk_glide *glide, const gk_system *s)
 {
+    GK_ASSERT(glide && s);
     return held(glide, s, s->force, s->end, glide->end);
 }
 
@@ -424,6 +428,8 @@ static void apply(const gk_glide *glide, gk_system *s)
  * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
 double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
 {
+    GK_ASSERT(glide && round >= 0);
+    GK_ASSERT(gk_system_is_sound(s));
     find_limits(glide, s);
     if (!round) guess_end(glide, s);
     find_sliding(glide, s);
@@ -455,6 +461,7 @@ static double faded(const gk_glide *glide, const gk_system *s)
  * means of those at its ends: the step's one scalar balances it (docs/theory.md, eq. 12) */
 double gk_friction_defect(const gk_glide *glide, const gk_system *s)
 {
+    GK_ASSERT(glide && s);
     double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double *gap = glide->gap_yields + j * s->stride, *own = glide->yields + j * s->stride;
@@ -470,6 +477,8 @@ double gk_friction_defect(const gk_glide *glide, const gk_system *s)
 /* the speed of gear A as a mean over the last millisecond */
 void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(h > 0.0);
     const gk_mesh *mesh = &setup->mesh[e];
     gk_meshing *meshing = &data->meshing[e];
     const double speed = data->v[mesh->spin[0]] - (mesh->frame < 0 ? 0.0 : data->v[mesh->frame]);
@@ -481,6 +490,8 @@ void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e)
 /* the end of the step: friction by which the next one is predicted; returns what it took */
 double gk_friction_settle(gk_glide *glide, const gk_system *s)
 {
+    GK_ASSERT(glide);
+    GK_ASSERT(gk_system_is_sound(s));
     double taken = -faded(glide, s);
     find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {

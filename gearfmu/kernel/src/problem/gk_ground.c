@@ -160,6 +160,8 @@ static void add_tabled(const gk_model *model, const gk_setup *setup, const gk_co
 void gk_ground_add(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
                    int tables)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(gk_system_is_sound(&work->engaged[e].system));
     gk_engaged *engaged = &work->engaged[e];
     if (tables)
         add_tabled(model, setup, k, engaged, e);

@@ -223,6 +223,7 @@ static void fill_supports(const gk_model *model, const gk_setup *setup, const gk
 /* ---- all of it --------------------------------------------------------------------------------------------------- */
 gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_linear *out)
 {
+    GK_ASSERT(model && setup && out);
     int at[MAX_SPINS];
     if (setup->magic != GK_SETUP_MAGIC) return GK_BAD_CALL;
     out->coordinates = number_spins(model, setup, at) + oscillators(model, setup);
@@ -237,6 +238,7 @@ gk_outcome gk_linearise_room(const gk_model *model, const gk_setup *setup, gk_li
 gk_outcome gk_linearise(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                         gk_linear *out)
 {
+    GK_ASSERT(model && setup && work && data && out);
     kept rows[MAX_ENGAGEMENTS * MAX_ROWS];
     if (setup->magic != GK_SETUP_MAGIC || data->magic != GK_DATA_MAGIC || data->state_h != 0.0) return GK_BAD_CALL;
     if (!form_all(model, setup, work, data)) return GK_DIVERGED;

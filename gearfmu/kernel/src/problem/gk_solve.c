@@ -33,10 +33,15 @@ GK_INLINE void times(const gk_system *s, const double *matrix, const double *x, 
 /* y = matrix x; the matrix is symmetric, so its rows are its columns */
 void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y)
 {
+    GK_ASSERT(matrix && x && y && x != y);
     GK_SIZED(s->stride / 4, times, s, matrix, x, y)
 }
 
-void gk_solve_path(const gk_system *s, const double *x, double *y) { gk_solve_times(s, s->P, x, y); }
+void gk_solve_path(const gk_system *s, const double *x, double *y)
+{
+    GK_ASSERT(x != y);
+    gk_solve_times(s, s->P, x, y);
+}
 
 /* D z, Aλ and A f in one pass over both matrices; without dashpots f deflects nothing */
 GK_INLINE void products(const gk_system *s, const double *f, const int dashpots, double *lag, double *Dz, double *Al,
@@ -60,6 +65,7 @@ GK_INLINE void products(const gk_system *s, const double *f, const int dashpots,
 /* rows and dashpots as numbers, after their status has changed */
 void gk_solve_status(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     gk_bits any = {0};
     for (int i = s->n; i < s->stride; i++) s->active[i] = 0, s->clip[i] = 2, s->hold[i] = 0;
     for (int q = 0; q < s->stride / 4; q++) {
@@ -112,6 +118,7 @@ GK_INLINE void dashpots_and_sums(gk_system *s, const int films, const int quads)
 /* everything that follows from λ, α and the status of rows and dashpots; the law has been applied */
 void gk_solve_settle(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     gk_solve_path(s, s->force, s->linear);
     if (gk_film_on(s)) {
         dashpots_and_sums(s, 1, s->stride / 4);
@@ -124,6 +131,7 @@ void gk_solve_settle(gk_system *s)
 /* the start of a step, before rows and dashpots have a status: what follows from λ0 and from what dampers did last */
 void gk_solve_begin(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     const int quads = s->stride / 4;
     gk_solve_path(s, s->force, s->linear);
     for (int q = 0; q < quads; q++) {
@@ -140,6 +148,7 @@ void gk_solve_begin(gk_system *s)
 /* and what is left of these at its end */
 void gk_solve_begin_dashpots(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     if (!s->dashpots) return;
     memcpy(s->end, s->rest, (size_t)s->stride * sizeof *s->end);
     gk_solve_times(s, s->A, s->end, s->lag);
@@ -265,6 +274,7 @@ static int limit_dashpots(gk_system *s)
 /* λ and z for the present α; starts from the present active set, settled */
 void gk_solve_contacts(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     int fewest = MAX_ROWS + 1, patience = 4, dashpot_rounds = s->dashpots_stand ? 0 : DASHPOT_ROUNDS;
     s->limit_reached = 0; /* of the solution that is used in the end */
     for (int round = 0; round < ROUND_LIMIT; round++) {
@@ -298,6 +308,7 @@ void gk_solve_contacts(gk_system *s)
 /* back to α = 0: η is the dampers' */
 void gk_solve_clear(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     const int stale = s->alpha != 0.0;
     s->alpha = 0.0;
     memset(s->direction, 0, (size_t)s->n * sizeof *s->direction);
@@ -307,6 +318,7 @@ void gk_solve_clear(gk_system *s)
 /* stored energy of the quasi-static part at the present λ: ½ λᵀ(A + P)λ + Σ Φ(λ) */
 double gk_solve_stored(const gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
     double sum = 0.0;
     for (int i = 0; i < s->n; i++)
         if (s->force[i] != 0.0) sum += 0.5 * s->force[i] * (s->Al[i] + s->beyond[i] + s->linear[i]) + s->potential[i];

@@ -6,6 +6,7 @@
  * step, f_d = β η_d + tail, deflects. */
 #ifndef GK_SYSTEM_H
 #define GK_SYSTEM_H
+#include "base/gk_check.h"
 #include "setup/gk_setup.h"
 
 /* how much of a damper's force at the end of the last step goes into that of this one (docs/theory.md, 3.2) */
@@ -107,18 +108,37 @@ typedef struct gk_film {
     double burst; /* energy lost where flanks touch through a film and no scalar balances the step */
 } gk_film;
 
+/* For GK_ASSERT: counts that fit together; the number of a row */
+static inline int gk_system_is_sound(const gk_system *s)
+{
+    return s->contacts >= 0 && s->contacts <= MAX_CONTACTS && s->n >= s->contacts && s->n <= MAX_ROWS &&
+           s->stride % 4 == 0 && s->stride >= s->n && s->stride <= MAX_STRIDE && s->clutches >= 0 &&
+           s->clutches <= s->n - s->contacts;
+}
+static inline int gk_is_row(const gk_system *s, int i) { return i >= 0 && i < s->n; }
+
 static inline int gk_film_on(const gk_system *s) { return GK_HAS(film) && s->films > 0; }
 /* flanks of a contact that carries touch: it is no film alone */
 static inline int gk_solve_touches(const gk_system *s, int i)
 {
+    GK_ASSERT(gk_is_row(s, i));
     return s->force[i] > 0.0 && !(gk_film_on(s) && s->film->left[i] > 0.0);
 }
 
-static inline int gk_film_sinks(const gk_system *s, int i) { return gk_film_on(s) && s->film->sinks[i] != 0.0; }
+static inline int gk_film_sinks(const gk_system *s, int i)
+{
+    GK_ASSERT(gk_is_row(s, i));
+    return gk_film_on(s) && s->film->sinks[i] != 0.0;
+}
 /* dz/dλ − 1; what z is more than λ + η */
-static inline double gk_film_lift(const gk_system *s, int i) { return gk_film_on(s) ? s->film->lift[i] : 0.0; }
+static inline double gk_film_lift(const gk_system *s, int i)
+{
+    GK_ASSERT(gk_is_row(s, i));
+    return gk_film_on(s) ? s->film->lift[i] : 0.0;
+}
 static inline double gk_film_carried(const gk_system *s, int i)
 {
+    GK_ASSERT(gk_is_row(s, i));
     return gk_film_sinks(s, i) ? gk_min(s->force[i], s->film->closes[i]) - s->force0[i] : 0.0;
 }
 
@@ -142,18 +162,23 @@ double gk_solve_stored(const gk_system *s);
  * distance that is left */
 static inline double gk_solve_end_gap(const gk_system *s, int i)
 {
+    GK_ASSERT(gk_is_row(s, i));
     return s->g[i] + s->Dz[i] + s->lag[i] + s->outer[i];
 }
 static inline double gk_solve_mean(const gk_system *s, int i)
 {
+    GK_ASSERT(gk_is_row(s, i));
     return 0.5 * (s->force0[i] + s->begin[i] + s->z[i]);
 } /* force of a row in the step */
+/* mean of the forces at its start and end, before a given torque jumps: that which does work on what is quasi-static */
 static inline double gk_solve_static_mean(const gk_system *s, int i)
 {
+    GK_ASSERT(gk_is_row(s, i));
     return gk_solve_mean(s, i) - 0.5 * s->jump[i];
-} /* mean of the forces at its start and end, which does the work on what is quasi-static */
+}
 static inline double gk_solve_quasi_static(const gk_system *s, int i)
 {
+    GK_ASSERT(gk_is_row(s, i));
     return s->Al[i] + s->approach[i] + s->beyond[i];
 }
 /* gk_tangent.c */

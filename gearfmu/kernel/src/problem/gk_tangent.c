@@ -92,6 +92,8 @@ GK_INLINE void factorise(gk_system *s, const int quads)
 
 void gk_tangent_factorise(gk_system *s)
 {
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_ASSERT(s->J && s->L && s->B);
     for (int q = 0; q < s->stride / 4; q++) ((gk_quad *)s->slope)[q] = ((gk_quad *)s->yield)[q] * ((gk_quad *)s->on)[q];
     GK_SIZED(s->stride / 4, factorise, s)
     s->iterations++;
@@ -125,4 +127,9 @@ GK_INLINE void solve(const gk_system *s, double *x, const int quads)
 }
 
 /* x ← J⁻¹ x; x (stride) is 0 where a row is not active */
-void gk_tangent_solve(const gk_system *s, double *x) { GK_SIZED(s->stride / 4, solve, s, x) }
+void gk_tangent_solve(const gk_system *s, double *x)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_ASSERT(x);
+    GK_SIZED(s->stride / 4, solve, s, x)
+}

@@ -1,6 +1,7 @@
 /* Scratch of a step: neither model nor state. And the functions that form the problem and take the step. */
 #ifndef GK_WORK_H
 #define GK_WORK_H
+#include "base/gk_check.h"
 #include "problem/gk_system.h"
 
 /* phases of a step, for the profile */
@@ -25,6 +26,7 @@ typedef struct gk_place { /* a tooth pair on one flank that may touch, at the pr
 
 static inline const gk_point *gk_point_of(const gk_setup *setup, const gk_place *place, int strip)
 {
+    GK_ASSERT(strip >= 0 && strip < setup->strips);
     return &place->point[setup->spatial ? strip : 0];
 }
 
@@ -202,6 +204,8 @@ void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
 /* does a joint pull at the bore of its port's rotor? */
 static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int i)
 {
+    GK_ASSERT(i >= s->contacts && i < s->n);
+    GK_ASSERT(s->port_of[i] >= 0 && s->port_of[i] < MAX_PORTS);
     return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
 void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read);
@@ -243,7 +247,11 @@ typedef struct gk_coupled { /* an island in a step */
 gk_island gk_couple_island(gk_coupled *coupled);
 void gk_couple_recall(gk_coupled *coupled);
 /* gk_compliance.c; columns of a row of D and A that are filled directly */
-static inline int gk_block_end(int i) { return i / 4 * 4 + 4; }
+static inline int gk_block_end(int i)
+{
+    GK_ASSERT(i >= 0);
+    return i / 4 * 4 + 4;
+}
 void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables);
 void gk_compliance_mirror(gk_system *s);
 /* gk_ground.c */

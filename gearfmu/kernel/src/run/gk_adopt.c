@@ -105,6 +105,7 @@ static void push_gear(const passage *c, int g, double *modes, double *ground)
 gk_outcome gk_adopt(const gk_model *model, const gk_setup *from_setup, const gk_work *from_work, const gk_data *from,
                     const gk_setup *setup, gk_data *data)
 {
+    GK_ASSERT(model && from_setup && from_work && from && setup && data);
     if (!allowed(from_setup, from, setup, data)) return GK_BAD_CALL;
     const gk_coefficients *k = gk_flow_known(from_work, from->state_h, from->state_gamma);
     const passage c = {model, from_setup, setup, from_work, from, data, k};

@@ -24,6 +24,8 @@ static double strip_load(const gk_setup *setup, const gk_engaged *engaged, int p
 void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, int which,
                                double *modes, double *ground)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
     const gk_engaged *engaged = &work->engaged[e];
     const int g = model->engagement[e].gear[which];
     gk_strip_load load = {.gear = g, .strips = engaged->system.strips};
@@ -38,6 +40,7 @@ void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, con
 /* what moments on ports do to ground oscillators that are not dynamic */
 void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const gk_work *work, double *ground)
 {
+    GK_ASSERT(work && ground);
     const gk_ground *all = &model->ground[setup->base.set];
     for (int e = 0; e < model->engagements; e++) {
         const gk_system *s = &work->engaged[e].system;
@@ -112,6 +115,7 @@ static void push_static(const gk_model *model, const gk_setup *setup, const gk_w
 
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
+    GK_ASSERT(data->amplitudes >= 0);
     if (!model->amplitudes) return;
     const gk_coefficients *k = gk_flow_known(work, data->state_h, data->state_gamma);
     for (int g = 0; g < model->gears; g++) {

@@ -7,7 +7,11 @@ static const double ULP = 2.220446049250313e-16;
 static const double JUMP = 10.0; /* rad/s: an input that begins to move faster than that was not there before */
 enum { HALVINGS = 3 };
 
-double gk_time(const gk_data *data) { return data->time_base + (double)data->count * data->step_H; }
+double gk_time(const gk_data *data)
+{
+    GK_ASSERT(data);
+    return data->time_base + (double)data->count * data->step_H;
+}
 
 static gk_motion motion_in(const gk_data *data, int p)
 {
@@ -28,6 +32,7 @@ static gk_motion carried(gk_motion m, gk_motion jump, double tau, double H)
 /* Phase profile: names and cycles since gk_prepare (zero unless built with GK_PROFILE) */
 int gk_profile(const gk_work *work, int phase, const char **name, uint64_t *cycles)
 {
+    GK_ASSERT(work && name && cycles);
     static const char *const names[PHASES] = {"predict", "find", "rows", "system", "solve", "correct", "remember"};
     if (phase < 0 || phase >= PHASES) return 0;
     *name = names[phase];
@@ -82,6 +87,7 @@ static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *w
 
 gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time)
 {
+    GK_ASSERT(model && setup && work && data);
     if (setup->magic != GK_SETUP_MAGIC || data->magic != GK_DATA_MAGIC || data->phase != PHASE_NEW) return GK_BAD_CALL;
     if (!gk_finite(time)) return GK_BAD_VALUE;
     const gk_outcome outcome = start(model, setup, work, data);
@@ -188,6 +194,7 @@ static void stand_at(gk_data *data, double time)
 gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time,
                    double wished)
 {
+    GK_ASSERT(model && setup && work && data);
     if (setup->magic != GK_SETUP_MAGIC) return GK_BAD_CALL;
     gk_outcome outcome = accept_step(data, time, wished);
     if (outcome) return outcome;
@@ -267,6 +274,7 @@ static int good_head(const gk_data *d)
  * know (the FMI face keeps the hash). Bytes are aligned to 8. */
 gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const void *bytes, size_t size)
 {
+    GK_ASSERT(model && setup && (bytes || !size));
     if (setup->magic != GK_SETUP_MAGIC || size != setup->state_size || size > gk_data_size(model) ||
         size < sizeof(gk_data) || (uintptr_t)bytes % 8)
         return GK_BAD_VALUE;

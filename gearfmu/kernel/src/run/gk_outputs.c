@@ -94,6 +94,7 @@ static double bore_speed(const gk_model *model, const gk_setup *setup, const gk_
 
 void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data)
 {
+    GK_ASSERT(model->ports <= MAX_PORTS);
     for (int p = 0; p < model->ports; p++) data->v_bore[p] = bore_speed(model, setup, data, p);
 }
 
@@ -167,6 +168,7 @@ static double stored(const gk_model *model, const gk_work *work)
  * mean */
 int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h, int first)
 {
+    GK_ASSERT(h > 0.0);
     double *v = data->stage;
     if (gk_scheme_of(setup->integrator)->is_explicit) { /* keeps no account of works: no balance */
         data->energy.quasi_static = stored(model, work);
@@ -216,6 +218,7 @@ static void watch_limits(const gk_model *model, gk_data *data, int e, double H, 
 
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
+    GK_ASSERT(data->phase == PHASE_RUNNING);
     outputs(model, setup, work, data, 0.0);
     for (int p = 0; p < model->ports; p++) {
         double *v = data->shaft[p];
@@ -236,6 +239,7 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
 void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
                     const gk_tally *tally)
 {
+    GK_ASSERT(H > 0.0 && h > 0.0 && tally);
     gk_tally_means(model, setup, data, H, tally);
     for (int e = 0; e < model->engagements && GK_ON(setup, friction); e++)
         data->mesh[e][V_FRICTION_POWER] = (data->meshing[e].rubbed - data->mesh[e][V_FRICTION_LOSS]) / H;

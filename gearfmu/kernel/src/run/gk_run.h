@@ -1,6 +1,7 @@
 /* Communication steps and their outputs. */
 #ifndef GK_RUN_H
 #define GK_RUN_H
+#include "base/gk_check.h"
 #include "integrate/gk_integrate.h"
 
 struct gk_tally { /* integrals over a communication step */
@@ -14,7 +15,11 @@ struct gk_tally { /* integrals over a communication step */
 
 /* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never
  * pulls. */
-static inline double gk_reported(const gk_system *s, int i) { return s->force[i] + s->end[i]; }
+static inline double gk_reported(const gk_system *s, int i)
+{
+    GK_ASSERT(gk_is_row(s, i));
+    return s->force[i] + s->end[i];
+}
 
 /* gk_amplitudes.c */
 void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);

@@ -5,6 +5,7 @@
 /* what moves the springs of the supports, and what their dashpots see, of the dynamic oscillators */
 void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved, double *speed)
 {
+    GK_ASSERT(moved && speed && moved != speed);
     const int n = setup->base.n;
     const gk_quad *x = (const gk_quad *)gk_ground_seen(data), *v = x + n / 4, *f = v + n / 4;
     const gk_quad *kappa = (const gk_quad *)gk_flow_known(work, data->state_h, data->state_gamma)->ground.kappa;
@@ -18,6 +19,7 @@ void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_dat
 void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,
                            double *out)
 {
+    GK_ASSERT(out && model->dampers <= model->supports);
     const gk_base *base = &setup->base;
     for (int s = 0; s < model->supports; s++) {
         out[s] = gk_dot_span(base->support_span[s], base->support_rows + s * base->n, moved);
@@ -66,6 +68,7 @@ static void add_rubbed(const gk_model *model, const gk_engaged *engaged, const g
 void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                             double *out)
 {
+    GK_ASSERT(out);
     for (int e = 0; e < model->engagements; e++) {
         const gk_engaged *engaged = &work->engaged[e];
         const gk_system *system = &engaged->system;
@@ -87,6 +90,7 @@ void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const 
 void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                         double *out)
 {
+    GK_ASSERT(out);
     double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS];
     gk_supports_motion(setup, work, data, moved, speed);
     gk_supports_by_motion(model, setup, moved, speed, out);
@@ -97,6 +101,7 @@ void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_w
  * (−1) */
 void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force)
 {
+    GK_ASSERT(sense == 1.0 || sense == -1.0);
     for (int s = 0; model->support_turn && s < model->supports; s++) {
         const int turn = model->support_turn[s];
         double sine, cosine;

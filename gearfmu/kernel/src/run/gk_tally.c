@@ -3,6 +3,7 @@
 
 void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)
 {
+    GK_ASSERT(tally && setup->base.n % 4 == 0);
     const size_t size = (size_t)setup->base.n * sizeof(double);
     memset(tally, 0, offsetof(gk_tally, moved));
     memset(tally->moved, 0, size);
@@ -54,6 +55,7 @@ static void integrate(double *sum, double *last, const double *now, int n, doubl
 void gk_tally_count(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h,
                     gk_tally *tally)
 {
+    GK_ASSERT(tally && h > 0.0);
     double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS], direct[MAX_SUPPORTS];
     for (int e = 0; e < model->engagements; e++) count_mesh(&work->engaged[e], data, e, h, tally);
     gk_supports_motion(setup, work, data, moved, speed);
@@ -70,6 +72,7 @@ void gk_tally_count(const gk_model *model, const gk_setup *setup, const gk_work 
 /* means of the communication step of length H */
 void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data *data, double H, const gk_tally *tally)
 {
+    GK_ASSERT(tally && H > 0.0);
     for (int p = 0; p < model->ports; p++)
         if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
     double force[MAX_SUPPORTS];

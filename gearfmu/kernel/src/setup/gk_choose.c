@@ -68,6 +68,8 @@ static gk_outcome choose_friction(const gk_model *model, const gk_setup *setup, 
  * contact, rk45 (dg4 and lines of contact where a clutch hangs on a port) */
 gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE])
 {
+    GK_ASSERT(model && setup && message);
+    GK_ASSERT(data && data->magic == GK_DATA_MAGIC);
     double damping = 0.0;
     setup->level = (gk_level)(int)data->stage[V_LEVEL];
     setup->integrator = (gk_integrator)(int)data->stage[V_INTEGRATOR];
@@ -135,6 +137,7 @@ static const double SHARED_BELOW = 0.25;
 
 int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
 {
+    GK_ASSERT(gk_is_gear(model, g));
     const gk_gear *gear = &model->gear[g];
     switch (setup->level) {
     case LEVEL_RIGID: return setup->engagements_of[g] > 1 ? modes_below(gear, SHARED_BELOW * model->cut[0]) : 0;
@@ -168,6 +171,7 @@ static int rotor_of(const gk_model *model, int set, int k)
 /* dynamic oscillators in order, rotor by rotor, each padded to quads with −1; returns their number */
 int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *which)
 {
+    GK_ASSERT(which && setup->base.set >= 0 && setup->base.set < model->sets);
     int n = 0;
     for (int r = 0; r < model->rotors; r++) {
         for (int k = 0; k < model->ground[setup->base.set].n; k++)

@@ -5,6 +5,7 @@
 /* ---- deviations of flanks ---------------------------------------------------------------------------------------- */
 size_t gk_deviation_size(const gk_gear *gear, int lines)
 {
+    GK_ASSERT(gear && lines > 0);
     const gk_field_of_flanks *field = &gear->flanks;
     return field->depth ? 2 * (size_t)(field->teeth * field->rolls * (field->places > 1 ? lines : 1)) : 0;
 }
@@ -21,6 +22,7 @@ static void add_line(const gk_field_of_flanks *field, const double *depth, doubl
 void gk_deviation_fill(const gk_setup *setup, const gk_gear *gear, int lines, const double *from, const double *to,
                        gk_deviation *d)
 {
+    GK_ASSERT(gear && d && lines > 0 && from && to);
     enum { SAMPLES = 16 };
     const gk_field_of_flanks *field = &gear->flanks;
     const int on = GK_ON(setup, flank_deviations) && field->depth, samples = from == to ? 1 : SAMPLES;
@@ -39,6 +41,8 @@ void gk_deviation_fill(const gk_setup *setup, const gk_gear *gear, int lines, co
 
 const double *gk_deviation_line(const gk_deviation *d, int tooth, int flank, int line)
 {
+    GK_ASSERT((flank == 0 || flank == 1) && line >= 0);
+    GK_ASSERT(!d->gear || (tooth >= 0 && tooth < d->gear->z));
     if (!GK_HAS(flank_deviations) || !d->gear) return NULL;
     const gk_field_of_flanks *field = &d->gear->flanks;
     const int row = ((field->teeth > 1 ? 2 * tooth : 0) + flank) * d->lines + (d->lines > 1 ? line : 0);
@@ -47,6 +51,7 @@ const double *gk_deviation_line(const gk_deviation *d, int tooth, int flank, int
 
 double gk_deviation_at(const gk_gear *gear, const double *line, double roll, double *slope)
 {
+    GK_ASSERT(gear && line && slope && gear->flanks.rolls >= 4);
     const double low = gk_min(gear->s_form, gear->s_tip), high = gk_max(gear->s_form, gear->s_tip);
     const double inside = gk_clamp(roll, low, high);
     const gk_grid at = gk_grid_flank(gear, gear->flanks.rolls, inside);
@@ -59,6 +64,7 @@ double gk_deviation_at(const gk_gear *gear, const double *line, double roll, dou
 /* ---- toothings that do not run true ------------------------------------------------------------------------------ */
 int gk_runout_move(const gk_model *model, const gk_setup *setup, const gk_engagement *e, double *pose, double *turn)
 {
+    GK_ASSERT(e && pose && turn && pose != turn);
     int any = 0;
     memset(turn, 0, POSE * sizeof *turn);
     for (int w = 0; w < 2 && GK_ON(setup, runout); w++) {
@@ -82,6 +88,7 @@ static const int TURNING[] = {XA, YA, RXA, RYA}; /* parts of a pose that a tooth
 
 void gk_runout_follow(const double *turn, double *motion)
 {
+    GK_ASSERT(turn && motion && turn != motion);
     for (int w = 0; w < 2; w++)
         for (int i = 0; i < 4; i++)
             motion[SPACE * w + TURNING[i]] += turn[SPACE * w + TURNING[i]] * motion[SPACE * w + PHIA];
@@ -89,6 +96,7 @@ void gk_runout_follow(const double *turn, double *motion)
 
 void gk_runout_turn(const double *turn, double *gradient)
 {
+    GK_ASSERT(turn && gradient && turn != gradient);
     for (int w = 0; w < 2; w++)
         for (int i = 0; i < 4; i++)
             gradient[SPACE * w + PHIA] += turn[SPACE * w + TURNING[i]] * gradient[SPACE * w + TURNING[i]];

@@ -223,6 +223,7 @@ static void fill_ground(const gk_model *model, const gk_setup *setup, gk_coeffic
 /* A pure function of (model, level, bits of h, γ), kept in a small cache: no state */
 const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
 {
+    GK_ASSERT(h > 0.0); /* γ may be that of a restored state */
     gk_coefficients *oldest = &work->cache[0];
     for (int i = 0; i < CACHE; i++) {
         gk_coefficients *k = &work->cache[i];
@@ -250,6 +251,7 @@ const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup,
 /* coefficients in use, without making any: those of the explicit forms for h = 0 */
 const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma)
 {
+    GK_ASSERT(work);
     for (int i = 0; i < CACHE; i++)
         if (work->cache[i].age && work->cache[i].h == h && work->cache[i].gamma == gamma) return &work->cache[i];
     return &work->explicit_rows;

@@ -31,6 +31,8 @@ static gk_grid cubic(double u, int count, double per)
 /* on `count` rolls even along the flank; beyond its ends the value there */
 gk_grid gk_grid_flank(const gk_gear *gear, int count, double roll)
 {
+    GK_ASSERT(count >= 4);
+    GK_ASSERT(gear->s_tip != gear->s_form);
     const double low = gk_min(gear->s_form, gear->s_tip), high = gk_max(gear->s_form, gear->s_tip);
     const double share = (gk_clamp(roll, low, high) - gear->s_form) / (gear->s_tip - gear->s_form);
     return cubic(share * (count - 1), count, (count - 1) / (gear->s_tip - gear->s_form));
@@ -39,12 +41,14 @@ gk_grid gk_grid_flank(const gk_gear *gear, int count, double roll)
 /* on the grid of rolls that the model's rows are given on */
 gk_grid gk_grid_at(const gk_model *model, const gk_gear *gear, double roll)
 {
+    GK_ASSERT(model && gear);
     return gk_grid_flank(gear, model->rolls, roll);
 }
 
 /* on the POINTS of a flank, which are even in arc length; beyond its ends the value there, without slope */
 gk_grid gk_grid_points(const gk_gear *gear, double roll)
 {
+    GK_ASSERT(gear && gear->s_tip != gear->s_form);
     const double from = gear->s_form * gear->s_form, to = gear->s_tip * gear->s_tip, per = (POINTS - 1) / (to - from);
     const double u = (gk_max(roll, 0.0) * roll - from) * per, inside = gk_clamp(u, 0.0, POINTS - 1);
     return cubic(inside, POINTS, u == inside ? 2.0 * roll * per : 0.0);

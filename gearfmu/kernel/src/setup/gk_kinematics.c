@@ -35,6 +35,7 @@ static double speed_of(const gk_model *model, const gk_engagement *e, const int 
 /* rotors whose speed is not known turn as their neighbours make them */
 void gk_kinematics_follow(const gk_model *model, int known[MAX_ROTORS], double *speed)
 {
+    GK_ASSERT(model && known && speed);
     for (int changed = 1; changed;) {
         changed = 0;
         for (int i = 0; i < model->engagements; i++) {
@@ -61,6 +62,7 @@ static int next_root(const gk_model *model, const int known[MAX_ROTORS])
 
 void gk_kinematics_find(const gk_model *model, gk_motions *motions)
 {
+    GK_ASSERT(model && motions);
     int known[MAX_ROTORS];
     memset(motions, 0, sizeof *motions);
     for (int r = 0; r < model->rotors; r++) known[r] = model->inertia[r] == 0.0;
@@ -102,6 +104,7 @@ static void find_arms(const gk_model *model, const gk_engagement *e, double arms
  * alike. λ = −Tᵀ y, (T Tᵀ) y = τ. */
 void gk_kinematics_carrying(const gk_model *model, int coasts[MAX_ENGAGEMENTS])
 {
+    GK_ASSERT(model && coasts && model->engagements <= MAX_ENGAGEMENTS);
     static const double SMALL = 1e-9; /* of the diagonal, for what no tooth turns; of the largest force, for none */
     double arms[MAX_ENGAGEMENTS][MAX_ROTORS], force[MAX_ENGAGEMENTS], most = 0.0, trace = 0.0;
     double product[MAX_ROTORS * MAX_ROTORS] = {0}, y[MAX_ROTORS] = {0};

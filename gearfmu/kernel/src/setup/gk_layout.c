@@ -42,6 +42,8 @@ static void count_engagements(const gk_model *model, gk_setup *setup)
 /* what sizes depend on once level and effects are chosen: islands, engagements of a gear, candidates of a side */
 void gk_layout_plan(const gk_model *model, gk_setup *setup)
 {
+    GK_ASSERT(model->engagements >= 0 && model->engagements <= MAX_ENGAGEMENTS);
+    GK_ASSERT(setup->strips >= 1 && setup->strips <= MAX_SLICES);
     find_islands(model, setup);
     count_engagements(model, setup);
     for (int e = 0; e < model->engagements; e++) {
@@ -309,17 +311,25 @@ size_t gk_data_size(const gk_model *model)
     return probe.state_size;
 }
 
-size_t gk_state_size(const gk_setup *setup) { return setup->state_size; }
+size_t gk_state_size(const gk_setup *setup)
+{
+    GK_ASSERT(setup && setup->state_size >= sizeof(gk_data));
+    return setup->state_size;
+}
 
 static char *behind(void *block, size_t size) { return (char *)(((uintptr_t)block + size + 63) / 64 * 64); }
 
 /* modes: dynamic ones of every gear; ground: dynamic ground oscillators, padded */
 void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground)
 {
+    GK_ASSERT(modes && ground >= 0 && ground % 4 == 0);
+    GK_ASSERT(ground <= MAX_GROUND + 4 * MAX_ROTORS);
     lay_out_setup(model, setup, behind(setup, sizeof *setup), modes, ground);
 }
 
 void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work)
 {
+    GK_ASSERT(model && setup && work);
+    GK_ASSERT(setup->base.n % 4 == 0);
     lay_out_work(model, setup, work, behind(work, sizeof *work));
 }

@@ -16,6 +16,7 @@ enum { POSITIONS = 8, POWER_ROUNDS = 60 };
 /* Cholesky of a (n, n), in place, lower; 0 when not positive */
 int gk_limit_cholesky(double *a, int n)
 {
+    GK_ASSERT(a && n >= 0);
     for (int i = 0; i < n; i++)
         for (int j = 0; j <= i; j++) {
             double sum = a[i * n + j];
@@ -33,6 +34,7 @@ int gk_limit_cholesky(double *a, int n)
 /* x ← (L Lᵀ)⁻¹ x */
 void gk_limit_solve(const double *L, double *x, int n)
 {
+    GK_ASSERT(L && x && n >= 0);
     for (int i = 0; i < n; i++) {
         for (int k = 0; k < i; k++) x[i] -= L[i * n + k] * x[k];
         x[i] /= L[i * n + i];
@@ -83,6 +85,8 @@ static int counts(const gk_system *s, int i) { return s->kind[i] == ROW_CONTACT 
  * without the κ part; with dashpots what yields to a force of alternating sign */
 void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C)
 {
+    GK_ASSERT(gk_system_is_sound(s));
+    GK_ASSERT(Q && C);
     const int n = s->n, strips = s->strips;
     for (int i = 0; i < n * n; i++)
         C[i] = counts(s, i / n) && counts(s, i % n) ? Q[i / n * s->stride + i % n] : i / n == i % n;
@@ -119,6 +123,9 @@ static void kappa_part(const gk_system *s, const double *Q, double *K)
 int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
                    int e, double position)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(gk_is_engagement(model, e));
+    GK_ASSERT(position >= 0.0 && position <= 1.0);
     const gk_engagement *engagement = &model->engagement[e];
     gk_engaged *engaged = &work->engaged[e];
     const gk_gear *A = &model->gear[engagement->gear[0]], *B = &model->gear[engagement->gear[1]];
@@ -159,6 +166,8 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work,
 
 double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
 {
+    GK_ASSERT(h > 0.0 && gk_finite(h));
+    GK_ASSERT(gamma >= 0.0 && gamma <= 1.0);
     const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
     double worst = 0.0;
     gk_data empty;
@@ -190,6 +199,8 @@ static const double QUARTER_OCTAVE = 0.84089641525371454; /* 2^(−1/4) */
  * of setup, state and h */
 double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h)
 {
+    GK_ASSERT(h > 0.0);
+    GK_ASSERT(setup->h > 0.0);
     double at = setup->h;
     int i = 0;
     if (!gk_scheme_of(setup->integrator)->corrected) return 0.0;
@@ -201,6 +212,7 @@ double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data 
 /* γ of the internal step of the run */
 void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
+    GK_ASSERT(data->table_h > 0.0);
     if (!gk_scheme_of(setup->integrator)->corrected || work->run_h == data->table_h) return;
     work->run_gamma = data->table_h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, data->table_h);
     work->run_h = data->table_h;
@@ -209,6 +221,8 @@ void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, c
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
                            char message[GK_MESSAGE])
 {
+    GK_ASSERT(message && model->period_min > 0.0);
+    GK_ASSERT(!(wished < 0.0));
     static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6,
                                     4e-6,  3e-6,  2.5e-6,  2e-6,  1.5e-6, 1e-6, 0.5e-6};
     const double period = model->period_min;

@@ -25,6 +25,8 @@ static double iso_tr_14179(const gk_friction *f, double width, const gk_sliding 
 
 double gk_lubrication_coefficient(const gk_friction *f, double width, const gk_sliding *at)
 {
+    GK_ASSERT(width > 0.0);
+    GK_ASSERT(at->slides >= 0.0 && at->rolls >= 0.0);
     if (f->law == FRICTION_CONSTANT) return f->coefficient;
     const double found = f->law == FRICTION_BENEDICT_KELLEY ? benedict_kelley(f, at) : iso_tr_14179(f, width, at);
     return gk_clamp(found, 0.0, HIGHEST);
@@ -33,6 +35,7 @@ double gk_lubrication_coefficient(const gk_friction *f, double width, const gk_s
 /* what the laws need of an engagement: its parameters, its pitch point and the ends of its path of contact */
 void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *mesh)
 {
+    GK_ASSERT(gk_is_engagement(model, mesh->index));
     const gk_engagement *e = &model->engagement[mesh->index];
     const gk_gear *a = &model->gear[e->gear[0]], *b = &model->gear[e->gear[1]];
     const double *v = data->mesh[mesh->index];

@@ -116,6 +116,8 @@ static void fill_step(const gk_model *model, const gk_setup *setup, gk_work *wor
 
 void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k)
 {
+    GK_ASSERT(k && k->h > 0.0);
+    GK_ASSERT(k->gamma >= 0.0 && k->gamma <= 1.0);
     for (int e = 0; e < model->engagements; e++)
         for (int which = 0; which < 2; which++) fill_step(model, setup, work, k, e, which);
     work->table_h = k->h;

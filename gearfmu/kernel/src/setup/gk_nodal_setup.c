@@ -152,6 +152,7 @@ static void fill_point(const gk_model *model, gk_setup *setup, int g, int flank,
 
 void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g)
 {
+    GK_ASSERT(gk_is_gear(model, g) && setup->nodal);
     const gk_gear *gear = &model->gear[g];
     const double length = fabs(gear->s_tip * gear->s_tip - gear->s_form * gear->s_form) / (2.0 * gear->r_b);
     for (int point = 0; point < POINTS && gear->nodes[0]; point++) {
@@ -163,6 +164,7 @@ void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g)
 /* ---- an engagement ----------------------------------------------------------------------------------------------- */
 void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh)
 {
+    GK_ASSERT(gk_is_engagement(model, mesh->index) && setup->nodal);
     const gk_engagement *e = &model->engagement[mesh->index];
     const double penalty = data->mesh[mesh->index][V_PENALTY];
     for (int w = 0; w < 2; w++) {

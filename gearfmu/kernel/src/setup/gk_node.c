@@ -11,6 +11,8 @@ double gk_node_tan(double angle)
 
 double gk_node_roll(const gk_side *side, int flank, double position, int offset)
 {
+    GK_ASSERT(flank == 0 || flank == 1);
+    GK_ASSERT(side->step == 1 || side->step == -1);
     const double roll = (position + offset) * side->pitch;
     return flank ? side->both - roll : roll;
 }
@@ -195,6 +197,8 @@ static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int str
 
 void gk_node_gather(gk_node *n, double position)
 {
+    GK_ASSERT(position >= 0.0 && position <= 1.0);
+    GK_ASSERT(n->points >= 0 && n->points <= MAX_CANDIDATES * MAX_SLICES);
     const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
     const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
     double ports[MAX_PORTS];
@@ -222,6 +226,8 @@ void gk_node_gather(gk_node *n, double position)
 
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
 {
+    GK_ASSERT(room && gk_is_engagement(model, e));
+    GK_ASSERT(side->candidates <= MAX_CANDIDATES);
     gk_node n = {
         .model = model, .setup = setup, .e = &model->engagement[e], .gear = &model->gear[side->gear], .side = side};
     const size_t most = points_of(model), reads = (size_t)n.gear->ground[setup->base.set].reads;
@@ -278,6 +284,8 @@ static void add_turned(const gk_gear *gear, int tooth, int first, const double *
  * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
 void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum)
 {
+    GK_ASSERT(gk_is_gear(model, load->gear) && load->strips <= MAX_SLICES);
+    GK_ASSERT(first >= 0 && first <= model->gear[load->gear].modes);
     const gk_gear *gear = &model->gear[load->gear];
     double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
     gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
@@ -298,6 +306,9 @@ void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, d
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
+    GK_ASSERT(setup->mesh[e].side[which].gear == load->gear);
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_node n = {.model = model,
                        .setup = setup,

@@ -1,6 +1,7 @@
 /* One node of a side's tables (gk_node.c): what its points read of all stored modes and of every ground oscillator. */
 #ifndef GK_NODE_H
 #define GK_NODE_H
+#include "base/gk_check.h"
 #include "problem/gk_work.h"
 
 typedef struct gk_spot { /* a candidate's strip at a node */
@@ -35,6 +36,7 @@ void gk_node_gather(gk_node *n, double position);
 /* sense of growing roll on this side against the direction in which gear B slides past A */
 static inline double gk_node_along(const gk_node *n)
 {
+    GK_ASSERT(n->side && n->e);
     return n->side->which == 1 && n->e->kind == MESH_INTERNAL ? 1.0 : -1.0;
 }
 /* length of roll of a candidate on the line of action at mid-width */

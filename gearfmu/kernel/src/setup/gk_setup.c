@@ -312,6 +312,7 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
 gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
                       char message[GK_MESSAGE])
 {
+    GK_ASSERT(model && data && setup && work && message);
     int modes[MAX_GEARS], coasts[MAX_ENGAGEMENTS];
     int32_t which[MAX_GROUND + 4 * MAX_ROTORS];
     message[0] = 0;

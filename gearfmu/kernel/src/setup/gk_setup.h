@@ -2,6 +2,7 @@
  * the path of contact, coefficients of the joints. */
 #ifndef GK_SETUP_H
 #define GK_SETUP_H
+#include "base/gk_check.h"
 #include "base/gk_math.h"
 #include "model/gk_data.h"
 #include "setup/gk_nodal.h"
@@ -260,29 +261,41 @@ struct gk_setup {
 
 typedef double gk_strip_weights[MAX_SLICES][MAX_FUNCTIONS];
 
+/* For GK_ASSERT: the number of an engagement that has been planned; a span of whole quads */
+static inline int gk_is_mesh(const gk_setup *setup, int e)
+{
+    return e >= 0 && e < MAX_ENGAGEMENTS && setup->mesh[e].index == e && setup->mesh[e].spins > 0;
+}
+static inline int gk_span_is_whole(gk_span span) { return span.from >= 0 && span.from % 4 == 0 && span.width % 4 == 0; }
+
 /* states in gk_data */
 static inline double *gk_ground_of(gk_data *data) { return data->oscillator; }
 static inline gk_real *gk_modal_of(const gk_setup *setup, gk_data *data, int g)
 {
+    GK_ASSERT(g >= 0 && g < MAX_GEARS);
     return (gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
 }
 static inline const double *gk_ground_seen(const gk_data *data) { return data->oscillator; }
 static inline const gk_real *gk_modal_seen(const gk_setup *setup, const gk_data *data, int g)
 {
+    GK_ASSERT(g >= 0 && g < MAX_GEARS);
     return (const gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
 }
 /* kinetic energy of a spin */
 static inline double gk_kinetic(const gk_setup *setup, int d, double speed)
 {
+    GK_ASSERT(d >= 0 && d < setup->spins);
     return setup->inverse_inertia[d] > 0.0 ? 0.5 * speed * speed / setup->inverse_inertia[d] : 0.0;
 }
 /* numbers of the spins of a port's chain */
 static inline int gk_inertia_of(const gk_model *model, int port)
 {
+    GK_ASSERT(port >= 0 && port < model->ports && model->port[port].chain > 0);
     return model->rotors + 2 * model->port[port].chain - 2;
 }
 static inline int gk_disc_of(const gk_model *model, int port)
 {
+    GK_ASSERT(port >= 0 && port < model->ports && model->port[port].chain > 0);
     return model->rotors + 2 * model->port[port].chain - 1;
 }
 
@@ -318,20 +331,27 @@ gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_me
                        const double roll[2], int strip);
 void gk_strips_row(const gk_model *model, int g, double from, double to, double *out);
 /* entries of whole quads that hold n */
-static inline int gk_padded(int n) { return (n + 3) / 4 * 4; }
+static inline int gk_padded(int n)
+{
+    GK_ASSERT(n >= 0);
+    return (n + 3) / 4 * 4;
+}
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
 /* Σ of a row over its span, and its multiple added there */
 static inline double gk_dot_span(gk_span span, const double *row, const double *x)
 {
+    GK_ASSERT(gk_span_is_whole(span));
     return gk_dot_quads(row + span.from, x + span.from, span.width / 4);
 }
 static inline void gk_axpy_span(gk_span span, double f, const double *row, double *y)
 {
+    GK_ASSERT(gk_span_is_whole(span));
     gk_axpy(f, row, y, span.from / 4, (span.from + span.width) / 4);
 }
 /* a row over the parts of an engagement, and a whole vector x or y of the ground group */
 static inline double gk_local_dot(const gk_mesh *mesh, const double *row, const double *x)
 {
+    GK_ASSERT(gk_span_is_whole(mesh->part[0]) && gk_span_is_whole(mesh->part[1]));
     const gk_quad *a = (const gk_quad *)row;
     gk_quad sum = {0};
     for (int w = 0; w < 2; w++) {
@@ -342,11 +362,13 @@ static inline double gk_local_dot(const gk_mesh *mesh, const double *row, const 
 }
 static inline void gk_local_axpy(const gk_mesh *mesh, double f, const double *row, double *y)
 {
+    GK_ASSERT(gk_span_is_whole(mesh->part[0]) && gk_span_is_whole(mesh->part[1]));
     gk_axpy(f, row, y + mesh->part[0].from, 0, mesh->part[0].width / 4);
     gk_axpy(f, row + mesh->part[0].width, y + mesh->part[1].from, 0, mesh->part[1].width / 4);
 }
 static inline void gk_local_gather(const gk_mesh *mesh, const double *x, double *row)
 {
+    GK_ASSERT(mesh->part[0].width + mesh->part[1].width == mesh->local);
     memcpy(row, x + mesh->part[0].from, (size_t)mesh->part[0].width * sizeof *row);
     memcpy(row + mesh->part[0].width, x + mesh->part[1].from, (size_t)mesh->part[1].width * sizeof *row);
 }

@@ -28,6 +28,8 @@ static void span(const gk_model *model, const gk_setup *setup, const gk_engageme
 
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_side *side, int which)
 {
+    GK_ASSERT(gk_is_engagement(model, index));
+    GK_ASSERT(which == 0 || which == 1);
     const gk_engagement *e = &model->engagement[index];
     const gk_gear *gear = &model->gear[e->gear[which]];
     memset(side, 0, sizeof *side);
@@ -345,6 +347,9 @@ static void keep_held(gk_side *side, size_t rows, int supports)
 /* tables of a side that the level decides */
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which)
 {
+    GK_ASSERT(gk_is_mesh(setup, e));
+    GK_ASSERT(which == 0 || which == 1);
+    GK_ASSERT(setup->mesh[e].side[which].candidates <= MAX_CANDIDATES);
     gk_side *side = &setup->mesh[e].side[which];
     gk_node n = gk_node_begin(model, setup, work->columns, e, side);
     double yields[MAX_GROUND];

@@ -11,7 +11,11 @@ int gk_strips_mirrored(const gk_model *model)
     return !model->spatial;
 }
 
-int gk_strips_count(const gk_model *model, int slices) { return gk_strips_mirrored(model) ? (slices + 1) / 2 : slices; }
+int gk_strips_count(const gk_model *model, int slices)
+{
+    GK_ASSERT(slices >= 1 && slices <= MAX_SLICES);
+    return gk_strips_mirrored(model) ? (slices + 1) / 2 : slices;
+}
 
 static double tan_of(double angle)
 {
@@ -43,12 +47,15 @@ static void row_over(const gk_model *model, double from, double to, double *out)
 
 void gk_strips_row(const gk_model *model, int g, double from, double to, double *out)
 {
+    GK_ASSERT(gk_is_gear(model, g) && from < to);
     const double per_half = 2.0 / model->gear[g].width;
     row_over(model, per_half * from, per_half * to, out);
 }
 
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out)
 {
+    GK_ASSERT(gk_is_gear(model, g));
+    GK_ASSERT(setup->strips >= 1 && setup->strips <= setup->slices);
     const double edge = e->width / model->gear[g].width;
     for (int s = 0; s < setup->strips; s++)
         row_over(model, edge * (2.0 * s / setup->slices - 1.0), edge * (2.0 * (s + 1) / setup->slices - 1.0), out[s]);
@@ -60,6 +67,8 @@ void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engag
 gk_part gk_strips_part(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, double sg,
                        const double roll[2], int strip)
 {
+    GK_ASSERT(strip >= 0 && strip < setup->strips);
+    GK_ASSERT(sg == 1.0 || sg == -1.0);
     static const double LEAST_SHARE = 0.02; /* of a strip that has left its flanks */
     const gk_engagement *e = &model->engagement[mesh->index];
     const double half = 0.5 * e->width / setup->slices, middle = mesh->strip_middle[strip];
@@ -94,6 +103,7 @@ static double past_end(const gk_setup *setup, const gk_engagement *e, const gk_g
 /* a gear's lead at x, −1 … 1 of its half-width */
 double gk_strips_lead(const gk_gear *gear, int flank, double x)
 {
+    GK_ASSERT(flank == 0 || flank == 1);
     if (!gear->lead) return 0.0;
     const double u = gk_clamp(0.5 * (x + 1.0), 0.0, 1.0) * (LEADS - 1);
     const int at = (int)u < LEADS - 1 ? (int)u : LEADS - 2;
@@ -134,6 +144,8 @@ static void fill_deviations(const gk_model *model, const gk_setup *setup, gk_mes
 
 void gk_strips_fill(const gk_model *model, const gk_setup *setup, gk_mesh *mesh)
 {
+    GK_ASSERT(gk_is_engagement(model, mesh->index));
+    GK_ASSERT(setup->strips >= 1 && setup->strips <= MAX_SLICES);
     const gk_engagement *e = &model->engagement[mesh->index];
     mesh->strip_term = 0.0;
     gk_sincos(model->gear[e->gear[0]].helix, &mesh->sine, &mesh->cosine);
