@@ -80,7 +80,7 @@ def _gear(gear: GearSpec, scale: float) -> GearSpec:
 
 
 def bodies_of(spec: StageSpec) -> list[ReducedBody]:
-    """Bodies of both gears with static tables of their own and a dozen modes; pictures are those of `helical_demo`."""
+    """Bodies of both gears with static tables and a dozen modes of their own, without pictures and gyroscopic terms."""
     stored = load_stage_bodies(load_stage("helical_demo"))
     return [_body(*entry) for entry in zip(stored, spec.gears, PairGeometry.of(spec).gears, strict=True)]
 
@@ -110,6 +110,8 @@ def _body(stored: ReducedBody, gear: GearSpec, shape: GearGeometry) -> ReducedBo
         static_fb=statics.static_fb,
         static_bb=statics.static_bb,
         tangent=None,
+        shapes=None,
+        spin=None,
         base_helix_angle=shape.beta_b,
     )
 
