@@ -20,6 +20,7 @@ from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
+from gearfmu.stage.far import LOWEST, far_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.film import film_starts
 from gearfmu.stage.flanks import deviation_sections
@@ -96,6 +97,10 @@ def general_sections(
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes)
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)
+    lowest = 2 * math.pi * LOWEST * float(sections["limits"][0])
+    for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
+        if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:
+            sections |= far_sections(i, sections, shape, gear.face_width, len(groups), lowest)
     for name in observe:
         sections |= observed_sections(observed_number(stage, name), bodies, groups)
     return sections

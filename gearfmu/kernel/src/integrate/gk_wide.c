@@ -66,6 +66,9 @@
 #define gk_friction_defect gk_friction_defect_avx2
 #define gk_friction_watch gk_friction_watch_avx2
 #define gk_friction_settle gk_friction_settle_avx2
+#define gk_far_form gk_far_form_avx2
+#define gk_far_push gk_far_push_avx2
+#define gk_far_read gk_far_read_avx2
 #define gk_rows_read_ground gk_rows_read_ground_avx2
 #define gk_rows_push_ground gk_rows_push_ground_avx2
 #define gk_rows_form_bores gk_rows_form_bores_avx2
@@ -125,6 +128,7 @@
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"
 #include "problem/gk_friction.c"
+#include "problem/gk_far.c"
 #include "problem/gk_couple.c"
 #include "force/gk_nodal.c"
 #include "integrate/gk_frame.c"

@@ -242,6 +242,9 @@ static void read_ground_of(reader *r, gk_model *m, gk_gear *g, int set)
     g->ground[set].centre = bounded(r, F_GEAR_SET_centre, 1e6);
     g->ground[set].rows = bounded(r, F_GEAR_SET_ground_rows, 1e6);
     g->ground[set].along = bounded(r, F_GEAR_SET_along_ground, 1e6);
+    g->ground[set].far = bounded(r, F_GEAR_SET_far_ground, 1e6);
+    if (!r->outcome && (!g->far_rows != !g->far_modes || !g->far_rows != !g->ground[set].far))
+        refuse(r, "patterns of far teeth", "are not known in all their parts");
     const int parts = !!g->along_rows + !!g->along_normal + !!g->along_own + !!g->ground[set].along;
     if (!r->outcome && parts % 4) refuse(r, "displacement along the profile", "is not known in all its parts");
     for (int k = 0; k < g->ground[set].reads && !r->outcome; k++) {
@@ -381,6 +384,8 @@ static void read_gear(reader *r, gk_model *m, int i)
     g->along_rows = bounded(r, F_GEAR_along_rows, 1e6);
     g->along_normal = bounded(r, F_GEAR_along_normal, 1e3);
     g->along_own = bounded(r, F_GEAR_along_own, 1e3);
+    g->far_rows = bounded(r, F_GEAR_far_rows, 1e3);
+    g->far_modes = bounded(r, F_GEAR_far_modes, 1e6);
     g->support_residual = bounded(r, F_GEAR_support_residual, 1e3);
     g->port_residual = bounded(r, F_GEAR_port_residual, 1e3);
     if (!r->outcome) check_modes(r, g);

@@ -63,11 +63,12 @@ typedef struct gk_gear {
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
     double index_most;   /* the largest of them along the flank normal, m */
     gk_field_of_flanks flanks;
+    const double *far_rows, *far_modes; /* patterns of far teeth (gk_far_fill.c); NULL: none */
     const double *runout; /* (4) axis of the toothing beside that of rotation: x, y, tilt about x, y; NULL: none */
     struct {
         int reads; /* ground oscillators that this gear reads */
         const int32_t *list;
-        const double *centre, *rows, *along;
+        const double *centre, *rows, *along, *far;
     } ground[SETS];
     gk_observed observed;
 } gk_gear;

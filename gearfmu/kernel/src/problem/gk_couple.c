@@ -18,6 +18,7 @@ typedef enum { WHOLE, AT_ONCE, AT_START, WHOLE_START } effect;
 /* forces of an engagement by what they meet: D in the step, A at once; the same along the profile */
 typedef struct gk_forces {
     double step[MAX_STRIDE], once[MAX_STRIDE], step_along[MAX_STRIDE], once_along[MAX_STRIDE];
+    const double *far; /* without dampers: what they deflect at far teeth is left out, so that it stores nothing */
 } gk_forces;
 
 /* a clutch knows no A; friction counts with all that forces do */
@@ -25,6 +26,7 @@ static void forces_of(const gk_setup *setup, const gk_engaged *engaged, effect o
 {
     const gk_system *s = &engaged->system;
     const int start = of == AT_START || of == WHOLE_START; /* given torques may have changed */
+    f->far = start ? s->force0 : s->force;
     for (int i = 0; i < s->stride; i++) {
         const int row = i < s->n, clutch = row && s->kind[i] == ROW_CLUTCH;
         f->step[i] = row && of == WHOLE ? s->z[i] : 0.0;
@@ -109,7 +111,10 @@ static void give(const gk_coupled *c, int e, effect of)
     give_ground(c->setup, c->work, c->k, e, &f);
     give_bores(c->setup, c->work, e, f.once);
     for (int w = 0; w < 2; w++)
-        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) give_modes(c->setup, c->work, c->k, e, w, &f);
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) {
+            give_modes(c->setup, c->work, c->k, e, w, &f);
+            if (c->setup->far_on[c->setup->mesh[e].side[w].gear]) gk_far_push(c->setup, c->work, e, w, f.far);
+        }
 }
 
 static int within(const gk_coupled *c, int e) { return c->setup->mesh[e].island == c->island; }
@@ -187,8 +192,10 @@ static void take(const gk_coupled *c, int e, double *read)
     take_ground(c, e, read);
     take_spins(c, e, read);
     take_bores(c, e, read);
-    for (int w = 0; w < 2; w++)
+    for (int w = 0; w < 2; w++) {
         if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, 0, read);
+        if (c->setup->far_on[c->setup->mesh[e].side[w].gear]) gk_far_read(c->model, c->setup, c->work, e, w, read);
+    }
 }
 
 /* what the others do to the sliding of its contacts */

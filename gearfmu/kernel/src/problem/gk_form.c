@@ -151,6 +151,7 @@ void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data 
     s->J = s->P + size;
     s->L = s->J + size;
     s->B = s->L + size;
+    gk_far_form(setup, work, e);
     gk_rows_form_ground(setup, work, e);
     gk_rows_form_bores(setup, work, e);
     gk_compliance_form(setup, k, work, e, tables);

@@ -126,9 +126,19 @@ static double own_compliance(const gk_system *s, int i, int j)
     return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->yield[i] : 0.0);
 }
 
+/* loads on far teeth by forces of one engagement alone */
+static void push_far(const gk_model *model, const gk_setup *setup, gk_work *work, int of, const double *force)
+{
+    static const double nothing[MAX_STRIDE];
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++)
+            if (setup->far_on[setup->mesh[e].side[w].gear]) gk_far_push(setup, work, e, w, e == of ? force : nothing);
+}
+
 /* what a unit force of one row does at once to all rows of its own engagement, and between bores and flanks to those of
  * others */
-static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *rows, int r, gk_linear *out)
+static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, const kept *rows, int r,
+                            gk_linear *out)
 {
     const gk_system *s = &work->engaged[rows[r].engagement].system;
     double unit[MAX_STRIDE] = {0}, read[MAX_STRIDE];
@@ -136,6 +146,7 @@ static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *ro
     unit[rows[r].row] = 1.0;
     gk_bores bores = {{0}, {0}};
     gk_rows_push_bores(setup, &work->engaged[rows[r].engagement], rows[r].engagement, unit, &bores);
+    push_far(model, setup, work, rows[r].engagement, unit);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
@@ -143,6 +154,8 @@ static void fill_compliance(const gk_setup *setup, gk_work *work, const kept *ro
             memset(read, 0, sizeof read);
             of = e;
             gk_rows_read_bores(setup, &work->engaged[e], e, &bores, read);
+            for (int w = 0; w < 2; w++)
+                if (setup->far_on[setup->mesh[e].side[w].gear]) gk_far_read(model, setup, work, e, w, read);
         }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
@@ -171,7 +184,7 @@ static void fill_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
 {
     for (int r = 0; r < out->rows; r++) {
         describe_row(setup, work, rows[r], r, out);
-        fill_compliance(setup, work, rows, r, out);
+        fill_compliance(model, setup, work, rows, r, out);
     }
     for (int e = 0; e < model->engagements; e++)
         memset(work->engaged[e].system.force, 0, sizeof work->engaged[e].system.force);

@@ -104,10 +104,11 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
     double *matrix;    /* D, A, P, J, L, B */
     double *given_ground,
-        given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
+        given_spin[2][MAX_LOCAL];  /* displacement that its forces give to ground group and spins: in the
                                                        step less at once; of spins in the step, at once */
-    gk_real *given_modes[2];      /* (n): the same of the gear groups that other engagements read too */
-    double bore[2][MAX_CONTACTS]; /* what a moment on the port of either side's rotor turns the contacts at once */
+    gk_real *given_modes[2];       /* (n): the same of the gear groups that other engagements read too */
+    double bore[2][MAX_CONTACTS];  /* what a moment on the port of either side's rotor turns the contacts at once */
+    double *far[2], *given_far[2]; /* (contacts, FAR) patterns of far teeth; (places, FAR) load on them */
     gk_bores given_bores;
     gk_step_side table[2];
     gk_system system;
@@ -223,6 +224,10 @@ void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged,
 void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
                               gk_real *out_x, gk_real *out_y);
 void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
+/* gk_far.c */
+void gk_far_form(const gk_setup *setup, gk_work *work, int e);
+void gk_far_push(const gk_setup *setup, gk_work *work, int e, int which, const double *force);
+void gk_far_read(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which, double *read);
 /* gk_film.c */
 void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
 void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);

@@ -147,6 +147,13 @@ int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
     }
 }
 
+static int shares(const gk_model *model, const gk_setup *setup)
+{
+    for (int g = 0; g < model->gears; g++)
+        if (setup->engagements_of[g] > 1) return 1;
+    return 0;
+}
+
 /* what moves rigidly is dynamic at every level; of the rest what lies below the cut. Rigid gears whose bores are
  * held do not move. */
 static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
@@ -154,7 +161,9 @@ static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
     const gk_ground *ground = &model->ground[setup->base.set];
     if (!setup->on.elastic && !setup->on.bearings) return 0;
     if (ground->rigid_share[k] > 0.5) return 1;
-    if (!setup->on.elastic || setup->level == LEVEL_RIGID) return 0;
+    if (!setup->on.elastic) return 0;
+    if (setup->level == LEVEL_RIGID)
+        return shares(model, setup) && ground->omega[k] < SHARED_BELOW * 2.0 * GK_PI * model->cut[0];
     if (setup->level != LEVEL_FAST && setup->level != LEVEL_STANDARD) return 1;
     return ground->omega[k] < 2.0 * GK_PI * model->cut[setup->level == LEVEL_STANDARD];
 }

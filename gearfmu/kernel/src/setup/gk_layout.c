@@ -126,6 +126,7 @@ static void lay_out_side(bump *b, const gk_model *model, const gk_setup *setup, 
     side->residual = reals(b, 2 * nodes * C * strips * (size_t)side->columns);
     side->path = doubles(b, points * strips);
     side->port = doubles(b, points);
+    side->far = doubles(b, gk_far_known(model, setup, side->gear) ? points * FAR : 0);
     side->support = doubles(b, points * (size_t)gk_padded(model->supports));
     if (!GK_ON(setup, friction)) return;
     side->along.rows = reals(b, points * (size_t)setup->modal[side->gear].n);
@@ -161,6 +162,8 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         setup->modal[g].at = at;
         at += 3 * (size_t)setup->modal[g].n;
     }
+    for (int g = 0; g < model->gears; g++)
+        setup->far[g] = doubles(&b, gk_far_known(model, setup, g) ? (size_t)model->gear[g].z * FAR * FAR : 0);
     lay_out_base(&b, model, &setup->base, ground);
     for (int e = 0; e < model->engagements; e++) {
         gk_mesh *mesh = &setup->mesh[e];
@@ -201,7 +204,7 @@ static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, 
     f->products = doubles(b, 3 * (size_t)(model->carried + model->whirls));
 }
 
-static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged, int e)
+static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setup, gk_engaged *engaged, int e)
 {
     const size_t contacts = MAX_PAIRS * (size_t)setup->strips, rows = contacts + MAX_JOINTS + 4;
     for (int w = 0; w < 2; w++) {
@@ -212,6 +215,11 @@ static void lay_out_engaged(bump *b, const gk_setup *setup, gk_engaged *engaged,
         engaged->given_modes[w] = reals(b, shared ? (size_t)setup->modal[side->gear].n : 0);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
+    }
+    for (int w = 0; w < 2; w++) {
+        const int far = gk_far_known(model, setup, setup->mesh[e].side[w].gear);
+        engaged->far[w] = doubles(b, far ? contacts * FAR : 0);
+        engaged->given_far[w] = doubles(b, far ? MAX_PAIRS * FAR : 0);
     }
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
     engaged->index = e;
@@ -253,7 +261,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     work->engaged = take(&b, (size_t)model->engagements * sizeof *work->engaged);
     for (int e = 0; e < model->engagements; e++) {
         gk_engaged counted;
-        lay_out_engaged(&b, setup, work->engaged ? &work->engaged[e] : &counted, e);
+        lay_out_engaged(&b, model, setup, work->engaged ? &work->engaged[e] : &counted, e);
     }
     work->rest_ground = doubles(&b, ground);
     size_t unknowns = (size_t)(model->rotors + 2 * model->chains) + ground;

@@ -33,8 +33,7 @@ size_t gk_node_scratch(const gk_model *model)
     return of_node > of_step ? of_node : of_step;
 }
 
-/* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
-static void blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out)
+void gk_node_blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out)
 {
     const int A = n->model->functions;
     const double *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
@@ -113,9 +112,9 @@ static void ground_point(const gk_node *n, const gk_spot *p, double *row, double
     }
     for (int s = 0; s < supports; s++) support[s] = 0.0;
     for (int c = 0; c < 3; c++) {
-        blend(n, n->gear->ground[set].rows + c * size * reads, p, reads, part);
+        gk_node_blend(n, n->gear->ground[set].rows + c * size * reads, p, reads, part);
         for (int k = 0; k < reads; k++) row[k] += trig[c] * part[k];
-        blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
+        gk_node_blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
         for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
     }
 }
@@ -136,7 +135,7 @@ static void along_point(const gk_node *n, const gk_spot *p, double *row, double 
         row[k] = rigid[k];
     }
     for (int c = 0; c < 3 && n->gear->ground[set].along; c++) {
-        blend(n, n->gear->ground[set].along + c * size * reads, p, reads, part);
+        gk_node_blend(n, n->gear->ground[set].along + c * size * reads, p, reads, part);
         for (int k = 0; k < reads; k++) row[k] += sense * trig[c] * part[k];
     }
 }
@@ -147,7 +146,7 @@ static void gather_along(gk_node *n, const gk_spot *p, int i)
     const int modes = n->gear->modes, set = n->setup->base.set;
     double *row = n->along_rows + (size_t)i * modes;
     if (n->gear->along_rows)
-        blend(n, n->gear->along_rows, p, modes, row);
+        gk_node_blend(n, n->gear->along_rows, p, modes, row);
     else
         memset(row, 0, (size_t)modes * sizeof *row);
     for (int k = 0; k < modes; k++) row[k] *= gk_node_along(n);
@@ -212,9 +211,9 @@ void gk_node_gather(gk_node *n, double position)
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * gk_node_tan(n->gear->helix);
         p->roll = corner_roll(n, p);
         p->grid = gk_grid_at(n->model, n->gear, p->roll);
-        blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
+        gk_node_blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
         if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
-        blend(n, n->gear->port_residual, p, n->model->ports, ports);
+        gk_node_blend(n, n->gear->port_residual, p, n->model->ports, ports);
         n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
         if (n->e->kind != MESH_FLAT)
             ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,

@@ -33,6 +33,8 @@ typedef struct gk_node { /* what a node's tables are made from */
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side);
 /* `position`: share of the pitch */
 void gk_node_gather(gk_node *n, double position);
+/* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
+void gk_node_blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out);
 /* sense of growing roll on this side against the direction in which gear B slides past A */
 static inline double gk_node_along(const gk_node *n)
 {

@@ -342,6 +342,7 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
         setup->mesh[e].coasts = coasts[e];
     }
     for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
+    for (int g = 0; g < model->gears; g++) gk_far_fill(model, setup, g);
     for (int e = 0; e < model->engagements; e++)
         for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);
     fill_explicit(model, setup, work);

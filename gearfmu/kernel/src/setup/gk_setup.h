@@ -15,6 +15,7 @@ enum {
     GAMMAS = 25,         /* γ is known at h·2^(−i/4) */
     MAX_CANDIDATES = 24, /* tooth pairs that can be near contact at any position, both flanks */
     MAX_BLOCK = MAX_SLICES * MAX_SLICES,
+    FAR = 12,     /* patterns by which engagements of one gear feel each other */
     MAX_SOFT = 64 /* modes of a gear with several engagements that statics take as unknowns */
 };
 
@@ -129,6 +130,7 @@ typedef struct gk_side {
     double *path;  /* (nodes + 1, candidates, strips²): residual of a tooth beyond all stored modes */
     int port_of;   /* the port that the gear feels, −1: none */
     double *port;  /* (nodes + 1, candidates, strips): residual between flank and bore angle */
+    double *far;   /* (nodes + 1, points, FAR): patterns of far teeth */
     gk_along along;
     gk_span held;    /* the supports that this side loads */
     double *support; /* (nodes + 1, candidates, strips, those in whole quads): force on them beside the oscillators' */
@@ -247,6 +249,8 @@ struct gk_setup {
     double port_support[MAX_PORTS]
                        [MAX_SUPPORTS]; /* force on a support per unit moment at a port, beside the oscillators' */
     gk_modal modal[MAX_GEARS];
+    double *far[MAX_GEARS]; /* (z, FAR, FAR): what the patterns on a tooth displace by a load so many teeth before it */
+    int far_on[MAX_GEARS];  /* the gear has several engagements, and something in it is not dynamic */
     gk_base base;
     gk_mesh mesh[MAX_ENGAGEMENTS];
     int islands;
@@ -302,6 +306,9 @@ static inline int gk_disc_of(const gk_model *model, int port)
 /* gk_vars.c */
 gk_effects gk_effects_of(const gk_data *data);
 void gk_vars_take(const gk_model *model, gk_data *data, const gk_data *from);
+/* gk_far_fill.c */
+int gk_far_known(const gk_model *model, const gk_setup *setup, int g);
+void gk_far_fill(const gk_model *model, gk_setup *setup, int g);
 /* gk_flow.c */
 const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
 const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);

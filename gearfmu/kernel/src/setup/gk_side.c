@@ -322,6 +322,14 @@ static void store_ground(const gk_node *n, int at)
     }
 }
 
+/* patterns of far teeth at the points */
+static void store_far(const gk_node *n, int at)
+{
+    const gk_side *side = n->side;
+    for (int i = 0; i < n->points; i++)
+        gk_node_blend(n, n->gear->far_rows, &n->at[i], FAR, side->far + ((size_t)at * n->points + i) * FAR);
+}
+
 /* ---- all of them ------------------------------------------------------------------------------------------------- */
 /* the supports that any point of the tables loads */
 static gk_span held_by(const double *support, size_t points, int supports)
@@ -359,6 +367,7 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
         gk_node_gather(&n, (double)at / side->nodes);
         store_rows(&n, at);
         if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
+        if (setup->far_on[side->gear]) store_far(&n, at);
         if (setup->on.residual) store_residual(&n, at, 0, yields);
         if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, yields);
         if (GK_ON(setup, friction)) store_along(&n, at, yields);
