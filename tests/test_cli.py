@@ -179,6 +179,25 @@ def test_bodies_that_are_being_made_are_named_where_there_is_no_terminal(capsys:
     assert capsys.readouterr().err == "reducing pinion …\nreducing wheel …\nreducing ring …\n"
 
 
+def test_bodies_that_are_being_made_are_told_how_far_every_ten_seconds(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gearfmu.commands import models
+
+    now = [0.0]
+    monkeypatch.setattr(models.time, "monotonic", lambda: now[0])
+    with models.reducing() as progress:
+        for second in range(25):
+            now[0] = float(second)
+            progress(second / 40, f"{'wheel' if second % 2 else 'pinion'}: step {second}")
+    assert capsys.readouterr().err.splitlines() == [
+        "reducing pinion …",
+        "reducing wheel …",
+        "reducing pinion: step 10, 25 %",
+        "reducing pinion: step 20, 50 %",
+    ]
+
+
 def test_mesh_writes_what_meshio_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     meshio = pytest.importorskip("meshio")
     code, out, _ = call("mesh", "fzg_c", "--gear", "pinion", "--scale", 0.4, "--out", tmp_path, capsys=capsys)

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.body.apart import Job, reduce_apart_together
 from gearfmu.body.imported import imported_parts
 from gearfmu.body.layout import ALGORITHM_VERSION
+from gearfmu.body.memory import available_memory, gear_need, require_memory
 from gearfmu.body.parts import (
     Parts,
     drawn_counts,
@@ -45,6 +47,9 @@ from gearfmu.spec.planetary import RingSpec
 from gearfmu.spec.stage import StageSpec, require_pair
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
+
+_AT_ONCE = 2  # gears in processes of their own
+_WORTH = 8000  # unknowns of a sector from which on that is faster
 
 Progress = Callable[[str, float], None]
 Geometry = GearGeometry | InternalGearGeometry
@@ -86,20 +91,41 @@ def reduce_stage(
     progress: Progress | None = None,
 ) -> list[ReducedBody]:
     """Reduce every gear of a stage and store it; a stored body whose input hash matches is read instead. Shafts need no
-    file.
+    file. Two large gears are reduced at the same time where processors and memory are there.
 
     out_dir : folder of the .h5 files, that of the stage file when None. force : reduce in any case.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
-    bodies = []
-    for own, index in gears_of(spec):
-        path = body_path(own, index, out_dir)
-        body = None if force else _stored(path, expected_hash(own, index))
-        if body is None:
-            body = reduce_gear(own, index, progress)
+    gears = [(own, index, body_path(own, index, out_dir)) for own, index in gears_of(spec)]
+    bodies = {path: None if force else _stored(path, expected_hash(own, index)) for own, index, path in gears}
+    missing = [(own, index, path) for own, index, path in gears if bodies[path] is None]
+    together = _together(missing)
+    if together:
+        reduce_apart_together(together, _AT_ONCE, progress)
+        bodies |= {path: load_body(path) for *_, path in together}
+    for own, index, path in missing:
+        if bodies[path] is None:
+            bodies[path] = body = reduce_gear(own, index, progress)
             save_body(body, path)
-        bodies.append(body)
-    return bodies
+    return [body for body in bodies.values() if body is not None]
+
+
+def _together(jobs: list[Job]) -> list[Job]:
+    """The gears that are worth processes of their own, the longest first; none where processors or memory are for one
+    only."""
+    found = []
+    for own, index, path in jobs:
+        gear, geometry = own.gears[index], _geometry(own, index)
+        if not getattr(gear, "imported", None):
+            need = gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body)
+            if need.unknowns > _WORTH:
+                found.append((need, geometry.z, (own, index, path)))
+    found.sort(key=lambda job: -job[0].unknowns * job[1])
+    most = sum(sorted((need.memory for need, _, _ in found), reverse=True)[:_AT_ONCE])
+    there = available_memory()
+    if len(found) < 2 or (os.cpu_count() or 1) < 2 or (there is not None and most > there):
+        return []
+    return [job for _, _, job in found]
 
 
 def gears_of(spec: Stage) -> list[tuple[Any, int]]:
@@ -114,15 +140,18 @@ def gears_of(spec: Stage) -> list[tuple[Any, int]]:
 def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = None) -> ReducedBody:
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
-    geometry: Geometry
-    if isinstance(gear, RingSpec):
-        geometry = InternalGearGeometry.of(gear, spec.pair, hand=1)
-    else:
-        geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
     try:
+        geometry = _geometry(spec, gear_index)
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
         raise MeshError(f"{spec.source}: {gear_table(spec, gear.name)}: {error}") from error
+
+
+def _geometry(spec: Any, gear_index: int) -> Geometry:
+    gear = spec.gears[gear_index]
+    if isinstance(gear, RingSpec):
+        return InternalGearGeometry.of(gear, spec.pair, hand=1)
+    return GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
 
 
 def reduced_gear(gear: Any, geometry: Geometry, input_hash: str, progress: Progress | None = None) -> ReducedBody:
@@ -178,14 +207,17 @@ def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Poi
     """A gear meshed here, reduced by cyclic symmetry."""
     flank, points = load_points
     sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
+    need = gear_need(sector, gear.body)
+    require_memory(need, gear.body.mesh)
+    report(f"finite elements, {need.text}", 0.0)
     rigid = getattr(gear, "rigid_bore", False)  # sun, planet and ring of a set are averaged
     body = SectorBody(sector, gear.material, flank, points, rigid)
     drawn = sector_mesh(geometry, gear.face_width, drawn_counts(geometry, gear.face_width))
     surface = outline(drawn, sector.nodes)
-    modes = elastic_modes(body, gear.body.modes, report, surface.sample)
-    statics = static_tables(body, pictured_loads(points), report)
-    report("frequency response", 0.0)
-    frf = frf_error(body, modes, statics, FrfCase(gear.modal_damping, FRF_CUT, geometry.r))
+    modes = elastic_modes(body, gear.body.modes, _within(report, 0.1, 0.6), surface.sample)
+    statics = static_tables(body, pictured_loads(points), _within(report, 0.6, 0.8))
+    case = FrfCase(gear.modal_damping, FRF_CUT, geometry.r)
+    frf = frf_error(body, modes, statics, case, _within(report, 0.8, 1.0))
     display = sector_display(surface, body, modes, statics)
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
     shapes = sector_shapes(surface, modes)
@@ -208,6 +240,11 @@ def _stored(path: Path, wanted_hash: str) -> ReducedBody | None:
 
 def _named(progress: Progress | None, name: str) -> Progress:
     return (lambda what, share: progress(f"{name}: {what}", share)) if progress else (lambda what, share: None)
+
+
+def _within(report: Progress, first: float, last: float) -> Progress:
+    """Progress of a part of the work as progress of the whole."""
+    return lambda what, share: report(what, first + (last - first) * share)
 
 
 def _by_point(rows: np.ndarray, points: Points) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,8 @@ from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
     from gearfmu.stage import StageModel
+
+_EVERY = 10.0  # s between lines of progress where there is no terminal
 
 
 def model_of(
@@ -59,23 +62,27 @@ def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Any, list[A
 
 @contextmanager
 def reducing(title: str = "reducing") -> Iterator[Progress]:
-    """A progress function for the reduction of bodies: a bar on a terminal, else one line on standard error for every
-    body that is being made, which takes a minute or more."""
+    """A progress function for the reduction of bodies: a bar on a terminal, else a line on standard error for every
+    body that is being made, and every ten seconds one that says what is being done and how far it is."""
     with progress_bar(title) as bar:
         yield bar or _Told(title)
 
 
 class _Told:
-    """One line for each body."""
+    """A line for each body, and one every `_EVERY` seconds."""
 
     def __init__(self, title: str) -> None:
-        self.title, self._last = title, ""
+        self.title, self._named, self._last = title, set[str](), time.monotonic()
 
     def __call__(self, fraction: float, text: str = "") -> None:
-        name = text.split(":")[0].removeprefix("reducing ")
-        if name != self._last:
+        told = text.removeprefix("reducing ")
+        name = told.split(":")[0]
+        if name not in self._named:
+            self._named.add(name)
             click.echo(f"{self.title} {name} …", err=True)
-            self._last = name
+        elif time.monotonic() - self._last >= _EVERY:
+            self._last = time.monotonic()
+            click.echo(f"{self.title} {told}, {100 * fraction:.0f} %", err=True)
 
 
 def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:

@@ -2,12 +2,10 @@
 
 Displacements are written in the frame of each sector; those of harmonic ν are u_j = U exp(2πiνj/z) in sector j. With
 the dofs of the plus cut turned by −2π/z into the frame of the minus cut, u_plus = exp(iθ) u_minus, θ = 2πν/z.
-The interior is factorised once, real, with both cuts held, and condensed onto the cuts:
-    S = K_BB − K_BI K_II⁻¹ K_IB,   S_ν = S_mm + S_pp + e^{iθ} S_mp + e^{−iθ} S_pm,
-so that each harmonic costs a dense system of the size of one cut. S_ν is singular only for ν = 0 and 1, by the rigid
-motions, which are known. A sector that is its own mirror image about mid-width (z → −z) splits once more, exactly,
-into symmetric and antisymmetric fields; one of a helical gear is not and has one space of all fields. Source: Thomas,
-Int. J. Numer. Meth. Eng. 14 (1979) 81 (cyclic symmetry).
+The interior is factorised once, real, with both cuts held, and condensed onto the cuts (`harmonic`).
+A sector that is its own mirror image about mid-width (z → −z) splits once more, exactly, into symmetric and
+antisymmetric fields; one of a helical gear is not and has one space of all fields. Source: Thomas, Int. J. Numer. Meth.
+Eng. 14 (1979) 81 (cyclic symmetry).
 
 A surface may be rigid (a bore on a stiff shaft): its nodes are eliminated for the rigid motions of that surface, which
 join the cuts as unknowns of the condensed system. Seen from sector j a motion q of the whole surface turns back by
@@ -19,16 +17,15 @@ has six unknowns of its own in each, which are inner ones like any other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from gearfmu.errors import MeshError
 from gearfmu.fem.coupling import rigid_fields, rigid_modes
-from gearfmu.fem.factor import Factor
+from gearfmu.fem.factor import CondensedFactor
+from gearfmu.fem.harmonic import Harmonic
 
 _MATCH = 1e-7  # of the mesh's size: nodes that should coincide
 
@@ -81,163 +78,17 @@ class SectorSpace:
         self.rigid = self.from_nodes @ rigid_modes(sector.nodes)
         if len(self.motions):
             self.rigid[self.interior + 2 * self.cut :] = (np.eye(6) * length)[self.motions]
-        inside, border = slice(0, self.interior), slice(self.interior, None)
         inner = owner[interior] // 3
         if sector.patch is not None:
             mirror = mirror.copy()
             mirror[sector.patch] = first = sector.patch.min()  # stands for all of them
             inner = np.concatenate([inner, np.full(6, first)])
-        self._factor = Factor(stiffness[inside, inside], _cells(sector.elements, mirror, inner), inner)
-        self.coupling = sp.csr_array(stiffness[inside, border])
-        self.influence = self._factor.solve(self.coupling.toarray())
-        self.schur = stiffness[border, border].toarray() - self.coupling.T @ self.influence
-
-    def solve_held(self, loads: np.ndarray) -> np.ndarray:
-        """K_II⁻¹ f for interior loads (interior, k): both cuts held."""
-        return self._factor.solve(loads)
+        self.stiffness = stiffness
+        self.factor = CondensedFactor(stiffness, _cells(sector.elements, mirror, inner), inner)
 
     def harmonic(self, nodal_diameter: int) -> Harmonic:
         """The body restricted to one nodal diameter 0 ≤ ν ≤ z/2."""
         return Harmonic(self, nodal_diameter)
-
-
-class Harmonic:
-    """One nodal diameter of one parity: a free body in complex coordinates (interior, minus cut, amplitudes of the
-    rigid surface), real for ν = 0, z/2.
-
-    Quantities are those of one sector: φᴴ M φ of a vector is its mass product over one sector.
-    rigid : (size, r) rigid motions of this harmonic, mass-normalised over one sector; r = 0 for ν ≥ 2.
-    """
-
-    def __init__(self, space: SectorSpace, nodal_diameter: int):
-        self.space, self.nodal_diameter = space, nodal_diameter
-        angle = 2 * np.pi * nodal_diameter / space.teeth
-        self.is_real = nodal_diameter == 0 or 2 * nodal_diameter == space.teeth
-        self.phase = float(round(np.cos(angle))) if self.is_real else complex(np.cos(angle), np.sin(angle))
-        self.dtype = float if self.is_real else complex
-        self._surface = self._surface_motions()
-        self.size = space.interior + space.cut + self._surface.shape[1]
-        self.rigid = self._rigid_motions()
-        self._mass_rigid = self.mass(self.rigid)
-        self.elastic = self.size - self.rigid.shape[1]
-
-    def _surface_motions(self) -> np.ndarray:
-        """Motions of the rigid surface that belong to this harmonic, as columns: (motions of the space, amplitudes)."""
-        patterns: dict[int, list[dict[int, complex]]] = {0: [{2: 1}, {5: 1}], 1: [{0: 1, 1: 1j}, {3: 1, 4: 1j}]}
-        motions = list(self.space.motions)
-        mine = [p for p in patterns.get(self.nodal_diameter, []) if set(p) <= set(motions)]
-        columns = np.zeros((len(motions), len(mine)), self.dtype)
-        for k, pattern in enumerate(mine):
-            for motion, value in pattern.items():
-                columns[motions.index(motion), k] = value if np.iscomplexobj(columns) else value.real
-        return columns
-
-    def _rigid_motions(self) -> np.ndarray:
-        r, nu = self.space.rigid, self.nodal_diameter
-        if nu == 0:
-            fields = r[:, [2, 5]]
-        elif nu == 1:
-            fields = np.stack([r[:, 0] + 1j * r[:, 1], r[:, 3] + 1j * r[:, 4]], axis=1)
-        else:
-            return np.zeros((self.size, 0), self.dtype)
-        fields = self._without_plus(fields)
-        fields = fields[:, np.linalg.norm(fields, axis=0) > 1e-9 * np.linalg.norm(r)]
-        gram = fields.conj().T @ self.mass(fields)
-        return sl.solve_triangular(np.linalg.cholesky(gram), fields.conj().T, lower=True).conj().T
-
-    def _without_plus(self, fields: np.ndarray) -> np.ndarray:
-        """Fields of this harmonic in the sector's coordinates → in this harmonic's."""
-        interior, cut = self.space.interior, self.space.cut
-        kept = fields[: interior + cut]
-        if not self._surface.shape[1]:
-            return kept
-        return np.concatenate([kept, np.linalg.pinv(self._surface) @ fields[interior + 2 * cut :]])
-
-    def reduce(self, sector_loads: np.ndarray) -> np.ndarray:
-        """Loads on the sector's coordinates (interior, minus, plus, rigid surface) → on this harmonic's coordinates."""
-        interior, cut = self.space.interior, self.space.cut
-        plus = interior + cut
-        loads = sector_loads[:plus].astype(np.result_type(sector_loads, self.dtype))
-        loads[interior:] += np.conj(self.phase) * sector_loads[plus : plus + cut]
-        return self._with_surface(loads, sector_loads[plus + cut :])
-
-    def _with_surface(self, loads: np.ndarray, on_surface: np.ndarray) -> np.ndarray:
-        if not self._surface.shape[1]:
-            return loads
-        return np.concatenate([loads, self._surface.conj().T @ on_surface])
-
-    def expand(self, vectors: np.ndarray) -> np.ndarray:
-        """This harmonic's coordinates → the sector's coordinates (interior, minus, plus, rigid surface)."""
-        return np.concatenate([vectors[: self.space.interior], self._expand_border(vectors[self.space.interior :])])
-
-    def _expand_border(self, border: np.ndarray) -> np.ndarray:
-        """(minus, amplitudes) → (minus, plus, rigid surface)."""
-        cut = border[: self.space.cut]
-        both = [cut, self.phase * cut]
-        if len(self.space.motions):
-            both.append(self._surface @ border[self.space.cut :])
-        return np.concatenate(both)
-
-    def mass(self, vectors: np.ndarray) -> np.ndarray:
-        """M v over one sector."""
-        return self.reduce(_real_times_any(self.space.mass_matrix, self.expand(vectors)))
-
-    @cached_property
-    def _cut_solver(self) -> tuple[np.ndarray, np.ndarray]:
-        """LU of S_ν; its rigid null space is filled up, which changes nothing for balanced loads."""
-        cut, schur = self.space.cut, self.space.schur
-        minus, plus, surface = slice(0, cut), slice(cut, 2 * cut), slice(2 * cut, None)
-        s = (
-            schur[minus, minus]
-            + schur[plus, plus]
-            + self.phase * schur[minus, plus]
-            + np.conj(self.phase) * schur[plus, minus]
-        )
-        if self._surface.shape[1]:
-            mixed = (schur[minus, surface] + np.conj(self.phase) * schur[plus, surface]) @ self._surface
-            own = self._surface.conj().T @ schur[surface, surface] @ self._surface
-            s = np.block([[s, mixed], [mixed.conj().T, own]])
-        rigid = self.rigid[self.space.interior :]
-        if rigid.shape[1]:
-            rigid = np.linalg.qr(rigid)[0]
-            s = s + np.abs(s.diagonal()).mean() * (rigid @ rigid.conj().T)
-        return sl.cho_factor(0.5 * (s + s.conj().T))
-
-    def balance(self, loads: np.ndarray) -> np.ndarray:
-        """Pᴴ f: loads together with the inertia forces of the rigid motion they cause."""
-        if not self.rigid.shape[1]:
-            return loads
-        return loads - self._mass_rigid @ (self.rigid.conj().T @ loads)
-
-    def gauge(self, vectors: np.ndarray) -> np.ndarray:
-        """P u: displacement without its rigid part."""
-        if not self.rigid.shape[1]:
-            return vectors
-        return vectors - self.rigid @ (self._mass_rigid.conj().T @ vectors)
-
-    @cached_property
-    def _held_inertia(self) -> np.ndarray:
-        return self.space.solve_held(self._mass_rigid[: self.space.interior])
-
-    def flexibility(self, loads: np.ndarray, held: np.ndarray | None = None) -> np.ndarray:
-        """C_ν f = P K_ν⁺ Pᴴ f. `held` = `space.solve_held` of the interior loads, where it is known already."""
-        space, interior, cut = self.space, self.space.interior, self.space.cut
-        balanced = self.balance(loads)
-        carried = _real_times_any(space.influence.T, balanced[:interior])
-        on_border = balanced[interior:]
-        on_cut = on_border[:cut] - carried[:cut] - np.conj(self.phase) * carried[cut : 2 * cut]
-        if self._surface.shape[1]:
-            on_surface = on_border[cut:] - self._surface.conj().T @ carried[2 * cut :]
-            on_cut = np.concatenate([on_cut, on_surface])
-        moved = sl.cho_solve(self._cut_solver, on_cut)
-        border = self._expand_border(moved)
-        if held is None:
-            inside = space.solve_held(balanced[:interior] - _real_times_any(space.coupling, border))
-        else:
-            inside = (
-                held - self._held_inertia @ (self.rigid.conj().T @ loads) - _real_times_any(space.influence, border)
-            )
-        return self.gauge(np.concatenate([inside, moved]))
 
 
 def sector_spaces(sector: Sector) -> list[SectorSpace]:
@@ -352,10 +203,3 @@ def _turn_plus(sector: Sector) -> sp.csr_array:
     diagonal[x] = diagonal[x + 1] = c
     turn = sp.coo_array((np.full(len(x), s), (x + 1, x)), (sector.nodes.size,) * 2).tocsr()
     return sp.csr_array(sp.diags(diagonal) + turn - turn.T)
-
-
-def _real_times_any(matrix: sp.csr_array | np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Real matrix times real or complex dense, without a complex copy of the matrix."""
-    if not np.iscomplexobj(vectors):
-        return matrix @ vectors
-    return (matrix @ np.ascontiguousarray(vectors).view(float)).view(complex)

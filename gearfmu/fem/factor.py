@@ -76,6 +76,56 @@ class Factor:
         return result
 
 
+class CondensedFactor:
+    """The first n unknowns of a real symmetric matrix (n + b, n + b) factorised and condensed onto the others.
+
+    cells, node_of_dof : as of `Factor`, of the first n unknowns, whose block must be positive definite. schur : (b, b)
+    S = A_BB − A_BI A_II⁻¹ A_IB, that the elimination leaves. Raises FactorError.
+    """
+
+    def __init__(self, matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray):
+        self.inner, size = len(node_of_dof), matrix.shape[0]
+        groups = dof_groups(nested_dissection(cells), node_of_dof)
+        self._order = np.concatenate(groups)
+        *self._fronts, self.schur = eliminated(matrix, [*groups, np.arange(self.inner, size)], self._take)
+
+    def _take(self, dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
+        if start < self.inner:
+            return _eliminate(dense, start, stop, below)
+        return np.tril(dense) + np.tril(dense, -1).T, dense
+
+    def forward(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Loads f on the first unknowns, (n, k) → y = L⁻¹ f (n, k), in the order of elimination, and −A_BI A_II⁻¹ f
+        (b, k). Of two loads yᵀ y' is fᵀ A_II⁻¹ f'."""
+        if np.iscomplexobj(loads):
+            parts = self.forward(np.ascontiguousarray(loads).view(float))
+            return parts[0].view(complex), parts[1].view(complex)
+        inner, passed = np.empty(loads.shape), np.empty((len(self.schur), loads.shape[1]))
+        for columns in _blocks(loads.shape[1]):
+            work = np.concatenate([loads[self._order, columns], np.zeros_like(passed[:, columns])])
+            for front in self._fronts:
+                front.forward(work)
+            inner[:, columns], passed[:, columns] = work[: self.inner], work[self.inner :]
+        return inner, passed
+
+    def backward(self, inner: np.ndarray, border: np.ndarray) -> np.ndarray:
+        """y of `forward` and displacement u_B (b, k) of the others → A_II⁻¹ (f − A_IB u_B) (n, k)."""
+        if np.iscomplexobj(inner) or np.iscomplexobj(border):
+            both = (np.ascontiguousarray(part, dtype=complex).view(float) for part in (inner, border))
+            return self.backward(*both).view(complex)
+        result = np.empty(inner.shape)
+        for columns in _blocks(inner.shape[1]):
+            work = np.concatenate([inner[:, columns], border[:, columns]])
+            for front in reversed(self._fronts):
+                front.backward(work)
+            result[self._order, columns] = work[: self.inner]
+        return result
+
+
+def _blocks(columns: int) -> list[slice]:
+    return [slice(first, min(first + _COLUMNS, columns)) for first in range(0, columns, _COLUMNS)]
+
+
 def substitute(fronts: list[Any], work: np.ndarray) -> None:
     """Forward and back substitution in place; (n, k) in C order, so that a group's rows are one block."""
     for front in fronts:

@@ -34,15 +34,18 @@ class ModesError(ArithmeticError):
     """The eigensolver did not converge."""
 
 
-def lowest_modes(body: Vibrating, count: int, tolerance: float = 1e-9, block: int = 8) -> tuple[np.ndarray, np.ndarray]:
+def lowest_modes(
+    body: Vibrating, count: int, tolerance: float = 1e-9, block: int = 8, start: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """The `count` lowest elastic modes (fewer when the body has fewer).
 
     Returns ω² (k,), rad²/s², ascending, and mass-normalised shapes (n, k). `tolerance` bounds the residual of
-    C M φ = φ/ω² relative to 1/ω², in the mass norm; the error of ω² is of the order of its square. Starts from fixed
-    random vectors. Raises ModesError when the Krylov space ends before `count` modes have converged.
+    C M φ = φ/ω² relative to 1/ω², in the mass norm; the error of ω² is of the order of its square. Starts from `start`
+    (n, k), approximate modes without rigid motion, or else from `block` fixed random vectors. Raises ModesError when
+    the Krylov space ends before `count` modes have converged.
     """
     count = min(count, body.elastic)
-    space = _Krylov(body, min(block, body.elastic))
+    space = _Krylov(body, _random_start(body, min(block, body.elastic)) if start is None else start)
     while True:
         if space.size >= count:
             values, vectors, residual = (part[..., :count] for part in space.ritz())
@@ -52,17 +55,20 @@ def lowest_modes(body: Vibrating, count: int, tolerance: float = 1e-9, block: in
             raise ModesError(f"not all of {count} modes found: the Krylov space ends at {space.size} vectors")
 
 
+def _random_start(body: Vibrating, block: int) -> np.ndarray:
+    start: np.ndarray = np.random.default_rng(1).standard_normal((body.size, block)).astype(body.dtype)
+    return body.flexibility(body.mass(start))
+
+
 class _Krylov:
     """Basis V, orthonormal in M, and T = Vᴴ M C M V, one block larger with each `grow`."""
 
-    def __init__(self, body: Vibrating, block: int):
+    def __init__(self, body: Vibrating, start: np.ndarray):
         self.body, self.size = body, 0
         self.v: np.ndarray = np.empty((body.size, 0), body.dtype, order="F")
         self.mv = self.v.copy(order="F")
         self.t: np.ndarray = np.zeros((0, 0), body.dtype)
-        start: np.ndarray = np.random.default_rng(1).standard_normal((body.size, block)).astype(body.dtype)
-        self.last = block
-        self.next = body.flexibility(body.mass(start))
+        self.last, self.next = start.shape[1], start
         self.grow()
 
     def basis(self) -> np.ndarray:

@@ -18,14 +18,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearfmu.reduction.modal import Modes
-from gearfmu.reduction.sector import SectorBody
+from gearfmu.fem.harmonic import flexibilities
+from gearfmu.reduction.modal import Modes, Progress
+from gearfmu.reduction.sector import Family, SectorBody
 from gearfmu.reduction.statics import Statics
 
 BAND = (50.0, 10e3)
 TRUSTED_ERROR = 0.01
 _HIGHEST = 20e3
 _LINES = 80
+_AT_ONCE = 5  # nodal diameters whose loads the interior answers together
 
 
 @dataclass(frozen=True)
@@ -69,13 +71,15 @@ class Series:
     moments: list[np.ndarray]
 
 
-def frf_error(body: SectorBody, modes: Modes, statics: Statics, case: FrfCase) -> FrfError:
+def frf_error(
+    body: SectorBody, modes: Modes, statics: Statics, case: FrfCase, progress: Progress | None = None
+) -> FrfError:
     """Relative error of modes below the cut + static residual against the finite elements (see the head of this
     file)."""
     inputs = frf_inputs(len(body.points.rolls), body.points.functions)
     scale = port_scale(len(inputs), case.length)
     static = _static_matrix(body, statics, inputs)
-    moments = [m * np.outer(scale, scale) for m in [static, *_moments(body, inputs)]]
+    moments = [m * np.outer(scale, scale) for m in [static, *_moments(body, inputs, progress)]]
     rows = np.vstack([modes.flank_rows[inputs], modes.bore_rows]) * scale[:, None]
     full = Series(rows, modes.frequency, moments)
     rigid = rigid_compliance(body.rigid_rows()[inputs], body.inertia) * np.outer(scale, scale)
@@ -131,32 +135,45 @@ def rigid_compliance(flank: np.ndarray, inertia: np.ndarray) -> np.ndarray:
 
 
 def _static_matrix(body: SectorBody, statics: Statics, inputs: np.ndarray) -> np.ndarray:
-    size = len(body.flank_rows)
+    size = body.flank_count
     flank = statics.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(size, size)[np.ix_(inputs, inputs)]
     bore = statics.static_fb.reshape(size, 6)[inputs]
     return np.block([[flank, bore], [bore.T, statics.static_bb]])
 
 
-def _moments(body: SectorBody, inputs: np.ndarray) -> list[np.ndarray]:
+def _moments(body: SectorBody, inputs: np.ndarray, progress: Progress | None) -> list[np.ndarray]:
     """Fᵀ C (M C)^j F for j = 1, 2, 3 over the whole body, flank loads on tooth 0 and bore loads."""
     size = len(inputs) + 6
     total = [np.zeros((size, size)) for _ in range(3)]
     for index in range(len(body.spaces)):
-        for nu in body.diameters():
-            family = body.family(index, nu)
-            harmonic = family.harmonic
-            loads = np.zeros((harmonic.size, size), harmonic.dtype)
-            position = np.flatnonzero(np.isin(inputs, family.columns))
-            loads[:, position] = family.flank[:, np.searchsorted(family.columns, inputs[position])] / body.teeth
-            loads[:, len(inputs) :] = family.bore
-            first = harmonic.flexibility(loads)
-            inertia = harmonic.mass(first)
-            second = harmonic.flexibility(inertia)
-            factor = body.teeth * family.weight
-            products = (first.conj().T @ inertia, second.conj().T @ inertia, second.conj().T @ harmonic.mass(second))
-            for matrix, product in zip(total, products, strict=True):
-                matrix += factor * product.real
+        diameters = body.diameters()
+        for start in range(0, len(diameters), _AT_ONCE):
+            if progress:
+                progress(f"frequency response, nodal diameter {start}", start / len(diameters))
+            families = [body.family(index, nu) for nu in diameters[start : start + _AT_ONCE]]
+            _add_moments(total, body, families, inputs)
     return total
+
+
+def _add_moments(total: list[np.ndarray], body: SectorBody, families: list[Family], inputs: np.ndarray) -> None:
+    harmonics = [family.harmonic for family in families]
+    ports, loads = [], []
+    for family in families:
+        seen = np.flatnonzero(np.isin(inputs, family.columns))
+        own = [family.loads(inputs[seen]) / body.teeth]
+        if family.harmonic.nodal_diameter <= 1:  # no other moves the bore's node
+            own.append(family.bore)
+        loads.append(np.hstack(own).astype(family.harmonic.dtype))
+        bore = range(len(inputs), len(inputs) + 6 * (len(own) - 1))
+        ports.append(np.ix_(*2 * [np.concatenate([seen, bore]).astype(int)]))
+    first = flexibilities(harmonics, loads)
+    inertia = [harmonic.mass(u) for harmonic, u in zip(harmonics, first, strict=True)]
+    second = flexibilities(harmonics, inertia)
+    for family, at, u, mu, v in zip(families, ports, first, inertia, second, strict=True):
+        factor = body.teeth * family.weight
+        products = (u.conj().T @ mu, v.conj().T @ mu, v.conj().T @ family.harmonic.mass(v))
+        for matrix, product in zip(total, products, strict=True):
+            matrix[at] += factor * product.real
 
 
 def _cut_in_gap(frequency: np.ndarray, wish: float) -> float:

@@ -13,7 +13,7 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.hex20 import Material
 from gearfmu.fem.patches import averaging_rows, patch_moments
 from gearfmu.femesh.cyclic_cut import CyclicCut
-from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.flank import Direction, Points, ToothFlank
 from gearfmu.reduction.imported_flank import tooth_loads
 from gearfmu.reduction.sector import SectorBody, turned_sum
 
@@ -50,12 +50,9 @@ class ImportedSector(SectorBody):
         self.spaces = sector_spaces(
             Sector(cut.nodes, self.mesh.elements, self.stiffness, self.mass_matrix, teeth, cut.cut_minus, cut.cut_plus)
         )
-        self._inputs = [self._space_inputs(space) for space in self.spaces]
 
-    @cached_property
-    def flank_rows(self) -> np.ndarray:
-        """Unit flank loads of tooth 0 as rows over the sector's nodes: (2·R·A, 3N)."""
-        return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points).toarray()
+    def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
+        return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points, direction=direction)
 
     @cached_property
     def patch_rows(self) -> np.ndarray:
@@ -68,12 +65,6 @@ class ImportedSector(SectorBody):
     def knows_stress(self) -> bool:
         """No: material and elements may be another program's."""
         return False
-
-    @cached_property
-    def tangent_rows(self) -> np.ndarray:
-        """The same of unit loads along the profile: (2·R·A, 3N)."""
-        direction = self.flank.tangent
-        return tooth_loads(self.cut.nodes, self.faces, self.flank, self.points, direction=direction).toarray()
 
     @property
     def patch_point(self) -> np.ndarray:

@@ -13,10 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from gearfmu.fem.cyclic import SectorSpace
+from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.fem.low_fields import LowFields
+from gearfmu.fem.refined import refined_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.spin import FamilySpin, Spin, family_spin, join_spin
 
+_SAMPLES = (0.0, 0.2, 1.0)  # nodal diameters, of the largest, that make the space of low modes
+_SAMPLED = 1e-4  # residual of their modes
+_BESIDE = 3  # modes of a family beyond its share that join the space
+_SPACE_SHARE = 0.4  # of the time, for the space
 _SHAPES = 4  # lowest shapes of each family kept for pictures
 COLUMNS = ("frequency", "diameter", "part", "parity", "flank", "bore", "surface")
 
@@ -71,14 +79,14 @@ def elastic_modes(
 
     sample (P, N) : points of sector 0 from its nodes, whose displacement is kept in every mode (`Modes.surface`).
 
-    Every family is solved for its expected share and again for more, until the highest frequency it was solved for
-    lies above the last mode kept: no mode is missed. Raises ModesError when the eigensolver fails.
+    A few families are solved first and tell, by a small space that holds their modes (`LowFields`), how many modes of
+    each family are wanted, and near where they are. A family whose highest frequency does not lie above the last mode
+    kept is solved again for more: no mode is missed. Raises ModesError when the eigensolver fails.
     """
     chosen = sp.csr_array((0, len(body.mesh.nodes))) if sample is None else sample
+    lows = [_low_fields(body, space, count, progress) for space in body.spaces]
     families = [(s, nu) for s in range(len(body.spaces)) for nu in body.diameters()]
-    mean = count / (body.teeth * len(body.spaces))
-    share = int(np.ceil(mean + np.sqrt(mean))) + 1
-    wanted = dict.fromkeys(families, share)
+    wanted = _expected(body, lows, count)
     found: dict[tuple[int, int], _FamilyModes] = {}
     while True:
         open_families = [
@@ -86,10 +94,15 @@ def elastic_modes(
             for key in families
             if key not in found or not found[key].complete and len(found[key].squared) < wanted[key]
         ]
-        for number, key in enumerate(open_families):
-            if progress:
-                progress(f"modes, nodal diameter {key[1]}", number / len(open_families))
-            found[key] = _solve(body, key, wanted[key], chosen)
+        number = 0
+        for index, low in enumerate(lows):
+            for mine in refined_modes(low, {nu: wanted[s, nu] for s, nu in open_families if s == index}):
+                nu = mine[0].nodal_diameter
+                if progress:
+                    done = number / len(open_families)
+                    progress(f"modes, nodal diameter {nu}", _SPACE_SHARE + (1 - _SPACE_SHARE) * done)
+                found[index, nu] = _made(body, index, mine, chosen)
+                number += 1
         limit = _limit(found.values(), count)
         again = [k for k in families if found[k].squared[-1] < limit and not found[k].complete]
         if not again:
@@ -99,28 +112,58 @@ def elastic_modes(
             wanted[key] = int(np.ceil(1.3 * wanted[key])) + 2
 
 
+def _low_fields(body: SectorBody, space: SectorSpace, count: int, progress: Progress | None) -> LowFields:
+    """The space of the modes of a few nodal diameters; low ones have the most modes in a band."""
+    low, last = LowFields(space), body.diameters()[-1]
+    diameters = sorted({round(part * last) for part in _SAMPLES})
+    for number, nu in enumerate(diameters):
+        if progress:
+            progress(f"space of low modes, nodal diameter {nu}", _SPACE_SHARE * number / len(diameters))
+        harmonic, wide = space.harmonic(nu), 2 - 1.5 * nu / last
+        low.add(harmonic, lowest_modes(harmonic, int(wide * _share(body, count)) + _BESIDE, _SAMPLED)[1])
+    return low
+
+
+def _share(body: SectorBody, count: int) -> int:
+    """Modes that a family has among the `count` lowest, and some more."""
+    mean = count / (body.teeth * len(body.spaces))
+    return int(np.ceil(mean + np.sqrt(mean))) + 1
+
+
+def _expected(body: SectorBody, lows: list[LowFields], count: int) -> dict[tuple[int, int], int]:
+    """How many modes of every family to look for: those among the `count` lowest and one more."""
+    most, near = 2 * _share(body, count) + _BESIDE, {}
+    for index, (space, low) in enumerate(zip(body.spaces, lows, strict=True)):
+        for nu in body.diameters():
+            squared = low.modes(space.harmonic(nu), most)[0]
+            near[index, nu] = np.repeat(squared, 1 if nu == 0 or 2 * nu == body.teeth else 2), squared
+    every = np.sort(np.concatenate([repeated for repeated, _ in near.values()]))
+    limit = every[min(count, len(every)) - 1]
+    return {key: max(1, int((squared <= limit).sum()) + 1) for key, (_, squared) in near.items()}
+
+
 def _limit(found: Iterable[_FamilyModes], count: int) -> float:
     """ω² of the `count`-th real mode among those found."""
     squared = np.sort(np.concatenate([np.repeat(m.squared, m.weight) for m in found]))
     return squared[min(count, len(squared)) - 1]
 
 
-def _solve(body: SectorBody, key: tuple[int, int], count: int, sample: sp.csr_array) -> _FamilyModes:
-    family = body.family(*key)
-    harmonic = family.harmonic
-    squared, shapes = lowest_modes(harmonic, count)
+def _made(
+    body: SectorBody, index: int, modes: tuple[Harmonic, np.ndarray, np.ndarray], sample: sp.csr_array
+) -> _FamilyModes:
+    harmonic, squared, shapes = modes
+    family = body.family_of(index, harmonic)
     shapes = shapes * np.sqrt(family.weight / body.teeth)
-    flank = np.zeros((len(body.load_rows), len(squared)), shapes.dtype)
-    flank[family.columns] = family.flank.conj().T @ shapes
+    fields = body.spaces[index].to_nodes @ harmonic.expand(shapes)
+    flank = np.zeros((body.load_matrix.shape[0], len(squared)), shapes.dtype)
+    flank[family.columns] = body.load_matrix[family.columns] @ fields
     gauge = _gauge(flank[: body.profile_loads])
-    shapes, flank = shapes * gauge, flank * gauge
-    bore = body.teeth * (family.bore.conj().T @ shapes)
-    space = body.spaces[key[0]]
-    fields = space.to_nodes @ harmonic.expand(shapes)
+    fields, flank = fields * gauge, flank * gauge
+    bore = body.teeth * (family.bore_parts.conj().T @ (family.moments @ fields))
     surface = np.zeros((len(squared), sample.shape[0], 3), shapes.dtype)
     for k in range(len(squared) if sample.shape[0] else 0):
         surface[k] = sample @ fields[:, k].reshape(-1, 3)
-    spin = family_spin(body, key[1], family.weight, fields) if body.knows_stress else None
+    spin = family_spin(body, harmonic.nodal_diameter, family.weight, fields) if body.knows_stress else None
     pictures = fields[:, :_SHAPES].copy()
     return _FamilyModes(family.weight, len(squared) >= harmonic.elastic, squared, flank, bore, pictures, surface, spin)
 
@@ -161,7 +204,7 @@ def _assembled(body: SectorBody, found: dict[tuple[int, int], _FamilyModes], cou
             columns["bore"].append(modes.bore_rows[:, k].imag if part == 2 else modes.bore_rows[:, k].real)
             columns["surface"].append(modes.surface[k].imag if part == 2 else modes.surface[k].real)
     numbers, parts, parities = (np.array(columns[name], int) for name in ("diameter", "part", "parity"))
-    flank, patch, tangent = np.split(np.stack(columns["flank"], 1), [len(body.flank_rows), body.profile_loads])
+    flank, patch, tangent = np.split(np.stack(columns["flank"], 1), [body.flank_count, body.profile_loads])
     return Modes(
         np.array(columns["frequency"]),
         numbers,

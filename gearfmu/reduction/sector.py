@@ -12,9 +12,10 @@ import scipy.sparse as sp
 
 from gearfmu.fem import hex20, surface
 from gearfmu.fem.coupling import averaging_rows_at, rigid_modes, surface_moments
-from gearfmu.fem.cyclic import Harmonic, Sector, SectorSpace, sector_spaces
+from gearfmu.fem.cyclic import Sector, sector_spaces
+from gearfmu.fem.harmonic import Harmonic
 from gearfmu.fem.spinning import growth, stress_stiffness
-from gearfmu.reduction.flank import Points, ToothFlank, flank_loads
+from gearfmu.reduction.flank import Direction, Points, ToothFlank, flank_loads
 
 
 @dataclass(frozen=True)
@@ -23,26 +24,38 @@ class Family:
 
     harmonic : nodal diameter ν of a parity.
     columns : which loads of a tooth (flat index over side, roll, function; then the patch; then side, roll, function of
-    the loads along the profile) this parity sees.
-    flank : (size, c) their force on one tooth. bore : (size, 6) Fourier coefficient of the unit loads on the bore node
-    (force x, y, z, moment x, y, z in the body frame): f_j = Σ_ν bore_ν e^{iθ_ν j} over ν and −ν.
+    the loads along the profile) this parity sees. rows : all loads of a tooth, (m, 3N). moments : (6, 3N) share of the
+    bore. bore_parts : (6, 6) Fourier coefficient of the unit loads on the bore node (force x, y, z, moment x, y, z in
+    the body frame) in `moments`: f_j = Σ_ν momentsᵀ bore_parts_ν e^{iθ_ν j} over ν and −ν.
     weight : 2 for 0 < ν < z/2 (ν and −ν together), else 1.
-    held_flank : interior response to `flank` with both cuts held.
     """
 
     harmonic: Harmonic
     columns: np.ndarray
-    flank: np.ndarray
-    bore: np.ndarray
-    held_flank: np.ndarray
+    rows: sp.csr_array
+    moments: np.ndarray
+    bore_parts: np.ndarray
 
     @property
     def weight(self) -> int:
         return 1 if self.harmonic.is_real else 2
 
-    def flank_response(self) -> np.ndarray:
-        """C_ν times the flank loads, (size, c)."""
-        return self.harmonic.flexibility(self.flank, self.held_flank)
+    @property
+    def flank(self) -> np.ndarray:
+        """Force of the loads `columns` on one tooth, (size, c)."""
+        return self.loads(self.columns)
+
+    def loads(self, chosen: np.ndarray) -> np.ndarray:
+        """Force of some loads of one tooth, (size, k)."""
+        return self._reduced(self.rows[chosen].toarray().T)
+
+    @property
+    def bore(self) -> np.ndarray:
+        """Force of the unit loads on the bore node, (size, 6)."""
+        return self._reduced(self.moments.T) @ self.bore_parts
+
+    def _reduced(self, nodal: np.ndarray) -> np.ndarray:
+        return self.harmonic.reduce(self.harmonic.space.from_nodes @ nodal)
 
 
 class SectorBody:
@@ -65,22 +78,29 @@ class SectorBody:
             bool(flank.base_helix_angle), np.unique(self._held_faces) if rigid_bore else None,
         )  # fmt: skip
         self.material, self.spaces = material, sector_spaces(sector)
-        self._inputs = [self._space_inputs(space) for space in self.spaces]
 
-    @cached_property
-    def flank_rows(self) -> np.ndarray:
-        """Unit flank loads (side, roll, function) flattened, as rows over the sector's nodes: (2·R·A, 3N)."""
-        both = [flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points) for s in (0, 1)]
-        return np.stack(both).reshape(-1, self.mesh.nodes.size)
-
-    @cached_property
-    def tangent_rows(self) -> np.ndarray:
-        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N)."""
+    def _tooth_rows(self, direction: Direction | None = None) -> sp.csr_array:
+        """Unit loads (side, roll, function) flattened along the flank normal or another direction: (2·R·A, 3N)."""
         both = [
-            flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points, self.flank.tangent)
+            flank_loads(self.mesh.nodes, self.mesh.flank[s].quads, self.flank, s, self.points, direction)
             for s in (0, 1)
         ]
-        return np.stack(both).reshape(-1, self.mesh.nodes.size)
+        return sp.csr_array(sp.vstack([sp.csr_array(rows.reshape(-1, self.mesh.nodes.size)) for rows in both]))
+
+    @property
+    def flank_count(self) -> int:
+        """Number 2·R·A of flank loads of a tooth."""
+        return 2 * len(self.points.rolls) * self.points.functions
+
+    @property
+    def flank_rows(self) -> np.ndarray:
+        """Unit flank loads (side, roll, function) flattened, as rows over the sector's nodes: (2·R·A, 3N)."""
+        return self.load_matrix[: self.flank_count].toarray()
+
+    @property
+    def tangent_rows(self) -> np.ndarray:
+        """Unit loads along the profile, ordered like `flank_rows`: (2·R·A, 3N)."""
+        return self.load_matrix[self.profile_loads :].toarray()
 
     @cached_property
     def patch_rows(self) -> np.ndarray:
@@ -95,14 +115,20 @@ class SectorBody:
         return self.mesh.nodes[self.mesh.sets["rim"]].mean(axis=0)
 
     @cached_property
-    def load_rows(self) -> np.ndarray:
+    def load_matrix(self) -> sp.csr_array:
         """All loads of one tooth as rows over the sector's nodes: flank rows, patch rows, tangent rows."""
-        return np.concatenate([self.flank_rows, self.patch_rows, self.tangent_rows])
+        parts = [self._tooth_rows(), sp.csr_array(self.patch_rows), self._tooth_rows(self.flank.tangent)]
+        return sp.csr_array(sp.vstack(parts))
+
+    @property
+    def load_rows(self) -> np.ndarray:
+        """`load_matrix`, dense."""
+        return self.load_matrix.toarray()
 
     @property
     def profile_loads(self) -> int:
-        """Number of the first load along the profile in `load_rows`."""
-        return len(self.flank_rows) + len(self.patch_rows)
+        """Number of the first load along the profile in `load_matrix`."""
+        return self.flank_count + len(self.patch_rows)
 
     @property
     def _held_faces(self) -> np.ndarray:
@@ -137,7 +163,7 @@ class SectorBody:
 
     def rigid_rows(self) -> np.ndarray:
         """Flank rows of the six rigid motions: (2·R·A, 6)."""
-        return self.flank_rows @ rigid_modes(self.mesh.nodes)
+        return self.load_matrix[: self.flank_count] @ rigid_modes(self.mesh.nodes)
 
     def diameters(self) -> range:
         """Nodal diameters 0 … z/2."""
@@ -145,28 +171,29 @@ class SectorBody:
 
     def family(self, space_index: int, nodal_diameter: int) -> Family:
         """Loads and operators of one nodal diameter of one parity."""
-        harmonic = self.spaces[space_index].harmonic(nodal_diameter)
-        columns, loads, held, bore = self._inputs[space_index]
-        spread = np.zeros((len(bore), 6), complex)
-        h = np.linalg.inv(self.bore_moments[1])
-        if nodal_diameter == 0:
-            spread = bore[:, [2, 5]] @ h[[2, 5]]
-        elif nodal_diameter == 1:
-            spread = 0.5 * (bore[:, 0:2] @ _rotating(h[0:2]) + bore[:, 3:5] @ _rotating(h[3:5]))
-        if harmonic.is_real:
-            spread = spread.real
-        return Family(harmonic, columns, harmonic.reduce(loads), harmonic.reduce(spread), held)
+        return self.family_of(space_index, self.spaces[space_index].harmonic(nodal_diameter))
 
-    def _space_inputs(self, space: SectorSpace) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def family_of(self, space_index: int, harmonic: Harmonic) -> Family:
+        """`family` of a harmonic that is there already."""
+        space = self.spaces[space_index]
+        parts = self._bore_parts(harmonic.nodal_diameter)
+        parts = parts.real if harmonic.is_real else parts
+        return Family(harmonic, self.seen_loads(space.parity), self.load_matrix, self.bore_moments[0], parts)
+
+    def _bore_parts(self, nodal_diameter: int) -> np.ndarray:
+        parts, h = np.zeros((6, 6), complex), np.linalg.inv(self.bore_moments[1])
+        if nodal_diameter == 0:
+            parts[[2, 5]] = h[[2, 5]]
+        elif nodal_diameter == 1:
+            parts[0:2], parts[3:5] = 0.5 * _rotating(h[0:2]), 0.5 * _rotating(h[3:5])
+        return parts
+
+    def seen_loads(self, parity: int) -> np.ndarray:
+        """Numbers of the loads of a tooth that fields of this parity see."""
         function = np.tile(np.arange(self.points.functions), 2 * len(self.points.rolls))
-        odd = np.concatenate(
-            [function % 2, [0, 0, 1][: len(self.patch_rows)], (function % 2)[: len(self.tangent_rows)]]
-        )
-        seen = {1: odd == 0, -1: odd == 1, 0: odd >= 0}[space.parity]
-        columns = np.flatnonzero(seen)
-        loads = space.from_nodes @ self.load_rows[columns].T
-        bore = space.from_nodes @ self.bore_moments[0].T
-        return columns, loads, space.solve_held(loads[: space.interior]), bore
+        odd = np.concatenate([function % 2, [0, 0, 1][: len(self.patch_rows)], function % 2])
+        odd = odd[: self.load_matrix.shape[0]]
+        return np.flatnonzero({1: odd == 0, -1: odd == 1, 0: odd >= 0}[parity])
 
 
 def _rotating(h: np.ndarray) -> np.ndarray:

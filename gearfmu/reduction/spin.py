@@ -74,7 +74,7 @@ def join_spin(body: SectorBody, entries: Sequence[tuple[FamilySpin, int, int]]) 
             if other is family:
                 turned = family.coupling[k, m] * (1j if part == 2 else 1) * (-1j if there == 2 else 1)
                 coupling[i, j] = turned.real
-    rows = body.flank_rows @ body.growth
+    rows = body.load_matrix[: body.flank_count] @ body.growth
     shape = (2, len(body.points.rolls), body.points.functions)
     radial = leave_axial(body.mesh.nodes.ravel()) @ (body.mass_matrix @ body.growth)
     return Spin(

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearfmu.fem.cyclic import SectorSpace
+from gearfmu.reduction.condensed import CondensedLoads
 from gearfmu.reduction.modal import Progress
-from gearfmu.reduction.sector import Family, SectorBody
+from gearfmu.reduction.sector import SectorBody
 
 
 @dataclass(frozen=True)
@@ -40,34 +40,96 @@ def static_tables(body: SectorBody, picture_loads: list[int], progress: Progress
 
     picture_loads : flat indices (side, roll, function) of loads on tooth 0 whose displacement is wanted everywhere.
     """
-    size, every, z = body.profile_loads, len(body.load_rows), body.teeth
+    size, every, z = body.profile_loads, body.load_matrix.shape[0], body.teeth
     ff, fb, bb = np.zeros((z, size, size)), np.zeros((every, 6)), np.zeros((6, 6))
     own = np.zeros((every, every))
     pictures = np.zeros((len(picture_loads), z, body.mesh.nodes.size))
     for index, space in enumerate(body.spaces):
-        for nu in body.diameters():
-            if progress:
-                progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
+        loads = CondensedLoads(body, space)
+        seen, normal = loads.columns, np.flatnonzero(loads.columns < size)
+        shown = [load for load in picture_loads if load in seen]
+        rest = _all_diameters(body, index, loads, np.searchsorted(seen, shown), progress)
+        table = np.zeros((z, len(normal), len(normal)))
+        for m in range(z):
+            table[m] = loads.parts[:, normal].T @ rest.kernels[m] @ loads.parts[:, normal]
+        inner = loads.gram[: loads.count, : loads.count]
+        table[0] += inner[np.ix_(normal, normal)]
+        own[np.ix_(seen, seen)] += inner + loads.parts.T @ rest.kernels[0] @ loads.parts
+        for nu in (0, 1):
             family = body.family(index, nu)
-            response = family.flank_response()
-            turn = np.exp(-2j * np.pi * nu * np.arange(z) / z)
-            product = family.weight / z * (family.flank.conj().T @ response)
-            normal = family.columns[family.columns < size]
-            among = np.multiply.outer(turn, product[: len(normal), : len(normal)]).real
-            ff[np.ix_(np.arange(z), normal, normal)] += among
-            own[np.ix_(family.columns, family.columns)] += product.real
-            _add_pictures(pictures, space, family, response, picture_loads)
-            if nu <= 1:
-                bore = family.harmonic.flexibility(family.bore)
-                fb[family.columns] += family.weight * (family.flank.conj().T @ bore).real
-                bb += z * family.weight * (family.bore.conj().T @ bore).real
+            product = loads.compliance(family.harmonic, loads.tooth, loads.tooth) - inner
+            own[np.ix_(seen, seen)] += family.weight / z * product.real
+            turn = family.weight / z * np.exp(-2j * np.pi * nu * np.arange(z) / z)
+            for m in range(z):
+                table[m] += (turn[m] * product[np.ix_(normal, normal)]).real
+            bore = loads.bore @ family.bore_parts
+            fb[seen] += family.weight * loads.compliance(family.harmonic, loads.tooth, bore).real
+            bb += z * family.weight * loads.compliance(family.harmonic, bore, bore).real
+        ff[np.ix_(np.arange(z), seen[normal], seen[normal])] += table
+        for number, load in enumerate(shown):
+            pictures[picture_loads.index(load)] += _picture(body, index, load, rest.moved[:, :, [number]])
     shaped = _shaped(body, ff, fb[:size], bb, pictures)
     return replace(shaped, **_along_profile(body, 0.5 * (own + own.T)))
 
 
+@dataclass(frozen=True)
+class _Diameters:
+    """What ν = 2, 3, … do on the cuts: kernels (z, r, r), Fourier sums of `CondensedLoads.kernel` by tooth offset, and
+    moved (ν, c, p), the cut's displacement under the loads that are shown."""
+
+    kernels: np.ndarray
+    moved: np.ndarray
+
+
+def _all_diameters(
+    body: SectorBody, index: int, loads: CondensedLoads, shown: np.ndarray, progress: Progress | None
+) -> _Diameters:
+    z, found = body.teeth, []
+    diameters = np.arange(2, z // 2 + 1)
+    for nu in diameters:
+        if progress:
+            progress(f"static compliance, nodal diameter {nu}", nu / (z // 2 + 1))
+        harmonic = body.spaces[index].harmonic(nu)
+        moved, kernel = loads.kernel(harmonic)
+        found.append((moved @ loads.parts[:, shown], kernel))
+    turn = _weights(z, diameters) * np.exp(2j * np.pi * np.multiply.outer(np.arange(z), diameters) / z)
+    rank = loads.patterns.shape[1]
+    if not found:
+        return _Diameters(np.zeros((z, rank, rank)), np.zeros((0, len(loads.border), len(shown))))
+    stacked = np.array([kernel for _, kernel in found]).reshape(len(found), -1)
+    kernels = turn.real @ stacked.real + turn.imag @ stacked.imag
+    return _Diameters(kernels.reshape(z, rank, rank), np.array([moved for moved, _ in found]))
+
+
+def _weights(z: int, diameters: np.ndarray) -> np.ndarray:
+    """Share of each ν in a sum over all: ν and −ν together where both are there."""
+    return np.where(2 * diameters % z, 2, 1) / z
+
+
+def _picture(body: SectorBody, index: int, load: int, moved: np.ndarray) -> np.ndarray:
+    """Displacement (z, 3N) of all sectors under a load of tooth 0; moved (ν, c, 1): that of the cut, ν = 2, 3, …"""
+    space, z = body.spaces[index], body.teeth
+    diameters = np.arange(2, z // 2 + 1)
+    turn = _weights(z, diameters)[:, None] * np.exp(2j * np.pi * np.multiply.outer(diameters, np.arange(z)) / z)
+    expand = [space.harmonic(nu).expand_border(cut) for nu, cut in zip(diameters, moved, strict=True)]
+    border = np.zeros((len(space.factor.schur), z))
+    for shape, around in zip(expand, turn, strict=True):
+        border += (shape * around).real
+    force = space.from_nodes @ body.load_matrix[[load]].toarray().T
+    inner, _ = space.factor.forward(force[: space.interior])
+    inside = space.factor.backward(inner * turn.real.sum(axis=0), border)
+    total = (space.to_nodes @ np.concatenate([inside, border])).T
+    for nu in (0, 1):
+        family = body.family(index, nu)
+        response = space.to_nodes @ family.harmonic.expand(family.harmonic.flexibility(family.loads(np.array([load]))))
+        around = family.weight / z * np.exp(2j * np.pi * nu * np.arange(z) / z)
+        total += np.multiply.outer(around, response[:, 0]).real
+    return total
+
+
 def _along_profile(body: SectorBody, own: np.ndarray) -> dict[str, np.ndarray]:
     """Tables of loads along the profile from the compliance (every, every) of all loads of one tooth."""
-    points, first = len(body.flank_rows), body.profile_loads
+    points, first = body.flank_count, body.profile_loads
     if first == len(own):
         return {}
     shape = (2, len(body.points.rolls), body.points.functions)
@@ -76,18 +138,6 @@ def _along_profile(body: SectorBody, own: np.ndarray) -> dict[str, np.ndarray]:
         name: np.ascontiguousarray(block.reshape(*shape, *shape).transpose(0, 3, 1, 4, 2, 5))
         for name, block in blocks.items()
     }
-
-
-def _add_pictures(
-    pictures: np.ndarray, space: SectorSpace, family: Family, response: np.ndarray, loads: list[int]
-) -> None:
-    z, nu = space.teeth, family.harmonic.nodal_diameter
-    turn = np.exp(2j * np.pi * nu * np.arange(z) / z)
-    for row, load in enumerate(loads):
-        column = np.flatnonzero(family.columns == load)
-        if len(column):
-            shape = space.to_nodes @ family.harmonic.expand(response[:, column])
-            pictures[row] += family.weight / z * np.multiply.outer(turn, shape[:, 0]).real
 
 
 def _shaped(body: SectorBody, ff: np.ndarray, fb: np.ndarray, bb: np.ndarray, pictures: np.ndarray) -> Statics:
