@@ -37,6 +37,7 @@ from gearfmu.stage import TeResult, assemble, loaded_te
 POSITIONS = 8
 TORQUES = (40.0, 120.0)  # N·m on the pinion
 MARGIN = 0.0  # m beyond the ends of the path of contact: the kernel has no tip edges in contact in a ring yet
+FLANKS = {"effect.tip_contact": 0.0}  # as in the other program, which has no tip edges in contact either
 HERE = Path(__file__).parent
 STAGE, TABLE = HERE / "internal" / "stage.toml", HERE / "internal.csv"
 
@@ -60,7 +61,7 @@ def pair_of(work: Path) -> Pair:
     spec = load_stage(STAGE)
     bodies, mesh = reduce_stage(spec, work / "internal"), mesh_shape(spec, spec.engagements[0])
     assert isinstance(mesh, RingMesh)
-    return Pair(spec, mesh, loaded_te(assemble(spec, bodies), TORQUES, POSITIONS, rigid_bearings=True))
+    return Pair(spec, mesh, loaded_te(assemble(spec, bodies), TORQUES, POSITIONS, rigid_bearings=True, **FLANKS))
 
 
 def touching(mesh: RingMesh, turn: float) -> dict[int, tuple[float, float]]:
