@@ -72,8 +72,8 @@ class Rotor:
 
     @cached_property
     def axes(self) -> np.ndarray:
-        """(n, n) turns the axes of every pair of modes so that impulses at the nodes drive its first alone: what is seen
-        in them does not depend on the signs and phases that modes come with."""
+        """(n, n) turns the axes of every pair of modes so that impulses at the nodes drive its first alone. What is
+        seen in them does not depend on the signs and phases that modes come with."""
         impulse = np.random.default_rng(2).standard_normal(self.shapes[0].shape)
         speeds, axes = np.einsum("knd,nd->k", self.shapes, impulse), np.zeros(2 * (len(self.shapes),))
         for k, part in enumerate(self.modes.part):
