@@ -145,6 +145,9 @@ struct gk_work {
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
     double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
     double *columns; /* room for a node's rows and their products */
+    double *spread;  /* room of gk_spread.c, and the compliances that it makes of one gear */
+    gk_real *blocks;
+    gk_compliance compliance;
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     gk_bores sum_bores;
     gk_field field[2];             /* nodal contact: teeth of A and B in hand */
@@ -174,6 +177,11 @@ void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work)
 /* gk_side.c */
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
+/* gk_spread.c; the first gear whose tables are those of gear g */
+int gk_spread_leader(const gk_model *model, int g);
+void gk_spread_rows(const gk_model *model, gk_setup *setup, int g);
+size_t gk_spread_scratch(const gk_model *model, size_t *reals);
+void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, int g);
 /* gk_node.c */
 size_t gk_node_scratch(const gk_model *model);
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
@@ -181,7 +189,7 @@ typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     double force[MAX_SLICES], roll[MAX_SLICES];
     gk_strip_weights width;
 } gk_strip_load;
-void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum);
+void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum);
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */

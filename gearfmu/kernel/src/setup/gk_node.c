@@ -33,10 +33,10 @@ size_t gk_node_scratch(const gk_model *model)
     return of_node > of_step ? of_node : of_step;
 }
 
-void gk_node_blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out)
+void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out)
 {
     const int A = n->model->functions;
-    const double *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
+    const gk_real *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
     for (int k = 0; k < width; k++) out[k] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < A; a++, t += width) {
@@ -95,49 +95,74 @@ static direction direction_of(const gk_node *n, const gk_spot *p)
     return d;
 }
 
+/* rows of modes of nodal diameter 0 and 1 on tooth 0 → on the tooth at an angle, in axes that do not turn */
+static void turn_low(const gk_gear *gear, double cosine, double sine, double *row)
+{
+    for (int k = 0; k < gear->low; k++)
+        if (gear->low_member[k] == 1) {
+            const double a = row[k], b = row[k + 1];
+            row[k] = a * cosine - b * sine;
+            row[k + 1] = a * sine + b * cosine;
+        }
+}
+
+/* rigid motion by the ground oscillators along a direction and about its lever */
+static void rigid_row(const gk_node *n, const double along[6], double *rigid)
+{
+    const int set = n->setup->base.set, reads = n->gear->ground[set].reads;
+    const double *centre = n->gear->ground[set].centre;
+    for (int k = 0; k < reads; k++) {
+        rigid[k] = 0.0;
+        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
+    }
+}
+
+/* row += factor · coefficients (count) of rows (count, reads) */
+static void add_ground(const double *rows, int reads, double factor, const double *coefficients, int count, double *row)
+{
+    for (int i = 0; i < count; i++, rows += reads) {
+        const double by = factor * coefficients[i];
+        for (int k = 0; k < reads && by != 0.0; k++) row[k] += by * rows[k];
+    }
+}
+
 /* what the ground oscillators of the gear move at a point, outward; C_fs there */
 static void ground_point(const gk_node *n, const gk_spot *p, double *row, double *rigid, double *support)
 {
     const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
-    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
+    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions * 6;
     const direction d = direction_of(n, p);
-    const double *centre = n->gear->ground[set].centre,
-                 along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
-    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
+    const double along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
+    double trig[3] = {1.0, 0.0, 0.0}, low[MAX_LOW], node[6] = {0}, part[6];
     gk_sincos(d.angle, &trig[2], &trig[1]);
-    for (int k = 0; k < reads; k++) {
-        rigid[k] = 0.0;
-        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
-        row[k] = rigid[k];
-    }
-    for (int s = 0; s < supports; s++) support[s] = 0.0;
+    rigid_row(n, along, rigid);
+    memcpy(row, rigid, (size_t)reads * sizeof *row);
+    gk_node_blend(n, n->flank->low, p, n->gear->low, low);
+    turn_low(n->gear, trig[1], trig[2], low);
+    add_ground(n->gear->ground[set].low, reads, 1.0, low, n->gear->low, row);
     for (int c = 0; c < 3; c++) {
-        gk_node_blend(n, n->gear->ground[set].rows + c * size * reads, p, reads, part);
-        for (int k = 0; k < reads; k++) row[k] += trig[c] * part[k];
-        gk_node_blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
-        for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
+        gk_node_blend(n, n->flank->node + c * size, p, 6, part);
+        for (int k = 0; k < 6; k++) node[k] += trig[c] * part[k];
     }
+    add_ground(n->gear->ground[set].node, reads, 1.0, node, 6, row);
+    memset(support, 0, (size_t)supports * sizeof *support);
+    add_ground(n->gear->node_support, supports, 1.0, node, 6, support);
 }
 
 /* what the ground oscillators of the gear move at a point along the profile */
 static void along_point(const gk_node *n, const gk_spot *p, double *row, double *rigid)
 {
     const int set = n->setup->base.set, reads = n->gear->ground[set].reads;
-    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
     const direction d = direction_of(n, p);
-    const double *centre = n->gear->ground[set].centre, sense = gk_node_along(n);
     const double along[6] = {d.along[0], d.along[1], d.along[2], d.lever[0], d.lever[1], d.lever[2]};
-    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
-    gk_sincos(d.angle, &trig[2], &trig[1]);
-    for (int k = 0; k < reads; k++) {
-        rigid[k] = 0.0;
-        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
-        row[k] = rigid[k];
-    }
-    for (int c = 0; c < 3 && n->gear->ground[set].along; c++) {
-        gk_node_blend(n, n->gear->ground[set].along + c * size * reads, p, reads, part);
-        for (int k = 0; k < reads; k++) row[k] += sense * trig[c] * part[k];
-    }
+    double cosine, sine, low[MAX_LOW];
+    gk_sincos(d.angle, &sine, &cosine);
+    rigid_row(n, along, rigid);
+    memcpy(row, rigid, (size_t)reads * sizeof *row);
+    if (!n->flank->along_low) return;
+    gk_node_blend(n, n->flank->along_low, p, n->gear->low, low);
+    turn_low(n->gear, cosine, sine, low);
+    add_ground(n->gear->ground[set].low, reads, gk_node_along(n), low, n->gear->low, row);
 }
 
 /* rows along the profile of a point */
@@ -145,8 +170,8 @@ static void gather_along(gk_node *n, const gk_spot *p, int i)
 {
     const int modes = n->gear->modes, set = n->setup->base.set;
     double *row = n->along_rows + (size_t)i * modes;
-    if (n->gear->along_rows)
-        gk_node_blend(n, n->gear->along_rows, p, modes, row);
+    if (n->flank->along_rows)
+        gk_node_blend(n, n->flank->along_rows, p, modes, row);
     else
         memset(row, 0, (size_t)modes * sizeof *row);
     for (int k = 0; k < modes; k++) row[k] *= gk_node_along(n);
@@ -211,9 +236,9 @@ void gk_node_gather(gk_node *n, double position)
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * gk_node_tan(n->gear->helix);
         p->roll = corner_roll(n, p);
         p->grid = gk_grid_at(n->model, n->gear, p->roll);
-        gk_node_blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
+        gk_node_blend(n, n->flank->rows, p, modes, n->rows + (size_t)i * modes);
         if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
-        gk_node_blend(n, n->gear->port_residual, p, n->model->ports, ports);
+        gk_node_blend(n, n->flank->port, p, n->model->ports, ports);
         n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
         if (n->e->kind != MESH_FLAT)
             ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
@@ -223,12 +248,18 @@ void gk_node_gather(gk_node *n, double position)
     }
 }
 
-gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
+gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side)
 {
-    GK_ASSERT(room && gk_is_engagement(model, e));
+    GK_ASSERT(work->columns && gk_is_engagement(model, e));
     GK_ASSERT(side->candidates <= MAX_CANDIDATES);
-    gk_node n = {
-        .model = model, .setup = setup, .e = &model->engagement[e], .gear = &model->gear[side->gear], .side = side};
+    gk_node n = {.model = model,
+                 .setup = setup,
+                 .e = &model->engagement[e],
+                 .gear = &model->gear[side->gear],
+                 .side = side,
+                 .flank = &setup->flank[side->gear],
+                 .compliance = &work->compliance};
+    double *room = work->columns;
     const size_t most = points_of(model), reads = (size_t)n.gear->ground[setup->base.set].reads;
     n.points = side->candidates * setup->strips;
     n.rows = room, room += most * (size_t)n.gear->modes;
@@ -250,14 +281,14 @@ gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room
 
 /* ---- loads ------------------------------------------------------------------------------------------------------- */
 /* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
-static void add_rows(const gk_model *model, const gk_gear *gear, const gk_spot *p, int first,
+static void add_rows(const gk_model *model, const gk_real *rows, int modes, const gk_spot *p, int first,
                      double weight[4][MAX_FUNCTIONS], double *sum)
 {
-    const size_t modes = (size_t)gear->modes;
-    const double *row = gear->rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * modes;
+    const gk_real *row =
+        rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * (size_t)modes;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < model->functions; a++, row += modes) {
-            for (int k = first; k < gear->modes; k++) sum[k] += weight[i][a] * row[k];
+            for (int k = first; k < modes; k++) sum[k] += weight[i][a] * row[k];
             weight[i][a] = 0.0;
         }
 }
@@ -281,23 +312,24 @@ static void add_turned(const gk_gear *gear, int tooth, int first, const double *
 
 /* Adds the modal forces of a gear group, modes from `first` on, by outward forces on the strips of a tooth at these
  * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
-void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum)
+void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum)
 {
     GK_ASSERT(gk_is_gear(model, load->gear) && load->strips <= MAX_SLICES);
     GK_ASSERT(first >= 0 && first <= model->gear[load->gear].modes);
     const gk_gear *gear = &model->gear[load->gear];
+    const gk_real *rows = setup->flank[load->gear].rows;
     double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
     gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
     memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
     for (int strip = 0; strip < load->strips; strip++) {
         next.grid = gk_grid_at(model, gear, load->roll[strip]);
-        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(model, gear, &p, first, weight, row);
+        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(model, rows, gear->modes, &p, first, weight, row);
         p = next;
         for (int i = 0; i < 4; i++)
             for (int a = 0; a < model->functions; a++)
                 weight[i][a] += load->force[strip] * p.grid.weight[i] * load->width[strip][a];
     }
-    add_rows(model, gear, &p, first, weight, row);
+    add_rows(model, rows, gear->modes, &p, first, weight, row);
     add_turned(gear, load->tooth, first, row, sum);
 }
 
@@ -313,7 +345,8 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
                        .setup = setup,
                        .e = &model->engagement[e],
                        .gear = &model->gear[load->gear],
-                       .side = &mesh->side[which]};
+                       .side = &mesh->side[which],
+                       .flank = &setup->flank[load->gear]};
     const int reads = n.gear->ground[setup->base.set].reads;
     const int32_t *list = n.gear->ground[setup->base.set].list;
     double row[MAX_GROUND], rigid[MAX_GROUND], support[MAX_SUPPORTS];

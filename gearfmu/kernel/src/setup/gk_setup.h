@@ -99,6 +99,22 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
 } gk_base;
 
+/* Rows of a gear on the even grid of rolls (gk_spread.c): (2 flanks, rolls, functions, …) of modes of the gear group, of
+ * those of nodal diameter 0 and 1, along the normal and along the profile; of the node (3 parts before the flanks, 6), of
+ * ports and of the patterns of far teeth. NULL: unknown */
+typedef struct gk_flank_tables {
+    gk_real *rows, *low, *along_rows, *along_low, *node, *port, *far;
+} gk_flank_tables;
+
+enum { FURTHER = OFFSETS / 2, ACROSS = 1 + 2 * FURTHER };
+/* Compliances of a gear on the even grid of rolls, blocks (rolls, rolls, functions, functions), loaded place first: of a
+ * flank by its own load, of the same flank 1 … FURTHER teeth further, of the other flank: of the same tooth from flank
+ * 0, then of those further from flank 0 and from flank 1. Of a mirrored gear those that begin at flank 0. */
+typedef struct gk_compliance {
+    gk_real *own[2], *next[2][FURTHER], *across[ACROSS];
+    gk_real *along_normal[2][2], *along_own[2], *along_across;
+} gk_compliance;
+
 /* What a side knows of displacement and force along the profile (docs/theory.md, 2.8), for friction. Everything is
  * against the direction in which gear A slides past B, so that rows stand beside those of the normal displacement. */
 typedef struct gk_along {
@@ -249,6 +265,7 @@ struct gk_setup {
     double port_support[MAX_PORTS]
                        [MAX_SUPPORTS]; /* force on a support per unit moment at a port, beside the oscillators' */
     gk_modal modal[MAX_GEARS];
+    gk_flank_tables flank[MAX_GEARS];
     double *far[MAX_GEARS]; /* (z, FAR, FAR): what the patterns on a tooth displace by a load so many teeth before it */
     int far_on[MAX_GEARS];  /* the gear has several engagements, and something in it is not dynamic */
     gk_base base;

@@ -79,18 +79,47 @@ static double carried(const gk_node *n, int i, int j, int dynamic)
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 
-/* stored compliance of the free body between two points, by width function, (functions, functions) */
-static void tabulate(const gk_node *n, const gk_spot *p, const gk_spot *q, double *cell)
+/* a block of gk_compliance and how it is read: loaded and displaced place swapped; as the image of a mirrored flank */
+typedef struct block {
+    const gk_real *table;
+    int swapped, image;
+} block;
+
+static block block_of(const gk_node *n, int from, int to, int offset)
 {
-    const int A = n->model->functions, R = n->model->rolls, offset = q->offset - p->offset;
-    const double *table = n->gear->residual + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + OFFSETS / 2) *
-                                                  (size_t)(R * R * A * A);
-    for (int c = 0; c < A * A; c++) cell[c] = 0.0;
+    block b = {.swapped = offset < 0};
+    if (b.swapped) {
+        const int other = from;
+        from = to, to = other, offset = -offset;
+    }
+    if (from != to) {
+        b.swapped ^= !offset && from == 1;
+        b.table = n->compliance->across[offset ? 2 * offset - 1 + from : 0];
+        return b;
+    }
+    b.image = n->gear->mirrored && from == 1;
+    b.swapped ^= b.image;
+    const int kept = b.image ? 0 : from;
+    b.table = offset ? n->compliance->next[kept][offset - 1] : n->compliance->own[kept];
+    return b;
+}
+
+/* compliance between two points by a block, by width function, (functions, functions) */
+static void tabulate(const gk_node *n, block b, const gk_spot *p, const gk_spot *q, double *cell)
+{
+    const int A = n->model->functions, R = n->model->rolls;
+    const gk_grid *first = b.swapped ? &q->grid : &p->grid, *second = b.swapped ? &p->grid : &q->grid;
+    double sum[MAX_FUNCTIONS * MAX_FUNCTIONS] = {0};
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++) {
-            const double w = p->grid.weight[i] * q->grid.weight[j],
-                         *t = table + ((p->grid.index + i) * R + q->grid.index + j) * A * A;
-            for (int c = 0; c < A * A; c++) cell[c] += w * t[c];
+            const double w = first->weight[i] * second->weight[j];
+            const gk_real *t = b.table + (size_t)((first->index + i) * R + second->index + j) * (size_t)(A * A);
+            for (int c = 0; c < A * A; c++) sum[c] += w * t[c];
+        }
+    for (int a = 0; a < A; a++)
+        for (int c = 0; c < A; c++) {
+            const double value = sum[b.swapped ? c * A + a : a * A + c];
+            cell[a * A + c] = b.image ? value * gk_width_sign(n->model, a) * gk_width_sign(n->model, c) : value;
         }
 }
 
@@ -102,11 +131,12 @@ static int tabulated(const gk_node *n, int first, int second, double *out)
     const int offset = n->at[second * strips].offset - n->at[first * strips].offset;
     double cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
     for (int c = 0; c < strips * strips; c++) out[c] = 0.0;
-    if (offset < -(OFFSETS / 2) || offset > OFFSETS / 2) return 0;
+    if (offset < -FURTHER || offset > FURTHER) return 0;
+    const block b = block_of(n, n->at[first * strips].flank, n->at[second * strips].flank, offset);
     for (int s = 0; s < strips; s++)
         for (int t = 0; t < strips; t++) {
             if (n->setup->spatial || s + t == 0) /* else all strips have the same rolls */
-                tabulate(n, &n->at[first * strips + s], &n->at[second * strips + t], cell);
+                tabulate(n, b, &n->at[first * strips + s], &n->at[second * strips + t], cell);
             const double *of_s = n->at[first * strips + s].width, *of_t = n->at[second * strips + t].width;
             for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * dot(cell + a * A, of_t, A);
         }
@@ -183,19 +213,27 @@ static void store_residual(const gk_node *n, int at, int halfway, const double *
         for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, yields, p, q);
 }
 
-/* Compliance of one tooth by a table without offsets, between two points */
-static double one_tooth(const gk_node *n, const double *table, int i, int j)
+/* of the normal displacement at flank `from` per force along the profile at flank `to` of the same tooth */
+static block along_normal_of(const gk_node *n, int from, int to)
 {
-    const int A = n->model->functions, R = n->model->rolls;
-    const gk_spot *p = &n->at[i], *q = &n->at[j];
-    const double *from = table + (size_t)(p->flank * 2 + q->flank) * (size_t)(R * R * A * A);
-    double sum = 0.0;
-    for (int k = 0; k < 4; k++)
-        for (int l = 0; l < 4; l++) {
-            const double w = p->grid.weight[k] * q->grid.weight[l];
-            const double *cell = from + ((p->grid.index + k) * R + q->grid.index + l) * A * A;
-            for (int a = 0; a < A; a++) sum += w * p->width[a] * dot(cell + a * A, q->width, A);
-        }
+    const int image = n->gear->mirrored && from == 1;
+    return (block){image ? n->compliance->along_normal[0][1 - to] : n->compliance->along_normal[from][to], 0, image};
+}
+
+static block along_own_of(const gk_node *n, int from, int to)
+{
+    const int image = n->gear->mirrored && from == 1;
+    if (from != to) return (block){n->compliance->along_across, from == 1, 0};
+    return (block){n->compliance->along_own[image ? 0 : from], image, image};
+}
+
+/* Compliance between two points by a block */
+static double between(const gk_node *n, block b, int i, int j)
+{
+    const int A = n->model->functions;
+    double sum = 0.0, cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
+    tabulate(n, b, &n->at[i], &n->at[j], cell);
+    for (int a = 0; a < A; a++) sum += n->at[i].width[a] * dot(cell + a * A, n->at[j].width, A);
     return sum;
 }
 
@@ -226,7 +264,8 @@ static void store_along_residual(const gk_node *n, int at, const double *yields)
             const double sign = same ? -1.0 : 1.0;
             double normal = sign * carried_by(n, a, t, from, to), along = sign * carried_by(n, s, t, from, to);
             if (same)
-                normal += own * one_tooth(n, gear->along_normal, i, j), along += one_tooth(n, gear->along_own, i, j);
+                normal += own * between(n, along_normal_of(n, n->at[i].flank, n->at[j].flank), i, j),
+                    along += between(n, along_own_of(n, n->at[i].flank, n->at[j].flank), i, j);
             for (int k = 0; k < reads; k++) normal += x[k] * v[k] * yields[k], along += u[k] * v[k] * yields[k];
             const size_t to_table = ((size_t)at * n->points + (size_t)i) * (size_t)side->columns + (size_t)j;
             side->along.normal[to_table] = (gk_real)normal;
@@ -327,7 +366,7 @@ static void store_far(const gk_node *n, int at)
 {
     const gk_side *side = n->side;
     for (int i = 0; i < n->points; i++)
-        gk_node_blend(n, n->gear->far_rows, &n->at[i], FAR, side->far + ((size_t)at * n->points + i) * FAR);
+        gk_node_blend(n, n->flank->far, &n->at[i], FAR, side->far + ((size_t)at * n->points + i) * FAR);
 }
 
 /* ---- all of them ------------------------------------------------------------------------------------------------- */
@@ -359,7 +398,7 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     GK_ASSERT(which == 0 || which == 1);
     GK_ASSERT(setup->mesh[e].side[which].candidates <= MAX_CANDIDATES);
     gk_side *side = &setup->mesh[e].side[which];
-    gk_node n = gk_node_begin(model, setup, work->columns, e, side);
+    gk_node n = gk_node_begin(model, setup, work, e, side);
     double yields[MAX_GROUND];
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
     quasi_static_flexibility(&n, yields);
