@@ -20,17 +20,30 @@ double gk_node_roll(const gk_side *side, int flank, double position, int offset)
 /* ---- where, and what is read there ------------------------------------------------------------------------------- */
 static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
 
+static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
+
+/* what gk_node_begin hands out */
+static size_t node_size(const gk_model *model, const gk_gear *gear)
+{
+    const size_t modes = (size_t)gear->modes, motions = (size_t)gk_node_motions(gear);
+    return points_of(model) * (2 * modes + 2 * motions + 1) + (1 + (size_t)model->functions) * modes +
+           2 * (size_t)gear->z;
+}
+
 size_t gk_node_scratch(const gk_model *model)
 {
-    size_t modes = 0, reads = 0;
+    size_t most = 0;
     for (int g = 0; g < model->gears; g++) {
-        modes = modes > (size_t)model->gear[g].modes ? modes : (size_t)model->gear[g].modes;
-        for (int s = 0; s < model->sets; s++)
-            reads = reads > (size_t)model->gear[g].ground[s].reads ? reads : (size_t)model->gear[g].ground[s].reads;
+        const gk_gear *gear = &model->gear[g];
+        const size_t motions = (size_t)gk_node_motions(gear);
+        size_t ground = 0;
+        for (int s = 0; s < model->sets; s++) ground = larger(ground, (size_t)model->ground[s].n);
+        const size_t of_side = motions * (motions + points_of(model) + (size_t)model->supports + 1) +
+                               motions * (ground + 4 * (MAX_ROTORS + 1));
+        const size_t of_step = 4 * points_of(model) * ((size_t)gear->modes + LANES);
+        most = larger(most, larger(node_size(model, gear) + of_side, of_step));
     }
-    const size_t of_node = points_of(model) * (2 * modes + 4 * reads + (size_t)model->supports + 1) + modes;
-    const size_t of_step = 4 * points_of(model) * (modes + LANES);
-    return of_node > of_step ? of_node : of_step;
+    return most;
 }
 
 void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out)
@@ -45,19 +58,44 @@ void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int
         }
 }
 
-static void turn_row(const gk_gear *gear, int offset, double *row)
+/* the same in two steps, for strips that have their length of roll in common: (functions, width) of the rolls … */
+static void blend_rolls(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *cells)
 {
+    const size_t size = (size_t)(n->model->functions * width);
+    const gk_real *t = table + (size_t)(p->flank * n->model->rolls + p->grid.index) * size;
+    for (size_t k = 0; k < size; k++)
+        cells[k] = p->grid.weight[0] * t[k] + p->grid.weight[1] * t[size + k] + p->grid.weight[2] * t[2 * size + k] +
+                   p->grid.weight[3] * t[3 * size + k];
+}
+
+/* … and of the width functions */
+static void blend_width(const gk_node *n, const double *cells, const gk_spot *p, int width, double *out)
+{
+    memset(out, 0, (size_t)width * sizeof *out);
+    for (int a = 0; a < n->model->functions; a++, cells += width)
+        for (int k = 0; k < width; k++) out[k] += p->width[a] * cells[k];
+}
+
+/* rows of a table of the gear group at a point */
+static void blend_strip(const gk_node *n, const gk_real *table, const gk_spot *p, int strip, double *out)
+{
+    if (n->gear->helix != 0.0) return gk_node_blend(n, table, p, n->gear->modes, out);
+    if (strip == 0) blend_rolls(n, table, p, n->gear->modes, n->cells);
+    blend_width(n, n->cells, p, n->gear->modes, out);
+}
+
+static void turn_row(const gk_node *n, int offset, double *row)
+{
+    const gk_gear *gear = n->gear;
     for (int k = 0; k < gear->modes; k++) {
-        double sine, cosine;
-        const int64_t turned = (int64_t)gear->diameter[k] * offset % gear->z;
-        gk_sincos(2.0 * GK_PI * (double)turned / gear->z, &sine, &cosine);
+        const int turned = (int)((int64_t)gear->diameter[k] * offset % gear->z), at = turned < 0 ? turned + gear->z : turned;
         if (gear->member[k] == 1) {
             const double a = row[k], b = row[k + 1];
-            row[k] = a * cosine - b * sine;
-            row[k + 1] = a * sine + b * cosine;
+            row[k] = a * n->cosine[at] - b * n->sine[at];
+            row[k + 1] = a * n->sine[at] + b * n->cosine[at];
             k++;
         } else {
-            row[k] *= cosine;
+            row[k] *= n->cosine[at];
         }
     }
 }
@@ -106,78 +144,49 @@ static void turn_low(const gk_gear *gear, double cosine, double sine, double *ro
         }
 }
 
-/* rigid motion by the ground oscillators along a direction and about its lever */
-static void rigid_row(const gk_node *n, const double along[6], double *rigid)
+/* motion outward at a point */
+static void ground_point(const gk_node *n, const gk_spot *p, double *motion)
 {
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads;
-    const double *centre = n->gear->ground[set].centre;
-    for (int k = 0; k < reads; k++) {
-        rigid[k] = 0.0;
-        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
-    }
-}
-
-/* row += factor · coefficients (count) of rows (count, reads) */
-static void add_ground(const double *rows, int reads, double factor, const double *coefficients, int count, double *row)
-{
-    for (int i = 0; i < count; i++, rows += reads) {
-        const double by = factor * coefficients[i];
-        for (int k = 0; k < reads && by != 0.0; k++) row[k] += by * rows[k];
-    }
-}
-
-/* what the ground oscillators of the gear move at a point, outward; C_fs there */
-static void ground_point(const gk_node *n, const gk_spot *p, double *row, double *rigid, double *support)
-{
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
     const size_t size = 2 * (size_t)n->model->rolls * n->model->functions * 6;
     const direction d = direction_of(n, p);
-    const double along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
-    double trig[3] = {1.0, 0.0, 0.0}, low[MAX_LOW], node[6] = {0}, part[6];
+    double trig[3] = {1.0, 0.0, 0.0}, part[6], *low = motion + 6, *node = low + n->gear->low;
     gk_sincos(d.angle, &trig[2], &trig[1]);
-    rigid_row(n, along, rigid);
-    memcpy(row, rigid, (size_t)reads * sizeof *row);
+    for (int c = 0; c < 3; c++) motion[c] = d.n[c], motion[3 + c] = d.arm[c];
     gk_node_blend(n, n->flank->low, p, n->gear->low, low);
     turn_low(n->gear, trig[1], trig[2], low);
-    add_ground(n->gear->ground[set].low, reads, 1.0, low, n->gear->low, row);
+    memset(node, 0, 6 * sizeof *node);
     for (int c = 0; c < 3; c++) {
         gk_node_blend(n, n->flank->node + c * size, p, 6, part);
         for (int k = 0; k < 6; k++) node[k] += trig[c] * part[k];
     }
-    add_ground(n->gear->ground[set].node, reads, 1.0, node, 6, row);
-    memset(support, 0, (size_t)supports * sizeof *support);
-    add_ground(n->gear->node_support, supports, 1.0, node, 6, support);
 }
 
-/* what the ground oscillators of the gear move at a point along the profile */
-static void along_point(const gk_node *n, const gk_spot *p, double *row, double *rigid)
+/* motion along the profile at a point; what the supports' forces displace there is not known */
+static void along_point(const gk_node *n, const gk_spot *p, double *motion)
 {
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads;
     const direction d = direction_of(n, p);
-    const double along[6] = {d.along[0], d.along[1], d.along[2], d.lever[0], d.lever[1], d.lever[2]};
-    double cosine, sine, low[MAX_LOW];
+    double cosine, sine, *low = motion + 6;
     gk_sincos(d.angle, &sine, &cosine);
-    rigid_row(n, along, rigid);
-    memcpy(row, rigid, (size_t)reads * sizeof *row);
+    memset(motion, 0, (size_t)gk_node_motions(n->gear) * sizeof *motion);
+    for (int c = 0; c < 3; c++) motion[c] = d.along[c], motion[3 + c] = d.lever[c];
     if (!n->flank->along_low) return;
     gk_node_blend(n, n->flank->along_low, p, n->gear->low, low);
     turn_low(n->gear, cosine, sine, low);
-    add_ground(n->gear->ground[set].low, reads, gk_node_along(n), low, n->gear->low, row);
+    for (int k = 0; k < n->gear->low; k++) low[k] *= gk_node_along(n);
 }
 
 /* rows along the profile of a point */
 static void gather_along(gk_node *n, const gk_spot *p, int i)
 {
-    const int modes = n->gear->modes, set = n->setup->base.set;
+    const int modes = n->gear->modes;
     double *row = n->along_rows + (size_t)i * modes;
     if (n->flank->along_rows)
         gk_node_blend(n, n->flank->along_rows, p, modes, row);
     else
         memset(row, 0, (size_t)modes * sizeof *row);
     for (int k = 0; k < modes; k++) row[k] *= gk_node_along(n);
-    if (p->offset) turn_row(n->gear, p->offset, row);
-    const size_t at = (size_t)i * n->gear->ground[set].reads;
-    if (n->e->kind != MESH_FLAT) along_point(n, p, n->along_ground + at, n->along_rigid + at);
+    if (p->offset) turn_row(n, p->offset, row);
+    if (n->e->kind != MESH_FLAT) along_point(n, p, n->along_motion + (size_t)i * gk_node_motions(n->gear));
 }
 
 /* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
@@ -223,7 +232,7 @@ void gk_node_gather(gk_node *n, double position)
 {
     GK_ASSERT(position >= 0.0 && position <= 1.0);
     GK_ASSERT(n->points >= 0 && n->points <= MAX_CANDIDATES * MAX_SLICES);
-    const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
+    const int strips = n->setup->strips, modes = n->gear->modes;
     const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
     double ports[MAX_PORTS];
     for (int i = 0; i < n->points; i++) {
@@ -236,14 +245,12 @@ void gk_node_gather(gk_node *n, double position)
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * gk_node_tan(n->gear->helix);
         p->roll = corner_roll(n, p);
         p->grid = gk_grid_at(n->model, n->gear, p->roll);
-        gk_node_blend(n, n->flank->rows, p, modes, n->rows + (size_t)i * modes);
-        if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
+        blend_strip(n, n->flank->rows, p, strip, n->rows + (size_t)i * modes);
+        if (p->offset) turn_row(n, p->offset, n->rows + (size_t)i * modes);
         gk_node_blend(n, n->flank->port, p, n->model->ports, ports);
         n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
         if (n->e->kind != MESH_FLAT)
-            ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
-                         n->rigid + (size_t)i * n->gear->ground[set].reads,
-                         n->support + (size_t)i * n->model->supports);
+            ground_point(n, p, n->motion + (size_t)i * gk_node_motions(n->gear));
         if (GK_ON(n->setup, friction)) gather_along(n, p, i);
     }
 }
@@ -260,17 +267,18 @@ gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_wor
                  .flank = &setup->flank[side->gear],
                  .compliance = &work->compliance};
     double *room = work->columns;
-    const size_t most = points_of(model), reads = (size_t)n.gear->ground[setup->base.set].reads;
+    const size_t most = points_of(model), modes = (size_t)n.gear->modes, motions = (size_t)gk_node_motions(n.gear);
     n.points = side->candidates * setup->strips;
-    n.rows = room, room += most * (size_t)n.gear->modes;
-    n.ground = room, room += most * reads;
-    n.rigid = room, room += most * reads;
-    n.support = room, room += most * (size_t)model->supports;
-    n.along_rows = room, room += most * (size_t)n.gear->modes;
-    n.along_ground = room, room += most * reads;
-    n.along_rigid = room, room += most * reads;
+    n.rows = room, room += most * modes;
+    n.along_rows = room, room += most * modes;
+    n.motion = room, room += most * motions;
+    n.along_motion = room, room += most * motions;
     n.port = room, room += most;
+    n.cells = room, room += (size_t)model->functions * modes;
+    n.cosine = room, room += n.gear->z;
+    n.sine = room, room += n.gear->z;
     n.flexibility = room;
+    for (int m = 0; m < n.gear->z; m++) gk_sincos(2.0 * GK_PI * m / n.gear->z, &n.sine[m], &n.cosine[m]);
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
     gk_strips_rows(model, setup, n.e, side->gear, n.weight);
     const double x = n.e->position[1][0] - n.e->position[0][0], y = n.e->position[1][1] - n.e->position[0][1];
@@ -278,6 +286,8 @@ gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_wor
     n.length = sqrt(gk_max(x * x + y * y - R * R, 0.0));
     return n;
 }
+
+double *gk_node_room(const gk_node *n) { return n->flexibility + n->gear->modes; }
 
 /* ---- loads ------------------------------------------------------------------------------------------------------- */
 /* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
@@ -347,9 +357,9 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
                        .gear = &model->gear[load->gear],
                        .side = &mesh->side[which],
                        .flank = &setup->flank[load->gear]};
-    const int reads = n.gear->ground[setup->base.set].reads;
-    const int32_t *list = n.gear->ground[setup->base.set].list;
-    double row[MAX_GROUND], rigid[MAX_GROUND], support[MAX_SUPPORTS];
+    const int set = setup->base.set, reads = n.gear->ground[set].reads, motions = gk_node_motions(n.gear);
+    const int32_t *list = n.gear->ground[set].list;
+    double motion[12 + MAX_LOW], all[12 + MAX_LOW] = {0};
     for (int strip = 0; strip < load->strips; strip++) {
         const double roll = load->roll[strip], z = mesh->strip_middle[strip], sg = load->flank ? -1.0 : 1.0;
         gk_spot p = {
@@ -357,8 +367,12 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
         p.middle = roll - sg * z * gk_node_tan(n.gear->helix);
         memcpy(p.width, load->width[strip], sizeof p.width);
         if (load->force[strip] == 0.0) continue;
-        ground_point(&n, &p, row, rigid, support);
+        ground_point(&n, &p, motion);
+        for (int i = 0; i < motions; i++) all[i] += load->force[strip] * motion[i];
+    }
+    for (int i = 0; i < motions; i++) {
+        const double *row = gk_node_motion(n.gear, set, i);
         for (int k = 0; k < reads; k++)
-            if (setup->base.slot[list[k]] < 0) sum[list[k]] += load->force[strip] * row[k];
+            if (setup->base.slot[list[k]] < 0) sum[list[k]] += all[i] * row[k];
     }
 }

@@ -24,15 +24,30 @@ typedef struct gk_node { /* what a node's tables are made from */
     gk_strip_weights weight;
     double length;   /* of the line of action between the base circles, nominal */
     double *rows;    /* (points, modes): all stored modes, tooth offset included */
-    double *ground;  /* (points, reads): outward, rigid motion included, of every ground oscillator */
-    double *rigid;   /* (points, reads): the part of it that is rigid motion */
-    double *support; /* (points, supports): C_fs */
-    double *along_rows, *along_ground, *along_rigid; /* rows, ground and rigid along the profile (gk_along) */
-    double *port;                                    /* (points) */
-    double *flexibility;                             /* (modes) 1/ω² of the dynamic ones */
+    double *motion;  /* (points, gk_node_motions): what ground oscillators displace outward is motion · M */
+    double *along_rows, *along_motion; /* rows and motion along the profile (gk_node_along) */
+    double *port;                      /* (points) */
+    double *flexibility;               /* (modes) 1/ω² */
+    double *cells;                     /* (functions, modes): rows at one length of roll */
+    double *cosine, *sine;             /* (z) of whole teeth */
 } gk_node;
 
+/* Motion at a flank by ground oscillators is a row of 12 + low numbers times M (12 + low, reads): rigid motion of the
+ * gear (centre), modes of nodal diameter 0 and 1 (low), and forces on its node (node). */
+static inline int gk_node_motions(const gk_gear *gear) { return 12 + gear->low; }
+/* row i of M, over what the gear reads */
+static inline const double *gk_node_motion(const gk_gear *gear, int set, int i)
+{
+    const int reads = gear->ground[set].reads;
+    if (i < 6) return gear->ground[set].centre + i * reads;
+    i -= 6;
+    return i < gear->low ? gear->ground[set].low + (size_t)i * (size_t)reads
+                         : gear->ground[set].node + (i - gear->low) * reads;
+}
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side);
+/* the scratch of a node that is left for what is made of it: (gk_node_motions)² + gk_node_motions (points, of supports and
+ * ports, of dynamic oscillators) */
+double *gk_node_room(const gk_node *n);
 /* `position`: share of the pitch */
 void gk_node_gather(gk_node *n, double position);
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */

@@ -135,7 +135,7 @@ static int tabulated(const gk_node *n, int first, int second, double *out)
     const block b = block_of(n, n->at[first * strips].flank, n->at[second * strips].flank, offset);
     for (int s = 0; s < strips; s++)
         for (int t = 0; t < strips; t++) {
-            if (n->setup->spatial || s + t == 0) /* else all strips have the same rolls */
+            if (n->gear->helix != 0.0 || s + t == 0) /* else all strips have the same rolls */
                 tabulate(n, b, &n->at[first * strips + s], &n->at[second * strips + t], cell);
             const double *of_s = n->at[first * strips + s].width, *of_t = n->at[second * strips + t].width;
             for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * dot(cell + a * A, of_t, A);
@@ -143,28 +143,107 @@ static int tabulated(const gk_node *n, int first, int second, double *out)
     return 1;
 }
 
-/* −C_fs κ C_sf + Σ W Wᵀ/Ω² over the ground oscillators that are not dynamic, between two points */
-static double through_ground(const gk_node *n, int i, int j, const double *yields)
+/* What the ground oscillators that are not dynamic and the supports do to a side (gk_node_motion: rows M of motions) */
+typedef struct grounded {
+    int motions, columns;
+    double *yields;  /* (motions, motions): M Ω⁻² Mᵀ − C_fs κ C_sf: the motion at a flank per load on motions */
+    double *loaded;  /* (points, motions): yields · motion of every point */
+    double *joints;  /* (motions, supports + 1): elongation of the supports; angle of the port */
+    double *dynamic; /* (motions, width of the gear): M of the dynamic oscillators */
+} grounded;
+
+static void add_outer(double factor, const double *a, const double *b, int n, int m, double *sum)
 {
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
-    const double *kappa = n->model->ground[set].kappa, *a = n->support + (size_t)i * supports;
-    const double *x = n->ground + (size_t)i * reads, *y = n->ground + (size_t)j * reads;
-    double sum = 0.0;
-    for (int s = 0; s < supports; s++)
-        if (a[s] != 0.0) sum -= a[s] * dot(kappa + s * supports, n->support + (size_t)j * supports, supports);
-    for (int k = 0; k < reads; k++) sum += x[k] * y[k] * yields[k];
-    return sum;
+    for (int i = 0; i < n; i++, sum += m) {
+        const double by = factor * a[i];
+        for (int j = 0; j < m && by != 0.0; j++) sum[j] += by * b[j];
+    }
 }
 
-/* 1/Ω² of the ground oscillators that the gear reads and that are not dynamic, 0 of the others */
-static void quasi_static_flexibility(const gk_node *n, double *yields)
+/* one oscillator that is not dynamic */
+static void add_yield(const gk_node *n, const grounded *g, int k)
+{
+    const gk_ground *ground = &n->model->ground[n->setup->base.set];
+    const int which = n->gear->ground[n->setup->base.set].list[k], supports = n->model->supports;
+    const double by = 1.0 / (ground->omega[which] * ground->omega[which]);
+    double column[12 + MAX_LOW], joint[MAX_SUPPORTS + 1] = {0};
+    for (int i = 0; i < g->motions; i++) column[i] = gk_node_motion(n->gear, n->setup->base.set, i)[k];
+    for (int s = 0; s < supports; s++) joint[s] = ground->support_rows[s * ground->n + which];
+    if (n->side->port_of >= 0) joint[supports] = ground->port_rows[n->side->port_of * ground->n + which];
+    add_outer(by, column, column, g->motions, g->motions, g->yields);
+    add_outer(by, column, joint, g->motions, supports + 1, g->joints);
+}
+
+/* the supports' answer to forces on the gear's node: C_fs of a point is node · node_support */
+static void add_supports(const gk_node *n, const grounded *g)
+{
+    const int supports = n->model->supports, first = 6 + n->gear->low;
+    const double *kappa = n->model->ground[n->setup->base.set].kappa;
+    const double *to_port = n->model->port_support + n->side->port_of * supports;
+    for (int i = 0; i < 6; i++) {
+        const double *a = n->gear->node_support + i * supports;
+        double *joint = g->joints + (size_t)(first + i) * (size_t)(supports + 1);
+        for (int s = 0; s < supports; s++) {
+            if (a[s] == 0.0) continue;
+            joint[s] += a[s];
+            for (int j = 0; j < 6; j++)
+                g->yields[(size_t)(first + i) * (size_t)g->motions + (size_t)(first + j)] -=
+                    a[s] * dot(kappa + s * supports, n->gear->node_support + j * supports, supports);
+            if (n->side->port_of >= 0) joint[supports] -= a[s] * dot(kappa + s * supports, to_port, supports);
+        }
+    }
+}
+
+/* M of the dynamic oscillators, in their order; rigid motion is not among what sides hold of them: the gap reads it */
+static void select_dynamic(const gk_node *n, const grounded *g)
 {
     const gk_base *base = &n->setup->base;
     const int32_t *list = n->gear->ground[base->set].list;
-    for (int k = 0; k < n->gear->ground[base->set].reads; k++) {
-        const double omega = n->model->ground[base->set].omega[list[k]];
-        yields[k] = base->slot[list[k]] >= 0 ? 0.0 : 1.0 / (omega * omega);
+    for (int i = 6; i < g->motions; i++) {
+        const double *row = gk_node_motion(n->gear, base->set, i);
+        double *to = g->dynamic + (size_t)i * (size_t)g->columns - base->from[n->side->gear];
+        for (int k = 0; k < n->gear->ground[base->set].reads; k++)
+            if (base->slot[list[k]] >= 0) to[base->slot[list[k]]] = row[k];
     }
+}
+
+static grounded ground_side(const gk_node *n)
+{
+    const gk_base *base = &n->setup->base;
+    const size_t motions = (size_t)gk_node_motions(n->gear), joints = (size_t)n->model->supports + 1;
+    grounded g = {.motions = (int)motions, .columns = base->width[n->side->gear]};
+    g.yields = gk_node_room(n), g.joints = g.yields + motions * motions;
+    g.dynamic = g.joints + motions * joints, g.loaded = g.dynamic + motions * (size_t)g.columns;
+    memset(g.yields, 0, (motions * (motions + joints + (size_t)g.columns)) * sizeof *g.yields);
+    const int32_t *list = n->gear->ground[base->set].list;
+    for (int k = 0; k < n->gear->ground[base->set].reads; k++)
+        if (base->slot[list[k]] < 0) add_yield(n, &g, k);
+    add_supports(n, &g);
+    select_dynamic(n, &g);
+    return g;
+}
+
+/* out (m) += x (n) · matrix (n, m) */
+static void add_times(const double *x, const double *matrix, int n, int m, double *out)
+{
+    for (int i = 0; i < n; i++, matrix += m)
+        for (int j = 0; j < m && x[i] != 0.0; j++) out[j] += x[i] * matrix[j];
+}
+
+/* yields · motion of every point of a node */
+static void load_ground(const gk_node *n, const grounded *g)
+{
+    memset(g->loaded, 0, (size_t)n->points * (size_t)g->motions * sizeof *g->loaded);
+    for (int i = 0; i < n->points; i++) {
+        const size_t at = (size_t)i * (size_t)g->motions;
+        add_times(n->motion + at, g->yields, g->motions, g->motions, g->loaded + at);
+    }
+}
+
+/* through the ground oscillators that are not dynamic and the supports, between two points */
+static double through_ground(const gk_node *n, const grounded *g, int i, int j)
+{
+    return dot(n->motion + (size_t)i * (size_t)g->motions, g->loaded + (size_t)j * (size_t)g->motions, g->motions);
 }
 
 /* Σ a b/ω² over the dynamic modes, rows halfway to the next node as the step interpolates them */
@@ -182,7 +261,7 @@ static double carried_halfway(const gk_node *n, int at, int i, int j)
 
 /* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its
  * damper is parallel to. Halfway to the next node: what makes the parabola there right. */
-static void store_block(const gk_node *n, int at, int halfway, const double *yields, int p, int q)
+static void store_block(const gk_node *n, int at, int halfway, const grounded *g, int p, int q)
 {
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
@@ -194,7 +273,7 @@ static void store_block(const gk_node *n, int at, int halfway, const double *yie
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = 2 * (size_t)i * columns + (size_t)j, mirrored = 2 * (size_t)j * columns + (size_t)i;
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
-        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, i, j, yields);
+        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, g, i, j);
         const double all = (near ? cell[c] : stored) + ground;
         if (halfway) {
             const double middle = all - carried_halfway(n, at, i, j);
@@ -207,10 +286,11 @@ static void store_block(const gk_node *n, int at, int halfway, const double *yie
     }
 }
 
-static void store_residual(const gk_node *n, int at, int halfway, const double *yields)
+static void store_residual(const gk_node *n, int at, int halfway, const grounded *g)
 {
+    if (n->e->kind != MESH_FLAT) load_ground(n, g);
     for (int p = 0; p < n->side->candidates; p++)
-        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, yields, p, q);
+        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, g, p, q);
 }
 
 /* of the normal displacement at flank `from` per force along the profile at flank `to` of the same tooth */
@@ -237,7 +317,7 @@ static double between(const gk_node *n, block b, int i, int j)
     return sum;
 }
 
-/* Σ a b/ω² over modes `from` … `to` − 1 and over the ground oscillators that are not dynamic */
+/* Σ a b/ω² over modes `from` … `to` − 1 */
 static double carried_by(const gk_node *n, const double *a, const double *b, int from, int to)
 {
     double sum = 0.0;
@@ -247,90 +327,74 @@ static double carried_by(const gk_node *n, const double *a, const double *b, int
 
 /* What is not dynamic yields along the normal and along the profile per force along the profile. One tooth by its own
  * table; of others what stored modes carry. */
-static void store_along_residual(const gk_node *n, int at, const double *yields)
+static void store_along_residual(const gk_node *n, int at, const grounded *g)
 {
     const gk_side *side = n->side;
     const gk_gear *gear = n->gear;
     const int modes = gear->modes, dynamic = n->setup->modal[side->gear].count;
-    const int reads = gear->ground[n->setup->base.set].reads;
     const double own = gk_node_along(n);
-    for (int i = 0; i < n->points; i++)
-        for (int j = 0; j < n->points; j++) {
+    double loaded[12 + MAX_LOW];
+    for (int j = 0; j < n->points; j++) {
+        memset(loaded, 0, (size_t)g->motions * sizeof *loaded);
+        if (n->e->kind != MESH_FLAT)
+            add_times(n->along_motion + (size_t)j * (size_t)g->motions, g->yields, g->motions, g->motions, loaded);
+        for (int i = 0; i < n->points; i++) {
             const int same = n->at[i].offset == n->at[j].offset && gear->along_normal;
             const double *a = n->rows + (size_t)i * modes, *s = n->along_rows + (size_t)i * modes;
-            const double *t = n->along_rows + (size_t)j * modes, *x = n->ground + (size_t)i * reads;
-            const double *u = n->along_ground + (size_t)i * reads, *v = n->along_ground + (size_t)j * reads;
+            const double *t = n->along_rows + (size_t)j * modes;
             const int from = same ? 0 : dynamic, to = same ? dynamic : modes;
             const double sign = same ? -1.0 : 1.0;
             double normal = sign * carried_by(n, a, t, from, to), along = sign * carried_by(n, s, t, from, to);
             if (same)
                 normal += own * between(n, along_normal_of(n, n->at[i].flank, n->at[j].flank), i, j),
                     along += between(n, along_own_of(n, n->at[i].flank, n->at[j].flank), i, j);
-            for (int k = 0; k < reads; k++) normal += x[k] * v[k] * yields[k], along += u[k] * v[k] * yields[k];
+            if (n->e->kind != MESH_FLAT) {
+                normal += dot(n->motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
+                along += dot(n->along_motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
+            }
             const size_t to_table = ((size_t)at * n->points + (size_t)i) * (size_t)side->columns + (size_t)j;
             side->along.normal[to_table] = (gk_real)normal;
             side->along.own[to_table] = (gk_real)along;
         }
+    }
 }
 
 /* rows along the profile of what is dynamic, and what friction puts on supports at once */
-static void store_along(const gk_node *n, int at, const double *yields)
+static void store_along(const gk_node *n, int at, const grounded *g)
 {
     const gk_side *side = n->side;
     const gk_modal *m = &n->setup->modal[side->gear];
-    const gk_base *base = &n->setup->base;
-    const int reads = n->gear->ground[base->set].reads, from = base->from[side->gear], width = base->width[side->gear];
     const int supports = n->model->supports;
-    const gk_ground *ground = &n->model->ground[base->set];
-    const int32_t *list = n->gear->ground[base->set].list;
+    const gk_ground *ground = &n->model->ground[n->setup->base.set];
     for (int i = 0; i < n->points; i++) {
         const size_t point = (size_t)at * n->points + (size_t)i;
         gk_real *to = side->along.rows + point * m->n;
         memset(to, 0, (size_t)m->n * sizeof *to);
         for (int k = 0; k < m->count; k++) to[m->lane[k]] = (gk_real)n->along_rows[(size_t)i * n->gear->modes + k];
-        double *moves = side->along.ground + point * width, *held = side->along.support + point * supports;
-        double moved[MAX_SUPPORTS] = {0};
-        memset(moves, 0, (size_t)width * sizeof *moves);
+        double *moves = side->along.ground + point * (size_t)g->columns, *held = side->along.support + point * supports;
+        double moved[MAX_SUPPORTS + 1] = {0};
+        memset(moves, 0, (size_t)g->columns * sizeof *moves);
         memset(held, 0, (size_t)supports * sizeof *held);
         if (n->e->kind == MESH_FLAT || !n->setup->on.elastic) continue;
-        const double *row = n->along_ground + (size_t)i * reads, *rigid = n->along_rigid + (size_t)i * reads;
-        for (int k = 0; k < reads; k++)
-            if (base->slot[list[k]] >= 0)
-                moves[base->slot[list[k]] - from] = row[k] - rigid[k];
-            else if (n->setup->on.residual)
-                for (int s = 0; s < supports; s++)
-                    moved[s] += row[k] * yields[k] * ground->support_rows[s * ground->n + list[k]];
+        const double *motion = n->along_motion + (size_t)i * (size_t)g->motions;
+        add_times(motion, g->dynamic, g->motions, g->columns, moves);
+        if (n->setup->on.residual) add_times(motion, g->joints, g->motions, supports + 1, moved);
         for (int s = 0; s < supports; s++) held[s] = dot(ground->kappa + s * supports, moved, supports);
     }
 }
 
 /* flank to bore angle and to supports, beside what dynamic oscillators carry */
-static void store_joints(const gk_node *n, int at, const double *yields)
+static void store_joints(const gk_node *n, int at, const grounded *g)
 {
     const gk_side *side = n->side;
-    const gk_base *base = &n->setup->base;
-    const int points = n->points, supports = n->model->supports, reads = n->gear->ground[base->set].reads;
-    const int32_t *list = n->gear->ground[base->set].list;
-    const gk_ground *ground = &n->model->ground[base->set];
-    double moved[MAX_SUPPORTS];
-    for (int i = 0; i < points; i++) {
-        const double *row = n->ground + (size_t)i * reads, *fs = n->support + (size_t)i * supports;
-        double turned = n->port[i];
-        for (int s = 0; s < supports; s++) moved[s] = fs[s];
-        for (int k = 0; k < reads; k++) {
-            const double w = row[k] * yields[k];
-            if (w == 0.0) continue;
-            for (int s = 0; s < supports; s++) moved[s] += w * ground->support_rows[s * ground->n + list[k]];
-            if (n->side->port_of >= 0) turned += w * ground->port_rows[n->side->port_of * ground->n + list[k]];
-        }
-        double *to = side->support + ((size_t)at * points + i) * gk_padded(supports);
-        for (int s = 0; s < supports; s++) {
-            const double *kappa = ground->kappa + s * supports;
-            to[s] = dot(kappa, moved, supports);
-            if (n->side->port_of >= 0)
-                turned -= fs[s] * dot(kappa, n->model->port_support + n->side->port_of * supports, supports);
-        }
-        side->port[(size_t)at * points + i] = turned;
+    const int supports = n->model->supports;
+    const double *kappa = n->model->ground[n->setup->base.set].kappa;
+    for (int i = 0; i < n->points; i++) {
+        const size_t point = (size_t)at * n->points + (size_t)i;
+        double moved[MAX_SUPPORTS + 1] = {0}, *to = side->support + point * gk_padded(supports);
+        add_times(n->motion + (size_t)i * (size_t)g->motions, g->joints, g->motions, supports + 1, moved);
+        for (int s = 0; s < supports; s++) to[s] = dot(kappa + s * supports, moved, supports);
+        side->port[point] = n->port[i] + moved[supports];
     }
 }
 
@@ -346,19 +410,12 @@ static void store_rows(const gk_node *n, int at)
 }
 
 /* rows of the dynamic ground oscillators without the rigid motion, which the gap reads */
-static void store_ground(const gk_node *n, int at)
+static void store_ground(const gk_node *n, int at, const grounded *g)
 {
-    const gk_side *side = n->side;
-    const gk_base *base = &n->setup->base;
-    const int reads = n->gear->ground[base->set].reads, from = base->from[side->gear], width = base->width[side->gear];
-    const int32_t *list = n->gear->ground[base->set].list;
-    for (int i = 0; i < n->points; i++) {
-        double *to = side->ground + ((size_t)at * n->points + i) * width;
-        const double *row = n->ground + (size_t)i * reads, *rigid = n->rigid + (size_t)i * reads;
-        memset(to, 0, (size_t)width * sizeof *to);
-        for (int k = 0; k < reads; k++)
-            if (base->slot[list[k]] >= 0) to[base->slot[list[k]] - from] = row[k] - rigid[k];
-    }
+    double *to = n->side->ground + (size_t)at * (size_t)n->points * (size_t)g->columns;
+    memset(to, 0, (size_t)n->points * (size_t)g->columns * sizeof *to);
+    for (int i = 0; i < n->points; i++, to += g->columns)
+        add_times(n->motion + (size_t)i * (size_t)g->motions, g->dynamic, g->motions, g->columns, to);
 }
 
 /* patterns of far teeth at the points */
@@ -399,22 +456,21 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     GK_ASSERT(setup->mesh[e].side[which].candidates <= MAX_CANDIDATES);
     gk_side *side = &setup->mesh[e].side[which];
     gk_node n = gk_node_begin(model, setup, work, e, side);
-    double yields[MAX_GROUND];
+    const grounded g = ground_side(&n);
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
-    quasi_static_flexibility(&n, yields);
     for (int at = 0; at <= side->nodes; at++) {
         gk_node_gather(&n, (double)at / side->nodes);
         store_rows(&n, at);
-        if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
+        if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at, &g);
         if (setup->far_on[side->gear]) store_far(&n, at);
-        if (setup->on.residual) store_residual(&n, at, 0, yields);
-        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, yields);
-        if (GK_ON(setup, friction)) store_along(&n, at, yields);
-        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, yields);
+        if (setup->on.residual) store_residual(&n, at, 0, &g);
+        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, &g);
+        if (GK_ON(setup, friction)) store_along(&n, at, &g);
+        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, &g);
     }
     for (int at = 0; at < side->nodes && setup->on.residual; at++) {
         gk_node_gather(&n, (at + 0.5) / side->nodes);
-        store_residual(&n, at, 1, yields);
+        store_residual(&n, at, 1, &g);
     }
     if (!setup->on.elastic || n.e->kind == MESH_FLAT)
         memset(side->ground, 0, nodes * points * (size_t)setup->base.width[side->gear] * sizeof *side->ground);
