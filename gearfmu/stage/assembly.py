@@ -25,8 +25,8 @@ from gearfmu.stage.far import LOWEST, far_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.film import film_starts
 from gearfmu.stage.flanks import deviation_sections
-from gearfmu.stage.friction import friction_starts
 from gearfmu.stage.free import Flank
+from gearfmu.stage.friction import friction_starts
 from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases

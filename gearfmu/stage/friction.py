@@ -26,4 +26,3 @@ def friction_starts(stage: GeneralStage) -> dict[str, float]:
             f"{prefix}flank_roughness": own.roughness,
         }
     return starts
-

@@ -65,7 +65,10 @@ static section section_at(const gk_blob *blob, uint32_t i)
 
 static uint64_t aligned(uint64_t n) { return (n + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT; }
 
-static uint64_t element_size(uint32_t type) { return type == F64 ? 8 : type == I32 || type == F32 ? 4 : type == TEXT ? 1 : 0; }
+static uint64_t element_size(uint32_t type)
+{
+    return type == F64 ? 8 : type == I32 || type == F32 ? 4 : type == TEXT ? 1 : 0;
+}
 
 /* printable ASCII without space, then NUL to the end */
 static int name_is_good(const char *name)

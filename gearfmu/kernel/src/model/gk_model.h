@@ -23,9 +23,9 @@ enum {
     MAX_GROUND = 2000,
     MAX_POINTS = 256, /* of a flank where rows are stored */
     MAX_LOW = 1000,   /* modes of nodal diameter 0 and 1 of a gear */
-    MAX_OWN = 1000, /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
-    OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */
-    SETS = 2,       /* of ground oscillators: as supported; with the supports held */
+    MAX_OWN = 1000,   /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
+    OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual */
+    SETS = 2,         /* of ground oscillators: as supported; with the supports held */
     NAME_LENGTH = 32,
     MAX_NODES = GK_HIGH_NODES, /* of a flank along or across */
     MAX_FLANK_ROLLS = 1025,
@@ -57,7 +57,7 @@ typedef struct gk_gear {
     double z_mid, helix;                      /* axial place of mid-width; base helix angle, right-hand positive */
     int rotor, z, modes;
     int points, low, mirrored; /* where rows are stored; modes of nodal diameter 0 and 1; flank 1 is the image of 0 */
-    int nodes[2]; /* of a flank for nodal contact: along, across; 0: none */
+    int nodes[2];              /* of a flank for nodal contact: along, across; 0: none */
     const double *omega, *zeta;
     const double *resample;              /* (rolls, points) weights of the points on the even grid of rolls */
     const float *rows, *low_rows, *node; /* (2, points, functions, modes), (…, low); (3, 2, points, functions, 6) */
@@ -66,7 +66,7 @@ typedef struct gk_gear {
     const float *residual_own, *residual_next, *residual_across; /* gk_spread.c puts them together */
     const float *port_residual;
     const float *along_rows, *along_low, *along_normal, *along_own, *along_across; /* NULL: unknown */
-    const double *turn_rate;                             /* (modes) Coriolis coupling of a pair; NULL: unknown */
+    const double *turn_rate; /* (modes) Coriolis coupling of a pair; NULL: unknown */
     const int32_t *diameter, *member;
     const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */

@@ -14,7 +14,8 @@ int gk_far_known(const gk_model *model, const gk_setup *setup, int g)
 static void add_product(double *sum, double f, const float *a, const float *b, int columns)
 {
     for (int i = 0; i < FAR; i++)
-        for (int j = 0; j < FAR; j++) sum[i * FAR + j] += f * (double)a[(size_t)i * columns] * (double)b[(size_t)j * columns];
+        for (int j = 0; j < FAR; j++)
+            sum[i * FAR + j] += f * (double)a[(size_t)i * columns] * (double)b[(size_t)j * columns];
 }
 
 /* modes of the gear group that are not dynamic, m teeth after the load: those of a pair turn into each other */
@@ -35,8 +36,8 @@ static void add_modes(const gk_gear *gear, int dynamic, int m, double *sum)
     }
 }
 
-/* Ground oscillators that are not dynamic, as a mean over all angles of the loaded tooth: these are stiff enough to feel
- * little of what is not the same in all directions */
+/* Ground oscillators that are not dynamic, as a mean over all angles of the loaded tooth: these are stiff enough to
+ * feel little of what is not the same in all directions */
 static void add_ground(const gk_model *model, const gk_setup *setup, int g, int m, double *sum)
 {
     const gk_base *base = &setup->base;

@@ -88,7 +88,8 @@ static void turn_row(const gk_node *n, int offset, double *row)
 {
     const gk_gear *gear = n->gear;
     for (int k = 0; k < gear->modes; k++) {
-        const int turned = (int)((int64_t)gear->diameter[k] * offset % gear->z), at = turned < 0 ? turned + gear->z : turned;
+        const int turned = (int)((int64_t)gear->diameter[k] * offset % gear->z),
+                  at = turned < 0 ? turned + gear->z : turned;
         if (gear->member[k] == 1) {
             const double a = row[k], b = row[k + 1];
             row[k] = a * n->cosine[at] - b * n->sine[at];
@@ -249,8 +250,7 @@ void gk_node_gather(gk_node *n, double position)
         if (p->offset) turn_row(n, p->offset, n->rows + (size_t)i * modes);
         gk_node_blend(n, n->flank->port, p, n->model->ports, ports);
         n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
-        if (n->e->kind != MESH_FLAT)
-            ground_point(n, p, n->motion + (size_t)i * gk_node_motions(n->gear));
+        if (n->e->kind != MESH_FLAT) ground_point(n, p, n->motion + (size_t)i * gk_node_motions(n->gear));
         if (GK_ON(n->setup, friction)) gather_along(n, p, i);
     }
 }
@@ -294,8 +294,7 @@ double *gk_node_room(const gk_node *n) { return n->flexibility + n->gear->modes;
 static void add_rows(const gk_model *model, const gk_real *rows, int modes, const gk_spot *p, int first,
                      double weight[4][MAX_FUNCTIONS], double *sum)
 {
-    const gk_real *row =
-        rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * (size_t)modes;
+    const gk_real *row = rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * (size_t)modes;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < model->functions; a++, row += modes) {
             for (int k = first; k < modes; k++) sum[k] += weight[i][a] * row[k];
@@ -333,7 +332,8 @@ void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_l
     memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
     for (int strip = 0; strip < load->strips; strip++) {
         next.grid = gk_grid_at(model, gear, load->roll[strip]);
-        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(model, rows, gear->modes, &p, first, weight, row);
+        if (p.grid.index >= 0 && next.grid.index != p.grid.index)
+            add_rows(model, rows, gear->modes, &p, first, weight, row);
         p = next;
         for (int i = 0; i < 4; i++)
             for (int a = 0; a < model->functions; a++)

@@ -22,9 +22,9 @@ typedef struct gk_node { /* what a node's tables are made from */
     int points;                              /* candidates × strips */
     gk_spot at[MAX_CANDIDATES * MAX_SLICES]; /* points */
     gk_strip_weights weight;
-    double length;   /* of the line of action between the base circles, nominal */
-    double *rows;    /* (points, modes): all stored modes, tooth offset included */
-    double *motion;  /* (points, gk_node_motions): what ground oscillators displace outward is motion · M */
+    double length;  /* of the line of action between the base circles, nominal */
+    double *rows;   /* (points, modes): all stored modes, tooth offset included */
+    double *motion; /* (points, gk_node_motions): what ground oscillators displace outward is motion · M */
     double *along_rows, *along_motion; /* rows and motion along the profile (gk_node_along) */
     double *port;                      /* (points) */
     double *flexibility;               /* (modes) 1/ω² */
@@ -45,8 +45,8 @@ static inline const double *gk_node_motion(const gk_gear *gear, int set, int i)
                          : gear->ground[set].node + (i - gear->low) * reads;
 }
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side);
-/* the scratch of a node that is left for what is made of it: (gk_node_motions)² + gk_node_motions (points, of supports and
- * ports, of dynamic oscillators) */
+/* the scratch of a node that is left for what is made of it: (gk_node_motions)² + gk_node_motions (points, of supports
+ * and ports, of dynamic oscillators) */
 double *gk_node_room(const gk_node *n);
 /* `position`: share of the pitch */
 void gk_node_gather(gk_node *n, double position);

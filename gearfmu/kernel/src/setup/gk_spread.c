@@ -1,6 +1,6 @@
 /* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (gearfmu/stage/compact.py).
- * A model stores rows at P points and each number of a compliance once; on the grid they are several times as large. Rows
- * are kept in the setup, compliances only while the sides of their gear are filled. */
+ * A model stores rows at P points and each number of a compliance once; on the grid they are several times as large.
+ * Rows are kept in the setup, compliances only while the sides of their gear are filled. */
 #include "setup/gk_node.h"
 
 enum { CHUNK = 64 };
@@ -10,10 +10,9 @@ enum { CHUNK = 64 };
 static int same_tables(const gk_gear *a, const gk_gear *b)
 {
     return a->resample == b->resample && a->rows == b->rows && a->low_rows == b->low_rows && a->node == b->node &&
-           a->far_rows == b->far_rows && a->residual_own == b->residual_own &&
-           a->residual_next == b->residual_next && a->residual_across == b->residual_across &&
-           a->along_rows == b->along_rows && a->along_low == b->along_low && a->along_normal == b->along_normal &&
-           a->along_own == b->along_own && a->along_across == b->along_across;
+           a->far_rows == b->far_rows && a->residual_own == b->residual_own && a->residual_next == b->residual_next &&
+           a->residual_across == b->residual_across && a->along_rows == b->along_rows && a->along_low == b->along_low &&
+           a->along_normal == b->along_normal && a->along_own == b->along_own && a->along_across == b->along_across;
 }
 
 int gk_spread_leader(const gk_model *model, int g)
@@ -102,8 +101,8 @@ size_t gk_spread_scratch(const gk_model *model, size_t *reals)
         gk_compliance counted;
         const size_t n = places_of(model, &model->gear[g]);
         const size_t own = n * n + n * (size_t)(model->rolls * model->functions);
-        const size_t blocks =
-            lay_out(model, &model->gear[g], model->gear[g].along_rows != NULL, NULL, &counted) * block_size(model);
+        const size_t blocks = lay_out(model, &model->gear[g], model->gear[g].along_rows != NULL, NULL, &counted) *
+                              block_size(model);
         doubles = own > doubles ? own : doubles;
         *reals = blocks > *reals ? blocks : *reals;
     }
