@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+import sys
 from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint32, c_uint64, c_void_p
 from functools import lru_cache
 from pathlib import Path
@@ -113,7 +114,8 @@ def aligned(size: int) -> tuple[ctypes.Array, int]:
 
     Pages that nothing touches cost nothing: the kernel's sizes are those of the largest setup.
     """
-    memory = (ctypes.c_char * max(size, 1)).from_buffer(mmap.mmap(-1, max(size, 1)))
+    own = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
+    memory = (ctypes.c_char * max(size, 1)).from_buffer(mmap.mmap(-1, max(size, 1), **own))
     return memory, ctypes.addressof(memory)
 
 

@@ -87,8 +87,8 @@ def along_sections(
 
 
 def ground_rows(index: int, number: int, sections: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(3, 2, P, A, reads) kg^-½: outward normal displacement of a tooth by ground oscillators beside the rigid motion of
-    the gear, as c₀, c_c, c_s, from the sections of `flank_tables` and `ground_tables`."""
+    """(3, 2, P, A, reads) kg^-½: outward normal displacement of a tooth by ground oscillators beside the rigid motion
+    of the gear, as c₀, c_c, c_s, from the sections of `flank_tables` and `ground_tables`."""
     patterns = turn_tables(sections[f"low_rows{index}"], sections[f"low_member{index}"])
     moved = products(patterns, sections[f"low_ground{index}_{number}"].T)
     return moved + products(sections[f"node{index}"], sections[f"node_ground{index}_{number}"].T)

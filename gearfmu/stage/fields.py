@@ -97,8 +97,8 @@ def fields() -> tuple[Field, ...]:
 
 
 def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
-    """`sections` in the order of the table, floats in the precision in which they are stored. AssertionError that lists every section that is missing, unknown, or of
-    another type or shape: the writer's mistake, not the user's."""
+    """`sections` in the order of the table, floats in the precision in which they are stored. AssertionError that lists
+    every section that is missing, unknown, or of another type or shape: the writer's mistake, not the user's."""
     sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True))
     found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference"}
     sizes |= {word: len(sections.get(name, ())) for word, name in found.items()}

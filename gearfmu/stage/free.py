@@ -92,8 +92,8 @@ class FreeBody:
 
 
 def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.ndarray) -> FreeBody:
-    """The FreeBody of a ReducedBody: `chosen` modes, width functions of `degrees`, rolls of `to_grid` (P, R), weights of
-    those of the body (`resampling`; a unit matrix leaves them). Its one node is the bore.
+    """The FreeBody of a ReducedBody: `chosen` modes, width functions of `degrees`, rolls of `to_grid` (P, R), weights
+    of those of the body (`resampling`; a unit matrix leaves them). Its one node is the bore.
 
     ModelError where patterns of nodal diameter 2 and more move the bore: the body is no ring of equal sectors.
     """

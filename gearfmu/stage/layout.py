@@ -82,8 +82,11 @@ def stage_layout(
     grid of ROLLS where None."""
     nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
     points = even_grids(stage, bodies, ROLLS) if points is None else points
-    toothed = zip(stage.gears, bodies, points, strict=True)
-    free = [_gear(stage, gear, body, degrees, weights) for gear, body, weights in toothed]
+    free: list[FreeBody] = []
+    for i, gear in enumerate(stage.gears):
+        same = next((k for k in range(i) if bodies[k] is bodies[i] and np.array_equal(points[k], points[i])), None)
+        free.append(_gear(stage, bodies[i], degrees, points[i]) if same is None else free[same])
+        free[i] = replace(free[i], name=gear.name)  # a body's file may come from another stage
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
     free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
     free += [replace(free_carrier(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
@@ -109,10 +112,8 @@ def even_grids(stage: GeneralStage, bodies: Sequence[Any], rolls: int) -> list[n
     return [resampling(body.roll, s.s_form, s.s_tip, rolls) for s, body in zip(shapes, bodies, strict=True)]
 
 
-def _gear(stage: GeneralStage, gear: ToothedBody, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
-    chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
-    free = free_gear(body, chosen, degrees, weights)
-    return replace(free, name=gear.name)  # a body's file may come from another stage
+def _gear(stage: GeneralStage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
+    return free_gear(body, excited_modes(body, degrees) if stage.even else _all_modes(body, degrees), degrees, weights)
 
 
 def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
