@@ -385,22 +385,6 @@ static void take_sizes(reader *r, const gk_model *m, const gk_gear *g)
     size[SYMBOL_across] = g->mirrored ? half : places * places;
 }
 
-/* rows of the modes and compliance beyond them, at the points that are stored */
-static void read_tables(reader *r, gk_gear *g)
-{
-    g->resample = bounded(r, F_GEAR_resample, 1e3);
-    g->rows = bounded_f32(r, F_GEAR_rows, 1e6f);
-    g->low_rows = bounded_f32(r, F_GEAR_low_rows, 1e6f);
-    g->low_member = take(r, F_GEAR_low_member);
-    if (!r->outcome) demand(r, pairs_whole(g->low_member, g->low), "pairs of modes of nodal diameter 0 and 1");
-    g->node = bounded_f32(r, F_GEAR_node, 1e3f);
-    g->node_support = bounded(r, F_GEAR_node_support, 1e3);
-    g->residual_own = bounded_f32(r, F_GEAR_residual_own, 1e3f);
-    g->residual_next = bounded_f32(r, F_GEAR_residual_next, 1e3f);
-    g->residual_across = bounded_f32(r, F_GEAR_residual_across, 1e3f);
-    g->port_residual = bounded_f32(r, F_GEAR_port_residual, 1e3f);
-}
-
 static void read_along(reader *r, gk_gear *g)
 {
     g->along_rows = bounded_f32(r, F_GEAR_along_rows, 1e6f);
@@ -410,6 +394,22 @@ static void read_along(reader *r, gk_gear *g)
     g->along_across = bounded_f32(r, F_GEAR_along_across, 1e3f);
     const int parts = !!g->along_rows + !!g->along_low + !!g->along_normal + !!g->along_own + !!g->along_across;
     if (!r->outcome && parts % 5) refuse(r, "displacement along the profile", "is not known in all its parts");
+}
+
+/* rows of the modes and compliance beyond them, at the points that are stored */
+static void read_tables(reader *r, gk_gear *g)
+{
+    g->resample = bounded(r, F_GEAR_resample, 1e3);
+    g->rows = bounded_f32(r, F_GEAR_rows, 1e6f);
+    g->low_rows = bounded_f32(r, F_GEAR_low_rows, 1e6f);
+    g->low_member = take(r, F_GEAR_low_member);
+    if (!r->outcome) demand(r, pairs_whole(g->low_member, g->low), "pairs of modes of nodal diameter 0 and 1");
+    g->node = bounded_f32(r, F_GEAR_node, 1e3f), g->node_support = bounded(r, F_GEAR_node_support, 1e3);
+    g->residual_own = bounded_f32(r, F_GEAR_residual_own, 1e3f);
+    g->residual_next = bounded_f32(r, F_GEAR_residual_next, 1e3f);
+    g->residual_across = bounded_f32(r, F_GEAR_residual_across, 1e3f);
+    g->port_residual = bounded_f32(r, F_GEAR_port_residual, 1e3f);
+    read_along(r, g);
 }
 
 static void read_gear(reader *r, gk_model *m, int i)
@@ -432,9 +432,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     g->diameter = take(r, F_GEAR_diameter), g->member = take(r, F_GEAR_member);
     g->turn_rate = bounded(r, F_GEAR_turn_rate, 1.001);
     read_tables(r, g);
-    read_along(r, g);
-    g->far_rows = bounded_f32(r, F_GEAR_far_rows, 1e3f);
-    g->far_modes = bounded_f32(r, F_GEAR_far_modes, 1e6f);
+    g->far_rows = bounded_f32(r, F_GEAR_far_rows, 1e3f), g->far_modes = bounded_f32(r, F_GEAR_far_modes, 1e6f);
     if (!r->outcome) check_modes(r, g);
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
@@ -564,49 +562,4 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
         model->running_out |= model->gear[g].runout != NULL;
     }
     return r.outcome;
-}
-
-size_t gk_model_size(void) { return sizeof(gk_model); }
-const char *gk_model_name(const gk_model *model)
-{
-    GK_ASSERT(model);
-    return model->name;
-}
-const char *gk_model_hash(const gk_model *model)
-{
-    GK_ASSERT(model);
-    return model->blob.hash;
-}
-int gk_abi(void) { return GK_ABI; }
-
-const char *gk_status_text(int bit)
-{
-    static const char *const text[] = {
-        "local contact law beyond its range",
-        "fallback scheme in use",
-        "limit of iterations reached",
-        "gamma lowered: forces are damped more",
-        "a loaded flank ended although effect.tip_contact is off",
-        "mesh force beyond torque_max, which the model is made for",
-        "speed beyond speed_max, which the model is made for",
-        "the gears started at rest and were torn along in the first step: set speeds before the initialisation ends",
-    };
-    return bit >= 0 && bit < (int)(sizeof text / sizeof *text) ? text[bit] : NULL;
-}
-
-const char *gk_outcome_text(gk_outcome outcome)
-{
-    static const char *const text[GK_OUTCOMES] = {
-        "ok",
-        "bad model blob",
-        "no such variable in this model",
-        "value refused: not finite or out of range",
-        "call not allowed now",
-        "communication step refused: not positive, not finite or not at the current time",
-        "internal step too large for this model",
-        "no static equilibrium found for the start",
-        "diverged: state not finite even with the smallest step and the fallback scheme",
-        "teeth overlap beyond what the model can mean",
-        "energy balance broken"};
-    return (int)outcome >= 0 && outcome < GK_OUTCOMES ? text[outcome] : "unknown outcome";
 }

@@ -3,6 +3,7 @@
 #define GK_WORK_H
 #include "base/gk_check.h"
 #include "problem/gk_system.h"
+#include "setup/gk_spread.h"
 
 /* phases of a step, for the profile */
 enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to quads */
@@ -177,11 +178,6 @@ void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work)
 /* gk_side.c */
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
-/* gk_spread.c; the first gear whose tables are those of gear g */
-int gk_spread_leader(const gk_model *model, int g);
-void gk_spread_rows(const gk_model *model, gk_setup *setup, int g);
-size_t gk_spread_scratch(const gk_model *model, size_t *reals);
-void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, int g);
 /* gk_node.c */
 size_t gk_node_scratch(const gk_model *model);
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */

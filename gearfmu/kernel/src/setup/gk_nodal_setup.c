@@ -143,39 +143,47 @@ static double ground_part(const gk_gear *gear, int set, const double *low, const
     return sum;
 }
 
-static void fill_modes(const gk_model *model, gk_setup *setup, int g, size_t cell, const gk_grid *grid, int flank,
-                       int a)
+/* a point of a flank and one width function: cell of the tables */
+typedef struct cell {
+    int gear, flank, function;
+    size_t number;
+    gk_grid grid;
+} cell;
+
+static void fill_modes(const gk_model *model, gk_setup *setup, const cell *c)
 {
-    const gk_gear *gear = &model->gear[g];
-    const gk_modal *m = &setup->modal[g];
+    const gk_gear *gear = &model->gear[c->gear];
+    const gk_modal *m = &setup->modal[c->gear];
     const size_t cells = (size_t)(model->rolls * model->functions);
-    const gk_real *rows = setup->flank[g].rows + (size_t)flank * cells * (size_t)gear->modes;
-    gk_real *modes = setup->point_rows[g].modes + cell * (size_t)m->n;
+    const gk_real *rows = setup->flank[c->gear].rows + (size_t)c->flank * cells * (size_t)gear->modes;
+    gk_real *modes = setup->point_rows[c->gear].modes + c->number * (size_t)m->n;
     memset(modes, 0, (size_t)m->n * sizeof *modes);
     for (int k = 0; k < m->count; k++)
-        modes[m->lane[k]] = (gk_real)blended(grid, rows, model->functions, gear->modes, a, k);
+        modes[m->lane[k]] = (gk_real)blended(&c->grid, rows, model->functions, gear->modes, c->function, k);
 }
 
-static void fill_ground(const gk_model *model, gk_setup *setup, int g, size_t cell, const gk_grid *grid, int flank,
-                        int a)
+static void fill_ground(const gk_model *model, gk_setup *setup, const cell *c)
 {
-    const gk_gear *gear = &model->gear[g];
+    const gk_gear *gear = &model->gear[c->gear];
     const gk_base *base = &setup->base;
+    const gk_flank_tables *from = &setup->flank[c->gear];
     const int A = model->functions, reads = setup->on.elastic ? gear->ground[base->set].reads : 0;
-    const size_t cells = (size_t)(model->rolls * A), width = (size_t)base->width[g];
-    const gk_real *rows = setup->flank[g].low + (size_t)flank * cells * (size_t)gear->low;
+    const size_t cells = (size_t)(model->rolls * A), width = (size_t)base->width[c->gear];
+    const gk_real *rows = from->low + (size_t)c->flank * cells * (size_t)gear->low;
     const int32_t *list = gear->ground[base->set].list;
     double low[MAX_LOW], node[3][6];
-    for (int k = 0; k < gear->low; k++) low[k] = blended(grid, rows, A, gear->low, a, k);
-    for (int c = 0; c < 3; c++)
+    for (int k = 0; k < gear->low; k++) low[k] = blended(&c->grid, rows, A, gear->low, c->function, k);
+    for (int part = 0; part < 3; part++)
         for (int k = 0; k < 6; k++)
-            node[c][k] = blended(grid, setup->flank[g].node + (size_t)(2 * c + flank) * cells * 6, A, 6, a, k);
-    for (int c = 0; c < 3; c++) {
-        gk_real *ground = setup->point_rows[g].ground + ((size_t)(2 * c * POINTS * A) + cell) * width;
+            node[part][k] = blended(&c->grid, from->node + (size_t)(2 * part + c->flank) * cells * 6, A, 6, c->function,
+                                    k);
+    for (int part = 0; part < 3; part++) {
+        gk_real *ground = setup->point_rows[c->gear].ground + ((size_t)(2 * part * POINTS * A) + c->number) * width;
         memset(ground, 0, width * sizeof *ground);
         for (int k = 0; k < reads; k++)
             if (base->slot[list[k]] >= 0)
-                ground[base->slot[list[k]] - base->from[g]] = (gk_real)ground_part(gear, base->set, low, node, c, k);
+                ground[base->slot[list[k]] - base->from[c->gear]] = (gk_real)ground_part(gear, base->set, low, node,
+                                                                                         part, k);
     }
 }
 
@@ -185,12 +193,12 @@ void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g)
     const gk_gear *gear = &model->gear[g];
     const double length = fabs(gear->s_tip * gear->s_tip - gear->s_form * gear->s_form) / (2.0 * gear->r_b);
     for (int point = 0; point < POINTS && gear->nodes[0]; point++) {
-        const gk_grid grid = weights_at(model, gear, length * point / (POINTS - 1), length);
-        for (int flank = 0; flank < 2; flank++)
-            for (int a = 0; a < model->functions; a++) {
-                const size_t cell = (size_t)((flank * POINTS + point) * model->functions + a);
-                fill_modes(model, setup, g, cell, &grid, flank, a);
-                fill_ground(model, setup, g, cell, &grid, flank, a);
+        cell c = {.gear = g, .grid = weights_at(model, gear, length * point / (POINTS - 1), length)};
+        for (c.flank = 0; c.flank < 2; c.flank++)
+            for (c.function = 0; c.function < model->functions; c.function++) {
+                c.number = (size_t)((c.flank * POINTS + point) * model->functions + c.function);
+                fill_modes(model, setup, &c);
+                fill_ground(model, setup, &c);
             }
     }
 }

@@ -291,12 +291,12 @@ double *gk_node_room(const gk_node *n) { return n->flexibility + n->gear->modes;
 
 /* ---- loads ------------------------------------------------------------------------------------------------------- */
 /* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
-static void add_rows(const gk_model *model, const gk_real *rows, int modes, const gk_spot *p, int first,
-                     double weight[4][MAX_FUNCTIONS], double *sum)
+static void add_rows(const gk_node *n, const gk_spot *p, int first, double weight[4][MAX_FUNCTIONS], double *sum)
 {
-    const gk_real *row = rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * (size_t)modes;
+    const int modes = n->gear->modes, A = n->model->functions;
+    const gk_real *row = n->flank->rows + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * (size_t)modes;
     for (int i = 0; i < 4; i++)
-        for (int a = 0; a < model->functions; a++, row += modes) {
+        for (int a = 0; a < A; a++, row += modes) {
             for (int k = first; k < modes; k++) sum[k] += weight[i][a] * row[k];
             weight[i][a] = 0.0;
         }
@@ -326,20 +326,19 @@ void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_l
     GK_ASSERT(gk_is_gear(model, load->gear) && load->strips <= MAX_SLICES);
     GK_ASSERT(first >= 0 && first <= model->gear[load->gear].modes);
     const gk_gear *gear = &model->gear[load->gear];
-    const gk_real *rows = setup->flank[load->gear].rows;
+    const gk_node n = {.model = model, .gear = gear, .flank = &setup->flank[load->gear]};
     double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
     gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
     memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
     for (int strip = 0; strip < load->strips; strip++) {
         next.grid = gk_grid_at(model, gear, load->roll[strip]);
-        if (p.grid.index >= 0 && next.grid.index != p.grid.index)
-            add_rows(model, rows, gear->modes, &p, first, weight, row);
+        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(&n, &p, first, weight, row);
         p = next;
         for (int i = 0; i < 4; i++)
             for (int a = 0; a < model->functions; a++)
                 weight[i][a] += load->force[strip] * p.grid.weight[i] * load->width[strip][a];
     }
-    add_rows(model, rows, gear->modes, &p, first, weight, row);
+    add_rows(&n, &p, first, weight, row);
     add_turned(gear, load->tooth, first, row, sum);
 }
 

@@ -2,7 +2,9 @@
 #ifndef GK_NODE_H
 #define GK_NODE_H
 #include "base/gk_check.h"
+#include "base/gk_lanes.h"
 #include "problem/gk_work.h"
+#include "setup/gk_spread.h"
 
 typedef struct gk_spot { /* a candidate's strip at a node */
     int flank, offset;
@@ -57,6 +59,16 @@ static inline double gk_node_along(const gk_node *n)
 {
     GK_ASSERT(n->side && n->e);
     return n->side->which == 1 && n->e->kind == MESH_INTERNAL ? 1.0 : -1.0;
+}
+/* Σ a b, in four lanes */
+static inline double gk_node_dot(const double *a, const double *b, int n)
+{
+    double lane[4] = {0, 0, 0, 0};
+    int k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
+    for (; k < n; k++) lane[0] += a[k] * b[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 /* (−1)^degree of a width function: what half a turn about the middle line of a tooth does to it */
 static inline double gk_width_sign(const gk_model *model, int function)

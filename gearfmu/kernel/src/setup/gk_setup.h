@@ -6,6 +6,7 @@
 #include "base/gk_math.h"
 #include "model/gk_data.h"
 #include "setup/gk_nodal.h"
+#include "setup/gk_spread.h"
 
 #define GK_FILM_REACH 100e-6 /* m: open flanks further apart than this know no film (assumed) */
 
@@ -98,22 +99,6 @@ typedef struct gk_base { /* dynamic oscillators of the ground group: rotor by ro
     gk_span damper_span[MAX_SUPPORTS], support_span[MAX_SUPPORTS], port_span[MAX_PORTS];
     int from[MAX_GEARS], width[MAX_GEARS]; /* quads-aligned part that a gear reads */
 } gk_base;
-
-/* Rows of a gear on the even grid of rolls (gk_spread.c): (2 flanks, rolls, functions, …) of modes of the gear group,
- * of those of nodal diameter 0 and 1, along the normal and along the profile; of the node (3 parts before the flanks,
- * 6), of ports and of the patterns of far teeth. NULL: unknown */
-typedef struct gk_flank_tables {
-    gk_real *rows, *low, *along_rows, *along_low, *node, *port, *far;
-} gk_flank_tables;
-
-enum { FURTHER = OFFSETS / 2, ACROSS = 1 + 2 * FURTHER };
-/* Compliances of a gear on the even grid of rolls, blocks (rolls, rolls, functions, functions), loaded place first: of
- * a flank by its own load, of the same flank 1 … FURTHER teeth further, of the other flank: of the same tooth from
- * flank 0, then of those further from flank 0 and from flank 1. Of a mirrored gear those that begin at flank 0. */
-typedef struct gk_compliance {
-    gk_real *own[2], *next[2][FURTHER], *across[ACROSS];
-    gk_real *along_normal[2][2], *along_own[2], *along_across;
-} gk_compliance;
 
 /* What a side knows of displacement and force along the profile (docs/theory.md, 2.8), for friction. Everything is
  * against the direction in which gear A slides past B, so that rows stand beside those of the normal displacement. */

@@ -2,7 +2,8 @@
  * read, and compliance of what is not dynamic (docs/theory.md, eq. 2), for all teeth that may touch, at NODES + 1
  * positions in one pitch. Teeth of one flank are whole base pitches apart, so one position decides all lengths of roll.
  * A row between two nodes is linear, the compliance of what is not dynamic a parabola. */
-#include "setup/gk_node.h"
+#include "setup/gk_block.h"
+#include "setup/gk_grounded.h"
 
 static const double MARGIN = 0.15, CORNER = 0.5; /* base pitches beyond the ends of the flanks: play; tip corners */
 
@@ -60,16 +61,6 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
 }
 
 /* ---- compliance of what is not dynamic --------------------------------------------------------------------------- */
-static double dot(const double *a, const double *b, int n)
-{
-    double lane[4] = {0, 0, 0, 0};
-    int k = 0;
-    for (; k + 4 <= n; k += 4)
-        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
-    for (; k < n; k++) lane[0] += a[k] * b[k];
-    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
-}
-
 /* Σ a_k b_k/ω² over modes below `dynamic` */
 static double carried(const gk_node *n, int i, int j, int dynamic)
 {
@@ -77,50 +68,6 @@ static double carried(const gk_node *n, int i, int j, int dynamic)
     double lane[4] = {0, 0, 0, 0};
     for (int k = 0; k < dynamic; k++) lane[k % 4] += a[k] * b[k] * n->flexibility[k];
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
-}
-
-/* a block of gk_compliance and how it is read: loaded and displaced place swapped; as the image of a mirrored flank */
-typedef struct block {
-    const gk_real *table;
-    int swapped, image;
-} block;
-
-static block block_of(const gk_node *n, int from, int to, int offset)
-{
-    block b = {.swapped = offset < 0};
-    if (b.swapped) {
-        const int other = from;
-        from = to, to = other, offset = -offset;
-    }
-    if (from != to) {
-        b.swapped ^= !offset && from == 1;
-        b.table = n->compliance->across[offset ? 2 * offset - 1 + from : 0];
-        return b;
-    }
-    b.image = n->gear->mirrored && from == 1;
-    b.swapped ^= b.image;
-    const int kept = b.image ? 0 : from;
-    b.table = offset ? n->compliance->next[kept][offset - 1] : n->compliance->own[kept];
-    return b;
-}
-
-/* compliance between two points by a block, by width function, (functions, functions) */
-static void tabulate(const gk_node *n, block b, const gk_spot *p, const gk_spot *q, double *cell)
-{
-    const int A = n->model->functions, R = n->model->rolls;
-    const gk_grid *first = b.swapped ? &q->grid : &p->grid, *second = b.swapped ? &p->grid : &q->grid;
-    double sum[MAX_FUNCTIONS * MAX_FUNCTIONS] = {0};
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const double w = first->weight[i] * second->weight[j];
-            const gk_real *t = b.table + (size_t)((first->index + i) * R + second->index + j) * (size_t)(A * A);
-            for (int c = 0; c < A * A; c++) sum[c] += w * t[c];
-        }
-    for (int a = 0; a < A; a++)
-        for (int c = 0; c < A; c++) {
-            const double value = sum[b.swapped ? c * A + a : a * A + c];
-            cell[a * A + c] = b.image ? value * gk_width_sign(n->model, a) * gk_width_sign(n->model, c) : value;
-        }
 }
 
 /* the same between two candidates, (strips, strips); 0 when they are too far apart for the table: what stored modes
@@ -132,130 +79,15 @@ static int tabulated(const gk_node *n, int first, int second, double *out)
     double cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
     for (int c = 0; c < strips * strips; c++) out[c] = 0.0;
     if (offset < -FURTHER || offset > FURTHER) return 0;
-    const block b = block_of(n, n->at[first * strips].flank, n->at[second * strips].flank, offset);
+    const gk_block b = gk_block_of(n, n->at[first * strips].flank, n->at[second * strips].flank, offset);
     for (int s = 0; s < strips; s++)
         for (int t = 0; t < strips; t++) {
             if (n->gear->helix != 0.0 || s + t == 0) /* else all strips have the same rolls */
-                tabulate(n, b, &n->at[first * strips + s], &n->at[second * strips + t], cell);
+                gk_block_tabulate(n, b, &n->at[first * strips + s], &n->at[second * strips + t], cell);
             const double *of_s = n->at[first * strips + s].width, *of_t = n->at[second * strips + t].width;
-            for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * dot(cell + a * A, of_t, A);
+            for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * gk_node_dot(cell + a * A, of_t, A);
         }
     return 1;
-}
-
-/* What the ground oscillators that are not dynamic and the supports do to a side (gk_node_motion: rows M of motions) */
-typedef struct grounded {
-    int motions, columns;
-    double *yields;  /* (motions, motions): M Ω⁻² Mᵀ − C_fs κ C_sf: the motion at a flank per load on motions */
-    double *loaded;  /* (points, motions): yields · motion of every point */
-    double *joints;  /* (motions, supports + 1): elongation of the supports; angle of the port */
-    double *dynamic; /* (motions, width of the gear): M of the dynamic oscillators */
-} grounded;
-
-static void add_outer(double factor, const double *a, const double *b, int n, int m, double *sum)
-{
-    for (int i = 0; i < n; i++, sum += m) {
-        const double by = factor * a[i];
-        for (int j = 0; j < m && by != 0.0; j++) sum[j] += by * b[j];
-    }
-}
-
-/* one oscillator that is not dynamic */
-static void add_yield(const gk_node *n, const grounded *g, int k)
-{
-    const gk_ground *ground = &n->model->ground[n->setup->base.set];
-    const int which = n->gear->ground[n->setup->base.set].list[k], supports = n->model->supports;
-    const double by = 1.0 / (ground->omega[which] * ground->omega[which]);
-    double column[12 + MAX_LOW], joint[MAX_SUPPORTS + 1] = {0};
-    for (int i = 0; i < g->motions; i++) column[i] = gk_node_motion(n->gear, n->setup->base.set, i)[k];
-    for (int s = 0; s < supports; s++) joint[s] = ground->support_rows[s * ground->n + which];
-    if (n->side->port_of >= 0) joint[supports] = ground->port_rows[n->side->port_of * ground->n + which];
-    add_outer(by, column, column, g->motions, g->motions, g->yields);
-    add_outer(by, column, joint, g->motions, supports + 1, g->joints);
-}
-
-/* the supports' answer to forces on the gear's node: C_fs of a point is node · node_support */
-static void add_supports(const gk_node *n, const grounded *g)
-{
-    const int supports = n->model->supports, first = 6 + n->gear->low;
-    const double *kappa = n->model->ground[n->setup->base.set].kappa;
-    const double *to_port = n->model->port_support + n->side->port_of * supports;
-    for (int i = 0; i < 6; i++) {
-        const double *a = n->gear->node_support + i * supports;
-        double *joint = g->joints + (size_t)(first + i) * (size_t)(supports + 1);
-        for (int s = 0; s < supports; s++) {
-            if (a[s] == 0.0) continue;
-            joint[s] += a[s];
-            for (int j = 0; j < 6; j++)
-                g->yields[(size_t)(first + i) * (size_t)g->motions + (size_t)(first + j)] -=
-                    a[s] * dot(kappa + s * supports, n->gear->node_support + j * supports, supports);
-            if (n->side->port_of >= 0) joint[supports] -= a[s] * dot(kappa + s * supports, to_port, supports);
-        }
-    }
-}
-
-/* M of the dynamic oscillators, in their order; rigid motion is not among what sides hold of them: the gap reads it */
-static void select_dynamic(const gk_node *n, const grounded *g)
-{
-    const gk_base *base = &n->setup->base;
-    const int32_t *list = n->gear->ground[base->set].list;
-    for (int i = 6; i < g->motions; i++) {
-        const double *row = gk_node_motion(n->gear, base->set, i);
-        double *to = g->dynamic + (size_t)i * (size_t)g->columns - base->from[n->side->gear];
-        for (int k = 0; k < n->gear->ground[base->set].reads; k++)
-            if (base->slot[list[k]] >= 0) to[base->slot[list[k]]] = row[k];
-    }
-}
-
-static grounded ground_side(const gk_node *n)
-{
-    const gk_base *base = &n->setup->base;
-    const size_t motions = (size_t)gk_node_motions(n->gear), joints = (size_t)n->model->supports + 1;
-    grounded g = {.motions = (int)motions, .columns = base->width[n->side->gear]};
-    g.yields = gk_node_room(n), g.joints = g.yields + motions * motions;
-    g.dynamic = g.joints + motions * joints, g.loaded = g.dynamic + motions * (size_t)g.columns;
-    memset(g.yields, 0, (motions * (motions + joints + (size_t)g.columns)) * sizeof *g.yields);
-    const int32_t *list = n->gear->ground[base->set].list;
-    for (int k = 0; k < n->gear->ground[base->set].reads; k++)
-        if (base->slot[list[k]] < 0) add_yield(n, &g, k);
-    add_supports(n, &g);
-    select_dynamic(n, &g);
-    return g;
-}
-
-typedef double gk_two __attribute__((vector_size(2 * sizeof(double)), may_alias, aligned(sizeof(double))));
-
-/* out (m) += x (n) · matrix (n, m), by eight columns whose sums stay in registers */
-static void add_times(const double *x, const double *matrix, int n, int m, double *out)
-{
-    int j = 0;
-    for (; j + 8 <= m; j += 8) {
-        const gk_two *row;
-        gk_two *to = (gk_two *)(out + j), a = to[0], b = to[1], c = to[2], d = to[3];
-        for (int i = 0; i < n; i++) {
-            row = (const gk_two *)(matrix + (size_t)i * (size_t)m + (size_t)j);
-            a += x[i] * row[0], b += x[i] * row[1], c += x[i] * row[2], d += x[i] * row[3];
-        }
-        to[0] = a, to[1] = b, to[2] = c, to[3] = d;
-    }
-    for (; j < m; j++)
-        for (int i = 0; i < n; i++) out[j] += x[i] * matrix[(size_t)i * (size_t)m + (size_t)j];
-}
-
-/* yields · motion of every point of a node */
-static void load_ground(const gk_node *n, const grounded *g)
-{
-    memset(g->loaded, 0, (size_t)n->points * (size_t)g->motions * sizeof *g->loaded);
-    for (int i = 0; i < n->points; i++) {
-        const size_t at = (size_t)i * (size_t)g->motions;
-        add_times(n->motion + at, g->yields, g->motions, g->motions, g->loaded + at);
-    }
-}
-
-/* through the ground oscillators that are not dynamic and the supports, between two points */
-static double through_ground(const gk_node *n, const grounded *g, int i, int j)
-{
-    return dot(n->motion + (size_t)i * (size_t)g->motions, g->loaded + (size_t)j * (size_t)g->motions, g->motions);
 }
 
 /* Σ a b/ω² over the dynamic modes, rows halfway to the next node as the step interpolates them */
@@ -273,7 +105,7 @@ static double carried_halfway(const gk_node *n, int at, int i, int j)
 
 /* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its
  * damper is parallel to. Halfway to the next node: what makes the parabola there right. */
-static void store_block(const gk_node *n, int at, int halfway, const grounded *g, int p, int q)
+static void store_block(const gk_node *n, int at, int halfway, const gk_grounded *g, int p, int q)
 {
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
@@ -285,7 +117,7 @@ static void store_block(const gk_node *n, int at, int halfway, const grounded *g
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = 2 * (size_t)i * columns + (size_t)j, mirrored = 2 * (size_t)j * columns + (size_t)i;
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
-        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, g, i, j);
+        const double ground = n->e->kind == MESH_FLAT ? 0.0 : gk_grounded_through(n, g, i, j);
         const double all = (near ? cell[c] : stored) + ground;
         if (halfway) {
             const double middle = all - carried_halfway(n, at, i, j);
@@ -298,35 +130,11 @@ static void store_block(const gk_node *n, int at, int halfway, const grounded *g
     }
 }
 
-static void store_residual(const gk_node *n, int at, int halfway, const grounded *g)
+static void store_residual(const gk_node *n, int at, int halfway, const gk_grounded *g)
 {
-    if (n->e->kind != MESH_FLAT) load_ground(n, g);
+    if (n->e->kind != MESH_FLAT) gk_grounded_load(n, g);
     for (int p = 0; p < n->side->candidates; p++)
         for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, g, p, q);
-}
-
-/* of the normal displacement at flank `from` per force along the profile at flank `to` of the same tooth */
-static block along_normal_of(const gk_node *n, int from, int to)
-{
-    const int image = n->gear->mirrored && from == 1;
-    return (block){image ? n->compliance->along_normal[0][1 - to] : n->compliance->along_normal[from][to], 0, image};
-}
-
-static block along_own_of(const gk_node *n, int from, int to)
-{
-    const int image = n->gear->mirrored && from == 1;
-    if (from != to) return (block){n->compliance->along_across, from == 1, 0};
-    return (block){n->compliance->along_own[image ? 0 : from], image, image};
-}
-
-/* Compliance between two points by a block */
-static double between(const gk_node *n, block b, int i, int j)
-{
-    const int A = n->model->functions;
-    double sum = 0.0, cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
-    tabulate(n, b, &n->at[i], &n->at[j], cell);
-    for (int a = 0; a < A; a++) sum += n->at[i].width[a] * dot(cell + a * A, n->at[j].width, A);
-    return sum;
 }
 
 /* Σ a b/ω² over modes `from` … `to` − 1 */
@@ -339,7 +147,7 @@ static double carried_by(const gk_node *n, const double *a, const double *b, int
 
 /* What is not dynamic yields along the normal and along the profile per force along the profile. One tooth by its own
  * table; of others what stored modes carry. */
-static void store_along_residual(const gk_node *n, int at, const grounded *g)
+static void store_along_residual(const gk_node *n, int at, const gk_grounded *g)
 {
     const gk_side *side = n->side;
     const gk_gear *gear = n->gear;
@@ -349,7 +157,8 @@ static void store_along_residual(const gk_node *n, int at, const grounded *g)
     for (int j = 0; j < n->points; j++) {
         memset(loaded, 0, (size_t)g->motions * sizeof *loaded);
         if (n->e->kind != MESH_FLAT)
-            add_times(n->along_motion + (size_t)j * (size_t)g->motions, g->yields, g->motions, g->motions, loaded);
+            gk_grounded_times(n->along_motion + (size_t)j * (size_t)g->motions, g->yields, g->motions, g->motions,
+                              loaded);
         for (int i = 0; i < n->points; i++) {
             const int same = n->at[i].offset == n->at[j].offset && gear->along_normal;
             const double *a = n->rows + (size_t)i * modes, *s = n->along_rows + (size_t)i * modes;
@@ -358,11 +167,11 @@ static void store_along_residual(const gk_node *n, int at, const grounded *g)
             const double sign = same ? -1.0 : 1.0;
             double normal = sign * carried_by(n, a, t, from, to), along = sign * carried_by(n, s, t, from, to);
             if (same)
-                normal += own * between(n, along_normal_of(n, n->at[i].flank, n->at[j].flank), i, j),
-                    along += between(n, along_own_of(n, n->at[i].flank, n->at[j].flank), i, j);
+                normal += own * gk_block_between(n, gk_block_along_normal(n, n->at[i].flank, n->at[j].flank), i, j),
+                    along += gk_block_between(n, gk_block_along_own(n, n->at[i].flank, n->at[j].flank), i, j);
             if (n->e->kind != MESH_FLAT) {
-                normal += dot(n->motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
-                along += dot(n->along_motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
+                normal += gk_node_dot(n->motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
+                along += gk_node_dot(n->along_motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
             }
             const size_t to_table = ((size_t)at * n->points + (size_t)i) * (size_t)side->columns + (size_t)j;
             side->along.normal[to_table] = (gk_real)normal;
@@ -372,7 +181,7 @@ static void store_along_residual(const gk_node *n, int at, const grounded *g)
 }
 
 /* rows along the profile of what is dynamic, and what friction puts on supports at once */
-static void store_along(const gk_node *n, int at, const grounded *g)
+static void store_along(const gk_node *n, int at, const gk_grounded *g)
 {
     const gk_side *side = n->side;
     const gk_modal *m = &n->setup->modal[side->gear];
@@ -389,14 +198,14 @@ static void store_along(const gk_node *n, int at, const grounded *g)
         memset(held, 0, (size_t)supports * sizeof *held);
         if (n->e->kind == MESH_FLAT || !n->setup->on.elastic) continue;
         const double *motion = n->along_motion + (size_t)i * (size_t)g->motions;
-        add_times(motion, g->dynamic, g->motions, g->columns, moves);
-        if (n->setup->on.residual) add_times(motion, g->joints, g->motions, supports + 1, moved);
-        for (int s = 0; s < supports; s++) held[s] = dot(ground->kappa + s * supports, moved, supports);
+        gk_grounded_times(motion, g->dynamic, g->motions, g->columns, moves);
+        if (n->setup->on.residual) gk_grounded_times(motion, g->joints, g->motions, supports + 1, moved);
+        for (int s = 0; s < supports; s++) held[s] = gk_node_dot(ground->kappa + s * supports, moved, supports);
     }
 }
 
 /* flank to bore angle and to supports, beside what dynamic oscillators carry */
-static void store_joints(const gk_node *n, int at, const grounded *g)
+static void store_joints(const gk_node *n, int at, const gk_grounded *g)
 {
     const gk_side *side = n->side;
     const int supports = n->model->supports;
@@ -404,8 +213,8 @@ static void store_joints(const gk_node *n, int at, const grounded *g)
     for (int i = 0; i < n->points; i++) {
         const size_t point = (size_t)at * n->points + (size_t)i;
         double moved[MAX_SUPPORTS + 1] = {0}, *to = side->support + point * gk_padded(supports);
-        add_times(n->motion + (size_t)i * (size_t)g->motions, g->joints, g->motions, supports + 1, moved);
-        for (int s = 0; s < supports; s++) to[s] = dot(kappa + s * supports, moved, supports);
+        gk_grounded_times(n->motion + (size_t)i * (size_t)g->motions, g->joints, g->motions, supports + 1, moved);
+        for (int s = 0; s < supports; s++) to[s] = gk_node_dot(kappa + s * supports, moved, supports);
         side->port[point] = n->port[i] + moved[supports];
     }
 }
@@ -422,12 +231,12 @@ static void store_rows(const gk_node *n, int at)
 }
 
 /* rows of the dynamic ground oscillators without the rigid motion, which the gap reads */
-static void store_ground(const gk_node *n, int at, const grounded *g)
+static void store_ground(const gk_node *n, int at, const gk_grounded *g)
 {
     double *to = n->side->ground + (size_t)at * (size_t)n->points * (size_t)g->columns;
     memset(to, 0, (size_t)n->points * (size_t)g->columns * sizeof *to);
     for (int i = 0; i < n->points; i++, to += g->columns)
-        add_times(n->motion + (size_t)i * (size_t)g->motions, g->dynamic, g->motions, g->columns, to);
+        gk_grounded_times(n->motion + (size_t)i * (size_t)g->motions, g->dynamic, g->motions, g->columns, to);
 }
 
 /* patterns of far teeth at the points */
@@ -468,7 +277,7 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     GK_ASSERT(setup->mesh[e].side[which].candidates <= MAX_CANDIDATES);
     gk_side *side = &setup->mesh[e].side[which];
     gk_node n = gk_node_begin(model, setup, work, e, side);
-    const grounded g = ground_side(&n);
+    const gk_grounded g = gk_grounded_side(&n);
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
     for (int at = 0; at <= side->nodes; at++) {
         gk_node_gather(&n, (double)at / side->nodes);

@@ -92,7 +92,6 @@ static size_t lay_out(const gk_model *model, const gk_gear *gear, int along, gk_
     return used;
 }
 
-/* of the scratch of gk_spread_compliance: doubles, then numbers of the blocks */
 size_t gk_spread_scratch(const gk_model *model, size_t *reals)
 {
     size_t doubles = 0;
@@ -167,7 +166,6 @@ static const float *spread_across(const spreader *s, const float *from, gk_real 
     return s->gear->mirrored ? spread_half(s, from, 1, out) : spread_whole(s, from, out);
 }
 
-/* compliances of a gear on the even grid of rolls, into work->compliance */
 void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work *work, int g)
 {
     GK_ASSERT(gk_is_gear(model, g) && work->blocks);
