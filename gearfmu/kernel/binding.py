@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import mmap
+import sys
 from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint32, c_uint64, c_void_p
 from functools import lru_cache
 from pathlib import Path
@@ -108,11 +110,13 @@ def status_words(status: int) -> list[str]:
 
 
 def aligned(size: int) -> tuple[ctypes.Array, int]:
-    """A zeroed buffer of `size` bytes whose returned address is a multiple of 64; keep the buffer as long as the
-    address."""
-    buffer = ctypes.create_string_buffer(size + 64)
-    address = ctypes.addressof(buffer)
-    return buffer, address + (-address) % 64
+    """Zeroed memory of `size` bytes whose returned address is a multiple of 64; keep the array as long as the address.
+
+    Pages that nothing touches cost nothing: the kernel's sizes are those of the largest setup.
+    """
+    own = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if sys.platform != "win32" else {}
+    memory = (ctypes.c_char * max(size, 1)).from_buffer(mmap.mmap(-1, max(size, 1), **own))
+    return memory, ctypes.addressof(memory)
 
 
 def blank_message() -> ctypes.Array:

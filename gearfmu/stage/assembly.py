@@ -20,23 +20,25 @@ from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
+from gearfmu.stage.compact import flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.far import LOWEST, far_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.film import film_starts
 from gearfmu.stage.flanks import deviation_sections
-from gearfmu.stage.friction import along_rows, friction_starts
-from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount
+from gearfmu.stage.free import Flank
+from gearfmu.stage.friction import friction_starts
+from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
 from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.nodal import nodal_sections
 from gearfmu.stage.observed import observed_number, observed_sections
 from gearfmu.stage.spinning import turn_rates
-from gearfmu.stage.tables import ROLLS
+from gearfmu.stage.tables import ROLLS, stored_points
 from gearfmu.stage.teeth import gear_section, mismatches
 from gearfmu.stage.whirls import whirl_rows
 
-MODEL_VERSION = 2
+MODEL_VERSION = 3
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
@@ -72,7 +74,8 @@ def general_sections(
     problems = [p for entry in zip(stage.gears, shapes, bodies, strict=True) for p in mismatches(*entry)]
     if problems:
         raise ModelError("; ".join(problems) + ": make the bodies again with `gearfmu reduce`")
-    layout = stage_layout(stage, bodies, rolls, carriers)
+    flanks = [stored_points(body, s.s_form, s.s_tip, rolls) for body, s in zip(bodies, shapes, strict=True)]
+    layout = stage_layout(stage, bodies, carriers, [points for points, _ in flanks])
     nodes = port_nodes(stage, carriers)
     groups = mount_sets(layout)
     degrees = width_degrees(stage, bodies)
@@ -94,7 +97,7 @@ def general_sections(
         place = stage.place(gear.name, None)
         sections[f"gear{i}"] = gear_section(gear, shape, phases[gear.name], place)
         sections |= deviation_sections(i, gear, shape)
-        sections |= _gear_sections(stage, i, bodies[i], groups, nodes)
+        sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)
     lowest = 2 * math.pi * LOWEST * float(sections["limits"][0])
@@ -191,22 +194,28 @@ def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str
 
 
 def _gear_sections(
-    stage: GeneralStage, index: int, body: Any, groups: Sequence[Group], nodes: Sequence[tuple[int, int]]
+    stage: GeneralStage,
+    index: int,
+    body: Any,
+    groups: Sequence[Group],
+    nodes: Sequence[tuple[int, int]],
+    degrees: np.ndarray,
 ) -> dict[str, Any]:
     """Sections of gear `index`, of its scope and in every set of ground oscillators."""
     flank = groups[0].layout.bodies[index].flank
     assert flank is not None
     name, chosen = stage.gears[index].name, flank.chosen
     meshes = sum(name in mesh.gears for mesh in stage.engagements)
-    tables = flank_sections(index, groups, nodes)
+    tables = flank_sections(index, groups, nodes, degrees)
     rates = turn_rates(body, chosen)
     turning = {} if rates is None else {f"turn_rate{index}": rates}
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
+    size = [rotor, body.teeth, chosen.size, reads, meshes > 1, *flank_sizes(flank, degrees)]
     return (
         tables
         | turning
         | {
-            f"size{index}": np.array([rotor, body.teeth, chosen.size, reads, meshes > 1], np.int32),
+            f"size{index}": np.array(size, np.int32),
             f"omega{index}": 2 * np.pi * body.frequency[chosen],
             f"zeta{index}": body.damping_ratio[chosen],
             f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
@@ -215,7 +224,14 @@ def _gear_sections(
     )
 
 
-def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[int, int]]) -> dict[str, np.ndarray]:
+def flank_sizes(flank: Flank, degrees: np.ndarray) -> tuple[int, int, bool]:
+    """The last of "size": points that are stored, ground modes, whether flank 1 is the image of flank 0."""
+    return flank.residual.shape[3], flank.low.size, is_mirrored(flank, degrees)
+
+
+def flank_sections(
+    index: int, groups: Sequence[Group], nodes: Sequence[tuple[int, int]], degrees: np.ndarray
+) -> dict[str, np.ndarray]:
     """What the flanks of gear `index` read: of its gear group and in every set of ground oscillators. nodes: (body,
     node) of every port."""
     layout = groups[0].layout
@@ -226,26 +242,12 @@ def flank_sections(index: int, groups: Sequence[Group], nodes: Sequence[tuple[in
     family = families(layout)[index]
     reads = [np.flatnonzero(group.owner == family) for group in groups]
     assert len({read.size for read in reads}) == 1
-    found = {
-        f"rows{index}": flank.turning,
-        f"residual{index}": flank.residual,
-        f"support_residual{index}": groups[0].flank_supports(index),
+    found = flank_tables(index, flank, degrees) | {
+        f"node_support{index}": node_directions(layout, index).T,
         f"port_residual{index}": port,
     }
-    if flank.along is not None:
-        found |= {
-            f"along_rows{index}": flank.along.turning,
-            f"along_normal{index}": flank.along.normal,
-            f"along_own{index}": flank.along.own,
-        }
     for s, (group, read) in enumerate(zip(groups, reads, strict=True)):
-        if flank.along is not None:
-            found |= {f"along_ground{index}_{s}": along_rows(group, index)[..., read]}
-        found |= {
-            f"ground_list{index}_{s}": read.astype(np.int32),
-            f"centre{index}_{s}": group.rigid(index)[:, read],
-            f"ground_rows{index}_{s}": group.flank_rows(index)[..., read],
-        }
+        found |= ground_tables(index, s, group, read)
     return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from gearfmu.errors import ModelError
 
 MAGIC = b"GFMB"
-FORMAT = 1
+FORMAT = 2
 HEADER = struct.Struct("<4sI32sQI12x")
 ENTRY = struct.Struct("<24sIIQQ")
 ALIGNMENT = 64
@@ -23,8 +23,8 @@ HASHED_FROM = 40
 MOST_SECTIONS = 1024
 LONGEST_NAME = 23
 REPEATED_FROM = 4096  # bytes: a section at least as long that is there already is stored once
-F64, I32, TEXT = 1, 2, 3
-DTYPE: dict[int, np.dtype] = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1")}
+F64, I32, TEXT, F32 = 1, 2, 3, 4
+DTYPE: dict[int, np.dtype] = {F64: np.dtype("<f8"), I32: np.dtype("<i4"), TEXT: np.dtype("u1"), F32: np.dtype("<f4")}
 
 Sections = Mapping[str, "np.ndarray | str"]
 
@@ -32,7 +32,7 @@ Sections = Mapping[str, "np.ndarray | str"]
 def write_blob(sections: Sections) -> bytes:
     """Bytes of a blob with `sections` in the order given.
 
-    Values: arrays of floats (stored as f64, any shape, C order, all finite),
+    Values: arrays of floats (float32 stored as f32, others as f64, any shape, C order, all finite),
     arrays of integers or booleans (stored as i32), or text without NUL.
     What equal bodies have in common, the tables of equal planets, is stored once.
     Raises ModelError that lists every section that cannot be stored.
@@ -71,7 +71,7 @@ def blob_hash(blob: bytes) -> str:
 
 
 def read_blob(blob: bytes) -> dict[str, np.ndarray | str]:
-    """Sections of a blob: one-dimensional read-only arrays (float64, int32) and text, in stored order.
+    """Sections of a blob: one-dimensional read-only arrays (float64, float32, int32) and text, in stored order.
 
     Raises ModelError at the first rule that is broken: nothing after it can be trusted.
     """
@@ -109,7 +109,8 @@ def _encode(name: str, value: np.ndarray | str, problems: list[str]) -> tuple[in
         if not np.all(np.isfinite(array)):
             wrong = np.count_nonzero(~np.isfinite(array))
             problems.append(f"section '{name}': {wrong} of {array.size} values are not finite")
-        return F64, np.ascontiguousarray(array, DTYPE[F64])
+        kind = F32 if array.dtype.itemsize == DTYPE[F32].itemsize else F64
+        return kind, np.ascontiguousarray(array, DTYPE[kind])
     if array.dtype.kind in "iub":
         limits = np.iinfo(np.int32)
         if array.size and (array.min() < limits.min or array.max() > limits.max):
@@ -132,7 +133,7 @@ def _encode_text(name: str, value: str, problems: list[str]) -> np.ndarray:
 
 
 def _decode(name: str, kind: int, values: np.ndarray) -> np.ndarray | str:
-    if kind == F64 and not np.all(np.isfinite(values)):
+    if kind in (F64, F32) and not np.all(np.isfinite(values)):
         raise ModelError(f"model blob: section '{name}' holds a value that is not finite")
     if kind != TEXT:
         return values

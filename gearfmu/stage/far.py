@@ -13,6 +13,8 @@ import math
 import numpy as np
 
 from gearfmu.spec.shapes import GearShape
+from gearfmu.stage.compact import ground_rows
+from gearfmu.stage.tables import blend
 
 RANK = 12  # error beside the own compliance of a tooth: docs/decisions/kernel.md
 LOWEST = 0.25  # of the cut of level fast: what is below is dynamic at every level (SHARED_BELOW, gk_choose.c)
@@ -28,7 +30,8 @@ def far_sections(
 
     sections: of the model so far; width: face width, m; lowest: rad/s, below it everything is dynamic at every level.
     """
-    rows, omega = sections[f"rows{index}"], sections[f"omega{index}"]
+    resample, omega = sections[f"resample{index}"], sections[f"omega{index}"]
+    rows = blend(resample, sections[f"rows{index}"], 1)
     size = rows.shape[:3]
     modes = rows.reshape(math.prod(size), omega.size)
     ground = [_ground_rows(index, s, sections, shape, width).reshape(3, math.prod(size), -1) for s in range(sets)]
@@ -45,9 +48,16 @@ def far_sections(
     found = _left_vectors(snapshots)[:, :RANK]
     patterns[:, : found.shape[1]] = found
     return {
-        f"far_rows{index}": patterns.reshape(*size, RANK),
+        f"far_rows{index}": _at_points(resample, patterns.reshape(*size, RANK)),
         f"far_modes{index}": patterns.T @ modes,
     } | {f"far_ground{index}_{s}": patterns.T @ tables for s, tables in enumerate(ground)}
+
+
+def _at_points(resample: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(2, P, A, RANK): the values at the points that are stored whose `resample` (rolls, P) is `rows`."""
+    columns = np.moveaxis(rows, 1, 0)
+    found = np.linalg.lstsq(resample, columns.reshape(len(columns), -1))[0]
+    return np.moveaxis(found.reshape(-1, *columns.shape[1:]), 0, 1)
 
 
 def _left_vectors(columns: np.ndarray) -> np.ndarray:
@@ -63,7 +73,7 @@ def _ground_rows(
 ) -> np.ndarray:
     """(3, 2, rolls, functions, reads) kg^-1/2: outward normal displacement of a tooth by ground oscillators, rigid
     motion included, as c0 + c_c cos ψ + c_s sin ψ of the tooth's angle."""
-    moved = sections[f"ground_rows{index}_{number}"]
+    moved = blend(sections[f"resample{index}"], ground_rows(index, number, sections), 2)
     rigid = _rigid_rows(shape, moved.shape[2], width, sections["degrees"])
     return moved + np.einsum("jfras,sk->jfrak", rigid, sections[f"centre{index}_{number}"])
 

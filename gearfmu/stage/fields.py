@@ -26,7 +26,7 @@ COUNTS = (
     "rolls",
     "sets",
 )
-SIZES = ("rotor", "z", "modes", "reads", "both_flanks")
+SIZES = ("rotor", "z", "modes", "reads", "both_flanks", "points", "low", "mirrored")
 FLANK_SIZES = ("flank_teeth", "flank_places", "flank_rolls")
 GEAR_NUMBERS = (
     "r_b",
@@ -58,12 +58,12 @@ ENGAGEMENT_NUMBERS = (
     "tilt_y",
 )
 _LINE = re.compile(r'^GK_FIELD\((\w+), (\w+), (\w+), "([^"]*)", "([^"]*)", "([^"]*)"\)$', re.MULTILINE)
-_KINDS = {"I32": "iub", "F64": "f", "TEXT": "U"}
+_KINDS = {"I32": "iub", "F64": "f", "F32": "f", "TEXT": "U"}
 
 
 @dataclass(frozen=True)
 class Field:
-    """One array of the blob. scope: MODEL, GEAR, SET or GEAR_SET; kind: I32, F64 or TEXT; dimensions: numbers and
+    """One array of the blob. scope: MODEL, GEAR, SET or GEAR_SET; kind: I32, F64, F32 or TEXT; dimensions: numbers and
     symbols."""
 
     scope: str
@@ -97,8 +97,8 @@ def fields() -> tuple[Field, ...]:
 
 
 def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
-    """`sections` in the order of the table. AssertionError that lists every section that is missing, unknown, or of
-    another type or shape: the writer's mistake, not the user's."""
+    """`sections` in the order of the table, floats in the precision in which they are stored. AssertionError that lists
+    every section that is missing, unknown, or of another type or shape: the writer's mistake, not the user's."""
     sizes = dict(zip(COUNTS, map(int, sections["counts"]), strict=True))
     found = {"carried": "carried", "whirls": "whirl", "starts": "start_reference"}
     sizes |= {word: len(sections.get(name, ())) for word, name in found.items()}
@@ -107,7 +107,7 @@ def order_sections(sections: Mapping[str, Any]) -> dict[str, Any]:
         if name not in sections:
             problems += [] if field.optional else [f"{name} is missing"]
             continue
-        ordered[name] = sections[name]
+        ordered[name] = np.asarray(sections[name], np.float32) if field.kind == "F32" else sections[name]
         problems += _problems(field, name, sections[name], known)
     problems += [f"{name} is unknown" for name in sections if name not in ordered]
     assert not problems, "; ".join(problems)
@@ -118,7 +118,7 @@ def _instances(sections: Mapping[str, Any], sizes: dict[str, int]) -> Iterator[t
     """Every field once per scope number: field, name of the section, sizes known there."""
     of_gear = {
         g: sizes
-        | dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True))
+        | _with_places(dict(zip(SIZES, map(int, sections[f"size{g}"]), strict=True)), sizes["functions"])
         | {"own": len(sections.get(f"own_number{g}", ()))}
         | dict(zip(FLANK_SIZES, map(int, sections.get(f"flank_size{g}", (0, 0, 0))), strict=True))
         for g in range(sizes["gears"])
@@ -135,6 +135,14 @@ def _instances(sections: Mapping[str, Any], sizes: dict[str, int]) -> Iterator[t
             yield from (
                 (field, f"{field.name}{g}_{s}", known | of_set[s]) for g, known in of_gear.items() for s in of_set
             )
+
+
+def _with_places(size: dict[str, int], functions: int) -> dict[str, int]:
+    """Sizes of a gear and what they come to: flanks with tables of their own, places of a flank, their pairs."""
+    places = size["points"] * functions
+    square, half = places**2, places * (places + 1) // 2
+    of_image = {"flanks": 2 - size["mirrored"], "across": half if size["mirrored"] else square}
+    return size | of_image | {"places": places, "half": half}
 
 
 def _problems(field: Field, name: str, value: Any, sizes: Mapping[str, int]) -> list[str]:

@@ -43,10 +43,11 @@ class Along:
 
 @dataclass(frozen=True)
 class Flank:
-    """What the flanks of a gear read, on the even grid of P rolls, for A width functions.
+    """What the flanks of a gear read at P lengths of roll, for A width functions.
 
     turning (2, P, A, m), kg^-½: rows on tooth 0 of the modes that turn with the gear (ν ≥ 2), chosen (m,) their
-    numbers in the body, low (n,) those of the ground modes (ν ≤ 1); patterns (3, 2, P, A, n), kg^-½: c₀, c_c, c_s of
+    numbers in the body, low (n,) those of the ground modes (ν ≤ 1), low_member (n,): 0 single, 1 and 2 of a pair;
+    patterns (3, 2, P, A, n), kg^-½: c₀, c_c, c_s of
     the ground modes; node (3, 2, P, A, 6), m/N and 1/N: the same per unit force and moment on the bore node, beyond the
     ground modes; residual (2, 2, 7, P, P, A, A), m/N: from flank, to flank, tooth offset −3 … 3, beyond the ground
     modes.
@@ -55,6 +56,7 @@ class Flank:
     turning: np.ndarray
     chosen: np.ndarray
     low: np.ndarray
+    low_member: np.ndarray
     patterns: np.ndarray
     node: np.ndarray
     residual: np.ndarray
@@ -90,8 +92,8 @@ class FreeBody:
 
 
 def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.ndarray) -> FreeBody:
-    """The FreeBody of a ReducedBody: `chosen` modes, width functions of `degrees`, rolls of `to_grid` (`resampling`).
-    Its one node is the bore.
+    """The FreeBody of a ReducedBody: `chosen` modes, width functions of `degrees`, rolls of `to_grid` (P, R), weights
+    of those of the body (`resampling`; a unit matrix leaves them). Its one node is the bore.
 
     ModelError where patterns of nodal diameter 2 and more move the bore: the body is no ring of equal sectors.
     """
@@ -103,7 +105,7 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
     rows = blend(to_grid, body.flank_rows[:, :, degrees], 1)
     patterns = turn_tables(rows[..., low], body.part[low])
     node = turn_tables(blend(to_grid, body.static_fb[:, :, degrees], 1), NODE_MEMBERS)
-    node -= _products(patterns / omega**2, bore)
+    node -= products(patterns / omega**2, bore)
     mass = np.zeros((6, 6))
     mass[:3, :3], mass[3:, 3:] = body.mass * np.eye(3), body.inertia
     return FreeBody(
@@ -113,11 +115,12 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
         zeta=body.damping_ratio[low],
         place=np.zeros(1),
         rows=bore[None],
-        residual=_symmetric(body.static_bb * _couples(NODE_MEMBERS) - _products(bore / omega**2, bore)),
+        residual=_symmetric(body.static_bb * _couples(NODE_MEMBERS) - products(bore / omega**2, bore)),
         flank=Flank(
             turning=rows[..., turning],
             chosen=turning,
             low=low,
+            low_member=body.part[low],
             patterns=patterns,
             node=node,
             residual=_flank_residual(body, degrees, to_grid, patterns, omega),
@@ -142,7 +145,7 @@ def free_carrier(body: InterfaceBody) -> FreeBody:
     if short:
         raise ModelError(f"body '{body.name}': {', '.join(short)} must move in all six directions to hold planets")
     omega, count = 2 * np.pi * body.frequency, len(body.interfaces)
-    residual = _symmetric(body.static - _products(body.rows / omega**2, body.rows))
+    residual = _symmetric(body.static - products(body.rows / omega**2, body.rows))
     scale = np.sqrt(np.abs(np.diag(body.static)))
     return FreeBody(
         name=body.name,
@@ -232,7 +235,7 @@ def _check_bore(body: Any, turning: np.ndarray) -> None:
         )
 
 
-def _products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """left (…, n) · right (m, n)ᵀ, summed in one order whatever the memory (`blend`)."""
     total = np.zeros((*left.shape[:-1], right.shape[0]))
     for k in range(right.shape[1]):

@@ -74,13 +74,19 @@ def width_degrees(stage: GeneralStage, bodies: Sequence[Any]) -> np.ndarray:
 def stage_layout(
     stage: GeneralStage,
     bodies: Sequence[Any],
-    rolls: int = ROLLS,
     carriers: Mapping[str, InterfaceBody] = MappingProxyType({}),
+    points: Sequence[np.ndarray] | None = None,
 ) -> Layout:
     """The layout of a stage: reduced gears `bodies` in the order of stage.gears, then its shafts and its reduced
-    `carriers`."""
+    `carriers`. points: of every gear the weights (P, R) of the body's rolls at those where flanks are read; the even
+    grid of ROLLS where None."""
     nodes, degrees = stage_nodes(stage, carriers), width_degrees(stage, bodies)
-    free = [_gear(stage, gear, body, degrees, rolls) for gear, body in zip(stage.gears, bodies, strict=True)]
+    points = even_grids(stage, bodies, ROLLS) if points is None else points
+    free: list[FreeBody] = []
+    for i, gear in enumerate(stage.gears):
+        same = next((k for k in range(i) if bodies[k] is bodies[i] and np.array_equal(points[k], points[i])), None)
+        free.append(_gear(stage, bodies[i], degrees, points[i]) if same is None else free[same])
+        free[i] = replace(free[i], name=gear.name)  # a body's file may come from another stage
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
     free += [_shaft(stage, shaft, nodes.places[shaft.name]) for shaft in shafts]
     free += [replace(free_carrier(carriers[carrier.name]), name=carrier.name) for carrier in stage.carriers]
@@ -100,11 +106,14 @@ def stage_layout(
     return replace(bare, supports=[_support(stage, nodes, bare, support) for support in stage.supports])
 
 
-def _gear(stage: GeneralStage, gear: ToothedBody, body: Any, degrees: np.ndarray, rolls: int) -> FreeBody:
-    shape = gear_shape(gear)
-    chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
-    free = free_gear(body, chosen, degrees, resampling(body.roll, shape.s_form, shape.s_tip, rolls))
-    return replace(free, name=gear.name)  # a body's file may come from another stage
+def even_grids(stage: GeneralStage, bodies: Sequence[Any], rolls: int) -> list[np.ndarray]:
+    """(rolls, R) of every gear: weights of its body's rolls on the even grid."""
+    shapes = [gear_shape(gear) for gear in stage.gears]
+    return [resampling(body.roll, s.s_form, s.s_tip, rolls) for s, body in zip(shapes, bodies, strict=True)]
+
+
+def _gear(stage: GeneralStage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
+    return free_gear(body, excited_modes(body, degrees) if stage.even else _all_modes(body, degrees), degrees, weights)
 
 
 def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:

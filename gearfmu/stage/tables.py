@@ -30,6 +30,16 @@ def resampling(roll: np.ndarray, s_form: float, s_tip: float, rolls: int = ROLLS
     return terms / sum(terms.T)[:, None]
 
 
+def stored_points(body: Any, s_form: float, s_tip: float, rolls: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where a model stores what a flank reads: at the body's own R points, or on the even grid where that has fewer.
+
+    (P, R) weights from the body's points to those that are stored, (rolls, P) from these to the even grid.
+    """
+    to_grid = resampling(body.roll, s_form, s_tip, rolls)
+    own = body.roll.size < rolls
+    return (np.eye(body.roll.size), to_grid) if own else (to_grid, np.eye(rolls))
+
+
 def blend(weights: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
     """`values` with `axis` (R,) replaced by (rolls,): Σ_r weights[:, r]·values[r], summed in the order of r.
 

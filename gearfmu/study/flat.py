@@ -10,10 +10,12 @@ import numpy as np
 
 from gearfmu.stage.assembly import MODEL_VERSION
 from gearfmu.stage.blob import write_blob
+from gearfmu.stage.compact import residual_sections
 from gearfmu.stage.fields import gear_numbers, order_sections
+from gearfmu.stage.tables import OFFSETS
 
 GRID = 4  # rolls of the tables: all equal
-OFFSETS, OWN = 7, 3
+OWN = 3
 FLAT, TORQUE = 0, 1
 TOUCHING = 1e-15  # m
 NO_LOCAL = 1e-20  # 1/Pa: the local law as good as rigid; all compliance is in the residual
@@ -82,22 +84,26 @@ def flat_blob(name: str, bodies: Sequence[FlatBody], contact: FlatContact) -> by
 
 def _body_sections(g: int, body: FlatBody, contact: FlatContact) -> dict[str, np.ndarray]:
     n, functions = body.omega.size, len(contact.degrees)
-    static = np.zeros((2, 2, OFFSETS, GRID, GRID, functions, functions))
+    static = np.zeros((2, 2, len(OFFSETS), GRID, GRID, functions, functions))
     static[0, 0, OWN] = body.residual + (body.rows / body.omega**2) @ body.rows.T
-    return {
-        f"size{g}": np.array([g, 1, n, 0, 0], np.int32),
+    return residual_sections(g, static, np.array(contact.degrees)) | {
+        f"size{g}": np.array([g, 1, n, 0, 0, GRID, 0, 0], np.int32),
         f"gear{g}": _flat_numbers(contact.local),
         f"omega{g}": body.omega,
         f"zeta{g}": body.zeta,
         f"diameter{g}": np.zeros(n, np.int32),
         f"member{g}": np.zeros(n, np.int32),
         f"rows{g}": np.broadcast_to(body.rows, (2, GRID, functions, n)),
-        f"residual{g}": static,
-        f"support_residual{g}": np.zeros((3, 2, GRID, functions, 0)),
+        f"resample{g}": np.eye(GRID),
+        f"low_rows{g}": np.zeros((2, GRID, functions, 0)),
+        f"low_member{g}": np.zeros(0, np.int32),
+        f"node{g}": np.zeros((3, 2, GRID, functions, 6)),
+        f"node_support{g}": np.zeros((6, 0)),
         f"port_residual{g}": np.zeros((2, GRID, functions, 2)),
         f"ground_list{g}_0": np.zeros(0, np.int32),
         f"centre{g}_0": np.zeros((6, 0)),
-        f"ground_rows{g}_0": np.zeros((3, 2, GRID, functions, 0)),
+        f"low_ground{g}_0": np.zeros((0, 0)),
+        f"node_ground{g}_0": np.zeros((6, 0)),
     }
 
 

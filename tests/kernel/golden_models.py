@@ -30,7 +30,7 @@ MODELS = {  # name → stage, modes of a body (a set needs more: distant teeth),
 }
 ROLLS = 6
 NODES = (9, 5)  # of a flank for nodal contact: along, across
-FRICTION = ("along_rows", "along_normal", "along_own", "along_ground")
+FRICTION = ("along_rows", "along_low", "along_normal", "along_own", "along_across")
 BITS = 16  # of the mantissa that tables keep
 TABLE = 64  # elements: shorter arrays are not rounded
 

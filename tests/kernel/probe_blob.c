@@ -12,7 +12,7 @@ int probe_blob_open(const void *bytes, size_t size, char *message, char *hash, u
     return outcome;
 }
 
-/* sum of the elements of section `name` under type 1, 2, 3; *count = UINT64_MAX when absent */
+/* sum of the elements of section `name` under type 1, 2, 3, 4; *count = UINT64_MAX when absent */
 int probe_blob_sum(const void *bytes, size_t size, const char *name, int type, double *sum, uint64_t *count)
 {
     char message[GK_MESSAGE];
@@ -25,7 +25,8 @@ int probe_blob_sum(const void *bytes, size_t size, const char *name, int type, d
     const double *f = type == 1 ? gk_blob_f64(&blob, name, &n) : NULL;
     const int32_t *k = type == 2 ? gk_blob_i32(&blob, name, &n) : NULL;
     const char *t = type == 3 ? gk_blob_text(&blob, name, &n) : NULL;
-    for (uint64_t i = 0; i < n; i++) *sum += f ? f[i] : k ? k[i] : t[i];
-    if (f || k || t) *count = n;
+    const float *s = type == 4 ? gk_blob_f32(&blob, name, &n) : NULL;
+    for (uint64_t i = 0; i < n; i++) *sum += f ? f[i] : k ? k[i] : s ? (double)s[i] : t[i];
+    if (f || k || s || t) *count = n;
     return GK_OK;
 }

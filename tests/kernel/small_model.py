@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 from exact_bars import Bar
 
-from gearfmu.stage.assembly import MODEL_VERSION, flank_sections, port_compliances, set_sections
+from gearfmu.stage.assembly import MODEL_VERSION, flank_sections, flank_sizes, port_compliances, set_sections
 from gearfmu.stage.blob import read_blob, write_blob
 from gearfmu.stage.fields import gear_numbers, order_sections
 from gearfmu.stage.free import FreeBody, free_gear
@@ -171,10 +171,12 @@ def _groups(bodies: list[FreeBody]) -> list[Group]:
 
 
 def _modes(g: int, body: SimpleNamespace, groups: list[Group]) -> dict[str, np.ndarray]:
-    tables, turning = flank_sections(g, groups, NODES), DIAMETER > 1
+    degrees, flank = np.array(DEGREES), groups[0].layout.bodies[g].flank
+    tables, turning = flank_sections(g, groups, NODES, degrees), DIAMETER > 1
     reads = tables[f"ground_list{g}_0"].size
     return tables | {
-        f"size{g}": np.array([g, TEETH[g], turning.sum(), reads, 0], np.int32),
+        f"size{g}": np.array([g, TEETH[g], turning.sum(), reads, 0, *flank_sizes(flank, degrees)], np.int32),
+        f"resample{g}": np.eye(ROLLS),
         f"omega{g}": 2 * np.pi * body.frequency[turning],
         f"zeta{g}": body.damping_ratio[turning],
         f"diameter{g}": DIAMETER[turning].astype(np.int32),

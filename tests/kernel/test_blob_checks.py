@@ -14,7 +14,7 @@ from mutations import mutated
 from probes import Probes
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.blob import ENTRY, F64, HEADER, I32, TEXT, blob_hash, read_blob, seal, write_blob
+from gearfmu.stage.blob import ENTRY, F32, F64, HEADER, I32, TEXT, blob_hash, read_blob, seal, write_blob
 
 BAD_BLOB = 1
 SAMPLE = {
@@ -25,6 +25,7 @@ SAMPLE = {
     "more": np.full(8, -2.5),
 }
 BLOB = write_blob(SAMPLE)
+SINGLE = write_blob({"single": np.full(16, -1.5, np.float32)})
 LONG = np.arange(600.0)
 REPEATING = write_blob({"long0": LONG, "other": LONG[:7], "long1": LONG, "long2": LONG})
 TYPE, REPEATS, COUNT, OFFSET = 24, 28, 32, 40  # places in a table entry
@@ -50,6 +51,8 @@ def test_sections_are_found_by_name_and_type(probes: Probes) -> None:
     assert probes.blob_sum(BLOB, "teeth", I32) == (-8.0, 2)
     assert probes.blob_sum(BLOB, "none", F64) == (0.0, 0)
     assert probes.blob_sum(BLOB, "name", TEXT)[1] == len("fzg_c µ".encode()) + 1
+    assert probes.blob_sum(SINGLE, "single", F32) == (-24.0, 16)
+    assert probes.blob_sum(SINGLE, "single", F64) is None and probes.blob_sum(BLOB, "roll", F32) is None
     assert probes.blob_sum(BLOB, "roll", I32) is None
     assert probes.blob_sum(BLOB, "rol", F64) is None and probes.blob_sum(BLOB, "rolls", F64) is None
 
@@ -66,7 +69,7 @@ def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
     [
         (BLOB[:10], "10 bytes are too few"),
         (b"GFMC" + BLOB[4:], "does not begin with GFMB"),
-        (patched(4, b"\x02"), "format version 2, this kernel reads version 1"),
+        (patched(4, b"\x01"), "format version 1, this kernel reads version 2: assemble the stage again"),
         (BLOB[:-64], "cut short"),
         (patched(40, struct.pack("<Q", len(BLOB) + 1)), "cut short"),
         (patched(48, struct.pack("<I", 2**32 - 1)), "sections do not fit"),
@@ -79,7 +82,7 @@ def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
         (patched(entry(1) + 20, b"x"), "name of section 1"),
         (patched(entry(0), b"y" * 24), "name of section 0"),
         (patched(entry(2), b"name\0"), "'name' is there twice"),
-        (patched(entry(1) + TYPE, b"\4"), "'roll' is of unknown type 4"),
+        (patched(entry(1) + TYPE, b"\5"), "'roll' is of unknown type 5"),
         (patched(entry(1) + TYPE + 4, b"\1"), "'roll' does not repeat an earlier one"),
         (patched(entry(2) + COUNT, struct.pack("<Q", 2**62)), "'teeth' reaches beyond the end"),
         (patched(entry(2) + COUNT, struct.pack("<Q", 2**64 - 1)), "'teeth' reaches beyond the end"),
@@ -89,6 +92,9 @@ def test_sha256_of_every_padding_case(probes: Probes, length: int) -> None:
         (patched(entry(4) + COUNT, struct.pack("<Q", 0)), "sections end at"),
         (patched(len(BLOB) - 8, struct.pack("<d", np.inf)), "'more' holds a value that is not finite"),
         (patched(len(BLOB) - 8, struct.pack("<d", np.nan)), "'more' holds a value that is not finite"),
+        (patched(len(SINGLE) - 4, struct.pack("<f", np.inf), SINGLE), "'single' holds a value that is not finite"),
+        (patched(len(SINGLE) - 4, struct.pack("<f", np.nan), SINGLE), "'single' holds a value that is not finite"),
+        (patched(entry(0) + COUNT, struct.pack("<Q", 17), SINGLE), "'single' reaches beyond the end"),
         (patched(entry(0) + COUNT, b"\7"), "'name' is not UTF-8 text that ends with NUL"),
         (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\xff"), "'name' is not UTF-8"),
         (patched(ENTRY.unpack_from(BLOB, entry(0))[4], b"\0"), "'name' is not UTF-8"),

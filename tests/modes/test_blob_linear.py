@@ -11,13 +11,13 @@ import math
 import numpy as np
 import pytest
 import scipy.linalg as sl
+from flank_reader import full_tables
 from pair_by_parts import Contact, couple, gear_at, slice_weights, tangents
 
 from gearfmu.body import load_stage_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.assembly import general_sections
-from gearfmu.stage.fields import order_sections
 from gearfmu.stage.free import read_tables
 from gearfmu.stage.tables import OFFSETS
 
@@ -40,15 +40,16 @@ class Side:
         self.supports = np.zeros((len(contacts), len(s[f"kappa{number}"])))
         self.port = np.zeros((len(contacts), 2))
         self.residual = np.zeros((len(contacts), len(contacts)))
+        tables = full_tables(s, gear, ROLLS, number)
         for i, (tooth, roll, slice_) in enumerate(contacts):
             psi, w = phase + tooth * step, weights[slice_]
-            elastic = read_tables(s[f"ground_rows{gear}_{number}"][:, 0, roll], psi)
+            elastic = read_tables(tables.ground[:, 0, roll], psi)
             self.ground[i, ground] = normal @ s[f"centre{gear}_{number}"][:2] + w @ elastic
-            self.turning[i] = turn(w @ s[f"rows{gear}"][0, roll], s, gear, tooth * step)
-            self.supports[i] = w @ read_tables(s[f"support_residual{gear}"][:, 0, roll], psi)
-            self.port[i] = w @ s[f"port_residual{gear}"][0, roll]
+            self.turning[i] = turn(w @ tables.rows[0, roll], s, gear, tooth * step)
+            self.supports[i] = w @ read_tables(tables.supports[:, 0, roll], psi)
+            self.port[i] = w @ tables.port[0, roll]
             for k, (other, there, of) in enumerate(contacts):
-                block = s[f"residual{gear}"][0, 0, OFFSETS.index(other - tooth), roll, there]
+                block = tables.residual[0, 0, OFFSETS.index(other - tooth), roll, there]
                 self.residual[i, k] = w @ block @ weights[of]
 
 
@@ -107,7 +108,7 @@ def test_frequencies_in_loaded_contact_are_those_of_the_parts(held):
     ]
     parts = couple(spec, [gear_at(spec, bodies, g, 0.0, contacts) for g in (0, 1)], contacts, held)
     want = np.sqrt(sl.eigh(parts.stiffness, np.diag(parts.mass), eigvals_only=True)) / (2 * math.pi)
-    sections = order_sections(general_sections(spec, bodies))
+    sections = general_sections(spec, bodies)
     have = frequencies_from_sections(spec, sections, contacts, int(held))
     error = np.abs(have / want - 1).max()
     print(

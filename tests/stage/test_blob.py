@@ -110,5 +110,5 @@ def test_every_length_but_the_right_one_is_refused() -> None:
 
 def test_another_version_names_the_remedy() -> None:
     blob = write_blob(SAMPLE)
-    with pytest.raises(ModelError, match="version 9, this package reads version 1: assemble the stage again"):
+    with pytest.raises(ModelError, match="version 9, this package reads version 2: assemble the stage again"):
         read_blob(seal(blob[:4] + b"\x09\0\0\0" + blob[8:]))

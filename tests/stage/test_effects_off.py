@@ -49,7 +49,7 @@ def of_supports(sections: Sections) -> None:
 
 
 DATA = {
-    "effect.elastic": of_sections(1.2, "residual0", "residual1"),
+    "effect.elastic": of_sections(1.2, "residual_own0", "residual_own1"),
     "effect.tip_relief": of_gears("relief", 2.0),
     "effect.tip_contact": of_gears("tip_edge", 1.001),  # more would leave a step between flank and edge
     "effect.contact_damping": of_pair("damping", 5.0),

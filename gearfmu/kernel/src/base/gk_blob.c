@@ -13,7 +13,7 @@
 #endif
 
 enum {
-    FORMAT = 1,
+    FORMAT = 2,
     HEADER = 64,
     HASH_OFFSET = 8,
     HASHED_FROM = 40,
@@ -22,7 +22,7 @@ enum {
     ALIGNMENT = 64,
     MOST_SECTIONS = 1024
 };
-typedef enum section_type { F64 = 1, I32 = 2, TEXT = 3 } section_type;
+typedef enum section_type { F64 = 1, I32 = 2, TEXT = 3, F32 = 4 } section_type;
 
 typedef struct section {
     const char *name;
@@ -65,7 +65,10 @@ static section section_at(const gk_blob *blob, uint32_t i)
 
 static uint64_t aligned(uint64_t n) { return (n + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT; }
 
-static uint64_t element_size(uint32_t type) { return type == F64 ? 8 : type == I32 ? 4 : type == TEXT ? 1 : 0; }
+static uint64_t element_size(uint32_t type)
+{
+    return type == F64 ? 8 : type == I32 || type == F32 ? 4 : type == TEXT ? 1 : 0;
+}
 
 /* printable ASCII without space, then NUL to the end */
 static int name_is_good(const char *name)
@@ -82,6 +85,14 @@ static int all_finite(const unsigned char *values, uint64_t count)
     const uint64_t exponent = (uint64_t)0x7ff << 52;
     for (uint64_t i = 0; i < count; i++)
         if ((u64_at(values + 8 * i) & exponent) == exponent) return 0;
+    return 1;
+}
+
+static int all_finite_f32(const unsigned char *values, uint64_t count)
+{
+    const uint32_t exponent = (uint32_t)0xff << 23;
+    for (uint64_t i = 0; i < count; i++)
+        if ((u32_at(values + 4 * i) & exponent) == exponent) return 0;
     return 1;
 }
 
@@ -177,7 +188,7 @@ static gk_outcome check_section(const gk_blob *blob, uint32_t i, uint64_t *end, 
     if (s.offset > blob->size || s.count > (blob->size - s.offset) / size)
         return refuse(message, "model blob: section '%s' reaches beyond the end", s.name);
     const unsigned char *contents = blob->bytes + s.offset;
-    if (s.type == F64 && !all_finite(contents, s.count))
+    if ((s.type == F64 && !all_finite(contents, s.count)) || (s.type == F32 && !all_finite_f32(contents, s.count)))
         return refuse(message, "model blob: section '%s' holds a value that is not finite", s.name);
     if (s.type == TEXT && !is_text(contents, s.count))
         return refuse(message, "model blob: section '%s' is not UTF-8 text that ends with NUL", s.name);
@@ -229,6 +240,11 @@ const double *gk_blob_f64(const gk_blob *blob, const char *name, uint64_t *count
 {
     GK_ASSERT(blob && name && count);
     return find(blob, name, F64, count);
+}
+const float *gk_blob_f32(const gk_blob *blob, const char *name, uint64_t *count)
+{
+    GK_ASSERT(blob && name && count);
+    return find(blob, name, F32, count);
 }
 const int32_t *gk_blob_i32(const gk_blob *blob, const char *name, uint64_t *count)
 {

@@ -5,7 +5,7 @@
 #include <string.h>
 
 typedef enum { MODEL, GEAR, SET, GEAR_SET } field_scope;
-typedef enum { F64, I32, TEXT } field_type;
+typedef enum { F64, F32, I32, TEXT } field_type;
 typedef struct field {
     field_scope scope;
     const char *name;
@@ -19,10 +19,11 @@ static const field TABLE[GK_FIELDS] = {
 #undef GK_FIELD
 };
 
-static const char *const WORDS[SYMBOLS] = {"rotors",  "gears",       "engagements",  "ports",      "supports",
-                                           "dampers", "functions",   "rolls",        "z",          "modes",
-                                           "reads",   "ground",      "carried",      "whirls",     "own",
-                                           "starts",  "flank_teeth", "flank_places", "flank_rolls"};
+static const char *const WORDS[SYMBOLS] = {"rotors",  "gears",       "engagements",  "ports",       "supports",
+                                           "dampers", "functions",   "rolls",        "z",           "modes",
+                                           "reads",   "ground",      "carried",      "whirls",      "own",
+                                           "starts",  "flank_teeth", "flank_places", "flank_rolls", "points",
+                                           "low",     "flanks",      "places",       "half",        "across"};
 
 static void section_name(const field *f, const gk_shape *shape, char out[32])
 {
@@ -39,6 +40,7 @@ static const void *section(const gk_blob *blob, const field *f, const gk_shape *
     char name[32];
     section_name(f, shape, name);
     return f->type == F64   ? (const void *)gk_blob_f64(blob, name, count)
+           : f->type == F32 ? (const void *)gk_blob_f32(blob, name, count)
            : f->type == I32 ? (const void *)gk_blob_i32(blob, name, count)
                             : (const void *)gk_blob_text(blob, name, count);
 }

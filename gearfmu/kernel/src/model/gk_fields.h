@@ -31,6 +31,12 @@ typedef enum gk_symbol {
     SYMBOL_flank_teeth,
     SYMBOL_flank_places,
     SYMBOL_flank_rolls,
+    SYMBOL_points, /* of a flank where rows are stored */
+    SYMBOL_low,    /* modes of nodal diameter 0 and 1 */
+    SYMBOL_flanks, /* with tables of their own */
+    SYMBOL_places, /* points times width functions */
+    SYMBOL_half,   /* pairs of places, each once */
+    SYMBOL_across, /* numbers of a table between both flanks */
     SYMBOLS
 } gk_symbol;
 

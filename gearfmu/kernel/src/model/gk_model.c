@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MODEL_VERSION = 2, MOST_NAME = 64 };
+enum { MODEL_VERSION = 3, MOST_NAME = 64 };
 static const double ROUNDING = 1e-9; /* relative: of numbers that are computed from those of the stage file */
 
 /* what is read with: blob, shape so far, and the first thing that was wrong */
@@ -61,6 +61,19 @@ static const double *bounded(reader *r, int field, double limit)
     if (!v) return NULL;
     for (uint64_t i = 0, count = length_of(r, field); i < count; i++)
         if (!between(v[i], -limit, limit)) {
+            refuse(r, gk_field_name(field), "is out of range");
+            return NULL;
+        }
+    return v;
+}
+
+/* the same in single precision */
+static const float *bounded_f32(reader *r, int field, float limit)
+{
+    const float *v = take(r, field);
+    if (!v) return NULL;
+    for (uint64_t i = 0, count = length_of(r, field); i < count; i++)
+        if (!(v[i] >= -limit && v[i] <= limit)) {
             refuse(r, gk_field_name(field), "is out of range");
             return NULL;
         }
@@ -240,13 +253,11 @@ static void read_ground_of(reader *r, gk_model *m, gk_gear *g, int set)
     g->ground[set].reads = (int)r->shape.size[SYMBOL_reads];
     g->ground[set].list = take(r, F_GEAR_SET_ground_list);
     g->ground[set].centre = bounded(r, F_GEAR_SET_centre, 1e6);
-    g->ground[set].rows = bounded(r, F_GEAR_SET_ground_rows, 1e6);
-    g->ground[set].along = bounded(r, F_GEAR_SET_along_ground, 1e6);
-    g->ground[set].far = bounded(r, F_GEAR_SET_far_ground, 1e6);
+    g->ground[set].low = bounded(r, F_GEAR_SET_low_ground, 1e6);
+    g->ground[set].node = bounded(r, F_GEAR_SET_node_ground, 1e17);
+    g->ground[set].far = bounded_f32(r, F_GEAR_SET_far_ground, 1e6f);
     if (!r->outcome && (!g->far_rows != !g->far_modes || !g->far_rows != !g->ground[set].far))
         refuse(r, "patterns of far teeth", "are not known in all their parts");
-    const int parts = !!g->along_rows + !!g->along_normal + !!g->along_own + !!g->ground[set].along;
-    if (!r->outcome && parts % 4) refuse(r, "displacement along the profile", "is not known in all its parts");
     for (int k = 0; k < g->ground[set].reads && !r->outcome; k++) {
         demand(r, counted(g->ground[set].list + k, 0, m->ground[set].n - 1), "ground oscillators of a gear");
         if (k && g->ground[set].list[k] <= g->ground[set].list[k - 1])
@@ -363,6 +374,44 @@ static int is_spatial(const gk_model *m)
     return 0;
 }
 
+/* what words in the dimensions of a gear's fields stand for */
+static void take_sizes(reader *r, const gk_model *m, const gk_gear *g)
+{
+    uint64_t *size = r->shape.size;
+    const uint64_t places = (uint64_t)g->points * (uint64_t)m->functions, half = places * (places + 1) / 2;
+    size[SYMBOL_z] = (uint64_t)g->z, size[SYMBOL_modes] = (uint64_t)g->modes;
+    size[SYMBOL_points] = (uint64_t)g->points, size[SYMBOL_low] = (uint64_t)g->low;
+    size[SYMBOL_flanks] = g->mirrored ? 1 : 2, size[SYMBOL_places] = places, size[SYMBOL_half] = half;
+    size[SYMBOL_across] = g->mirrored ? half : places * places;
+}
+
+static void read_along(reader *r, gk_gear *g)
+{
+    g->along_rows = bounded_f32(r, F_GEAR_along_rows, 1e6f);
+    g->along_low = bounded_f32(r, F_GEAR_along_low, 1e6f);
+    g->along_normal = bounded_f32(r, F_GEAR_along_normal, 1e3f);
+    g->along_own = bounded_f32(r, F_GEAR_along_own, 1e3f);
+    g->along_across = bounded_f32(r, F_GEAR_along_across, 1e3f);
+    const int parts = !!g->along_rows + !!g->along_low + !!g->along_normal + !!g->along_own + !!g->along_across;
+    if (!r->outcome && parts % 5) refuse(r, "displacement along the profile", "is not known in all its parts");
+}
+
+/* rows of the modes and compliance beyond them, at the points that are stored */
+static void read_tables(reader *r, gk_gear *g)
+{
+    g->resample = bounded(r, F_GEAR_resample, 1e3);
+    g->rows = bounded_f32(r, F_GEAR_rows, 1e6f);
+    g->low_rows = bounded_f32(r, F_GEAR_low_rows, 1e6f);
+    g->low_member = take(r, F_GEAR_low_member);
+    if (!r->outcome) demand(r, pairs_whole(g->low_member, g->low), "pairs of modes of nodal diameter 0 and 1");
+    g->node = bounded_f32(r, F_GEAR_node, 1e3f), g->node_support = bounded(r, F_GEAR_node_support, 1e3);
+    g->residual_own = bounded_f32(r, F_GEAR_residual_own, 1e3f);
+    g->residual_next = bounded_f32(r, F_GEAR_residual_next, 1e3f);
+    g->residual_across = bounded_f32(r, F_GEAR_residual_across, 1e3f);
+    g->port_residual = bounded_f32(r, F_GEAR_port_residual, 1e3f);
+    read_along(r, g);
+}
+
 static void read_gear(reader *r, gk_model *m, int i)
 {
     gk_gear *g = &m->gear[i];
@@ -370,24 +419,20 @@ static void read_gear(reader *r, gk_model *m, int i)
     const int32_t *size = take(r, F_GEAR_size);
     if (!size) return;
     WITHIN(r, size[1], TEETH, "number of teeth");
-    demand(r, counted(size, 0, m->rotors - 1) && counted(size + 2, 0, MAX_MODES), "sizes of a gear");
+    demand(r,
+           counted(size, 0, m->rotors - 1) && counted(size + 2, 0, MAX_MODES) && counted(size + 5, 1, MAX_POINTS) &&
+               counted(size + 6, 0, MAX_LOW) && counted(size + 7, 0, 1),
+           "sizes of a gear");
     if (r->outcome) return;
     g->rotor = size[0], g->z = size[1], g->modes = size[2];
-    r->shape.size[SYMBOL_z] = (uint64_t)g->z;
-    r->shape.size[SYMBOL_modes] = (uint64_t)g->modes;
+    g->points = size[5], g->low = size[6], g->mirrored = size[7];
+    take_sizes(r, m, g);
     read_numbers(r, g);
     g->omega = take(r, F_GEAR_omega), g->zeta = take(r, F_GEAR_zeta);
     g->diameter = take(r, F_GEAR_diameter), g->member = take(r, F_GEAR_member);
     g->turn_rate = bounded(r, F_GEAR_turn_rate, 1.001);
-    g->rows = bounded(r, F_GEAR_rows, 1e6);
-    g->residual = bounded(r, F_GEAR_residual, 1e3);
-    g->along_rows = bounded(r, F_GEAR_along_rows, 1e6);
-    g->along_normal = bounded(r, F_GEAR_along_normal, 1e3);
-    g->along_own = bounded(r, F_GEAR_along_own, 1e3);
-    g->far_rows = bounded(r, F_GEAR_far_rows, 1e3);
-    g->far_modes = bounded(r, F_GEAR_far_modes, 1e6);
-    g->support_residual = bounded(r, F_GEAR_support_residual, 1e3);
-    g->port_residual = bounded(r, F_GEAR_port_residual, 1e3);
+    read_tables(r, g);
+    g->far_rows = bounded_f32(r, F_GEAR_far_rows, 1e3f), g->far_modes = bounded_f32(r, F_GEAR_far_modes, 1e6f);
     if (!r->outcome) check_modes(r, g);
     for (int set = 0; set < m->sets; set++) read_ground_of(r, m, g, set);
     if (!r->outcome) read_index(r, g);
@@ -517,49 +562,4 @@ gk_outcome gk_model_open(gk_model *model, const void *blob, size_t size, char me
         model->running_out |= model->gear[g].runout != NULL;
     }
     return r.outcome;
-}
-
-size_t gk_model_size(void) { return sizeof(gk_model); }
-const char *gk_model_name(const gk_model *model)
-{
-    GK_ASSERT(model);
-    return model->name;
-}
-const char *gk_model_hash(const gk_model *model)
-{
-    GK_ASSERT(model);
-    return model->blob.hash;
-}
-int gk_abi(void) { return GK_ABI; }
-
-const char *gk_status_text(int bit)
-{
-    static const char *const text[] = {
-        "local contact law beyond its range",
-        "fallback scheme in use",
-        "limit of iterations reached",
-        "gamma lowered: forces are damped more",
-        "a loaded flank ended although effect.tip_contact is off",
-        "mesh force beyond torque_max, which the model is made for",
-        "speed beyond speed_max, which the model is made for",
-        "the gears started at rest and were torn along in the first step: set speeds before the initialisation ends",
-    };
-    return bit >= 0 && bit < (int)(sizeof text / sizeof *text) ? text[bit] : NULL;
-}
-
-const char *gk_outcome_text(gk_outcome outcome)
-{
-    static const char *const text[GK_OUTCOMES] = {
-        "ok",
-        "bad model blob",
-        "no such variable in this model",
-        "value refused: not finite or out of range",
-        "call not allowed now",
-        "communication step refused: not positive, not finite or not at the current time",
-        "internal step too large for this model",
-        "no static equilibrium found for the start",
-        "diverged: state not finite even with the smallest step and the fallback scheme",
-        "teeth overlap beyond what the model can mean",
-        "energy balance broken"};
-    return (int)outcome >= 0 && outcome < GK_OUTCOMES ? text[outcome] : "unknown outcome";
 }

@@ -21,9 +21,11 @@ enum {
     MAX_MODES = 6000,
     MAX_TEETH = GK_HIGH_TEETH,
     MAX_GROUND = 2000,
-    MAX_OWN = 1000, /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
-    OFFSETS = 7,    /* tooth offsets −3 … 3 of the residual */
-    SETS = 2,       /* of ground oscillators: as supported; with the supports held */
+    MAX_POINTS = 256, /* of a flank where rows are stored */
+    MAX_LOW = 1000,   /* modes of nodal diameter 0 and 1 of a gear */
+    MAX_OWN = 1000,   /* rigid motion and patterns of nodal diameter 0 and 1 of an observed gear */
+    OFFSETS = 7,      /* tooth offsets −3 … 3 of the residual */
+    SETS = 2,         /* of ground oscillators: as supported; with the supports held */
     NAME_LENGTH = 32,
     MAX_NODES = GK_HIGH_NODES, /* of a flank along or across */
     MAX_FLANK_ROLLS = 1025,
@@ -54,21 +56,29 @@ typedef struct gk_gear {
     double edge, corner_radius, corner_angle; /* tip edge: arc radius, polar position of its centre */
     double z_mid, helix;                      /* axial place of mid-width; base helix angle, right-hand positive */
     int rotor, z, modes;
-    int nodes[2]; /* of a flank for nodal contact: along, across; 0: none */
-    const double *omega, *zeta, *rows, *residual, *support_residual, *port_residual;
-    const double *along_rows, *along_normal, *along_own; /* along the profile; NULL: unknown */
-    const double *turn_rate;                             /* (modes) Coriolis coupling of a pair; NULL: unknown */
+    int points, low, mirrored; /* where rows are stored; modes of nodal diameter 0 and 1; flank 1 is the image of 0 */
+    int nodes[2];              /* of a flank for nodal contact: along, across; 0: none */
+    const double *omega, *zeta;
+    const double *resample;              /* (rolls, points) weights of the points on the even grid of rolls */
+    const float *rows, *low_rows, *node; /* (2, points, functions, modes), (…, low); (3, 2, points, functions, 6) */
+    const int32_t *low_member;           /* (low) 0 single, 1 first, 2 second of a pair */
+    const double *node_support;          /* (6, supports) force on the gear's node by that of a support */
+    const float *residual_own, *residual_next, *residual_across; /* gk_spread.c puts them together */
+    const float *port_residual;
+    const float *along_rows, *along_low, *along_normal, *along_own, *along_across; /* NULL: unknown */
+    const double *turn_rate; /* (modes) Coriolis coupling of a pair; NULL: unknown */
     const int32_t *diameter, *member;
     const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
     double index_most;   /* the largest of them along the flank normal, m */
     gk_field_of_flanks flanks;
-    const double *far_rows, *far_modes; /* patterns of far teeth (gk_far_fill.c); NULL: none */
+    const float *far_rows, *far_modes; /* patterns of far teeth (gk_far_fill.c); NULL: none */
     const double *runout; /* (4) axis of the toothing beside that of rotation: x, y, tilt about x, y; NULL: none */
     struct {
         int reads; /* ground oscillators that this gear reads */
         const int32_t *list;
-        const double *centre, *rows, *along, *far;
+        const double *centre, *low, *node; /* (6, reads); of the modes (low, reads); on the gear's node (6, reads) */
+        const float *far;
     } ground[SETS];
     gk_observed observed;
 } gk_gear;

@@ -3,6 +3,7 @@
 #define GK_WORK_H
 #include "base/gk_check.h"
 #include "problem/gk_system.h"
+#include "setup/gk_spread.h"
 
 /* phases of a step, for the profile */
 enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to quads */
@@ -145,6 +146,9 @@ struct gk_work {
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
     double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
     double *columns; /* room for a node's rows and their products */
+    double *spread;  /* room of gk_spread.c, and the compliances that it makes of one gear */
+    gk_real *blocks;
+    gk_compliance compliance;
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
     gk_bores sum_bores;
     gk_field field[2];             /* nodal contact: teeth of A and B in hand */
@@ -181,7 +185,7 @@ typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     double force[MAX_SLICES], roll[MAX_SLICES];
     gk_strip_weights width;
 } gk_strip_load;
-void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum);
+void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum);
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */

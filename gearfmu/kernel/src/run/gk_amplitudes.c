@@ -32,7 +32,7 @@ void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, con
     gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
     for (int p = 0; p < engaged->places; p++)
         if (strip_load(setup, engaged, p, which, &load) > 0.0) {
-            gk_node_push(model, &load, setup->modal[g].count, modes);
+            gk_node_push(model, setup, &load, setup->modal[g].count, modes);
             gk_node_push_ground(model, setup, e, which, &load, ground);
         }
 }

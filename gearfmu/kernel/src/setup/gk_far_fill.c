@@ -11,17 +11,19 @@ int gk_far_known(const gk_model *model, const gk_setup *setup, int g)
 }
 
 /* sum += f a bᵀ of columns a and b of coefficients with that many columns */
-static void add_product(double *sum, double f, const double *a, const double *b, int columns)
+static void add_product(double *sum, double f, const float *a, const float *b, int columns)
 {
     for (int i = 0; i < FAR; i++)
-        for (int j = 0; j < FAR; j++) sum[i * FAR + j] += f * a[(size_t)i * columns] * b[(size_t)j * columns];
+        for (int j = 0; j < FAR; j++)
+            sum[i * FAR + j] += f * (double)a[(size_t)i * columns] * (double)b[(size_t)j * columns];
 }
 
 /* modes of the gear group that are not dynamic, m teeth after the load: those of a pair turn into each other */
 static void add_modes(const gk_gear *gear, int dynamic, int m, double *sum)
 {
     for (int k = dynamic; k < gear->modes; k++) {
-        const double f = 1.0 / (gear->omega[k] * gear->omega[k]), *a = gear->far_modes + k, *b = a + 1;
+        const double f = 1.0 / (gear->omega[k] * gear->omega[k]);
+        const float *a = gear->far_modes + k, *b = a + 1;
         const int64_t turned = (int64_t)gear->diameter[k] * m % gear->z;
         double sine, cosine;
         gk_sincos(2.0 * GK_PI * (double)turned / gear->z, &sine, &cosine);
@@ -47,8 +49,8 @@ static void add_ground(const gk_model *model, const gk_setup *setup, int g, int 
     for (int k = 0; k < reads; k++) {
         if (base->slot[list[k]] >= 0) continue;
         const double f = 1.0 / (omega[list[k]] * omega[list[k]]);
-        const double *all = model->gear[g].ground[base->set].far + k, *c = all + (size_t)FAR * reads,
-                     *s = c + (size_t)FAR * reads;
+        const float *all = model->gear[g].ground[base->set].far + k, *c = all + (size_t)FAR * reads,
+                    *s = c + (size_t)FAR * reads;
         add_product(sum, f, all, all, reads);
         add_product(sum, 0.5 * f * cosine, c, c, reads);
         add_product(sum, 0.5 * f * cosine, s, s, reads);

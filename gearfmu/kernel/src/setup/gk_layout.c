@@ -94,6 +94,24 @@ static void lay_out_modal(bump *b, const gk_gear *gear, gk_modal *m, int modes)
     m->turn_rate = reals(b, (size_t)m->pairs);
 }
 
+static void lay_out_flank(bump *b, const gk_model *model, gk_setup *setup, int g)
+{
+    const gk_gear *gear = &model->gear[g];
+    const int leader = gk_spread_leader(model, g);
+    const size_t cells = 2 * (size_t)(model->rolls * model->functions);
+    gk_flank_tables *to = &setup->flank[g];
+    *to = leader < g ? setup->flank[leader] : (gk_flank_tables){0};
+    to->port = reals(b, cells * (size_t)model->ports);
+    if (leader < g) return;
+    to->rows = reals(b, cells * (size_t)gear->modes);
+    to->low = reals(b, cells * (size_t)gear->low);
+    to->node = reals(b, 3 * cells * 6);
+    if (gear->far_rows) to->far = reals(b, cells * FAR);
+    if (!gear->along_rows || !GK_ON(setup, friction)) return;
+    to->along_rows = reals(b, cells * (size_t)gear->modes);
+    to->along_low = reals(b, cells * (size_t)gear->low);
+}
+
 static void lay_out_base(bump *b, const gk_model *model, gk_base *base, int count)
 {
     base->n = count;
@@ -164,6 +182,7 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
     }
     for (int g = 0; g < model->gears; g++)
         setup->far[g] = doubles(&b, gk_far_known(model, setup, g) ? (size_t)model->gear[g].z * FAR * FAR : 0);
+    for (int g = 0; g < model->gears; g++) lay_out_flank(&b, model, setup, g);
     lay_out_base(&b, model, &setup->base, ground);
     for (int e = 0; e < model->engagements; e++) {
         gk_mesh *mesh = &setup->mesh[e];
@@ -272,6 +291,9 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
     }
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
     work->columns = doubles(&b, gk_node_scratch(model));
+    size_t blocks;
+    work->spread = doubles(&b, gk_spread_scratch(model, &blocks));
+    work->blocks = reals(&b, blocks);
     work->sum_ground = doubles(&b, ground);
     for (int w = 0; w < 2; w++) {
         gk_real **of_field[] = {&work->field[w].q, &work->field[w].v, &work->field[w].f};

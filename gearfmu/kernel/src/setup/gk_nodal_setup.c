@@ -116,37 +116,74 @@ static gk_grid weights_at(const gk_model *model, const gk_gear *gear, double p, 
     return grid;
 }
 
-/* Σ weight row[roll] of entry k of a table (…, rolls, functions, width), at one function */
-static double blended(const gk_grid *grid, const double *table, int functions, int width, int a, int k)
+/* Σ weight row[roll] of entry k of a table (rolls, functions, width), at one function */
+static double blended(const gk_grid *grid, const gk_real *table, int functions, int width, int a, int k)
 {
     double sum = 0.0;
     for (int i = 0; i < 4; i++) sum += grid->weight[i] * table[(size_t)((grid->index + i) * functions + a) * width + k];
     return sum;
 }
 
-static void fill_point(const gk_model *model, gk_setup *setup, int g, int flank, int point, const gk_grid *grid)
+/* part c0, c_c or c_s of a row of modes of nodal diameter 0 and 1 (free.py, turn_tables), from that on tooth 0 */
+static double low_part(const gk_gear *gear, const double *row, int part, int k)
 {
-    const gk_gear *gear = &model->gear[g];
-    const gk_modal *m = &setup->modal[g];
+    const int member = gear->low_member[k];
+    if (part < 2) return (member == 0) == (part == 0) ? row[k] : 0.0;
+    return member == 1 ? -row[k + 1] : member == 2 ? row[k - 1] : 0.0;
+}
+
+/* Σ over the modes of nodal diameter 0 and 1 and the node, of one part of a row by ground oscillator k */
+static double ground_part(const gk_gear *gear, int set, const double *low, const double node[3][6], int part, int k)
+{
+    const int reads = gear->ground[set].reads;
+    double sum = 0.0;
+    for (int i = 0; i < gear->low; i++)
+        sum += low_part(gear, low, part, i) * gear->ground[set].low[(size_t)i * (size_t)reads + (size_t)k];
+    for (int i = 0; i < 6; i++) sum += node[part][i] * gear->ground[set].node[i * reads + k];
+    return sum;
+}
+
+/* a point of a flank and one width function: cell of the tables */
+typedef struct cell {
+    int gear, flank, function;
+    size_t number;
+    gk_grid grid;
+} cell;
+
+static void fill_modes(const gk_model *model, gk_setup *setup, const cell *c)
+{
+    const gk_gear *gear = &model->gear[c->gear];
+    const gk_modal *m = &setup->modal[c->gear];
+    const size_t cells = (size_t)(model->rolls * model->functions);
+    const gk_real *rows = setup->flank[c->gear].rows + (size_t)c->flank * cells * (size_t)gear->modes;
+    gk_real *modes = setup->point_rows[c->gear].modes + c->number * (size_t)m->n;
+    memset(modes, 0, (size_t)m->n * sizeof *modes);
+    for (int k = 0; k < m->count; k++)
+        modes[m->lane[k]] = (gk_real)blended(&c->grid, rows, model->functions, gear->modes, c->function, k);
+}
+
+static void fill_ground(const gk_model *model, gk_setup *setup, const cell *c)
+{
+    const gk_gear *gear = &model->gear[c->gear];
     const gk_base *base = &setup->base;
+    const gk_flank_tables *from = &setup->flank[c->gear];
     const int A = model->functions, reads = setup->on.elastic ? gear->ground[base->set].reads : 0;
-    const size_t rolls = (size_t)(model->rolls * A), width = (size_t)base->width[g];
+    const size_t cells = (size_t)(model->rolls * A), width = (size_t)base->width[c->gear];
+    const gk_real *rows = from->low + (size_t)c->flank * cells * (size_t)gear->low;
     const int32_t *list = gear->ground[base->set].list;
-    for (int a = 0; a < A; a++) {
-        const size_t cell = (size_t)((flank * POINTS + point) * A + a);
-        gk_real *modes = setup->point_rows[g].modes + cell * (size_t)m->n;
-        memset(modes, 0, (size_t)m->n * sizeof *modes);
-        for (int k = 0; k < m->count; k++)
-            modes[m->lane[k]] = (gk_real)blended(grid, gear->rows + (size_t)flank * rolls * (size_t)gear->modes, A,
-                                                 gear->modes, a, k);
-        for (int c = 0; c < 3; c++) {
-            gk_real *ground = setup->point_rows[g].ground + ((size_t)(2 * c * POINTS * A) + cell) * width;
-            const double *table = gear->ground[base->set].rows + (size_t)(2 * c + flank) * rolls * (size_t)reads;
-            memset(ground, 0, width * sizeof *ground);
-            for (int k = 0; k < reads; k++)
-                if (base->slot[list[k]] >= 0)
-                    ground[base->slot[list[k]] - base->from[g]] = (gk_real)blended(grid, table, A, reads, a, k);
-        }
+    double low[MAX_LOW], node[3][6];
+    for (int k = 0; k < gear->low; k++) low[k] = blended(&c->grid, rows, A, gear->low, c->function, k);
+    for (int part = 0; part < 3; part++)
+        for (int k = 0; k < 6; k++)
+            node[part][k] = blended(&c->grid, from->node + (size_t)(2 * part + c->flank) * cells * 6, A, 6, c->function,
+                                    k);
+    for (int part = 0; part < 3; part++) {
+        gk_real *ground = setup->point_rows[c->gear].ground + ((size_t)(2 * part * POINTS * A) + c->number) * width;
+        memset(ground, 0, width * sizeof *ground);
+        for (int k = 0; k < reads; k++)
+            if (base->slot[list[k]] >= 0)
+                ground[base->slot[list[k]] - base->from[c->gear]] = (gk_real)ground_part(gear, base->set, low, node,
+                                                                                         part, k);
     }
 }
 
@@ -156,8 +193,13 @@ void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g)
     const gk_gear *gear = &model->gear[g];
     const double length = fabs(gear->s_tip * gear->s_tip - gear->s_form * gear->s_form) / (2.0 * gear->r_b);
     for (int point = 0; point < POINTS && gear->nodes[0]; point++) {
-        const gk_grid grid = weights_at(model, gear, length * point / (POINTS - 1), length);
-        for (int flank = 0; flank < 2; flank++) fill_point(model, setup, g, flank, point, &grid);
+        cell c = {.gear = g, .grid = weights_at(model, gear, length * point / (POINTS - 1), length)};
+        for (c.flank = 0; c.flank < 2; c.flank++)
+            for (c.function = 0; c.function < model->functions; c.function++) {
+                c.number = (size_t)((c.flank * POINTS + point) * model->functions + c.function);
+                fill_modes(model, setup, &c);
+                fill_ground(model, setup, &c);
+            }
     }
 }
 

@@ -20,23 +20,36 @@ double gk_node_roll(const gk_side *side, int flank, double position, int offset)
 /* ---- where, and what is read there ------------------------------------------------------------------------------- */
 static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
 
-size_t gk_node_scratch(const gk_model *model)
+static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
+
+/* what gk_node_begin hands out */
+static size_t node_size(const gk_model *model, const gk_gear *gear)
 {
-    size_t modes = 0, reads = 0;
-    for (int g = 0; g < model->gears; g++) {
-        modes = modes > (size_t)model->gear[g].modes ? modes : (size_t)model->gear[g].modes;
-        for (int s = 0; s < model->sets; s++)
-            reads = reads > (size_t)model->gear[g].ground[s].reads ? reads : (size_t)model->gear[g].ground[s].reads;
-    }
-    const size_t of_node = points_of(model) * (2 * modes + 4 * reads + (size_t)model->supports + 1) + modes;
-    const size_t of_step = 4 * points_of(model) * (modes + LANES);
-    return of_node > of_step ? of_node : of_step;
+    const size_t modes = (size_t)gear->modes, motions = (size_t)gk_node_motions(gear);
+    return points_of(model) * (2 * modes + 2 * motions + 1) + (1 + (size_t)model->functions) * modes +
+           2 * (size_t)gear->z;
 }
 
-void gk_node_blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out)
+size_t gk_node_scratch(const gk_model *model)
+{
+    size_t most = 0;
+    for (int g = 0; g < model->gears; g++) {
+        const gk_gear *gear = &model->gear[g];
+        const size_t motions = (size_t)gk_node_motions(gear);
+        size_t ground = 0;
+        for (int s = 0; s < model->sets; s++) ground = larger(ground, (size_t)model->ground[s].n);
+        const size_t of_side = motions * (motions + points_of(model) + (size_t)model->supports + 1) +
+                               motions * (ground + 4 * (MAX_ROTORS + 1));
+        const size_t of_step = 4 * points_of(model) * ((size_t)gear->modes + LANES);
+        most = larger(most, larger(node_size(model, gear) + of_side, of_step));
+    }
+    return most;
+}
+
+void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out)
 {
     const int A = n->model->functions;
-    const double *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
+    const gk_real *t = table + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * width;
     for (int k = 0; k < width; k++) out[k] = 0.0;
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < A; a++, t += width) {
@@ -45,19 +58,45 @@ void gk_node_blend(const gk_node *n, const double *table, const gk_spot *p, int 
         }
 }
 
-static void turn_row(const gk_gear *gear, int offset, double *row)
+/* the same in two steps, for strips that have their length of roll in common: (functions, width) of the rolls … */
+static void blend_rolls(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *cells)
 {
+    const size_t size = (size_t)(n->model->functions * width);
+    const gk_real *t = table + (size_t)(p->flank * n->model->rolls + p->grid.index) * size;
+    for (size_t k = 0; k < size; k++)
+        cells[k] = p->grid.weight[0] * t[k] + p->grid.weight[1] * t[size + k] + p->grid.weight[2] * t[2 * size + k] +
+                   p->grid.weight[3] * t[3 * size + k];
+}
+
+/* … and of the width functions */
+static void blend_width(const gk_node *n, const double *cells, const gk_spot *p, int width, double *out)
+{
+    memset(out, 0, (size_t)width * sizeof *out);
+    for (int a = 0; a < n->model->functions; a++, cells += width)
+        for (int k = 0; k < width; k++) out[k] += p->width[a] * cells[k];
+}
+
+/* rows of a table of the gear group at a point */
+static void blend_strip(const gk_node *n, const gk_real *table, const gk_spot *p, int strip, double *out)
+{
+    if (n->gear->helix != 0.0) return gk_node_blend(n, table, p, n->gear->modes, out);
+    if (strip == 0) blend_rolls(n, table, p, n->gear->modes, n->cells);
+    blend_width(n, n->cells, p, n->gear->modes, out);
+}
+
+static void turn_row(const gk_node *n, int offset, double *row)
+{
+    const gk_gear *gear = n->gear;
     for (int k = 0; k < gear->modes; k++) {
-        double sine, cosine;
-        const int64_t turned = (int64_t)gear->diameter[k] * offset % gear->z;
-        gk_sincos(2.0 * GK_PI * (double)turned / gear->z, &sine, &cosine);
+        const int turned = (int)((int64_t)gear->diameter[k] * offset % gear->z),
+                  at = turned < 0 ? turned + gear->z : turned;
         if (gear->member[k] == 1) {
             const double a = row[k], b = row[k + 1];
-            row[k] = a * cosine - b * sine;
-            row[k + 1] = a * sine + b * cosine;
+            row[k] = a * n->cosine[at] - b * n->sine[at];
+            row[k + 1] = a * n->sine[at] + b * n->cosine[at];
             k++;
         } else {
-            row[k] *= cosine;
+            row[k] *= n->cosine[at];
         }
     }
 }
@@ -95,64 +134,60 @@ static direction direction_of(const gk_node *n, const gk_spot *p)
     return d;
 }
 
-/* what the ground oscillators of the gear move at a point, outward; C_fs there */
-static void ground_point(const gk_node *n, const gk_spot *p, double *row, double *rigid, double *support)
+/* rows of modes of nodal diameter 0 and 1 on tooth 0 → on the tooth at an angle, in axes that do not turn */
+static void turn_low(const gk_gear *gear, double cosine, double sine, double *row)
 {
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
-    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
+    for (int k = 0; k < gear->low; k++)
+        if (gear->low_member[k] == 1) {
+            const double a = row[k], b = row[k + 1];
+            row[k] = a * cosine - b * sine;
+            row[k + 1] = a * sine + b * cosine;
+        }
+}
+
+/* motion outward at a point */
+static void ground_point(const gk_node *n, const gk_spot *p, double *motion)
+{
+    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions * 6;
     const direction d = direction_of(n, p);
-    const double *centre = n->gear->ground[set].centre,
-                 along[6] = {d.n[0], d.n[1], d.n[2], d.arm[0], d.arm[1], d.arm[2]};
-    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
+    double trig[3] = {1.0, 0.0, 0.0}, part[6], *low = motion + 6, *node = low + n->gear->low;
     gk_sincos(d.angle, &trig[2], &trig[1]);
-    for (int k = 0; k < reads; k++) {
-        rigid[k] = 0.0;
-        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
-        row[k] = rigid[k];
-    }
-    for (int s = 0; s < supports; s++) support[s] = 0.0;
+    for (int c = 0; c < 3; c++) motion[c] = d.n[c], motion[3 + c] = d.arm[c];
+    gk_node_blend(n, n->flank->low, p, n->gear->low, low);
+    turn_low(n->gear, trig[1], trig[2], low);
+    memset(node, 0, 6 * sizeof *node);
     for (int c = 0; c < 3; c++) {
-        gk_node_blend(n, n->gear->ground[set].rows + c * size * reads, p, reads, part);
-        for (int k = 0; k < reads; k++) row[k] += trig[c] * part[k];
-        gk_node_blend(n, n->gear->support_residual + c * size * supports, p, supports, part);
-        for (int s = 0; s < supports; s++) support[s] += trig[c] * part[s];
+        gk_node_blend(n, n->flank->node + c * size, p, 6, part);
+        for (int k = 0; k < 6; k++) node[k] += trig[c] * part[k];
     }
 }
 
-/* what the ground oscillators of the gear move at a point along the profile */
-static void along_point(const gk_node *n, const gk_spot *p, double *row, double *rigid)
+/* motion along the profile at a point; what the supports' forces displace there is not known */
+static void along_point(const gk_node *n, const gk_spot *p, double *motion)
 {
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads;
-    const size_t size = 2 * (size_t)n->model->rolls * n->model->functions;
     const direction d = direction_of(n, p);
-    const double *centre = n->gear->ground[set].centre, sense = gk_node_along(n);
-    const double along[6] = {d.along[0], d.along[1], d.along[2], d.lever[0], d.lever[1], d.lever[2]};
-    double trig[3] = {1.0, 0.0, 0.0}, part[MAX_GROUND];
-    gk_sincos(d.angle, &trig[2], &trig[1]);
-    for (int k = 0; k < reads; k++) {
-        rigid[k] = 0.0;
-        for (int c = 0; c < 6; c++) rigid[k] += along[c] * centre[c * reads + k];
-        row[k] = rigid[k];
-    }
-    for (int c = 0; c < 3 && n->gear->ground[set].along; c++) {
-        gk_node_blend(n, n->gear->ground[set].along + c * size * reads, p, reads, part);
-        for (int k = 0; k < reads; k++) row[k] += sense * trig[c] * part[k];
-    }
+    double cosine, sine, *low = motion + 6;
+    gk_sincos(d.angle, &sine, &cosine);
+    memset(motion, 0, (size_t)gk_node_motions(n->gear) * sizeof *motion);
+    for (int c = 0; c < 3; c++) motion[c] = d.along[c], motion[3 + c] = d.lever[c];
+    if (!n->flank->along_low) return;
+    gk_node_blend(n, n->flank->along_low, p, n->gear->low, low);
+    turn_low(n->gear, cosine, sine, low);
+    for (int k = 0; k < n->gear->low; k++) low[k] *= gk_node_along(n);
 }
 
 /* rows along the profile of a point */
 static void gather_along(gk_node *n, const gk_spot *p, int i)
 {
-    const int modes = n->gear->modes, set = n->setup->base.set;
+    const int modes = n->gear->modes;
     double *row = n->along_rows + (size_t)i * modes;
-    if (n->gear->along_rows)
-        gk_node_blend(n, n->gear->along_rows, p, modes, row);
+    if (n->flank->along_rows)
+        gk_node_blend(n, n->flank->along_rows, p, modes, row);
     else
         memset(row, 0, (size_t)modes * sizeof *row);
     for (int k = 0; k < modes; k++) row[k] *= gk_node_along(n);
-    if (p->offset) turn_row(n->gear, p->offset, row);
-    const size_t at = (size_t)i * n->gear->ground[set].reads;
-    if (n->e->kind != MESH_FLAT) along_point(n, p, n->along_ground + at, n->along_rigid + at);
+    if (p->offset) turn_row(n, p->offset, row);
+    if (n->e->kind != MESH_FLAT) along_point(n, p, n->along_motion + (size_t)i * gk_node_motions(n->gear));
 }
 
 /* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
@@ -198,7 +233,7 @@ void gk_node_gather(gk_node *n, double position)
 {
     GK_ASSERT(position >= 0.0 && position <= 1.0);
     GK_ASSERT(n->points >= 0 && n->points <= MAX_CANDIDATES * MAX_SLICES);
-    const int strips = n->setup->strips, modes = n->gear->modes, set = n->setup->base.set;
+    const int strips = n->setup->strips, modes = n->gear->modes;
     const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
     double ports[MAX_PORTS];
     for (int i = 0; i < n->points; i++) {
@@ -211,35 +246,39 @@ void gk_node_gather(gk_node *n, double position)
         p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * gk_node_tan(n->gear->helix);
         p->roll = corner_roll(n, p);
         p->grid = gk_grid_at(n->model, n->gear, p->roll);
-        gk_node_blend(n, n->gear->rows, p, modes, n->rows + (size_t)i * modes);
-        if (p->offset) turn_row(n->gear, p->offset, n->rows + (size_t)i * modes);
-        gk_node_blend(n, n->gear->port_residual, p, n->model->ports, ports);
+        blend_strip(n, n->flank->rows, p, strip, n->rows + (size_t)i * modes);
+        if (p->offset) turn_row(n, p->offset, n->rows + (size_t)i * modes);
+        gk_node_blend(n, n->flank->port, p, n->model->ports, ports);
         n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
-        if (n->e->kind != MESH_FLAT)
-            ground_point(n, p, n->ground + (size_t)i * n->gear->ground[set].reads,
-                         n->rigid + (size_t)i * n->gear->ground[set].reads,
-                         n->support + (size_t)i * n->model->supports);
+        if (n->e->kind != MESH_FLAT) ground_point(n, p, n->motion + (size_t)i * gk_node_motions(n->gear));
         if (GK_ON(n->setup, friction)) gather_along(n, p, i);
     }
 }
 
-gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side)
+gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side)
 {
-    GK_ASSERT(room && gk_is_engagement(model, e));
+    GK_ASSERT(work->columns && gk_is_engagement(model, e));
     GK_ASSERT(side->candidates <= MAX_CANDIDATES);
-    gk_node n = {
-        .model = model, .setup = setup, .e = &model->engagement[e], .gear = &model->gear[side->gear], .side = side};
-    const size_t most = points_of(model), reads = (size_t)n.gear->ground[setup->base.set].reads;
+    gk_node n = {.model = model,
+                 .setup = setup,
+                 .e = &model->engagement[e],
+                 .gear = &model->gear[side->gear],
+                 .side = side,
+                 .flank = &setup->flank[side->gear],
+                 .compliance = &work->compliance};
+    double *room = work->columns;
+    const size_t most = points_of(model), modes = (size_t)n.gear->modes, motions = (size_t)gk_node_motions(n.gear);
     n.points = side->candidates * setup->strips;
-    n.rows = room, room += most * (size_t)n.gear->modes;
-    n.ground = room, room += most * reads;
-    n.rigid = room, room += most * reads;
-    n.support = room, room += most * (size_t)model->supports;
-    n.along_rows = room, room += most * (size_t)n.gear->modes;
-    n.along_ground = room, room += most * reads;
-    n.along_rigid = room, room += most * reads;
+    n.rows = room, room += most * modes;
+    n.along_rows = room, room += most * modes;
+    n.motion = room, room += most * motions;
+    n.along_motion = room, room += most * motions;
     n.port = room, room += most;
+    n.cells = room, room += (size_t)model->functions * modes;
+    n.cosine = room, room += n.gear->z;
+    n.sine = room, room += n.gear->z;
     n.flexibility = room;
+    for (int m = 0; m < n.gear->z; m++) gk_sincos(2.0 * GK_PI * m / n.gear->z, &n.sine[m], &n.cosine[m]);
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
     gk_strips_rows(model, setup, n.e, side->gear, n.weight);
     const double x = n.e->position[1][0] - n.e->position[0][0], y = n.e->position[1][1] - n.e->position[0][1];
@@ -248,16 +287,17 @@ gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room
     return n;
 }
 
+double *gk_node_room(const gk_node *n) { return n->flexibility + n->gear->modes; }
+
 /* ---- loads ------------------------------------------------------------------------------------------------------- */
 /* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
-static void add_rows(const gk_model *model, const gk_gear *gear, const gk_spot *p, int first,
-                     double weight[4][MAX_FUNCTIONS], double *sum)
+static void add_rows(const gk_node *n, const gk_spot *p, int first, double weight[4][MAX_FUNCTIONS], double *sum)
 {
-    const size_t modes = (size_t)gear->modes;
-    const double *row = gear->rows + (size_t)((p->flank * model->rolls + p->grid.index) * model->functions) * modes;
+    const int modes = n->gear->modes, A = n->model->functions;
+    const gk_real *row = n->flank->rows + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * (size_t)modes;
     for (int i = 0; i < 4; i++)
-        for (int a = 0; a < model->functions; a++, row += modes) {
-            for (int k = first; k < gear->modes; k++) sum[k] += weight[i][a] * row[k];
+        for (int a = 0; a < A; a++, row += modes) {
+            for (int k = first; k < modes; k++) sum[k] += weight[i][a] * row[k];
             weight[i][a] = 0.0;
         }
 }
@@ -281,23 +321,24 @@ static void add_turned(const gk_gear *gear, int tooth, int first, const double *
 
 /* Adds the modal forces of a gear group, modes from `first` on, by outward forces on the strips of a tooth at these
  * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
-void gk_node_push(const gk_model *model, const gk_strip_load *load, int first, double *sum)
+void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum)
 {
     GK_ASSERT(gk_is_gear(model, load->gear) && load->strips <= MAX_SLICES);
     GK_ASSERT(first >= 0 && first <= model->gear[load->gear].modes);
     const gk_gear *gear = &model->gear[load->gear];
+    const gk_node n = {.model = model, .gear = gear, .flank = &setup->flank[load->gear]};
     double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
     gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
     memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
     for (int strip = 0; strip < load->strips; strip++) {
         next.grid = gk_grid_at(model, gear, load->roll[strip]);
-        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(model, gear, &p, first, weight, row);
+        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(&n, &p, first, weight, row);
         p = next;
         for (int i = 0; i < 4; i++)
             for (int a = 0; a < model->functions; a++)
                 weight[i][a] += load->force[strip] * p.grid.weight[i] * load->width[strip][a];
     }
-    add_rows(model, gear, &p, first, weight, row);
+    add_rows(&n, &p, first, weight, row);
     add_turned(gear, load->tooth, first, row, sum);
 }
 
@@ -313,10 +354,11 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
                        .setup = setup,
                        .e = &model->engagement[e],
                        .gear = &model->gear[load->gear],
-                       .side = &mesh->side[which]};
-    const int reads = n.gear->ground[setup->base.set].reads;
-    const int32_t *list = n.gear->ground[setup->base.set].list;
-    double row[MAX_GROUND], rigid[MAX_GROUND], support[MAX_SUPPORTS];
+                       .side = &mesh->side[which],
+                       .flank = &setup->flank[load->gear]};
+    const int set = setup->base.set, reads = n.gear->ground[set].reads, motions = gk_node_motions(n.gear);
+    const int32_t *list = n.gear->ground[set].list;
+    double motion[12 + MAX_LOW], all[12 + MAX_LOW] = {0};
     for (int strip = 0; strip < load->strips; strip++) {
         const double roll = load->roll[strip], z = mesh->strip_middle[strip], sg = load->flank ? -1.0 : 1.0;
         gk_spot p = {
@@ -324,8 +366,12 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
         p.middle = roll - sg * z * gk_node_tan(n.gear->helix);
         memcpy(p.width, load->width[strip], sizeof p.width);
         if (load->force[strip] == 0.0) continue;
-        ground_point(&n, &p, row, rigid, support);
+        ground_point(&n, &p, motion);
+        for (int i = 0; i < motions; i++) all[i] += load->force[strip] * motion[i];
+    }
+    for (int i = 0; i < motions; i++) {
+        const double *row = gk_node_motion(n.gear, set, i);
         for (int k = 0; k < reads; k++)
-            if (setup->base.slot[list[k]] < 0) sum[list[k]] += load->force[strip] * row[k];
+            if (setup->base.slot[list[k]] < 0) sum[list[k]] += all[i] * row[k];
     }
 }

@@ -2,7 +2,9 @@
 #ifndef GK_NODE_H
 #define GK_NODE_H
 #include "base/gk_check.h"
+#include "base/gk_lanes.h"
 #include "problem/gk_work.h"
+#include "setup/gk_spread.h"
 
 typedef struct gk_spot { /* a candidate's strip at a node */
     int flank, offset;
@@ -17,29 +19,61 @@ typedef struct gk_node { /* what a node's tables are made from */
     const gk_engagement *e;
     const gk_gear *gear;
     const gk_side *side;
+    const gk_flank_tables *flank;
+    const gk_compliance *compliance;
     int points;                              /* candidates × strips */
     gk_spot at[MAX_CANDIDATES * MAX_SLICES]; /* points */
     gk_strip_weights weight;
-    double length;   /* of the line of action between the base circles, nominal */
-    double *rows;    /* (points, modes): all stored modes, tooth offset included */
-    double *ground;  /* (points, reads): outward, rigid motion included, of every ground oscillator */
-    double *rigid;   /* (points, reads): the part of it that is rigid motion */
-    double *support; /* (points, supports): C_fs */
-    double *along_rows, *along_ground, *along_rigid; /* rows, ground and rigid along the profile (gk_along) */
-    double *port;                                    /* (points) */
-    double *flexibility;                             /* (modes) 1/ω² of the dynamic ones */
+    double length;  /* of the line of action between the base circles, nominal */
+    double *rows;   /* (points, modes): all stored modes, tooth offset included */
+    double *motion; /* (points, gk_node_motions): what ground oscillators displace outward is motion · M */
+    double *along_rows, *along_motion; /* rows and motion along the profile (gk_node_along) */
+    double *port;                      /* (points) */
+    double *flexibility;               /* (modes) 1/ω² */
+    double *cells;                     /* (functions, modes): rows at one length of roll */
+    double *cosine, *sine;             /* (z) of whole teeth */
 } gk_node;
 
-gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, double *room, int e, const gk_side *side);
+/* Motion at a flank by ground oscillators is a row of 12 + low numbers times M (12 + low, reads): rigid motion of the
+ * gear (centre), modes of nodal diameter 0 and 1 (low), and forces on its node (node). */
+static inline int gk_node_motions(const gk_gear *gear) { return 12 + gear->low; }
+/* row i of M, over what the gear reads */
+static inline const double *gk_node_motion(const gk_gear *gear, int set, int i)
+{
+    const int reads = gear->ground[set].reads;
+    if (i < 6) return gear->ground[set].centre + i * reads;
+    i -= 6;
+    return i < gear->low ? gear->ground[set].low + (size_t)i * (size_t)reads
+                         : gear->ground[set].node + (i - gear->low) * reads;
+}
+gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side);
+/* the scratch of a node that is left for what is made of it: (gk_node_motions)² + gk_node_motions (points, of supports
+ * and ports, of dynamic oscillators) */
+double *gk_node_room(const gk_node *n);
 /* `position`: share of the pitch */
 void gk_node_gather(gk_node *n, double position);
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
-void gk_node_blend(const gk_node *n, const double *table, const gk_spot *p, int width, double *out);
+void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out);
 /* sense of growing roll on this side against the direction in which gear B slides past A */
 static inline double gk_node_along(const gk_node *n)
 {
     GK_ASSERT(n->side && n->e);
     return n->side->which == 1 && n->e->kind == MESH_INTERNAL ? 1.0 : -1.0;
+}
+/* Σ a b, in four lanes */
+static inline double gk_node_dot(const double *a, const double *b, int n)
+{
+    double lane[4] = {0, 0, 0, 0};
+    int k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
+    for (; k < n; k++) lane[0] += a[k] * b[k];
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
+}
+/* (−1)^degree of a width function: what half a turn about the middle line of a tooth does to it */
+static inline double gk_width_sign(const gk_model *model, int function)
+{
+    return model->degree[function] % 2 ? -1.0 : 1.0;
 }
 /* length of roll of a candidate on the line of action at mid-width */
 double gk_node_roll(const gk_side *side, int flank, double position, int offset);

@@ -309,6 +309,18 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
     memset(work->ground_zero, 0, ground);
 }
 
+/* gear by gear, those of one body together: each body's compliances are spread once */
+static void fill_sides(const gk_model *model, gk_setup *setup, gk_work *work)
+{
+    for (int g = 0; g < model->gears; g++) {
+        if (gk_spread_leader(model, g) != g) continue;
+        if (setup->on.residual) gk_spread_compliance(model, setup, work, g);
+        for (int e = 0; e < model->engagements; e++)
+            for (int w = 0; w < 2; w++)
+                if (gk_spread_leader(model, setup->mesh[e].side[w].gear) == g) gk_side_fill(model, setup, work, e, w);
+    }
+}
+
 gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
                       char message[GK_MESSAGE])
 {
@@ -341,10 +353,10 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
         fill_mesh(model, setup, data, e);
         setup->mesh[e].coasts = coasts[e];
     }
+    for (int g = 0; g < model->gears; g++) gk_spread_rows(model, setup, g);
     for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
     for (int g = 0; g < model->gears; g++) gk_far_fill(model, setup, g);
-    for (int e = 0; e < model->engagements; e++)
-        for (int w = 0; w < 2; w++) gk_side_fill(model, setup, work, e, w);
+    fill_sides(model, setup, work);
     fill_explicit(model, setup, work);
     outcome = gk_limit_choose(model, setup, work, data->stage[V_H], message);
     if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;

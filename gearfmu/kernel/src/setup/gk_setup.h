@@ -6,6 +6,7 @@
 #include "base/gk_math.h"
 #include "model/gk_data.h"
 #include "setup/gk_nodal.h"
+#include "setup/gk_spread.h"
 
 #define GK_FILM_REACH 100e-6 /* m: open flanks further apart than this know no film (assumed) */
 
@@ -249,6 +250,7 @@ struct gk_setup {
     double port_support[MAX_PORTS]
                        [MAX_SUPPORTS]; /* force on a support per unit moment at a port, beside the oscillators' */
     gk_modal modal[MAX_GEARS];
+    gk_flank_tables flank[MAX_GEARS];
     double *far[MAX_GEARS]; /* (z, FAR, FAR): what the patterns on a tooth displace by a load so many teeth before it */
     int far_on[MAX_GEARS];  /* the gear has several engagements, and something in it is not dynamic */
     gk_base base;

@@ -2,7 +2,8 @@
  * read, and compliance of what is not dynamic (docs/theory.md, eq. 2), for all teeth that may touch, at NODES + 1
  * positions in one pitch. Teeth of one flank are whole base pitches apart, so one position decides all lengths of roll.
  * A row between two nodes is linear, the compliance of what is not dynamic a parabola. */
-#include "setup/gk_node.h"
+#include "setup/gk_block.h"
+#include "setup/gk_grounded.h"
 
 static const double MARGIN = 0.15, CORNER = 0.5; /* base pitches beyond the ends of the flanks: play; tip corners */
 
@@ -60,16 +61,6 @@ void gk_side_plan(const gk_model *model, const gk_setup *setup, int index, gk_si
 }
 
 /* ---- compliance of what is not dynamic --------------------------------------------------------------------------- */
-static double dot(const double *a, const double *b, int n)
-{
-    double lane[4] = {0, 0, 0, 0};
-    int k = 0;
-    for (; k + 4 <= n; k += 4)
-        for (int l = 0; l < 4; l++) lane[l] += a[k + l] * b[k + l];
-    for (; k < n; k++) lane[0] += a[k] * b[k];
-    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
-}
-
 /* Σ a_k b_k/ω² over modes below `dynamic` */
 static double carried(const gk_node *n, int i, int j, int dynamic)
 {
@@ -77,21 +68,6 @@ static double carried(const gk_node *n, int i, int j, int dynamic)
     double lane[4] = {0, 0, 0, 0};
     for (int k = 0; k < dynamic; k++) lane[k % 4] += a[k] * b[k] * n->flexibility[k];
     return (lane[0] + lane[1]) + (lane[2] + lane[3]);
-}
-
-/* stored compliance of the free body between two points, by width function, (functions, functions) */
-static void tabulate(const gk_node *n, const gk_spot *p, const gk_spot *q, double *cell)
-{
-    const int A = n->model->functions, R = n->model->rolls, offset = q->offset - p->offset;
-    const double *table = n->gear->residual + (size_t)((p->flank * 2 + q->flank) * OFFSETS + offset + OFFSETS / 2) *
-                                                  (size_t)(R * R * A * A);
-    for (int c = 0; c < A * A; c++) cell[c] = 0.0;
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const double w = p->grid.weight[i] * q->grid.weight[j],
-                         *t = table + ((p->grid.index + i) * R + q->grid.index + j) * A * A;
-            for (int c = 0; c < A * A; c++) cell[c] += w * t[c];
-        }
 }
 
 /* the same between two candidates, (strips, strips); 0 when they are too far apart for the table: what stored modes
@@ -102,39 +78,16 @@ static int tabulated(const gk_node *n, int first, int second, double *out)
     const int offset = n->at[second * strips].offset - n->at[first * strips].offset;
     double cell[MAX_FUNCTIONS * MAX_FUNCTIONS];
     for (int c = 0; c < strips * strips; c++) out[c] = 0.0;
-    if (offset < -(OFFSETS / 2) || offset > OFFSETS / 2) return 0;
+    if (offset < -FURTHER || offset > FURTHER) return 0;
+    const gk_block b = gk_block_of(n, n->at[first * strips].flank, n->at[second * strips].flank, offset);
     for (int s = 0; s < strips; s++)
         for (int t = 0; t < strips; t++) {
-            if (n->setup->spatial || s + t == 0) /* else all strips have the same rolls */
-                tabulate(n, &n->at[first * strips + s], &n->at[second * strips + t], cell);
+            if (n->gear->helix != 0.0 || s + t == 0) /* else all strips have the same rolls */
+                gk_block_tabulate(n, b, &n->at[first * strips + s], &n->at[second * strips + t], cell);
             const double *of_s = n->at[first * strips + s].width, *of_t = n->at[second * strips + t].width;
-            for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * dot(cell + a * A, of_t, A);
+            for (int a = 0; a < A; a++) out[s * strips + t] += of_s[a] * gk_node_dot(cell + a * A, of_t, A);
         }
     return 1;
-}
-
-/* −C_fs κ C_sf + Σ W Wᵀ/Ω² over the ground oscillators that are not dynamic, between two points */
-static double through_ground(const gk_node *n, int i, int j, const double *yields)
-{
-    const int set = n->setup->base.set, reads = n->gear->ground[set].reads, supports = n->model->supports;
-    const double *kappa = n->model->ground[set].kappa, *a = n->support + (size_t)i * supports;
-    const double *x = n->ground + (size_t)i * reads, *y = n->ground + (size_t)j * reads;
-    double sum = 0.0;
-    for (int s = 0; s < supports; s++)
-        if (a[s] != 0.0) sum -= a[s] * dot(kappa + s * supports, n->support + (size_t)j * supports, supports);
-    for (int k = 0; k < reads; k++) sum += x[k] * y[k] * yields[k];
-    return sum;
-}
-
-/* 1/Ω² of the ground oscillators that the gear reads and that are not dynamic, 0 of the others */
-static void quasi_static_flexibility(const gk_node *n, double *yields)
-{
-    const gk_base *base = &n->setup->base;
-    const int32_t *list = n->gear->ground[base->set].list;
-    for (int k = 0; k < n->gear->ground[base->set].reads; k++) {
-        const double omega = n->model->ground[base->set].omega[list[k]];
-        yields[k] = base->slot[list[k]] >= 0 ? 0.0 : 1.0 / (omega * omega);
-    }
 }
 
 /* Σ a b/ω² over the dynamic modes, rows halfway to the next node as the step interpolates them */
@@ -152,7 +105,7 @@ static double carried_halfway(const gk_node *n, int at, int i, int j)
 
 /* The residual between two candidates at a node, and of a tooth with itself what no stored mode carries: what its
  * damper is parallel to. Halfway to the next node: what makes the parabola there right. */
-static void store_block(const gk_node *n, int at, int halfway, const double *yields, int p, int q)
+static void store_block(const gk_node *n, int at, int halfway, const gk_grounded *g, int p, int q)
 {
     const gk_side *side = n->side;
     const int strips = n->setup->strips, square = strips * strips, dynamic = n->setup->modal[side->gear].count;
@@ -164,7 +117,7 @@ static void store_block(const gk_node *n, int at, int halfway, const double *yie
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = 2 * (size_t)i * columns + (size_t)j, mirrored = 2 * (size_t)j * columns + (size_t)i;
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
-        const double ground = n->e->kind == MESH_FLAT ? 0.0 : through_ground(n, i, j, yields);
+        const double ground = n->e->kind == MESH_FLAT ? 0.0 : gk_grounded_through(n, g, i, j);
         const double all = (near ? cell[c] : stored) + ground;
         if (halfway) {
             const double middle = all - carried_halfway(n, at, i, j);
@@ -177,29 +130,14 @@ static void store_block(const gk_node *n, int at, int halfway, const double *yie
     }
 }
 
-static void store_residual(const gk_node *n, int at, int halfway, const double *yields)
+static void store_residual(const gk_node *n, int at, int halfway, const gk_grounded *g)
 {
+    if (n->e->kind != MESH_FLAT) gk_grounded_load(n, g);
     for (int p = 0; p < n->side->candidates; p++)
-        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, yields, p, q);
+        for (int q = p; q < n->side->candidates; q++) store_block(n, at, halfway, g, p, q);
 }
 
-/* Compliance of one tooth by a table without offsets, between two points */
-static double one_tooth(const gk_node *n, const double *table, int i, int j)
-{
-    const int A = n->model->functions, R = n->model->rolls;
-    const gk_spot *p = &n->at[i], *q = &n->at[j];
-    const double *from = table + (size_t)(p->flank * 2 + q->flank) * (size_t)(R * R * A * A);
-    double sum = 0.0;
-    for (int k = 0; k < 4; k++)
-        for (int l = 0; l < 4; l++) {
-            const double w = p->grid.weight[k] * q->grid.weight[l];
-            const double *cell = from + ((p->grid.index + k) * R + q->grid.index + l) * A * A;
-            for (int a = 0; a < A; a++) sum += w * p->width[a] * dot(cell + a * A, q->width, A);
-        }
-    return sum;
-}
-
-/* Σ a b/ω² over modes `from` … `to` − 1 and over the ground oscillators that are not dynamic */
+/* Σ a b/ω² over modes `from` … `to` − 1 */
 static double carried_by(const gk_node *n, const double *a, const double *b, int from, int to)
 {
     double sum = 0.0;
@@ -209,89 +147,75 @@ static double carried_by(const gk_node *n, const double *a, const double *b, int
 
 /* What is not dynamic yields along the normal and along the profile per force along the profile. One tooth by its own
  * table; of others what stored modes carry. */
-static void store_along_residual(const gk_node *n, int at, const double *yields)
+static void store_along_residual(const gk_node *n, int at, const gk_grounded *g)
 {
     const gk_side *side = n->side;
     const gk_gear *gear = n->gear;
     const int modes = gear->modes, dynamic = n->setup->modal[side->gear].count;
-    const int reads = gear->ground[n->setup->base.set].reads;
     const double own = gk_node_along(n);
-    for (int i = 0; i < n->points; i++)
-        for (int j = 0; j < n->points; j++) {
+    double loaded[12 + MAX_LOW];
+    for (int j = 0; j < n->points; j++) {
+        memset(loaded, 0, (size_t)g->motions * sizeof *loaded);
+        if (n->e->kind != MESH_FLAT)
+            gk_grounded_times(n->along_motion + (size_t)j * (size_t)g->motions, g->yields, g->motions, g->motions,
+                              loaded);
+        for (int i = 0; i < n->points; i++) {
             const int same = n->at[i].offset == n->at[j].offset && gear->along_normal;
             const double *a = n->rows + (size_t)i * modes, *s = n->along_rows + (size_t)i * modes;
-            const double *t = n->along_rows + (size_t)j * modes, *x = n->ground + (size_t)i * reads;
-            const double *u = n->along_ground + (size_t)i * reads, *v = n->along_ground + (size_t)j * reads;
+            const double *t = n->along_rows + (size_t)j * modes;
             const int from = same ? 0 : dynamic, to = same ? dynamic : modes;
             const double sign = same ? -1.0 : 1.0;
             double normal = sign * carried_by(n, a, t, from, to), along = sign * carried_by(n, s, t, from, to);
             if (same)
-                normal += own * one_tooth(n, gear->along_normal, i, j), along += one_tooth(n, gear->along_own, i, j);
-            for (int k = 0; k < reads; k++) normal += x[k] * v[k] * yields[k], along += u[k] * v[k] * yields[k];
+                normal += own * gk_block_between(n, gk_block_along_normal(n, n->at[i].flank, n->at[j].flank), i, j),
+                    along += gk_block_between(n, gk_block_along_own(n, n->at[i].flank, n->at[j].flank), i, j);
+            if (n->e->kind != MESH_FLAT) {
+                normal += gk_node_dot(n->motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
+                along += gk_node_dot(n->along_motion + (size_t)i * (size_t)g->motions, loaded, g->motions);
+            }
             const size_t to_table = ((size_t)at * n->points + (size_t)i) * (size_t)side->columns + (size_t)j;
             side->along.normal[to_table] = (gk_real)normal;
             side->along.own[to_table] = (gk_real)along;
         }
+    }
 }
 
 /* rows along the profile of what is dynamic, and what friction puts on supports at once */
-static void store_along(const gk_node *n, int at, const double *yields)
+static void store_along(const gk_node *n, int at, const gk_grounded *g)
 {
     const gk_side *side = n->side;
     const gk_modal *m = &n->setup->modal[side->gear];
-    const gk_base *base = &n->setup->base;
-    const int reads = n->gear->ground[base->set].reads, from = base->from[side->gear], width = base->width[side->gear];
     const int supports = n->model->supports;
-    const gk_ground *ground = &n->model->ground[base->set];
-    const int32_t *list = n->gear->ground[base->set].list;
+    const gk_ground *ground = &n->model->ground[n->setup->base.set];
     for (int i = 0; i < n->points; i++) {
         const size_t point = (size_t)at * n->points + (size_t)i;
         gk_real *to = side->along.rows + point * m->n;
         memset(to, 0, (size_t)m->n * sizeof *to);
         for (int k = 0; k < m->count; k++) to[m->lane[k]] = (gk_real)n->along_rows[(size_t)i * n->gear->modes + k];
-        double *moves = side->along.ground + point * width, *held = side->along.support + point * supports;
-        double moved[MAX_SUPPORTS] = {0};
-        memset(moves, 0, (size_t)width * sizeof *moves);
+        double *moves = side->along.ground + point * (size_t)g->columns, *held = side->along.support + point * supports;
+        double moved[MAX_SUPPORTS + 1] = {0};
+        memset(moves, 0, (size_t)g->columns * sizeof *moves);
         memset(held, 0, (size_t)supports * sizeof *held);
         if (n->e->kind == MESH_FLAT || !n->setup->on.elastic) continue;
-        const double *row = n->along_ground + (size_t)i * reads, *rigid = n->along_rigid + (size_t)i * reads;
-        for (int k = 0; k < reads; k++)
-            if (base->slot[list[k]] >= 0)
-                moves[base->slot[list[k]] - from] = row[k] - rigid[k];
-            else if (n->setup->on.residual)
-                for (int s = 0; s < supports; s++)
-                    moved[s] += row[k] * yields[k] * ground->support_rows[s * ground->n + list[k]];
-        for (int s = 0; s < supports; s++) held[s] = dot(ground->kappa + s * supports, moved, supports);
+        const double *motion = n->along_motion + (size_t)i * (size_t)g->motions;
+        gk_grounded_times(motion, g->dynamic, g->motions, g->columns, moves);
+        if (n->setup->on.residual) gk_grounded_times(motion, g->joints, g->motions, supports + 1, moved);
+        for (int s = 0; s < supports; s++) held[s] = gk_node_dot(ground->kappa + s * supports, moved, supports);
     }
 }
 
 /* flank to bore angle and to supports, beside what dynamic oscillators carry */
-static void store_joints(const gk_node *n, int at, const double *yields)
+static void store_joints(const gk_node *n, int at, const gk_grounded *g)
 {
     const gk_side *side = n->side;
-    const gk_base *base = &n->setup->base;
-    const int points = n->points, supports = n->model->supports, reads = n->gear->ground[base->set].reads;
-    const int32_t *list = n->gear->ground[base->set].list;
-    const gk_ground *ground = &n->model->ground[base->set];
-    double moved[MAX_SUPPORTS];
-    for (int i = 0; i < points; i++) {
-        const double *row = n->ground + (size_t)i * reads, *fs = n->support + (size_t)i * supports;
-        double turned = n->port[i];
-        for (int s = 0; s < supports; s++) moved[s] = fs[s];
-        for (int k = 0; k < reads; k++) {
-            const double w = row[k] * yields[k];
-            if (w == 0.0) continue;
-            for (int s = 0; s < supports; s++) moved[s] += w * ground->support_rows[s * ground->n + list[k]];
-            if (n->side->port_of >= 0) turned += w * ground->port_rows[n->side->port_of * ground->n + list[k]];
-        }
-        double *to = side->support + ((size_t)at * points + i) * gk_padded(supports);
-        for (int s = 0; s < supports; s++) {
-            const double *kappa = ground->kappa + s * supports;
-            to[s] = dot(kappa, moved, supports);
-            if (n->side->port_of >= 0)
-                turned -= fs[s] * dot(kappa, n->model->port_support + n->side->port_of * supports, supports);
-        }
-        side->port[(size_t)at * points + i] = turned;
+    const int supports = n->model->supports;
+    const double *kappa = n->model->ground[n->setup->base.set].kappa;
+    for (int i = 0; i < n->points; i++) {
+        const size_t point = (size_t)at * n->points + (size_t)i;
+        double moved[MAX_SUPPORTS + 1] = {0}, *to = side->support + point * gk_padded(supports);
+        gk_grounded_times(n->motion + (size_t)i * (size_t)g->motions, g->joints, g->motions, supports + 1, moved);
+        for (int s = 0; s < supports; s++) to[s] = gk_node_dot(kappa + s * supports, moved, supports);
+        side->port[point] = n->port[i] + moved[supports];
     }
 }
 
@@ -307,19 +231,12 @@ static void store_rows(const gk_node *n, int at)
 }
 
 /* rows of the dynamic ground oscillators without the rigid motion, which the gap reads */
-static void store_ground(const gk_node *n, int at)
+static void store_ground(const gk_node *n, int at, const gk_grounded *g)
 {
-    const gk_side *side = n->side;
-    const gk_base *base = &n->setup->base;
-    const int reads = n->gear->ground[base->set].reads, from = base->from[side->gear], width = base->width[side->gear];
-    const int32_t *list = n->gear->ground[base->set].list;
-    for (int i = 0; i < n->points; i++) {
-        double *to = side->ground + ((size_t)at * n->points + i) * width;
-        const double *row = n->ground + (size_t)i * reads, *rigid = n->rigid + (size_t)i * reads;
-        memset(to, 0, (size_t)width * sizeof *to);
-        for (int k = 0; k < reads; k++)
-            if (base->slot[list[k]] >= 0) to[base->slot[list[k]] - from] = row[k] - rigid[k];
-    }
+    double *to = n->side->ground + (size_t)at * (size_t)n->points * (size_t)g->columns;
+    memset(to, 0, (size_t)n->points * (size_t)g->columns * sizeof *to);
+    for (int i = 0; i < n->points; i++, to += g->columns)
+        gk_grounded_times(n->motion + (size_t)i * (size_t)g->motions, g->dynamic, g->motions, g->columns, to);
 }
 
 /* patterns of far teeth at the points */
@@ -327,7 +244,7 @@ static void store_far(const gk_node *n, int at)
 {
     const gk_side *side = n->side;
     for (int i = 0; i < n->points; i++)
-        gk_node_blend(n, n->gear->far_rows, &n->at[i], FAR, side->far + ((size_t)at * n->points + i) * FAR);
+        gk_node_blend(n, n->flank->far, &n->at[i], FAR, side->far + ((size_t)at * n->points + i) * FAR);
 }
 
 /* ---- all of them ------------------------------------------------------------------------------------------------- */
@@ -359,23 +276,22 @@ void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, 
     GK_ASSERT(which == 0 || which == 1);
     GK_ASSERT(setup->mesh[e].side[which].candidates <= MAX_CANDIDATES);
     gk_side *side = &setup->mesh[e].side[which];
-    gk_node n = gk_node_begin(model, setup, work->columns, e, side);
-    double yields[MAX_GROUND];
+    gk_node n = gk_node_begin(model, setup, work, e, side);
+    const gk_grounded g = gk_grounded_side(&n);
     const size_t nodes = (size_t)side->nodes + 1, points = (size_t)n.points;
-    quasi_static_flexibility(&n, yields);
     for (int at = 0; at <= side->nodes; at++) {
         gk_node_gather(&n, (double)at / side->nodes);
         store_rows(&n, at);
-        if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at);
+        if (setup->on.elastic && n.e->kind != MESH_FLAT) store_ground(&n, at, &g);
         if (setup->far_on[side->gear]) store_far(&n, at);
-        if (setup->on.residual) store_residual(&n, at, 0, yields);
-        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, yields);
-        if (GK_ON(setup, friction)) store_along(&n, at, yields);
-        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, yields);
+        if (setup->on.residual) store_residual(&n, at, 0, &g);
+        if (setup->on.residual && n.e->kind != MESH_FLAT) store_joints(&n, at, &g);
+        if (GK_ON(setup, friction)) store_along(&n, at, &g);
+        if (GK_ON(setup, friction) && setup->on.residual) store_along_residual(&n, at, &g);
     }
     for (int at = 0; at < side->nodes && setup->on.residual; at++) {
         gk_node_gather(&n, (at + 0.5) / side->nodes);
-        store_residual(&n, at, 1, yields);
+        store_residual(&n, at, 1, &g);
     }
     if (!setup->on.elastic || n.e->kind == MESH_FLAT)
         memset(side->ground, 0, nodes * points * (size_t)setup->base.width[side->gear] * sizeof *side->ground);

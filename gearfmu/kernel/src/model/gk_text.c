@@ -1,0 +1,47 @@
+/* Sizes, names and words of a model: bits of the status, outcomes. */
+#include "model/gk_model.h"
+
+size_t gk_model_size(void) { return sizeof(gk_model); }
+const char *gk_model_name(const gk_model *model)
+{
+    GK_ASSERT(model);
+    return model->name;
+}
+const char *gk_model_hash(const gk_model *model)
+{
+    GK_ASSERT(model);
+    return model->blob.hash;
+}
+int gk_abi(void) { return GK_ABI; }
+
+const char *gk_status_text(int bit)
+{
+    static const char *const text[] = {
+        "local contact law beyond its range",
+        "fallback scheme in use",
+        "limit of iterations reached",
+        "gamma lowered: forces are damped more",
+        "a loaded flank ended although effect.tip_contact is off",
+        "mesh force beyond torque_max, which the model is made for",
+        "speed beyond speed_max, which the model is made for",
+        "the gears started at rest and were torn along in the first step: set speeds before the initialisation ends",
+    };
+    return bit >= 0 && bit < (int)(sizeof text / sizeof *text) ? text[bit] : NULL;
+}
+
+const char *gk_outcome_text(gk_outcome outcome)
+{
+    static const char *const text[GK_OUTCOMES] = {
+        "ok",
+        "bad model blob",
+        "no such variable in this model",
+        "value refused: not finite or out of range",
+        "call not allowed now",
+        "communication step refused: not positive, not finite or not at the current time",
+        "internal step too large for this model",
+        "no static equilibrium found for the start",
+        "diverged: state not finite even with the smallest step and the fallback scheme",
+        "teeth overlap beyond what the model can mean",
+        "energy balance broken"};
+    return (int)outcome >= 0 && outcome < GK_OUTCOMES ? text[outcome] : "unknown outcome";
+}
