@@ -107,7 +107,7 @@ def test_a_check_that_fails_ends_the_process_and_says_where() -> None:
     call = f"import ctypes; ctypes.CDLL({str(checked_library())!r}).gk_model_name(None)"
     done = subprocess.run([sys.executable, "-c", call], capture_output=True, text=True)
     assert done.returncode == -6
-    assert re.search(r"model/gk_model\.c:\d+: GK_ASSERT\(model\) failed", done.stderr)
+    assert re.search(r"model/gk_text\.c:\d+: GK_ASSERT\(model\) failed", done.stderr)
 
 
 def test_the_product_has_no_checks(system_library: Path) -> None:
