@@ -65,17 +65,19 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* Adds the rows of the contacts (along: of their sliding) on the part of the ground group that one gear reads, or writes
- * them (afresh); strips of a place whose gradient is the same: all, or each has its own */
+enum { ADD, WRITE, ADD_ALONG }; /* rows of the gaps, added or written; of the sliding */
+
+/* Rows of the contacts on the part of the ground group that one gear reads; strips of a place whose gradient is the
+ * same: all, or each has its own */
 GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
-                              const int motions, const int each, const int strips, const int along, const int afresh)
+                              const int motions, const int each, const int strips, const int what)
 {
     const gk_base *base = &setup->base;
     const gk_position *at = &engaged->position[side->which];
     const int quads = base->width[side->gear] / 4, points = side->candidates * strips;
     const int *motion = base->motion[side->gear];
     const size_t local = (size_t)setup->mesh[engaged->index].local / 4;
-    const gk_quad *const table = (const gk_quad *)(along ? side->along.ground : side->ground);
+    const gk_quad *const table = (const gk_quad *)(what == ADD_ALONG ? side->along.ground : side->ground);
     const gk_quad *const node = table + (size_t)(at->node * points) * quads;
     for (int p = 0; p < engaged->places; p++) {
         const gk_place *place = &engaged->place[p];
@@ -84,7 +86,7 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
         gk_quad *to = (gk_quad *)out + (size_t)(p * strips) * local;
         for (int first = 0; first < strips; first += each) {
             const gk_point *point = &place->point[first];
-            const double *gradient = (along ? point->slide : point->gradient) + SPACE * side->which;
+            const double *gradient = (what == ADD_ALONG ? point->slide : point->gradient) + SPACE * side->which;
             double g[SPACE];
             const gk_quad *moved[SPACE];
             for (int m = 0; m < motions; m++)
@@ -95,7 +97,7 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
                 for (int i = first; i < first + each; i++) {
                     const gk_quad here = low[i * quads + q];
                     const gk_quad row = rigid - (here + at->part * (high[i * quads + q] - here));
-                    if (afresh)
+                    if (what == WRITE)
                         to[(size_t)i * local + q] = row;
                     else
                         to[(size_t)i * local + q] += row;
@@ -106,15 +108,15 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
 }
 
 GK_INLINE void ground_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
-                           const int afresh, const int strips)
+                           const int what, const int strips)
 {
     const int motions = setup->base.motions[side->gear];
     if (setup->spatial)
-        ground_rows_of(setup, side, engaged, out, motions, 1, strips, 0, afresh);
+        ground_rows_of(setup, side, engaged, out, motions, 1, strips, what);
     else if (motions == 2)
-        ground_rows_of(setup, side, engaged, out, 2, strips, strips, 0, afresh);
+        ground_rows_of(setup, side, engaged, out, 2, strips, strips, what);
     else
-        ground_rows_of(setup, side, engaged, out, motions, strips, strips, 0, afresh);
+        ground_rows_of(setup, side, engaged, out, motions, strips, strips, what);
 }
 
 /* do the rows of both gears fill those of the engagement, each its own part of them? */
@@ -140,9 +142,11 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     if (!afresh) memset(engaged->ground, 0, (size_t)(s->contacts * local) * sizeof *engaged->ground);
     for (int w = 0; w < 2; w++)
         if (afresh) {
-            GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w], 1)
+            GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w],
+                        WRITE)
         } else {
-            GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w], 0)
+            GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w],
+                        ADD)
         }
     for (int i = s->contacts; i < s->n; i++) {
         double *row = engaged->ground + (size_t)i * local;
@@ -169,7 +173,7 @@ void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
         if (GK_LANES(setup, side->gear)) contact_rows(setup, side, side->along.rows, engaged, glide->basis[w]);
         if (mesh->local)
             ground_rows_of(setup, side, engaged, glide->ground + mesh->at[w], setup->base.motions[side->gear],
-                           setup->spatial ? 1 : strips, strips, 1, 0);
+                           setup->spatial ? 1 : strips, strips, ADD_ALONG);
     }
     for (int i = 0; i < contacts; i++) {
         const double *slide = gk_point_of(setup, &engaged->place[i / strips], i % strips)->slide;

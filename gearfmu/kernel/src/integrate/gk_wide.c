@@ -69,7 +69,6 @@
 #define gk_friction_settle gk_friction_settle_avx2
 #define gk_far_form gk_far_form_avx2
 #define gk_far_between gk_far_between_avx2
-#define gk_shared_list gk_shared_list_avx2
 #define gk_shared_form gk_shared_form_avx2
 #define gk_shared_read gk_shared_read_avx2
 #define gk_rows_read_local gk_rows_read_local_avx2

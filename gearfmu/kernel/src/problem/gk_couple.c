@@ -2,7 +2,7 @@
  * do to its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and scattered, never
  * through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at γ = 1, so that
  * three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
-#include "problem/gk_work.h"
+#include "problem/gk_shared.h"
 
 enum { SWEEPS = 40, SETTLED = 20 }; /* from then on dashpots stand: they may go on limiting each other in turns */
 #ifdef GK_DOUBLE_MODES

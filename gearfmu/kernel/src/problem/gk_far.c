@@ -33,7 +33,8 @@ void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work 
     for (int q = 0; q < from->places; q++)
         for (int p = 0; p < to->places; p++) {
             const int before = (from->place[q].tooth[s->side[1]] - to->place[p].tooth[s->side[0]] + z) % z;
-            const double *S = setup->far[s->gear] + (size_t)before * FAR * FAR; /* its rows: columns of the other sense */
+            const double *S = setup->far[s->gear] +
+                              (size_t)before * FAR * FAR; /* its rows: columns of the other sense */
             for (int j = q * strips; j < (q + 1) * strips; j++) {
                 gk_quad moved[FAR / 4] = {{0}};
                 for (int k = 0; k < FAR; k++)

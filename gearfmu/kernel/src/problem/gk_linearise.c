@@ -2,6 +2,7 @@
  * equilibrium, as matrices. What a row reads is what its unit force does, so that all rows come from those functions
  * that spread the forces of a step. */
 #include "problem/gk_linearise.h"
+#include "problem/gk_shared.h"
 #include "integrate/gk_integrate.h"
 
 static const double DAMPER_AT_UNIT_STEP = 0.5; /* c over 2c/h, h = 1 */

@@ -1,23 +1,7 @@
 /* Gears that two engagements share: what forces of one do to the gaps of the other through modes of the gear and through
- * far teeth, as blocks of contacts × contacts that are formed once a step. Engagements then exchange some hundred products
- * a round instead of gathering and scattering over oscillators. */
-#include "problem/gk_work.h"
-
-/* Pairs of engagements with a gear in common; list NULL: counts them */
-int gk_shared_list(const gk_model *model, gk_shared *list)
-{
-    int count = 0;
-    for (int a = 0; a < model->engagements; a++)
-        for (int b = a + 1; b < model->engagements; b++)
-            for (int pair = 0; pair < 4; pair++) {
-                const int w = pair / 2, v = pair % 2, g = model->engagement[a].gear[w];
-                if (model->engagement[b].gear[v] != g) continue;
-                if (list) list[count].engagement[0] = a, list[count].engagement[1] = b;
-                if (list) list[count].side[0] = w, list[count].side[1] = v, list[count].gear = g;
-                count++;
-            }
-    return count;
-}
+ * far teeth, as blocks of contacts × contacts that are formed once a step. Engagements then exchange some hundred
+ * products a round instead of gathering and scattering over oscillators. */
+#include "problem/gk_shared.h"
 
 /* Rows of the contacts on the modes of a gear in axes of the gear, so that rows of several engagements meet */
 static void turn_rows(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which)
@@ -79,7 +63,8 @@ void gk_shared_form(const gk_model *model, const gk_setup *setup, const gk_coeff
     const int modes = !k->timeless && !GK_ON(setup, friction);
     for (int e = 0; e < model->engagements && modes; e++)
         for (int w = 0; w < 2; w++)
-            if (setup->mesh[e].island == island && setup->engagements_of[setup->mesh[e].side[w].gear] > 1)
+            if ((island < 0 || setup->mesh[e].island == island) &&
+                setup->engagements_of[setup->mesh[e].side[w].gear] > 1)
                 turn_rows(model, setup, work, e, w);
     for (int p = 0; p < work->shareds; p++) {
         gk_shared *s = &work->shared[p];

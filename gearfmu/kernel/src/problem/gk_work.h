@@ -117,13 +117,13 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
     double *matrix;    /* D, A, P, J, L, B */
     double *given_ground,
-        given_spin[2][MAX_LOCAL];  /* displacement that its forces give to ground group and spins: in the
+        given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
                                                        step less at once; of spins in the step, at once */
-    gk_real *given_modes[2];       /* with friction, (n): the same of the gear groups that other engagements read too */
-    double bore[2][MAX_CONTACTS];  /* what a moment on the port of either side's rotor turns the contacts at once */
-    double *far[2];                /* (contacts, FAR) patterns of far teeth */
-    gk_forces forces;              /* as given to the others */
-    gk_real *turned[2];            /* (contacts, n) rows on the modes of a shared gear, in its axes */
+    gk_real *given_modes[2];      /* with friction, (n): the same of the gear groups that other engagements read too */
+    double bore[2][MAX_CONTACTS]; /* what a moment on the port of either side's rotor turns the contacts at once */
+    double *far[2];               /* (contacts, FAR) patterns of far teeth */
+    gk_forces forces;             /* as given to the others */
+    gk_real *turned[2];           /* (contacts, n) rows on the modes of a shared gear, in its axes */
     gk_bores given_bores;
     gk_step_side table[2];
     gk_system system;
@@ -245,10 +245,6 @@ void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int w
 /* gk_far.c */
 void gk_far_form(const gk_setup *setup, gk_work *work, int e);
 void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s);
-/* gk_shared.c */
-int gk_shared_list(const gk_model *model, gk_shared *list);
-void gk_shared_form(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int island);
-void gk_shared_read(const gk_work *work, int e, int at_once, double *read);
 /* gk_film.c */
 void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
 void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);

@@ -235,12 +235,28 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     of->matrix = doubles(b, 6 * rows * rows);
 }
 
+/* Pairs of engagements with a gear in common; list NULL: counts them */
+static int list_shared(const gk_model *model, gk_shared *list)
+{
+    int count = 0;
+    for (int a = 0; a < model->engagements; a++)
+        for (int b = a + 1; b < model->engagements; b++)
+            for (int pair = 0; pair < 4; pair++) {
+                const int w = pair / 2, v = pair % 2, g = model->engagement[a].gear[w];
+                if (model->engagement[b].gear[v] != g) continue;
+                if (list) list[count].engagement[0] = a, list[count].engagement[1] = b;
+                if (list) list[count].side[0] = w, list[count].side[1] = v, list[count].gear = g;
+                count++;
+            }
+    return count;
+}
+
 static void lay_out_shared(bump *b, const gk_model *model, const gk_setup *setup, gk_work *work)
 {
     const size_t contacts = MAX_PAIRS * (size_t)setup->strips, block = contacts * ((contacts + 3) / 4 * 4);
-    work->shareds = gk_shared_list(model, NULL);
+    work->shareds = list_shared(model, NULL);
     work->shared = take(b, (size_t)work->shareds * sizeof *work->shared);
-    if (work->shared) gk_shared_list(model, work->shared);
+    if (work->shared) list_shared(model, work->shared);
     for (int p = 0; p < work->shareds; p++) {
         gk_shared counted, *s = work->shared ? &work->shared[p] : &counted;
         double **array[] = {&s->moves, &s->yielded, &s->far};
