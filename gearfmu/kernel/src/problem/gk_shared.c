@@ -1,6 +1,6 @@
-/* Gears that two engagements share: what forces of one do to the gaps of the other through modes of the gear and through
- * far teeth, as blocks of contacts × contacts that are formed once a step. Engagements then exchange some hundred
- * products a round instead of gathering and scattering over oscillators. */
+/* Gears that two engagements share: what forces of one do to the gaps of the other through modes of the gear and
+ * through far teeth, as blocks of contacts × contacts that are formed once a step. Engagements then exchange some
+ * hundred products a round instead of gathering and scattering over oscillators. */
 #include "problem/gk_shared.h"
 
 /* Rows of the contacts on the modes of a gear in axes of the gear, so that rows of several engagements meet */
@@ -19,7 +19,7 @@ static double across(const gk_half *sum)
     return (s[0] + s[2]) + (s[1] + s[3]);
 }
 
-/* to[i] += row·rows[i], four rows side by side; rows are `width` halves apart, the product runs over `halves` of them */
+/* to[i] += row·rows[i], four rows side by side; rows are `width` halves apart, of which the product takes `halves` */
 static void multiply(const gk_half *row, const gk_half *rows, int count, int width, int halves, double *to)
 {
     int i = 0;

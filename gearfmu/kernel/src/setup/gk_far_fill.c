@@ -34,8 +34,8 @@ static void add_modes(const gk_gear *gear, int dynamic, int m, double *sum)
     }
 }
 
-/* Ground oscillators that are not dynamic, as a mean over all angles of the loaded tooth: these are stiff enough to feel
- * little of what is not the same in all directions */
+/* Ground oscillators that are not dynamic, as a mean over all angles of the loaded tooth: these are stiff enough to
+ * feel little of what is not the same in all directions */
 static void add_ground(const gk_model *model, const gk_setup *setup, int g, int m, double *sum)
 {
     const gk_base *base = &setup->base;
