@@ -344,22 +344,18 @@ static void lean(const pair *q, double sg, const touch *t, double z, gk_point *p
     }
 }
 
-/* one transverse section of a strip, in space */
-static void section_at(const pair *q, const tooth_flanks *f, const double roll[2], double z, gk_point *p)
+/* one transverse section of a strip, in its plane */
+static void section_at(const pair *q, const tooth_flanks *f, const double roll[2], double z, gk_point *p, touch *t)
 {
     const flank_side *s = f->side;
     tooth_flanks here = *f;
-    touch t;
     for (int w = 0; w < 2; w++) {
         p->roll[w] = roll[w] + s->sg * z * q->mesh->helix[w];
         here.beta[w] = f->beta[w] + z * q->mesh->helix[w] / q->gear[w]->r_b;
     }
-    if (!section(q, &here, p, &t)) {
-        flank_contact(q, &s->l, &here, s->gap - f->closer + OPEN, p);
-        flank_touch(q, &s->l, p, &t);
-    }
-    lean(q, s->sg, &t, z, p);
-    if (GK_ON(q->setup, friction)) glide(q, s->sg, &t, z, p);
+    if (section(q, &here, p, t)) return;
+    flank_contact(q, &s->l, &here, s->gap - f->closer + OPEN, p);
+    flank_touch(q, &s->l, p, t);
 }
 
 /* of a strip of both teeth */
@@ -368,16 +364,25 @@ static void take_deviations(const pair *q, const gk_place *p, int strip, tooth_f
     for (int w = 0; w < 2; w++) f->depth[w] = gk_deviation_line(&q->mesh->deviation[w], p->tooth[w], p->flank, strip);
 }
 
-/* every strip by itself, in the middle of its part that carries; 0 when none comes within `search_distance` */
+/* Every strip by itself, in the middle of its part that carries; 0 when none comes within `search_distance`. Strips of
+ * spur teeth with the same deviations have one section. */
 static int strips_of(const pair *q, tooth_flanks *f, const double roll[2], double search_distance, gk_place *place)
 {
     const flank_side *s = f->side;
+    const int spur = q->mesh->helix[0] == 0.0 && q->mesh->helix[1] == 0.0;
+    const double *depth[2] = {NULL, NULL};
+    gk_point plane;
+    touch t;
     place->gap = OPEN;
     for (int i = 0; i < GK_STRIPS(q->setup); i++) {
         gk_point *p = &place->point[i];
         const gk_part part = gk_strips_part(q->model, q->setup, q->mesh, s->sg, roll, i);
         take_deviations(q, place, i, f);
-        section_at(q, f, roll, part.middle, p);
+        if (!i || !spur || f->depth[0] != depth[0] || f->depth[1] != depth[1])
+            section_at(q, f, roll, part.middle, &plane, &t);
+        *p = plane, depth[0] = f->depth[0], depth[1] = f->depth[1];
+        lean(q, s->sg, &t, part.middle, p);
+        if (GK_ON(q->setup, friction)) glide(q, s->sg, &t, part.middle, p);
         p->share = part.share;
         p->gap += q->mesh->cosine * q->mesh->lead[s->flank][i];
         place->gap = gk_min(place->gap, p->gap);

@@ -65,17 +65,19 @@ void gk_rows_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* adds the rows of the contacts (along: of their sliding) on the part of the ground group that one gear reads; strips
- * of a place whose gradient is the same: all, or each has its own */
+enum { ADD, WRITE, ADD_ALONG }; /* rows of the gaps, added or written; of the sliding */
+
+/* Rows of the contacts on the part of the ground group that one gear reads; strips of a place whose gradient is the
+ * same: all, or each has its own */
 GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
-                              const int motions, const int each, const int strips, const int along)
+                              const int motions, const int each, const int strips, const int what)
 {
     const gk_base *base = &setup->base;
     const gk_position *at = &engaged->position[side->which];
     const int quads = base->width[side->gear] / 4, points = side->candidates * strips;
     const int *motion = base->motion[side->gear];
     const size_t local = (size_t)setup->mesh[engaged->index].local / 4;
-    const gk_quad *const table = (const gk_quad *)(along ? side->along.ground : side->ground);
+    const gk_quad *const table = (const gk_quad *)(what == ADD_ALONG ? side->along.ground : side->ground);
     const gk_quad *const node = table + (size_t)(at->node * points) * quads;
     for (int p = 0; p < engaged->places; p++) {
         const gk_place *place = &engaged->place[p];
@@ -84,7 +86,7 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
         gk_quad *to = (gk_quad *)out + (size_t)(p * strips) * local;
         for (int first = 0; first < strips; first += each) {
             const gk_point *point = &place->point[first];
-            const double *gradient = (along ? point->slide : point->gradient) + SPACE * side->which;
+            const double *gradient = (what == ADD_ALONG ? point->slide : point->gradient) + SPACE * side->which;
             double g[SPACE];
             const gk_quad *moved[SPACE];
             for (int m = 0; m < motions; m++)
@@ -94,7 +96,11 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
                 for (int m = 0; m < motions; m++) rigid += g[m] * moved[m][q];
                 for (int i = first; i < first + each; i++) {
                     const gk_quad here = low[i * quads + q];
-                    to[(size_t)i * local + q] += rigid - (here + at->part * (high[i * quads + q] - here));
+                    const gk_quad row = rigid - (here + at->part * (high[i * quads + q] - here));
+                    if (what == WRITE)
+                        to[(size_t)i * local + q] = row;
+                    else
+                        to[(size_t)i * local + q] += row;
                 }
             }
         }
@@ -102,15 +108,23 @@ GK_INLINE void ground_rows_of(const gk_setup *setup, const gk_side *side, const 
 }
 
 GK_INLINE void ground_rows(const gk_setup *setup, const gk_side *side, const gk_engaged *engaged, double *out,
-                           const int strips)
+                           const int what, const int strips)
 {
     const int motions = setup->base.motions[side->gear];
     if (setup->spatial)
-        ground_rows_of(setup, side, engaged, out, motions, 1, strips, 0);
+        ground_rows_of(setup, side, engaged, out, motions, 1, strips, what);
     else if (motions == 2)
-        ground_rows_of(setup, side, engaged, out, 2, strips, strips, 0);
+        ground_rows_of(setup, side, engaged, out, 2, strips, strips, what);
     else
-        ground_rows_of(setup, side, engaged, out, motions, strips, strips, 0);
+        ground_rows_of(setup, side, engaged, out, motions, strips, strips, what);
+}
+
+/* do the rows of both gears fill those of the engagement, each its own part of them? */
+static int fills(const gk_base *base, const gk_mesh *mesh)
+{
+    int width = 0;
+    for (int w = 0; w < 2; w++) width += base->width[mesh->side[w].gear];
+    return !mesh->joined && width == mesh->local;
 }
 
 /* Fills the rows of contacts and joints on the ground group; the rows have been listed */
@@ -124,9 +138,16 @@ void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e)
     const gk_system *s = &engaged->system;
     const int local = mesh->local;
     if (!local) return;
-    memset(engaged->ground, 0, (size_t)(s->contacts * local) * sizeof *engaged->ground);
+    const int afresh = fills(base, mesh);
+    if (!afresh) memset(engaged->ground, 0, (size_t)(s->contacts * local) * sizeof *engaged->ground);
     for (int w = 0; w < 2; w++)
-        GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w])
+        if (afresh) {
+            GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w],
+                        WRITE)
+        } else {
+            GK_STRIPPED(GK_STRIPS(setup), ground_rows, setup, &mesh->side[w], engaged, engaged->ground + mesh->at[w],
+                        ADD)
+        }
     for (int i = s->contacts; i < s->n; i++) {
         double *row = engaged->ground + (size_t)i * local;
         if (gk_rows_at_bore(setup, s, i))
@@ -152,7 +173,7 @@ void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e)
         if (GK_LANES(setup, side->gear)) contact_rows(setup, side, side->along.rows, engaged, glide->basis[w]);
         if (mesh->local)
             ground_rows_of(setup, side, engaged, glide->ground + mesh->at[w], setup->base.motions[side->gear],
-                           setup->spatial ? 1 : strips, strips, 1);
+                           setup->spatial ? 1 : strips, strips, ADD_ALONG);
     }
     for (int i = 0; i < contacts; i++) {
         const double *slide = gk_point_of(setup, &engaged->place[i / strips], i % strips)->slide;
@@ -206,34 +227,36 @@ static void read_rows(const double *rows, int n, int width, const double *x, dou
     for (; i < n; i++) read_some(rows + (size_t)i * (size_t)width, width, x, read + i, 1);
 }
 
-/* what the rows of an engagement read of displacements (or speeds) of the ground group */
-void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read)
+/* what the rows of an engagement read of displacements (or speeds) of its own part of the ground group */
+void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read)
 {
-    GK_ASSERT(engaged && engaged->index == e);
-    GK_ASSERT(read);
-    const gk_mesh *mesh = &setup->mesh[e];
+    GK_ASSERT(engaged && engaged->index == mesh->index);
+    GK_ASSERT(local && read);
     const gk_system *s = &engaged->system;
-    double local[MAX_GROUND + 4 * MAX_ROTORS];
-    gk_local_gather(mesh, ground, local);
     for (int i = 0; i < s->stride; i++) read[i] = 0.0;
     read_rows(engaged->ground, s->n, mesh->local, local, read);
 }
 
 /* the same of the sliding of the contacts */
-void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
-                               double *read)
+void gk_rows_read_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read)
 {
-    GK_ASSERT(engaged && engaged->index == e);
-    GK_ASSERT(engaged->glide && read);
-    const gk_mesh *mesh = &setup->mesh[e];
+    GK_ASSERT(engaged && engaged->index == mesh->index);
+    GK_ASSERT(engaged->glide && local && read);
     const gk_system *s = &engaged->system;
-    double local[MAX_GROUND + 4 * MAX_ROTORS];
-    gk_local_gather(mesh, ground, local);
     for (int i = 0; i < s->stride; i++) read[i] = 0.0;
     read_rows(engaged->glide->ground, s->contacts, mesh->local, local, read);
 }
 
-/* the same with displacements (or speeds) y of the gear groups */
+/* what the sliding of the contacts reads of displacements (or speeds) of the ground group */
+void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
+                               double *read)
+{
+    double local[MAX_GROUND + 4 * MAX_ROTORS];
+    gk_local_gather(&setup->mesh[e], ground, local);
+    gk_rows_read_local_along(&setup->mesh[e], engaged, local, read);
+}
+
+/* what the gaps of an engagement read of displacements (or speeds) of the ground group and, y, of the gear groups */
 void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
                   double *read)
 {
@@ -241,7 +264,9 @@ void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *co
     GK_ASSERT(y && read);
     const gk_engaged *engaged = &work->engaged[e];
     const gk_system *s = &engaged->system;
-    gk_rows_read_ground(setup, engaged, e, ground, read);
+    double local[MAX_GROUND + 4 * MAX_ROTORS];
+    gk_local_gather(&setup->mesh[e], ground, local);
+    gk_rows_read_local(&setup->mesh[e], engaged, local, read);
     for (int w = 0; w < 2; w++) {
         const int g = setup->mesh[e].side[w].gear, n = GK_LANES(setup, g);
         if (!n || !s->contacts) continue;
@@ -438,47 +463,54 @@ GK_INLINE void push_quads(const pushes *p, const gk_quad *rows, int width, int f
     for (int k = 0; k < quads; k++) out_x[k] = sum_x[k], out_y[k] = sum_y[k];
 }
 
-/* adds the forces x and y of rows on the ground group */
-static void ground_forces(const gk_mesh *mesh, const double *ground, const pushes *p, double *out_x, double *out_y)
+/* adds the forces x and y of rows to those on the ground group, whose two parts for this engagement begin at `at` */
+static void ground_forces(const gk_mesh *mesh, const double *ground, const pushes *p, const int at[2], double *out_x,
+                          double *out_y)
 {
     const int width = mesh->local / 4;
     const gk_quad *rows = (const gk_quad *)ground;
-    for (int w = 0, at = 0; w < 2; w++) {
+    for (int w = 0, first = 0; w < 2; w++) {
         const int quads = mesh->part[w].width / 4;
-        gk_quad *x = (gk_quad *)(out_x + mesh->part[w].from), *y = (gk_quad *)(out_y + mesh->part[w].from);
-        int q = 0;
-        for (; q + 3 <= quads; q += 3, at += 3) push_quads(p, rows, width, at, x + q, y + q, 3);
-        for (; q + 2 <= quads; q += 2, at += 2) push_quads(p, rows, width, at, x + q, y + q, 2);
-        for (; q < quads; q++, at++) push_quads(p, rows, width, at, x + q, y + q, 1);
+        gk_quad *x = (gk_quad *)(out_x + at[w]) - first, *y = (gk_quad *)(out_y + at[w]) - first;
+        const int end = first + quads;
+        for (; first + 3 <= end; first += 3) push_quads(p, rows, width, first, x + first, y + first, 3);
+        for (; first + 2 <= end; first += 2) push_quads(p, rows, width, first, x + first, y + first, 2);
+        for (; first < end; first++) push_quads(p, rows, width, first, x + first, y + first, 1);
     }
 }
 
-void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
-                         double *out_x, double *out_y)
+/* adds the forces x and y of rows to those on the engagement's own part of the ground group */
+void gk_rows_push_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y, double *out_x,
+                        double *out_y)
 {
-    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(engaged && engaged->index == mesh->index);
+    const int at[2] = {0, mesh->part[0].width};
     pushes p;
     list_pushes(x, y, engaged->system.n, &p);
-    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged->ground, &p, out_x, out_y);
+    if (mesh->local && p.count) ground_forces(mesh, engaged->ground, &p, at, out_x, out_y);
 }
 
 /* the same of forces along the profile */
-void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x,
-                               const double *y, double *out_x, double *out_y)
+void gk_rows_push_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
+                              double *out_x, double *out_y)
 {
-    GK_ASSERT(engaged && engaged->index == e);
+    GK_ASSERT(engaged && engaged->index == mesh->index);
     GK_ASSERT(engaged->glide);
+    const int at[2] = {0, mesh->part[0].width};
     pushes p;
     list_pushes(x, y, engaged->system.contacts, &p);
-    if (setup->mesh[e].local && p.count) ground_forces(&setup->mesh[e], engaged->glide->ground, &p, out_x, out_y);
+    if (mesh->local && p.count) ground_forces(mesh, engaged->glide->ground, &p, at, out_x, out_y);
 }
 
 /* friction of an engagement, into the same as gk_rows_scatter */
 static void scatter_along(const gk_setup *setup, gk_work *work, int e)
 {
     const gk_glide *glide = work->engaged[e].glide;
-    gk_rows_push_ground_along(setup, &work->engaged[e], e, glide->step, glide->last, work->ground_force,
-                              work->ground_next);
+    const gk_mesh *mesh = &setup->mesh[e];
+    const int at[2] = {mesh->part[0].from, mesh->part[1].from};
+    pushes p;
+    list_pushes(glide->step, glide->last, work->engaged[e].system.contacts, &p);
+    if (mesh->local && p.count) ground_forces(mesh, glide->ground, &p, at, work->ground_force, work->ground_next);
     for (int w = 0; w < 2; w++) {
         const int g = setup->mesh[e].side[w].gear;
         gk_rows_push_modes_along(setup, work, e, w, glide->step, glide->last, work->force[g], work->next[g]);
@@ -503,8 +535,9 @@ void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work
         const gk_system *s = &engaged->system;
         pushes p;
         list_pushes(x(s), y(s), s->n, &p);
-        if (setup->mesh[e].local)
-            ground_forces(&setup->mesh[e], engaged->ground, &p, work->ground_force, work->ground_next);
+        const gk_mesh *mesh = &setup->mesh[e];
+        const int at[2] = {mesh->part[0].from, mesh->part[1].from};
+        if (mesh->local) ground_forces(mesh, engaged->ground, &p, at, work->ground_force, work->ground_next);
         while (p.count && p.row[p.count - 1] >= s->contacts) p.count--;
         for (int w = 0; w < 2; w++) {
             const int g = setup->mesh[e].side[w].gear;

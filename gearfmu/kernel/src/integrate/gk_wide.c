@@ -51,7 +51,8 @@
 #define gk_couple_recall gk_couple_recall_avx2
 #define gk_rows_form_along gk_rows_form_along_avx2
 #define gk_rows_read_ground_along gk_rows_read_ground_along_avx2
-#define gk_rows_push_ground_along gk_rows_push_ground_along_avx2
+#define gk_rows_read_local_along gk_rows_read_local_along_avx2
+#define gk_rows_push_local_along gk_rows_push_local_along_avx2
 #define gk_rows_push_modes_along gk_rows_push_modes_along_avx2
 #define gk_rows_read_modes_along gk_rows_read_modes_along_avx2
 #define gk_film_begin gk_film_begin_avx2
@@ -67,10 +68,11 @@
 #define gk_friction_watch gk_friction_watch_avx2
 #define gk_friction_settle gk_friction_settle_avx2
 #define gk_far_form gk_far_form_avx2
-#define gk_far_push gk_far_push_avx2
-#define gk_far_read gk_far_read_avx2
-#define gk_rows_read_ground gk_rows_read_ground_avx2
-#define gk_rows_push_ground gk_rows_push_ground_avx2
+#define gk_far_between gk_far_between_avx2
+#define gk_shared_form gk_shared_form_avx2
+#define gk_shared_read gk_shared_read_avx2
+#define gk_rows_read_local gk_rows_read_local_avx2
+#define gk_rows_push_local gk_rows_push_local_avx2
 #define gk_rows_form_bores gk_rows_form_bores_avx2
 #define gk_rows_push_bores gk_rows_push_bores_avx2
 #define gk_rows_read_bores gk_rows_read_bores_avx2
@@ -129,6 +131,7 @@
 #include "problem/gk_balance.c"
 #include "problem/gk_friction.c"
 #include "problem/gk_far.c"
+#include "problem/gk_shared.c"
 #include "problem/gk_couple.c"
 #include "force/gk_nodal.c"
 #include "integrate/gk_frame.c"

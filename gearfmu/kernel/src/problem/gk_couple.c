@@ -2,7 +2,7 @@
  * do to its gaps goes through spins, ground group, bores and the modes of shared gears, gathered and scattered, never
  * through one dense system. Block Gauss–Seidel: in M = D + C′ a rigid coordinate enters with h²/12 at γ = 1, so that
  * three or four sweeps suffice. The sum of all parts is exact, so is the energy they are balanced with. */
-#include "problem/gk_work.h"
+#include "problem/gk_shared.h"
 
 enum { SWEEPS = 40, SETTLED = 20 }; /* from then on dashpots stand: they may go on limiting each other in turns */
 #ifdef GK_DOUBLE_MODES
@@ -15,24 +15,20 @@ static const double TOLERANCE = 1e-7; /* of the largest gap and deflection */
  * the start with what dampers and friction do there */
 typedef enum { WHOLE, AT_ONCE, AT_START, WHOLE_START } effect;
 
-/* forces of an engagement by what they meet: D in the step, A at once; the same along the profile */
-typedef struct gk_forces {
-    double step[MAX_STRIDE], once[MAX_STRIDE], step_along[MAX_STRIDE], once_along[MAX_STRIDE];
-    const double *far; /* without dampers: what they deflect at far teeth is left out, so that it stores nothing */
-} gk_forces;
-
-/* a clutch knows no A; friction counts with all that forces do */
-static void forces_of(const gk_setup *setup, const gk_engaged *engaged, effect of, gk_forces *f)
+/* a clutch knows no A; friction counts with all that forces do; what dampers deflect at far teeth is left out, so that
+ * it stores nothing */
+static void forces_of(const gk_setup *setup, gk_engaged *engaged, effect of)
 {
     const gk_system *s = &engaged->system;
+    gk_forces *f = &engaged->forces;
     const int start = of == AT_START || of == WHOLE_START; /* given torques may have changed */
-    f->far = start ? s->force0 : s->force;
     for (int i = 0; i < s->stride; i++) {
         const int row = i < s->n, clutch = row && s->kind[i] == ROW_CLUTCH;
         f->step[i] = row && of == WHOLE ? s->z[i] : 0.0;
         const double force = start ? s->force0[i] : s->force[i];
         const double damper = of == WHOLE ? s->end[i] : of == WHOLE_START ? s->end0[i] : 0.0;
         f->once[i] = row && !clutch ? force + damper : 0.0;
+        f->far[i] = i < s->contacts ? force : 0.0;
         if (!GK_ON(setup, friction)) continue;
         const gk_glide *glide = engaged->glide;
         const int rubs = i < s->contacts;
@@ -68,17 +64,27 @@ static void give_spins(const gk_setup *setup, gk_work *work, const gk_coefficien
     }
 }
 
+/* displacement of the engagement's own part of the ground group */
 static void give_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, const gk_forces *f)
 {
-    const int n = setup->base.n;
-    double moved[MAX_GROUND + 4 * MAX_ROTORS], yielded[MAX_GROUND + 4 * MAX_ROTORS];
-    memset(moved, 0, (size_t)n * sizeof *moved);
-    memset(yielded, 0, (size_t)n * sizeof *yielded);
-    gk_rows_push_ground(setup, &work->engaged[e], e, f->step, f->once, moved, yielded);
+    const gk_mesh *mesh = &setup->mesh[e];
+    gk_engaged *engaged = &work->engaged[e];
+    gk_quad moved[(MAX_GROUND + 4 * MAX_ROTORS) / 4], yielded[(MAX_GROUND + 4 * MAX_ROTORS) / 4];
+    gk_clear((double *)moved, mesh->local / 4), gk_clear((double *)yielded, mesh->local / 4);
+    gk_rows_push_local(mesh, engaged, f->step, f->once, (double *)moved, (double *)yielded);
     if (GK_ON(setup, friction))
-        gk_rows_push_ground_along(setup, &work->engaged[e], e, f->step_along, f->once_along, moved, yielded);
-    for (int i = 0; i < n; i++) moved[i] = k->ground.mobility[i] * moved[i] - k->ground.kappa[i] * yielded[i];
-    exchange(work->sum_ground, work->engaged[e].given_ground, moved, n);
+        gk_rows_push_local_along(mesh, engaged, f->step_along, f->once_along, (double *)moved, (double *)yielded);
+    for (int w = 0, at = 0; w < 2; w++) {
+        const gk_span part = mesh->part[w];
+        const gk_quad *mobility = (const gk_quad *)(k->ground.mobility + part.from);
+        const gk_quad *kappa = (const gk_quad *)(k->ground.kappa + part.from);
+        gk_quad *sum = (gk_quad *)(work->sum_ground + part.from), *given = (gk_quad *)engaged->given_ground;
+        for (int q = 0; q < part.width / 4; q++, at++) {
+            const gk_quad now = mobility[q] * moved[at] - kappa[q] * yielded[at];
+            sum[q] += now - given[at];
+            given[at] = now;
+        }
+    }
 }
 
 /* displacement of the modes of a gear that other engagements read too */
@@ -89,8 +95,7 @@ static void give_modes(const gk_setup *setup, gk_work *work, const gk_coefficien
     memset(given, 0, (size_t)n * sizeof *given);
     memset(yielded, 0, (size_t)n * sizeof *yielded);
     gk_rows_push_modes(setup, work, e, w, f->step, f->once, given, yielded);
-    if (GK_ON(setup, friction))
-        gk_rows_push_modes_along(setup, work, e, w, f->step_along, f->once_along, given, yielded);
+    gk_rows_push_modes_along(setup, work, e, w, f->step_along, f->once_along, given, yielded);
     for (int i = 0; i < n; i++) given[i] = k->flow[g].mobility[i] * given[i] - k->flow[g].kappa[i] * yielded[i];
 }
 
@@ -102,19 +107,16 @@ static void give_bores(const gk_setup *setup, gk_work *work, int e, const double
     exchange(work->sum_bores.turned, given->turned, bores.turned, MAX_PORTS);
 }
 
-/* what an engagement's forces do to spins, ground group, bores and shared gears */
+/* what an engagement's forces do to spins, ground group and bores; with friction to the modes of shared gears too */
 static void give(const gk_coupled *c, int e, effect of)
 {
-    gk_forces f;
-    forces_of(c->setup, &c->work->engaged[e], of, &f);
-    give_spins(c->setup, c->work, c->k, e, &f);
-    give_ground(c->setup, c->work, c->k, e, &f);
-    give_bores(c->setup, c->work, e, f.once);
-    for (int w = 0; w < 2; w++)
-        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) {
-            give_modes(c->setup, c->work, c->k, e, w, &f);
-            if (c->setup->far_on[c->setup->mesh[e].side[w].gear]) gk_far_push(c->setup, c->work, e, w, f.far);
-        }
+    const gk_forces *f = &c->work->engaged[e].forces;
+    forces_of(c->setup, &c->work->engaged[e], of);
+    give_spins(c->setup, c->work, c->k, e, f);
+    give_ground(c->setup, c->work, c->k, e, f);
+    give_bores(c->setup, c->work, e, f->once);
+    for (int w = 0; w < 2 && GK_ON(c->setup, friction); w++)
+        if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) give_modes(c->setup, c->work, c->k, e, w, f);
 }
 
 static int within(const gk_coupled *c, int e) { return c->setup->mesh[e].island == c->island; }
@@ -129,7 +131,7 @@ static void give_all(const gk_coupled *c, effect of)
         gk_engaged *engaged = &work->engaged[e];
         if (!within(c, e)) continue;
         memset(engaged->given_spin, 0, sizeof engaged->given_spin);
-        memset(engaged->given_ground, 0, (size_t)c->setup->base.n * sizeof *engaged->given_ground);
+        memset(engaged->given_ground, 0, (size_t)c->setup->mesh[e].local * sizeof *engaged->given_ground);
         memset(&engaged->given_bores, 0, sizeof engaged->given_bores);
         give(c, e, of);
     }
@@ -149,12 +151,22 @@ static void take_spins(const gk_coupled *c, int e, double *read)
     }
 }
 
+/* what all others displace of the engagement's own part of the ground group */
+static void others_ground(const gk_coupled *c, int e, double *others)
+{
+    const gk_mesh *mesh = &c->setup->mesh[e];
+    const gk_quad *given = (const gk_quad *)c->work->engaged[e].given_ground;
+    for (int w = 0, at = 0; w < 2; w++) {
+        const gk_quad *sum = (const gk_quad *)(c->work->sum_ground + mesh->part[w].from);
+        for (int q = 0; q < mesh->part[w].width / 4; q++, at++) ((gk_quad *)others)[at] = sum[q] - given[at];
+    }
+}
+
 static void take_ground(const gk_coupled *c, int e, double *read)
 {
-    const gk_work *work = c->work;
     double others[MAX_GROUND + 4 * MAX_ROTORS];
-    for (int i = 0; i < c->setup->base.n; i++) others[i] = work->sum_ground[i] - work->engaged[e].given_ground[i];
-    gk_rows_read_ground(c->setup, &work->engaged[e], e, others, read);
+    others_ground(c, e, others);
+    gk_rows_read_local(&c->setup->mesh[e], &c->work->engaged[e], others, read);
 }
 
 static void take_bores(const gk_coupled *c, int e, double *read)
@@ -186,16 +198,15 @@ static void take_modes(const gk_coupled *c, int e, int which, int along, double 
         gk_rows_read_modes(c->setup, work, e, which, sum, read);
 }
 
-/* what the others do to the rows of an engagement */
-static void take(const gk_coupled *c, int e, double *read)
+/* what the others do to the rows of an engagement; at_once: their forces in the step are 0 */
+static void take(const gk_coupled *c, int e, int at_once, double *read)
 {
     take_ground(c, e, read);
     take_spins(c, e, read);
     take_bores(c, e, read);
-    for (int w = 0; w < 2; w++) {
+    gk_shared_read(c->work, e, at_once, read);
+    for (int w = 0; w < 2 && GK_ON(c->setup, friction); w++)
         if (c->setup->engagements_of[c->setup->mesh[e].side[w].gear] > 1) take_modes(c, e, w, 0, read);
-        if (c->setup->far_on[c->setup->mesh[e].side[w].gear]) gk_far_read(c->model, c->setup, c->work, e, w, read);
-    }
 }
 
 /* what the others do to the sliding of its contacts */
@@ -205,8 +216,8 @@ static void take_along(const gk_coupled *c, int e, double *read)
     const gk_mesh *mesh = &c->setup->mesh[e];
     const gk_engaged *engaged = &work->engaged[e];
     double others[MAX_GROUND + 4 * MAX_ROTORS];
-    for (int i = 0; i < c->setup->base.n; i++) others[i] = work->sum_ground[i] - engaged->given_ground[i];
-    gk_rows_read_ground_along(c->setup, engaged, e, others, read);
+    others_ground(c, e, others);
+    gk_rows_read_local_along(mesh, engaged, others, read);
     for (int l = 0; l < mesh->spins; l++) {
         const double moved = work->sum_spin[0][mesh->spin[l]] - engaged->given_spin[0][l];
         const double yielded = work->sum_spin[1][mesh->spin[l]] - engaged->given_spin[1][l];
@@ -221,7 +232,7 @@ static double take_whole(const gk_coupled *c, int e)
 {
     gk_system *s = &c->work->engaged[e].system;
     double read[MAX_STRIDE], change = 0.0, scale = 1e-12;
-    take(c, e, read);
+    take(c, e, 0, read);
     for (int i = 0; i < s->n; i++) {
         change = gk_max(change, fabs(read[i] - s->outer[i] - s->beyond[i]));
         scale = gk_max(scale, fabs(s->g[i]) + fabs(s->Dz[i]) + fabs(s->Al[i]));
@@ -238,7 +249,7 @@ static void part_at_once(const gk_coupled *c, effect of)
         gk_system *s = &c->work->engaged[e].system;
         double read[MAX_STRIDE];
         if (!within(c, e)) continue;
-        take(c, e, read);
+        take(c, e, 1, read);
         for (int i = 0; i < s->n; i++) {
             const double beyond = s->kind[i] == ROW_CLUTCH ? 0.0 : read[i];
             s->outer[i] += s->beyond[i] - beyond;
@@ -301,6 +312,7 @@ gk_island gk_couple_island(gk_coupled *c)
     gk_island island = {.context = c};
     for (int e = 0; e < c->model->engagements; e++)
         if (within(c, e)) island.member[island.count++] = &c->work->engaged[e].system, c->alone = e;
+    if (island.count > 1) gk_shared_form(c->model, c->setup, c->k, c->work, c->island);
     island.sweep = island.count > 1 ? sweep : GK_ON(c->setup, friction) ? rub : NULL;
     return island;
 }

@@ -22,37 +22,25 @@ void gk_far_form(const gk_setup *setup, gk_work *work, int e)
     }
 }
 
-/* load on the patterns of every tooth by forces of the contacts */
-void gk_far_push(const gk_setup *setup, gk_work *work, int e, int which, const double *force)
+/* Adds to a block what forces of the contacts of s->engagement[1] displace at those of s->engagement[0]: U S Uᵀ. The
+ * same block is read in both directions, so that it is symmetric whatever S is rounded to. */
+void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s)
 {
-    gk_engaged *engaged = &work->engaged[e];
-    const int strips = GK_STRIPS(setup);
-    GK_ASSERT(which == 0 || which == 1);
-    memset(engaged->given_far[which], 0, (size_t)(engaged->places * FAR) * sizeof(double));
-    for (int i = 0; i < engaged->places * strips; i++)
-        if (force[i] != 0.0)
-            gk_axpy(force[i], engaged->far[which] + i * FAR, engaged->given_far[which] + i / strips * FAR, 0, FAR / 4);
-}
-
-/* adds what the loads of the other engagements of a gear displace at the contacts of this one */
-void gk_far_read(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which, double *read)
-{
-    gk_engaged *engaged = &work->engaged[e];
-    const int g = setup->mesh[e].side[which].gear, z = model->gear[g].z, strips = GK_STRIPS(setup);
-    GK_ASSERT(setup->far_on[g]);
-    for (int p = 0; p < engaged->places; p++) {
-        double moved[FAR] = {0};
-        for (int other = 0; other < model->engagements; other++)
-            for (int w = 0; w < 2 && other != e; w++) {
-                const gk_engaged *from = &work->engaged[other];
-                for (int q = 0; q < from->places && setup->mesh[other].side[w].gear == g; q++) {
-                    const int after = (engaged->place[p].tooth[which] - from->place[q].tooth[w] + z) % z;
-                    const double *S = setup->far[g] + (size_t)after * FAR * FAR;
-                    for (int i = 0; i < FAR; i++)
-                        moved[i] += gk_dot_quads(S + i * FAR, from->given_far[w] + q * FAR, FAR / 4);
-                }
+    const gk_engaged *to = &work->engaged[s->engagement[0]], *from = &work->engaged[s->engagement[1]];
+    const double *U = to->far[s->side[0]], *V = from->far[s->side[1]];
+    const int z = model->gear[s->gear].z, strips = GK_STRIPS(setup), stride = s->stride;
+    GK_ASSERT(setup->far_on[s->gear]);
+    for (int q = 0; q < from->places; q++)
+        for (int p = 0; p < to->places; p++) {
+            const int before = (from->place[q].tooth[s->side[1]] - to->place[p].tooth[s->side[0]] + z) % z;
+            const double *S = setup->far[s->gear] +
+                              (size_t)before * FAR * FAR; /* its rows: columns of the other sense */
+            for (int j = q * strips; j < (q + 1) * strips; j++) {
+                gk_quad moved[FAR / 4] = {{0}};
+                for (int k = 0; k < FAR; k++)
+                    for (int n = 0; n < FAR / 4; n++) moved[n] += V[j * FAR + k] * ((const gk_quad *)(S + k * FAR))[n];
+                for (int i = p * strips; i < (p + 1) * strips; i++)
+                    s->far[j * stride + i] = gk_dot_quads(U + i * FAR, (const double *)moved, FAR / 4);
             }
-        for (int i = p * strips; i < (p + 1) * strips; i++)
-            read[i] += gk_dot_quads(engaged->far[which] + i * FAR, moved, FAR / 4);
-    }
+        }
 }

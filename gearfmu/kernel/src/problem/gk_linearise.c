@@ -2,6 +2,7 @@
  * equilibrium, as matrices. What a row reads is what its unit force does, so that all rows come from those functions
  * that spread the forces of a step. */
 #include "problem/gk_linearise.h"
+#include "problem/gk_shared.h"
 #include "integrate/gk_integrate.h"
 
 static const double DAMPER_AT_UNIT_STEP = 0.5; /* c over 2c/h, h = 1 */
@@ -126,13 +127,14 @@ static double own_compliance(const gk_system *s, int i, int j)
     return s->P[i * s->stride + j] + (i == j && i < s->contacts ? s->yield[i] : 0.0);
 }
 
-/* loads on far teeth by forces of one engagement alone */
-static void push_far(const gk_model *model, const gk_setup *setup, gk_work *work, int of, const double *force)
+/* forces on far teeth: those of one engagement alone */
+static void push_far(const gk_model *model, gk_work *work, int of, const double *force)
 {
-    static const double nothing[MAX_STRIDE];
-    for (int e = 0; e < model->engagements; e++)
-        for (int w = 0; w < 2; w++)
-            if (setup->far_on[setup->mesh[e].side[w].gear]) gk_far_push(setup, work, e, w, e == of ? force : nothing);
+    for (int e = 0; e < model->engagements; e++) {
+        gk_forces *f = &work->engaged[e].forces;
+        memset(f, 0, sizeof *f);
+        if (e == of) memcpy(f->far, force, sizeof f->far);
+    }
 }
 
 /* what a unit force of one row does at once to all rows of its own engagement, and between bores and flanks to those of
@@ -146,7 +148,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
     unit[rows[r].row] = 1.0;
     gk_bores bores = {{0}, {0}};
     gk_rows_push_bores(setup, &work->engaged[rows[r].engagement], rows[r].engagement, unit, &bores);
-    push_far(model, setup, work, rows[r].engagement, unit);
+    push_far(model, work, rows[r].engagement, unit);
     for (int c = 0; c < out->rows; c++) {
         const int e = rows[c].engagement, same = e == rows[r].engagement;
         double *Q = out->Q + (size_t)r * (size_t)out->room + (size_t)c;
@@ -154,8 +156,7 @@ static void fill_compliance(const gk_model *model, const gk_setup *setup, gk_wor
             memset(read, 0, sizeof read);
             of = e;
             gk_rows_read_bores(setup, &work->engaged[e], e, &bores, read);
-            for (int w = 0; w < 2; w++)
-                if (setup->far_on[setup->mesh[e].side[w].gear]) gk_far_read(model, setup, work, e, w, read);
+            gk_shared_read(work, e, 1, read);
         }
         *Q = same ? s->A[rows[r].row * s->stride + rows[c].row]
              : setup->mesh[e].island == setup->mesh[rows[r].engagement].island ? read[rows[c].row]
@@ -258,6 +259,7 @@ gk_outcome gk_linearise(const gk_model *model, const gk_setup *setup, gk_work *w
     out->rows = list_kept(model, work, rows);
     describe_coordinates(model, setup, out);
     fill_supports(model, setup, work, rows, out);
+    gk_shared_form(model, setup, &work->explicit_rows, work, -1);
     fill_rows(model, setup, work, rows, out);
     return GK_OK;
 }

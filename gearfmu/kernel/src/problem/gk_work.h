@@ -93,6 +93,19 @@ typedef struct gk_glide {
     double taken, held0; /* energy that friction took in the step; that it holds in what is quasi-static at the start */
 } gk_glide;
 
+/* forces of an engagement by what they meet: D in the step, A at once, far teeth; the same along the profile */
+typedef struct gk_forces {
+    double step[MAX_STRIDE], once[MAX_STRIDE], far[MAX_STRIDE], step_along[MAX_STRIDE], once_along[MAX_STRIDE];
+} gk_forces;
+
+/* a gear that two engagements share: (contacts of the second, stride) what its forces do to the gaps of the first: in
+ * the step; at once; through far teeth */
+typedef struct gk_shared {
+    int engagement[2], side[2], gear, stride;
+    int dynamic, yields, far_on; /* which of them there are */
+    double *moves, *yielded, *far;
+} gk_shared;
+
 typedef struct gk_engaged { /* an engagement in a step */
     int index;
     gk_glide *glide; /* with friction */
@@ -105,11 +118,13 @@ typedef struct gk_engaged { /* an engagement in a step */
     double *ground;    /* (rows, local part): rows of contacts and joints on the ground group */
     double *matrix;    /* D, A, P, J, L, B */
     double *given_ground,
-        given_spin[2][MAX_LOCAL];  /* displacement that its forces give to ground group and spins: in the
+        given_spin[2][MAX_LOCAL]; /* displacement that its forces give to ground group and spins: in the
                                                        step less at once; of spins in the step, at once */
-    gk_real *given_modes[2];       /* (n): the same of the gear groups that other engagements read too */
-    double bore[2][MAX_CONTACTS];  /* what a moment on the port of either side's rotor turns the contacts at once */
-    double *far[2], *given_far[2]; /* (contacts, FAR) patterns of far teeth; (places, FAR) load on them */
+    gk_real *given_modes[2];      /* with friction, (n): the same of the gear groups that other engagements read too */
+    double bore[2][MAX_CONTACTS]; /* what a moment on the port of either side's rotor turns the contacts at once */
+    double *far[2];               /* (contacts, FAR) patterns of far teeth */
+    gk_forces forces;             /* as given to the others */
+    gk_real *turned[2];           /* (contacts, n) rows on the modes of a shared gear, in its axes */
     gk_bores given_bores;
     gk_step_side table[2];
     gk_system system;
@@ -141,6 +156,8 @@ struct gk_work {
     double table_h, table_gamma; /* step of the tables of D and K; 0: none yet */
     double run_h, run_gamma;     /* γ of the internal step of the run */
     gk_engaged *engaged;         /* (engagements) */
+    gk_shared *shared;           /* (shareds) */
+    int shareds;
     /* statics (gk_static.c): every oscillator is compliance */
     double *rest_ground;            /* displacement of the ground group */
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
@@ -213,9 +230,9 @@ static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int
     GK_ASSERT(s->port_of[i] >= 0 && s->port_of[i] < MAX_PORTS);
     return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
-void gk_rows_read_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground, double *read);
-void gk_rows_push_ground(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, const double *y,
-                         double *out_x, double *out_y);
+void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
+void gk_rows_push_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y, double *out_x,
+                        double *out_y);
 void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e);
 void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum);
 void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores, double *read);
@@ -223,15 +240,15 @@ void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e,
 void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e);
 void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
                                double *read);
-void gk_rows_push_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x,
-                               const double *y, double *out_x, double *out_y);
+void gk_rows_read_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
+void gk_rows_push_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
+                              double *out_x, double *out_y);
 void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
                               gk_real *out_x, gk_real *out_y);
 void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
 /* gk_far.c */
 void gk_far_form(const gk_setup *setup, gk_work *work, int e);
-void gk_far_push(const gk_setup *setup, gk_work *work, int e, int which, const double *force);
-void gk_far_read(const gk_model *model, const gk_setup *setup, gk_work *work, int e, int which, double *read);
+void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s);
 /* gk_film.c */
 void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
 void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);

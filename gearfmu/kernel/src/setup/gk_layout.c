@@ -230,7 +230,7 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
         const gk_side *side = &setup->mesh[e].side[w];
         const size_t points = (size_t)(side->candidates * setup->strips);
         engaged->basis[w] = reals(b, contacts * (size_t)setup->modal[side->gear].n);
-        const int shared = setup->engagements_of[side->gear] > 1;
+        const int shared = setup->engagements_of[side->gear] > 1 && GK_ON(setup, friction);
         engaged->given_modes[w] = reals(b, shared ? (size_t)setup->modal[side->gear].n : 0);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
@@ -238,7 +238,8 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     for (int w = 0; w < 2; w++) {
         const int far = gk_far_known(model, setup, setup->mesh[e].side[w].gear);
         engaged->far[w] = doubles(b, far ? contacts * FAR : 0);
-        engaged->given_far[w] = doubles(b, far ? MAX_PAIRS * FAR : 0);
+        const int g = setup->mesh[e].side[w].gear;
+        engaged->turned[w] = reals(b, setup->engagements_of[g] > 1 ? (size_t)setup->modal[g].n * contacts : 0);
     }
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
     engaged->index = e;
@@ -251,6 +252,35 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     for (int w = 0; w < 2; w++) of->basis[w] = reals(b, contacts * (size_t)setup->modal[setup->mesh[e].side[w].gear].n);
     of->ground = doubles(b, rows * (size_t)setup->base.n);
     of->matrix = doubles(b, 6 * rows * rows);
+}
+
+/* Pairs of engagements with a gear in common; list NULL: counts them */
+static int list_shared(const gk_model *model, gk_shared *list)
+{
+    int count = 0;
+    for (int a = 0; a < model->engagements; a++)
+        for (int b = a + 1; b < model->engagements; b++)
+            for (int pair = 0; pair < 4; pair++) {
+                const int w = pair / 2, v = pair % 2, g = model->engagement[a].gear[w];
+                if (model->engagement[b].gear[v] != g) continue;
+                if (list) list[count].engagement[0] = a, list[count].engagement[1] = b;
+                if (list) list[count].side[0] = w, list[count].side[1] = v, list[count].gear = g;
+                count++;
+            }
+    return count;
+}
+
+static void lay_out_shared(bump *b, const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    const size_t contacts = MAX_PAIRS * (size_t)setup->strips, block = contacts * ((contacts + 3) / 4 * 4);
+    work->shareds = list_shared(model, NULL);
+    work->shared = take(b, (size_t)work->shareds * sizeof *work->shared);
+    if (work->shared) list_shared(model, work->shared);
+    for (int p = 0; p < work->shareds; p++) {
+        gk_shared counted, *s = work->shared ? &work->shared[p] : &counted;
+        double **array[] = {&s->moves, &s->yielded, &s->far};
+        for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, block);
+    }
 }
 
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
@@ -282,6 +312,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         gk_engaged counted;
         lay_out_engaged(&b, model, setup, work->engaged ? &work->engaged[e] : &counted, e);
     }
+    lay_out_shared(&b, model, setup, work);
     work->rest_ground = doubles(&b, ground);
     size_t unknowns = (size_t)(model->rotors + 2 * model->chains) + ground;
     for (int g = 0; g < model->gears; g++) {
