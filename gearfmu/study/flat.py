@@ -26,13 +26,24 @@ LOAD = 100.0  # N: where the local law is taken when effect.hertz is off
 @dataclass(frozen=True)
 class FlatBody:
     """mass kg · omega (n,) rad/s and zeta (n,) · rows (A, n): outward displacement by width function and mode, 1/√kg ·
-    residual (A, A) m/N: static compliance beyond the modes."""
+    residual (A, A) m/N: static compliance beyond the modes. Rows and whole static compliance are rounded to the single
+    precision in which a model stores them."""
 
     mass: float
     omega: np.ndarray
     zeta: np.ndarray
     rows: np.ndarray
     residual: np.ndarray
+
+    def __post_init__(self) -> None:
+        carried = (self.rows / self.omega**2) @ self.rows.T
+        stored = _single(self.residual + carried)
+        object.__setattr__(self, "rows", _single(self.rows))
+        object.__setattr__(self, "residual", stored - (self.rows / self.omega**2) @ self.rows.T)
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values, np.float32).astype(float)
 
 
 @dataclass(frozen=True)

@@ -72,11 +72,15 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
 def bars_blob(bars: tuple[Bar, Bar], modes: tuple[int, int], gap: float, local: float = 1e-20) -> bytes:
     """Two coaxial bars `gap` apart, with the residual of the modes left out; `local`: 2 (1 − ν²)/(πE) of the contact
     strip of 1 m, 1/Pa (as good as rigid when left out)."""
-    bodies = [
+    return flat_blob("bars", bar_bodies(bars, modes), FlatContact(gap=gap, local=local))
+
+
+def bar_bodies(bars: tuple[Bar, Bar], modes: tuple[int, int]) -> list[FlatBody]:
+    """The bars of `bars_blob`."""
+    return [
         FlatBody(b.mass, b.frequencies(n), np.zeros(n), b.end_row(n)[None, 1:], np.array([[b.residual(n)]]))
         for b, n in zip(bars, modes, strict=True)
     ]
-    return flat_blob("bars", bodies, FlatContact(gap=gap, local=local))
 
 
 def with_nodes(blob: bytes, share: float = 0.5, nodes: tuple[int, int] = (9, 5), penalty: float = 2e9) -> bytes:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from exact_bars import Bar, impact
 from reference_dg4 import Problem, Reference, Scheme
-from small_model import bars_blob
+from small_model import bar_bodies, bars_blob
 
 from gearfmu.kernel import Kernel
 
@@ -80,9 +80,11 @@ def kernel_forces(case: Case, library: Path, integrator: str, output: str = "mes
 def reference_forces(case: Case, integrator: str) -> np.ndarray:
     """The same from tests/kernel/reference_dg4.py."""
     (bar1, bar2), (n1, n2) = case.bars, case.modes
+    bodies = bar_bodies(case.bars, case.modes)
     omega = np.concatenate([[0.0], bar1.frequencies(n1), [0.0], bar2.frequencies(n2)])
-    rows = np.concatenate([-bar1.end_row(n1), bar2.end_row(n2)])
-    compliance = np.array([[bar1.residual(n1) + bar2.residual(n2) + case.local_compliance]])
+    elastic = [body.rows[0] for body in bodies]  # as a model stores them
+    rows = np.concatenate([-bar1.end_row(n1)[:1], -elastic[0], bar2.end_row(n2)[:1], elastic[1]])
+    compliance = sum(body.residual for body in bodies) + case.local_compliance
     problem = Problem(omega, np.zeros(len(omega)), rows[None, :], compliance, np.array([case.gap]))
     reference = Reference(problem, Scheme(case.h, GAMMA[integrator]))
     v, none = np.zeros(len(omega)), np.zeros(len(omega))

@@ -77,9 +77,8 @@ static oscillator linear_force(double omega, double zeta, double h)
 
 /* The flow in gk_real: a11 − 1, a12, a21, a22 − 1, which keeps frequencies to 1e-7 at any h. Rounded one by one to
  * single precision the four numbers let a mode grow or fade by up to 1e-7 of its energy every step, always the same
- * way. Where damping does not cover that, the nearest values and three neighbours on either side, each with the a21
- * that belongs to it, are searched for the best determinant: some 1e-10 off the exact one, e^(−2ζωh). What is left is
- * the rounding of the states, a random walk: 1e-5 of a mode's energy in 10 000 steps. */
+ * way. Where damping does not cover that, the nearest values and their next neighbours, each with the a21 that belongs
+ * to it, are searched for the best determinant: some 1e-9 off the exact one, e^(−2ζωh). */
 static void round_flow(const oscillator *o, gk_real out[4])
 {
     const double wanted = o->a11 * o->a22 - o->a12 * o->a21, ulp = 1e-7, d11 = o->a11 - 1.0, d22 = o->a22 - 1.0,
@@ -87,10 +86,10 @@ static void round_flow(const oscillator *o, gk_real out[4])
     double least = INFINITY;
     out[0] = (gk_real)d11, out[1] = (gk_real)o->a12, out[2] = (gk_real)o->a21, out[3] = (gk_real)d22;
     if (sizeof(gk_real) > sizeof(float) || 1.0 - wanted > covered) return;
-    for (int choice = 0; choice < 7 * 7 * 7; choice++) {
-        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 7 - 3))),
-                              (gk_real)(o->a12 * (1.0 + ulp * (choice / 49 - 3))),
-                              (gk_real)(d22 * (1.0 + ulp * (choice / 7 % 7 - 3)))};
+    for (int choice = 0; choice < 27; choice++) {
+        const gk_real a[3] = {(gk_real)(d11 * (1.0 + ulp * (choice % 3 - 1))),
+                              (gk_real)(o->a12 * (1.0 + ulp * (choice / 9 - 1))),
+                              (gk_real)(d22 * (1.0 + ulp * (choice / 3 % 3 - 1)))};
         const double product = (1.0 + (double)a[0]) * (1.0 + (double)a[2]) - wanted; /* what a12·a21 should be */
         const gk_real a21 = (gk_real)(product / a[1]);
         const double error = fabs(product - (double)a[1] * a21);
