@@ -132,7 +132,7 @@ static int modes_below(const gk_gear *gear, double cut_hz)
 }
 
 /* Modes below a share of the cut of level fast by which engagements of one gear feel each other (the ovals of a ring
- * between planets) are dynamic at every level: what is static is known within an engagement alone. */
+ * between planets) are dynamic at every level: far teeth (gk_far_fill.c) know those above it alone. */
 static const double SHARED_BELOW = 0.25;
 
 int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
