@@ -3,7 +3,6 @@ of port."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -39,18 +38,6 @@ def planetary() -> StageModel:
 @pytest.fixture(scope="module")
 def fmu(planetary: StageModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return export(planetary, tmp_path_factory.mktemp("set") / "planetary54.fmu")
-
-
-def size_said(name: str) -> int:
-    """MB of a set's FMU as CHANGELOG.md has it."""
-    text = (Path(__file__).parents[2] / "CHANGELOG.md").read_text(encoding="utf-8")
-    found = re.search(rf"FMUs of planetary sets are a third smaller \(.*`{name}` (\d+) MB", text)
-    assert found is not None
-    return int(found[1])
-
-
-def test_an_fmu_weighs_what_the_changelog_says(fmu: Path) -> None:
-    assert size_said("planetary54") == round(fmu.stat().st_size / 1e6)
 
 
 @pytest.fixture
@@ -94,7 +81,6 @@ def test_a_helical_set_runs_through_fmpy(tmp_path: Path) -> None:
     spec = load_stage("helical_set")
     helical = assemble(spec, load_bodies(spec))
     file = export(helical, tmp_path / "helical_set.fmu")
-    assert size_said("helical_set") == round(file.stat().st_size / 1e6)
     ratio = 90 / 26
     start = {"carrier.tau": 400.0, "sun.tau": -400 / ratio, "carrier.w_start": 85.0, "sun.w_start": 85 * ratio}
     names = ["sun_planet1.force_mean", "bearing.sun.fz_mean", "bearing.ring.fz_mean", "pin.planet2.mx_mean"]

@@ -20,6 +20,7 @@ PITCH = 2 * math.pi / 24  # rad, of the wheel
 LOAD = 302.0
 H = 60e-6
 FAST = 1
+SPEED = 15.0  # rad/s of the pinion before free rattle
 UNDAMPED = {"effect.contact_damping": 0.0, "effect.modal_damping": 0.0}
 
 
@@ -33,11 +34,12 @@ def free(spec: StageSpec, bodies: list[ReducedBody], bearing_damping: float) -> 
     return assemble(spec.model_copy(update={"gears": gears, "ports": ports}), bodies)
 
 
-def rattle(model: StageModel, bodies: list[ReducedBody], duration: float = 0.03, **parameters: float) -> Trace:
-    """Gears thrown together so that they bounce between drive and coast flanks where they are: their momenta along
-    the mesh cancel."""
+def rattle(
+    model: StageModel, bodies: list[ReducedBody], duration: float = 0.03, speed: float = SPEED, **parameters: float
+) -> Trace:
+    """Gears thrown together, the pinion at `speed` in rad/s, so that they bounce between drive and coast flanks where
+    they are: their momenta along the mesh cancel."""
     pinion, wheel = ((body.inertia[2, 2], body.r_b) for body in bodies)
-    speed = 15.0
     start = {"pinion.w_start": speed, "wheel.w_start": speed * pinion[0] / pinion[1] * wheel[1] / wheel[0]}
     return simulate(model, lambda time: {}, duration, 30e-6, {"level": FAST, "h": 5e-6, **start, **parameters})
 
@@ -58,25 +60,24 @@ def compliance(model: StageModel, positions: float | np.ndarray, torque: float, 
 def test_free_rattle_keeps_its_energy_and_its_backlash(
     spec: StageSpec, bodies: list[ReducedBody], pair: PairGeometry, level: int, h: float
 ) -> None:
-    """Some 80 impacts without damping. The energy goes up and down with the place on the flanks where the gears meet,
-    by the same at every step size: rows depend on the roll, and the slope of elastic displacement along the flank
-    does no work in the model. It does not run away."""
-    trace = rattle(free(spec, bodies, 0.0), bodies, level=level, h=h, **UNDAMPED)
-    stored, te = trace["energy.stored"][1:], trace["mesh.te"]
-    drift = np.ptp(stored) / stored[0]
-    print(
-        f"{trace['mesh.impacts'][-1]} impacts, energy within {drift:.1e}, "
-        f"te from {1e6 * te.min():.1f} to {1e6 * te.max():.1f} µm"
-    )
-    assert (
-        trace.meta["outcome"] == "completed"
-        and trace["mesh.impacts"][-1] > 40
-        and trace["solver.retried_steps"][-1] == 0
-    )
-    assert drift < 1e-3
-    assert trace["mesh.force_drive"].max() > 100 and trace["mesh.force_coast"].max() > 100
-    depth = 0.5 * (np.ptp(te) - pair.normal_backlash)
-    assert 0 < depth < 30e-6  # compliance of mesh and bearings under the impacts, nothing more
+    """Some 80 impacts without damping, from three speeds: how often they meet in one run is chance. The energy goes up
+    and down with the place on the flanks where the gears meet, by the same at every step size: rows depend on the roll,
+    and the slope of elastic displacement along the flank does no work in the model. It does not run away."""
+    model, impacts = free(spec, bodies, 0.0), []
+    for speed in (14.0, SPEED, 16.0):
+        trace = rattle(model, bodies, speed=speed, level=level, h=h, **UNDAMPED)
+        stored, te = trace["energy.stored"][1:], trace["mesh.te"]
+        drift = np.ptp(stored) / stored[0]
+        impacts.append(trace["mesh.impacts"][-1])
+        print(
+            f"{impacts[-1]} impacts, energy within {drift:.1e}, te from {1e6 * te.min():.1f} to {1e6 * te.max():.1f} µm"
+        )
+        assert trace.meta["outcome"] == "completed" and trace["solver.retried_steps"][-1] == 0
+        assert drift < 1e-3
+        assert trace["mesh.force_drive"].max() > 100 and trace["mesh.force_coast"].max() > 100
+        depth = 0.5 * (np.ptp(te) - pair.normal_backlash)
+        assert 0 < depth < 30e-6  # compliance of mesh and bearings under the impacts, nothing more
+    assert np.median(impacts) > 40
 
 
 def test_energy_of_free_rattle_does_not_run_away(spec: StageSpec, bodies: list[ReducedBody]) -> None:

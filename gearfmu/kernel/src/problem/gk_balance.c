@@ -196,11 +196,20 @@ static double kept_within(bracket *ends, double alpha, double defect, double mov
     return 0.5 * (low + high) - alpha;
 }
 
+/* The move of α by the slope that the defect has had since `last`. Friction follows α, which the quadratic does not
+ * know: Newton's moves would go to and fro about the root. */
+static double secant(double alpha, double defect, double last, double last_defect, double newton)
+{
+    const double slope = (defect - last_defect) / (alpha - last);
+    return slope * newton * defect < 0.0 ? -defect / slope : newton;
+}
+
 /* α by Newton on the quadratic; 0 when the limit of iterations is reached or no direction is left */
 static int find_alpha(const gk_island *island, balance b)
 {
-    double p[MAX_STRIDE], damper[MAX_STRIDE];
+    double p[MAX_STRIDE], damper[MAX_STRIDE], last = 0.0, last_defect = 0.0;
     bracket ends = {0};
+    const int rubs = GK_HAS(friction) && island->member[0]->rubs;
     for (int round = 0; round < GK_ENERGY_LIMIT; round++) {
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
@@ -209,8 +218,11 @@ static int find_alpha(const gk_island *island, balance b)
         }
         const double root = root_of(&b);
         if (!(fabs(root) > 0.0)) return 0;
-        if (GK_HAS(friction) && island->member[0]->rubs && b.c1 * b.c1 < 4.0 * b.defect * b.c2) return 0;
-        const double a = kept_within(&ends, island->member[0]->alpha, b.defect, root);
+        if (rubs && b.c1 * b.c1 < 4.0 * b.defect * b.c2) return 0;
+        const double alpha = island->member[0]->alpha;
+        const double move = rubs && round ? secant(alpha, b.defect, last, last_defect, root) : root;
+        const double a = kept_within(&ends, alpha, b.defect, move);
+        last = alpha, last_defect = b.defect;
         for (int m = 0; m < island->count; m++) {
             gk_system *s = island->member[m];
             memcpy(p, s->along, (size_t)s->stride * sizeof *p);
