@@ -21,7 +21,7 @@ from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.compact import flank_tables, ground_tables, is_mirrored
-from gearfmu.stage.far import LOWEST, far_sections
+from gearfmu.stage.far import far_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.film import film_starts
 from gearfmu.stage.flanks import deviation_sections
@@ -29,6 +29,7 @@ from gearfmu.stage.free import Flank
 from gearfmu.stage.friction import friction_starts
 from gearfmu.stage.groups import SPIN, Group, Layout, RigidSupportError, families, mount, node_directions
 from gearfmu.stage.layout import stage_layout, stage_nodes, width_degrees
+from gearfmu.stage.levels import FAST, RIGID, SHARED_BELOW, STANDARD
 from gearfmu.stage.meshes import stage_sections, tooth_phases
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.nodal import nodal_sections
@@ -38,7 +39,7 @@ from gearfmu.stage.tables import ROLLS, stored_points
 from gearfmu.stage.teeth import gear_section, mismatches
 from gearfmu.stage.whirls import whirl_rows
 
-MODEL_VERSION = 3
+MODEL_VERSION = 4
 PORT_KINDS = {"spring": 0, "torque": 1, "fixed": 2}
 FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is held by
 
@@ -100,7 +101,7 @@ def general_sections(
         sections |= _gear_sections(stage, i, bodies[i], groups, nodes, degrees) | {f"resample{i}": flanks[i][1]}
     for s, group in enumerate(groups):
         sections |= set_sections(s, group, nodes)
-    lowest = 2 * math.pi * LOWEST * float(sections["limits"][0])
+    lowest = 2 * math.pi * SHARED_BELOW * float(sections["limits"][0])
     for i, (gear, shape) in enumerate(zip(stage.gears, shapes, strict=True)):
         if sum(gear.name in mesh.gears for mesh in stage.engagements) > 1:
             sections |= far_sections(i, sections, shape, gear.face_width, len(groups), lowest)
@@ -211,17 +212,19 @@ def _gear_sections(
     turning = {} if rates is None else {f"turn_rate{index}": rates}
     rotor, reads = list(stage.rotors).index(stage.rotor_of(name)), tables[f"ground_list{index}_0"].size
     size = [rotor, body.teeth, chosen.size, reads, meshes > 1, *flank_sizes(flank, degrees)]
-    return (
-        tables
-        | turning
-        | {
-            f"size{index}": np.array(size, np.int32),
-            f"omega{index}": 2 * np.pi * body.frequency[chosen],
-            f"zeta{index}": body.damping_ratio[chosen],
-            f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
-            f"member{index}": body.part[chosen].astype(np.int32),
-        }
-    )
+    return tables | turning | mode_sections(index, body, flank) | {f"size{index}": np.array(size, np.int32)}
+
+
+def mode_sections(index: int, body: Any, flank: Flank) -> dict[str, np.ndarray]:
+    """What the kernel knows of the modes that turn with gear `index`, but for their rows."""
+    chosen = flank.chosen
+    return {
+        f"omega{index}": 2 * np.pi * body.frequency[chosen],
+        f"zeta{index}": body.damping_ratio[chosen],
+        f"diameter{index}": body.nodal_diameter[chosen].astype(np.int32),
+        f"member{index}": body.part[chosen].astype(np.int32),
+        f"level_modes{index}": np.searchsorted(flank.level, (RIGID, FAST, STANDARD), "right").astype(np.int32),
+    }
 
 
 def flank_sizes(flank: Flank, degrees: np.ndarray) -> tuple[int, int, bool]:

@@ -17,7 +17,6 @@ from gearfmu.stage.compact import ground_rows
 from gearfmu.stage.tables import blend
 
 RANK = 12  # error beside the own compliance of a tooth: docs/decisions/kernel.md
-LOWEST = 0.25  # of the cut of level fast: what is below is dynamic at every level (SHARED_BELOW, gk_choose.c)
 RIGID_SHARE = 0.5  # of the kinetic energy: oscillators above are dynamic at every level
 POINTS = 8  # Gauss points over the face width
 

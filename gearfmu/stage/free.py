@@ -21,6 +21,8 @@ import numpy as np
 from gearfmu.body.beam import BeamBody
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
+from gearfmu.spec.ports import LevelSpec
+from gearfmu.stage.levels import lowest_levels
 from gearfmu.stage.spinning import Spinning, gear_spinning, shaft_spinning
 from gearfmu.stage.tables import OFFSETS, blend
 
@@ -46,7 +48,8 @@ class Flank:
     """What the flanks of a gear read at P lengths of roll, for A width functions.
 
     turning (2, P, A, m), kg^-½: rows on tooth 0 of the modes that turn with the gear (ν ≥ 2), chosen (m,) their
-    numbers in the body, low (n,) those of the ground modes (ν ≤ 1), low_member (n,): 0 single, 1 and 2 of a pair;
+    numbers in the body, level (m,), ascending, the lowest level at which each is dynamic; low (n,) the numbers of the
+    ground modes (ν ≤ 1), low_member (n,): 0 single, 1 and 2 of a pair;
     patterns (3, 2, P, A, n), kg^-½: c₀, c_c, c_s of
     the ground modes; node (3, 2, P, A, 6), m/N and 1/N: the same per unit force and moment on the bore node, beyond the
     ground modes; residual (2, 2, 7, P, P, A, A), m/N: from flank, to flank, tooth offset −3 … 3, beyond the ground
@@ -55,6 +58,7 @@ class Flank:
 
     turning: np.ndarray
     chosen: np.ndarray
+    level: np.ndarray
     low: np.ndarray
     low_member: np.ndarray
     patterns: np.ndarray
@@ -91,9 +95,11 @@ class FreeBody:
         return rows
 
 
-def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.ndarray) -> FreeBody:
+def free_gear(
+    body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.ndarray, cuts: LevelSpec | None = None
+) -> FreeBody:
     """The FreeBody of a ReducedBody: `chosen` modes, width functions of `degrees`, rolls of `to_grid` (P, R), weights
-    of those of the body (`resampling`; a unit matrix leaves them). Its one node is the bore.
+    of those of the body (`resampling`; a unit matrix leaves them), `cuts` of the levels. Its one node is the bore.
 
     ModelError where patterns of nodal diameter 2 and more move the bore: the body is no ring of equal sectors.
     """
@@ -103,6 +109,11 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
     omega = 2 * np.pi * body.frequency[low]
     bore = body.bore_rows[:, low] * _couples(body.part[low])
     rows = blend(to_grid, body.flank_rows[:, :, degrees], 1)
+    level = lowest_levels(
+        2 * np.pi * body.frequency[turning], body.part[turning], rows[..., turning], degrees, cuts or LevelSpec()
+    )
+    order = np.argsort(level, kind="stable")
+    turning, level = turning[order], level[order]
     patterns = turn_tables(rows[..., low], body.part[low])
     node = turn_tables(blend(to_grid, body.static_fb[:, :, degrees], 1), NODE_MEMBERS)
     node -= products(patterns / omega**2, bore)
@@ -119,12 +130,13 @@ def free_gear(body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.nd
         flank=Flank(
             turning=rows[..., turning],
             chosen=turning,
+            level=level,
             low=low,
             low_member=body.part[low],
             patterns=patterns,
             node=node,
             residual=_flank_residual(body, degrees, to_grid, patterns, omega),
-            along=_along(body, chosen, degrees, to_grid, patterns),
+            along=_along(body, np.concatenate([low, turning]), degrees, to_grid, patterns),
         ),
         spinning=gear_spinning(body, mass, low),
     )

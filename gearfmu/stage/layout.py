@@ -113,7 +113,8 @@ def even_grids(stage: GeneralStage, bodies: Sequence[Any], rolls: int) -> list[n
 
 
 def _gear(stage: GeneralStage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
-    return free_gear(body, excited_modes(body, degrees) if stage.even else _all_modes(body, degrees), degrees, weights)
+    chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
+    return free_gear(body, chosen, degrees, weights, stage.levels)
 
 
 def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:

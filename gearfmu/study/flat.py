@@ -104,6 +104,7 @@ def _body_sections(g: int, body: FlatBody, contact: FlatContact) -> dict[str, np
         f"zeta{g}": body.zeta,
         f"diameter{g}": np.zeros(n, np.int32),
         f"member{g}": np.zeros(n, np.int32),
+        f"level_modes{g}": np.array([0, n, n], np.int32),
         f"rows{g}": np.broadcast_to(body.rows, (2, GRID, functions, n)),
         f"resample{g}": np.eye(GRID),
         f"low_rows{g}": np.zeros((2, GRID, functions, 0)),

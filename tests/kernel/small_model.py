@@ -13,7 +13,15 @@ from types import SimpleNamespace
 import numpy as np
 from exact_bars import Bar
 
-from gearfmu.stage.assembly import MODEL_VERSION, flank_sections, flank_sizes, port_compliances, set_sections
+from gearfmu.spec.ports import LevelSpec
+from gearfmu.stage.assembly import (
+    MODEL_VERSION,
+    flank_sections,
+    flank_sizes,
+    mode_sections,
+    port_compliances,
+    set_sections,
+)
 from gearfmu.stage.blob import read_blob, write_blob
 from gearfmu.stage.fields import gear_numbers, order_sections
 from gearfmu.stage.free import FreeBody, free_gear
@@ -31,6 +39,7 @@ LENGTH = DISTANCE * np.sin(WORKING)
 PHASE = (0.0, np.pi - WORKING - PSI[1] + (LENGTH - BASE[0] * (PSI[0] + WORKING)) / BASE[1])  # drive flanks just touch
 FORM, TIP = (3.0e-3, 9.0e-3), (23.3e-3, 30.2e-3)
 ROLLS, DEGREES = 6, (0, 2)
+CUTS = (20e3, 60e3)  # Hz
 BEARING_K, BEARING_C = 3e8, 600.0
 EXTERNAL, SPRING, TORQUE, FIXED = 1, 0, 1, 2
 PORTS = {"spring": (SPRING, 0), "torque": (TORQUE, 0), "fixed": (FIXED, 0), "chain": (SPRING, 1)}  # kind, chain
@@ -45,7 +54,8 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
     named."""
     rng = np.random.default_rng(seed)
     bodies = [_body(g, rng) for g in (0, 1)]
-    groups = _groups([free_gear(body, np.arange(len(FREQUENCY)), np.arange(2), np.eye(ROLLS)) for body in bodies])
+    every, cuts = np.arange(len(FREQUENCY)), LevelSpec(fast_cut=CUTS[0], standard_cut=CUTS[1])
+    groups = _groups([free_gear(body, every, np.arange(2), np.eye(ROLLS), cuts) for body in bodies])
     layout, last = groups[0].layout, (2e4, 5.0, 0.05, 2e-3, 8e3, 0.5)
     sections = {
         "counts": np.array([MODEL_VERSION, 3, 2, 2, 1, 2, 4, 4, len(DEGREES), ROLLS, len(groups)], np.int32),
@@ -54,7 +64,7 @@ def pair_blob(ports: tuple[str, str] = ("chain", "spring"), seed: int = 0) -> by
         "engagement_names": "mesh",
         "support_names": "|".join(layout.support_names()),
         "displacement_names": "|".join(layout.displacement_names()),
-        "limits": np.array([20e3, 60e3, 7.5e-6, 2 * np.pi / (628.0 * TEETH[0])]),
+        "limits": np.array([*CUTS, 7.5e-6, 2 * np.pi / (628.0 * TEETH[0])]),
         "degrees": np.array(DEGREES, np.int32),
         "inertia": np.array(INERTIA),
         "engaged": np.array([[0, 1, EXTERNAL, _coast_shift()]], np.int32),
@@ -176,16 +186,11 @@ def _groups(bodies: list[FreeBody]) -> list[Group]:
 
 def _modes(g: int, body: SimpleNamespace, groups: list[Group]) -> dict[str, np.ndarray]:
     degrees, flank = np.array(DEGREES), groups[0].layout.bodies[g].flank
-    tables, turning = flank_sections(g, groups, NODES, degrees), DIAMETER > 1
+    tables = flank_sections(g, groups, NODES, degrees)
     reads = tables[f"ground_list{g}_0"].size
-    return tables | {
-        f"size{g}": np.array([g, TEETH[g], turning.sum(), reads, 0, *flank_sizes(flank, degrees)], np.int32),
-        f"resample{g}": np.eye(ROLLS),
-        f"omega{g}": 2 * np.pi * body.frequency[turning],
-        f"zeta{g}": body.damping_ratio[turning],
-        f"diameter{g}": DIAMETER[turning].astype(np.int32),
-        f"member{g}": MEMBER[turning].astype(np.int32),
-    }
+    size = [g, TEETH[g], flank.chosen.size, reads, 0, *flank_sizes(flank, degrees)]
+    of_modes = mode_sections(g, body, flank)
+    return tables | of_modes | {f"size{g}": np.array(size, np.int32), f"resample{g}": np.eye(ROLLS)}
 
 
 def own_residual() -> np.ndarray:

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { MODEL_VERSION = 3, MOST_NAME = 64 };
+enum { MODEL_VERSION = 4, MOST_NAME = 64 };
 static const double ROUNDING = 1e-9; /* relative: of numbers that are computed from those of the stage file */
 
 /* what is read with: blob, shape so far, and the first thing that was wrong */
@@ -237,9 +237,14 @@ static void check_modes(reader *r, const gk_gear *g)
         const int next = k + 1 < g->modes ? g->member[k + 1] : -1, before = k ? g->member[k - 1] : -1;
         demand(r, between(g->omega[k], 1e-3, 1e12), "frequencies");
         WITHIN(r, g->zeta[k], DAMPING_RATIO, "damping ratio of a gear's mode");
-        if (k && g->omega[k] < g->omega[k - 1] * (1 - 1e-6)) refuse(r, "frequencies", "are not sorted");
         demand(r, counted(g->diameter + k, 0, g->z) && counted(g->member + k, 0, 2), "nodal diameters or members");
         if ((g->member[k] == 1 && next != 2) || (g->member[k] == 2 && before != 1)) refuse(r, "mode pairs", "are torn");
+    }
+    for (int level = 0, fewest = 0; level < 3 && !r->outcome; level++) {
+        const int count = g->level_modes[level];
+        demand(r, counted(&count, fewest, g->modes), "modes of a level");
+        if (!r->outcome && count < g->modes && g->member[count] == 2) refuse(r, "mode pairs", "are torn by a level");
+        fewest = count;
     }
 }
 
@@ -430,6 +435,7 @@ static void read_gear(reader *r, gk_model *m, int i)
     read_numbers(r, g);
     g->omega = take(r, F_GEAR_omega), g->zeta = take(r, F_GEAR_zeta);
     g->diameter = take(r, F_GEAR_diameter), g->member = take(r, F_GEAR_member);
+    g->level_modes = take(r, F_GEAR_level_modes);
     g->turn_rate = bounded(r, F_GEAR_turn_rate, 1.001);
     read_tables(r, g);
     g->far_rows = bounded_f32(r, F_GEAR_far_rows, 1e3f), g->far_modes = bounded_f32(r, F_GEAR_far_modes, 1e6f);

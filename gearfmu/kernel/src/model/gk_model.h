@@ -67,7 +67,7 @@ typedef struct gk_gear {
     const float *port_residual;
     const float *along_rows, *along_low, *along_normal, *along_own, *along_across; /* NULL: unknown */
     const double *turn_rate; /* (modes) Coriolis coupling of a pair; NULL: unknown */
-    const int32_t *diameter, *member;
+    const int32_t *diameter, *member, *level_modes;
     const double *lead;  /* (2 flanks, LEADS) depth across the face width, in the transverse section; NULL: none */
     const double *index; /* (2 flanks, z) rad: individual index deviation of every tooth; NULL: none */
     double index_most;   /* the largest of them along the flank normal, m */

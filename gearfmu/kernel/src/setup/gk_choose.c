@@ -114,38 +114,22 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
 }
 
 /* ---- which oscillators are dynamic ------------------------------------------------------------------------------- */
-/* number of modes below the wished cut, moved to the widest relative gap within 15 %: never inside a cluster, never
- * inside a pair */
-static int modes_below(const gk_gear *gear, double cut_hz)
-{
-    double cut = 2.0 * GK_PI * cut_hz, widest = 0.0;
-    int best = 0;
-    while (best < gear->modes && gear->omega[best] < cut) best++;
-    if (best == gear->modes) return best;
-    for (int k = 1; k < gear->modes; k++) {
-        if (gear->member[k] == 2 || gear->omega[k] < 0.85 * cut || gear->omega[k - 1] > 1.15 * cut) continue;
-        double gap = gear->omega[k] / gear->omega[k - 1] - 1.0;
-        if (gap > widest) widest = gap, best = k;
-    }
-    if (best < gear->modes && gear->member[best] == 2) best++;
-    return best;
-}
-
-/* Modes below a share of the cut of level fast by which engagements of one gear feel each other (the ovals of a ring
- * between planets) are dynamic at every level: far teeth (gk_far_fill.c) know those above it alone. */
-static const double SHARED_BELOW = 0.25;
-
+/* how many modes of a gear group are dynamic, from the first on (gearfmu/stage/levels.py has their order) */
 int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
 {
     GK_ASSERT(gk_is_gear(model, g));
     const gk_gear *gear = &model->gear[g];
     switch (setup->level) {
-    case LEVEL_RIGID: return setup->engagements_of[g] > 1 ? modes_below(gear, SHARED_BELOW * model->cut[0]) : 0;
-    case LEVEL_FAST: return modes_below(gear, model->cut[0]);
-    case LEVEL_STANDARD: return modes_below(gear, model->cut[1]);
+    case LEVEL_RIGID: return setup->engagements_of[g] > 1 ? gear->level_modes[0] : 0;
+    case LEVEL_FAST: return gear->level_modes[1];
+    case LEVEL_STANDARD: return gear->level_modes[2];
     default: return gear->modes;
     }
 }
+
+/* Oscillators below a share of the cut of level fast by which engagements of one gear feel each other (the ovals of a
+ * ring between planets) are dynamic at every level: far teeth (gk_far_fill.c) know those above it alone. */
+static const double SHARED_BELOW = 0.25;
 
 static int shares(const gk_model *model, const gk_setup *setup)
 {
