@@ -19,13 +19,22 @@ TORQUE = 600.0
 
 @pytest.fixture(scope="module")
 def model() -> StageModel:
-    spec = load_stage("planetary54")
+    return set_of("planetary54")
+
+
+def set_of(name: str) -> StageModel:
+    spec = load_stage(name)
     return assemble(spec, load_bodies(spec))
+
+
+def bare_of(model: StageModel) -> bytes:
+    """Its blob without the far part."""
+    return write_blob({name: part for name, part in read_blob(model.blob).items() if not name.startswith("far_")})
 
 
 @pytest.fixture(scope="module")
 def without(model: StageModel) -> bytes:
-    return write_blob({name: part for name, part in read_blob(model.blob).items() if not name.startswith("far_")})
+    return bare_of(model)
 
 
 def linear(blob: bytes, level: float) -> LinearModel:
@@ -75,3 +84,11 @@ def test_engagements_feel_each_other_as_at_level_full(
     found, bare = error(model.blob, level, exact), error(without, level, exact)
     print(f"level {level:g}: error {found:.1e} of own compliance, {bare:.1e} without far teeth")
     assert found < limit < bare
+
+
+@pytest.mark.full
+def test_so_do_those_of_helical_gears() -> None:
+    helical = set_of("helical_set")
+    wanted, bare = compliance(linear(helical.blob, FULL)), bare_of(helical)
+    for level, limit in ((RIGID, 5e-4), (FAST, 2e-4), (STANDARD, 1e-4)):
+        assert error(helical.blob, level, wanted) < limit < error(bare, level, wanted), f"level {level:g}"
