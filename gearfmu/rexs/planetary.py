@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from gearfmu.errors import Problem
-from gearfmu.rexs.draft import Draft, millimetres
+from gearfmu.geometry.shifts import sum_of_shifts
+from gearfmu.spec.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -19,13 +20,9 @@ from gearfmu.rexs.gears import (
     shaft_diameters,
     shaft_speed,
     shaft_torque,
-    sum_of_shifts,
 )
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import (
-    BACKLASH_PER_MODULE,
-    PITCH_SPEED,
-    STRIP_PER_MODULE,
     assumed_torque,
     put_rack_data,
     root_diameter,
