@@ -110,7 +110,8 @@ class OpenPair:
         """Smallest and largest x of gear 0 with which neither gear is undercut; the first is larger where there is
         none."""
         least = [self.rack.least_shift(z) + _FINE for z in self.teeth]
-        return max(least[0], -3.0), min(self.total - least[1], 3.0)
+        low, high = max(least[0], -3.0), min(self.total - least[1], 3.0)
+        return math.ceil(low / _FINE) * _FINE, high
 
     def best_efforts(self) -> list[str]:
         """Why nothing can be made: shortcomings of the split that has the fewest."""
@@ -145,23 +146,26 @@ def specific_sliding(pair: PairGeometry) -> tuple[float, float]:
 
 def shortcomings(pair: PairGeometry) -> Iterator[str]:
     """What keeps the gears of a pair from being made or from meeting, in words."""
+    if any(gear.r_a - gear.tip_edge <= gear.r_b for gear in pair.gears):
+        yield "teeth without an involute"
+        return
     for gear, other in (pair.gears, pair.gears[::-1]):
         name = f"of {gear.z} teeth (x = {gear.x:.3f})"
         if gear.s_form <= 0:
             yield f"undercut of the gear {name}"
-        elif gear.r_a <= gear.r_b or gear.tip_half_angle * 2 * gear.r_a * math.cos(gear.beta) < LEAST_TIP * gear.m:
+        elif gear.tip_half_angle * 2 * gear.r_a * math.cos(gear.beta) < LEAST_TIP * gear.m:
             yield f"pointed teeth of the gear {name}"
         elif pair.opposite(other.s_a) < gear.s_form:
             yield f"interference at the root of the gear {name}"
-    if all(gear.r_a > gear.r_b for gear in pair.gears) and pair.contact_ratio < 1:
+    if pair.contact_ratio < 1:
         yield f"a contact ratio of {pair.contact_ratio:.2f}, below 1"
 
 
 def reach(rack: Rack, teeth: tuple[int, int]) -> tuple[float, float] | None:
     """Smallest and largest centre distance (m) at which `OpenPair.balanced` finds something; None: nowhere."""
     found = []
-    for step in range(-40, 81):
-        distance = distance_of_shifts(rack.m, rack.alpha, rack.beta, sum(teeth), 0.05 * step)
+    for step in range(-40, 61):
+        distance = distance_of_shifts(rack.m, rack.alpha, rack.beta, sum(teeth), 0.1 * step)
         if distance > 0 and _can_be_made(OpenPair(rack, teeth, distance)):
             found.append(distance)
     return (min(found), max(found)) if found else None

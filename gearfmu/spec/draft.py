@@ -59,6 +59,13 @@ class Draft:
         """`put` for a value that the file does not give."""
         self.put(place, value, f"assumed: {why}")
 
+    def at(self, place: str) -> Any:
+        """The value or table at a place."""
+        found: Any = self.tables
+        for step in place.split("."):
+            found = found[step]
+        return found
+
     def drop(self, place: str) -> None:
         """Take a field or table out."""
         *way, key = place.split(".")
