@@ -17,7 +17,6 @@ from gearfmu.spec.stage import load_stage
 
 FOLDER = "coarse"
 SCALE = 0.5  # on all element counts
-ROLL_POINTS, MODES = 16, 200  # at most
 # measured by benchmarks/coarse.py on a pair z 31/73 and a set z 30/20/70 of m_n = 2.5 and 2 mm
 STATED_ERROR = ""
 
@@ -49,14 +48,8 @@ def _description(spec: Any) -> str:
 
 def _tables(spec: Any) -> list[tuple[str, dict[str, Any]]]:
     """Tables that say what is coarser; of bodies meshed elsewhere the counts of our own mesh mean nothing."""
-    found: list[tuple[str, dict[str, Any]]] = []
     prefix = {"planetary_set": "", "external_pair": "gears."}.get(spec.kind, "bodies.")
-    for gear in spec.gears:
-        own = {"roll_points": min(gear.body.roll_points, ROLL_POINTS), "modes": min(gear.body.modes, MODES)}
-        found += [
-            (f"{prefix}{gear.name}.body", own),
-            (f"{prefix}{gear.name}.body.mesh", {"scale": SCALE * gear.body.mesh.scale}),
-        ]
+    meshes = {f"{prefix}{gear.name}.body.mesh": gear.body.mesh for gear in spec.gears}
     if isinstance(spec, PlanetarySpec):
-        found.append(("carrier.mesh", {"scale": SCALE * spec.carrier.mesh.scale}))
-    return found
+        meshes["carrier.mesh"] = spec.carrier.mesh
+    return [(place, {"scale": SCALE * mesh.scale}) for place, mesh in meshes.items()]
