@@ -45,9 +45,7 @@ def distance_of_shifts(module: float, alpha: float, beta: float, teeth: int, tot
     """Centre distance (m) at which teeth with Σx = `total` have no backlash: the inverse of `sum_of_shifts`."""
     alpha_t = math.atan(math.tan(alpha) / math.cos(beta))
     working = float(involute.inv(alpha_t)) + 2 * total * math.tan(alpha) / teeth
-    return (
-        module * teeth / math.cos(beta) / 2 * math.cos(alpha_t) / math.cos(involute.inverse_inv(max(working, 0.0)))
-    )
+    return module * teeth / math.cos(beta) / 2 * math.cos(alpha_t) / math.cos(involute.inverse_inv(max(working, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -99,12 +97,16 @@ class OpenPair:
         """x of gear 0 with equal specific sliding at both ends of the path, within what can be made; None: nothing
         can."""
         low, high = self.range_of_shifts()
-        sound = [x for x in _steps(low, high, _STEP) if not list(shortcomings(self.at(x)))]
-        if not sound:
+        near = self._most_even(_steps(low, high, _STEP))
+        if near is None:
             return None
-        near = min(sound, key=self._unevenness)
-        fine = _steps(max(near - _STEP, low), min(near + _STEP, high), _FINE)
-        return round(min((x for x in fine if not list(shortcomings(self.at(x)))), key=self._unevenness, default=near), 6)
+        fine = self._most_even(_steps(max(near - _STEP, low), min(near + _STEP, high), _FINE))
+        return round(near if fine is None else fine, 6)
+
+    def _most_even(self, shifts: list[float]) -> float | None:
+        """Of the shifts with which both gears can be made, the one of the most even sliding."""
+        sound = [x for x in shifts if not list(shortcomings(self.at(x)))]
+        return min(sound, key=self._unevenness) if sound else None
 
     def range_of_shifts(self) -> tuple[float, float]:
         """Smallest and largest x of gear 0 with which neither gear is undercut; the first is larger where there is

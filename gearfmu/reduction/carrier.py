@@ -10,6 +10,7 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_carrier import imported_carrier
+from gearfmu.reduction.memory import Need, whole_need
 
 
 def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
@@ -22,6 +23,12 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
         return imported_carrier(spec).full
     geometry = CarrierGeometry.of(spec)
     return full_order("carrier", *carrier_elements(spec, scale), Judgement(("bore",), geometry.a))
+
+
+def carrier_need(spec: Any) -> Need:
+    """Memory that the reduction of a carrier meshed here takes, from its counts."""
+    sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh)
+    return whole_need(3 * sector.teeth * (len(sector.nodes) - len(sector.cut_plus)), spec.carrier.modes)
 
 
 def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:

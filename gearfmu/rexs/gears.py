@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 from gearfmu.errors import Problem
-from gearfmu.geometry import involute
-from gearfmu.spec.draft import Draft, millimetres
 from gearfmu.rexs.model import Component, RexsModel
+from gearfmu.spec.draft import Draft, millimetres
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")

@@ -8,15 +8,6 @@ from typing import Any
 from gearfmu.errors import Problem
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.shifts import sum_of_shifts
-from gearfmu.spec.draft import (
-    BACKLASH_PER_MODULE,
-    PITCH_SPEED,
-    STRIP_PER_MODULE,
-    Draft,
-    degrees,
-    millimetres,
-    usual_torque,
-)
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -30,6 +21,15 @@ from gearfmu.rexs.gears import (
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.spec.base import validate
 from gearfmu.spec.checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.spec.draft import (
+    BACKLASH_PER_MODULE,
+    PITCH_SPEED,
+    STRIP_PER_MODULE,
+    Draft,
+    degrees,
+    millimetres,
+    usual_torque,
+)
 from gearfmu.spec.gear import GearSpec, PairSpec
 from gearfmu.units import to_si
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry.shifts import sum_of_shifts
-from gearfmu.spec.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -28,6 +27,7 @@ from gearfmu.rexs.pair import (
     root_diameter,
 )
 from gearfmu.spec.checks import rounded_up
+from gearfmu.spec.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 
 _PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed

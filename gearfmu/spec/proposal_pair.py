@@ -48,9 +48,7 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     torque, _ = put_load(draft, wish, *usual)
     radius = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
     for name in NAMES:
-        put_patch(
-            draft, f"gears.{name}", pinion.m, torque / pinion.r_b / width, radius / math.cos(pinion.beta_b)
-        )
+        put_patch(draft, f"gears.{name}", pinion.m, torque / pinion.r_b / width, radius / math.cos(pinion.beta_b))
     for name, own in zip(NAMES, (torque, torque * ratio), strict=True):
         stiffness = rounded_up(own / _TWIST, 2)
         propose(draft, f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")

@@ -62,7 +62,7 @@ def draft_set(wish: Wish) -> Draft:
 
 def _assembly(wish: Wish) -> Iterator[Problem]:
     """Whether the planets can be put between sun and ring."""
-    (sun, planet, ring), count = wish.teeth, wish.planets or 1
+    (sun, _, ring), count = wish.teeth, wish.planets or 1
     teeth = sun + ring
     if wish.unequal or teeth % count == 0:
         return
@@ -83,7 +83,9 @@ def _room(wish: Wish, distance: float, tip: float) -> Iterator[Problem]:
         return
     most = math.floor(math.pi / math.asin(min(tip / distance, 1.0)) - 1e-9)
     fewer = f"at most {most} of this size" if most > 1 else "smaller planets"
-    remedy = f"neighbouring planets touch: axes {millimetres(apart)} apart, tip diameter {millimetres(2 * tip)}; {fewer}"
+    remedy = (
+        f"neighbouring planets touch: axes {millimetres(apart)} apart, tip diameter {millimetres(2 * tip)}; {fewer}"
+    )
     yield Problem("", "planets", str(wish.planets), remedy)
 
 

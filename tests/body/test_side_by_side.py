@@ -8,13 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gearfmu.body import memory, reduce
+from gearfmu.body import apart, reduce
 from gearfmu.body.layout import entries_of
-from gearfmu.body.memory import Need, gear_need
 from gearfmu.body.reduced import value_of
 from gearfmu.errors import MeshError
 from gearfmu.femesh import sector_mesh
 from gearfmu.geometry import PairGeometry
+from gearfmu.reduction import memory
+from gearfmu.reduction.memory import Need, gear_need
 from gearfmu.spec.stage import load_stage
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,8 +36,8 @@ def test_gears_side_by_side_are_those_made_one_after_the_other(
     spec: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = reduce.reduce_stage(spec, tmp_path / "alone")
-    monkeypatch.setattr(reduce, "_WORTH", 0)
-    monkeypatch.setattr(reduce.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(apart, "_WORTH", 0)
+    monkeypatch.setattr(apart.os, "cpu_count", lambda: 2)
     told: list[str] = []
     together = reduce.reduce_stage(spec, tmp_path / "together", progress=lambda text, share: told.append(text))
     assert {text.split(":")[0] for text in told} == {"pinion", "wheel"}
@@ -50,8 +51,8 @@ def test_gears_side_by_side_are_those_made_one_after_the_other(
 
 
 def test_what_a_process_raises_is_raised_here(spec: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reduce, "_WORTH", 0)
-    monkeypatch.setattr(reduce.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(apart, "_WORTH", 0)
+    monkeypatch.setattr(apart.os, "cpu_count", lambda: 2)
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     with pytest.raises(OSError, match="file"):
         reduce.reduce_stage(spec, tmp_path / "file" / "below")
@@ -66,7 +67,7 @@ def test_a_gear_that_does_not_fit_is_refused_with_the_counts_to_lower(
     with pytest.raises(MeshError, match=r"pinion.*about 0\.2 GB.*0\.1 GB are free: lower .*flank = 2.*width = 1"):
         reduce.reduce_stage(spec, tmp_path)
     monkeypatch.setattr(memory, "_MEMORY_TABLE", tmp_path / "none")
-    memory.require_memory(Need(10**6, 1e15), None)  # a system that does not tell
+    memory.require_memory(Need(10**6, 1e15), "")  # a system that does not tell
 
 
 def test_the_estimate_is_near_what_was_measured() -> None:
