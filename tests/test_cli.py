@@ -182,10 +182,10 @@ def test_bodies_that_are_being_made_are_named_where_there_is_no_terminal(capsys:
 def test_bodies_that_are_being_made_are_told_how_far_every_ten_seconds(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gearfmu.commands import models
+    from gearfmu.commands import models, shared
 
     now = [0.0]
-    monkeypatch.setattr(models.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(shared.time, "monotonic", lambda: now[0])
     with models.reducing() as progress:
         for second in range(25):
             now[0] = float(second)
@@ -193,9 +193,27 @@ def test_bodies_that_are_being_made_are_told_how_far_every_ten_seconds(
     assert capsys.readouterr().err.splitlines() == [
         "reducing pinion …",
         "reducing wheel …",
-        "reducing pinion: step 10, 25 %",
-        "reducing pinion: step 20, 50 %",
+        "reducing wheel: step 9, 22 %",
+        "reducing pinion: step 18, 45 %",
     ]
+
+
+def test_long_work_is_told_of_while_nothing_is_heard(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from gearfmu.commands import shared
+
+    monkeypatch.setattr(shared, "_EVERY", 0.1)
+    with shared.progress_bar("te") as progress:
+        progress(None, "statics")
+        deadline = time.monotonic() + 20
+        told = ""
+        while told.count("te statics, for ") < 2 and time.monotonic() < deadline:
+            time.sleep(0.02)
+            told += capsys.readouterr().err
+    assert told.count("te statics, for ") >= 2
+    time.sleep(0.3)
+    assert capsys.readouterr().err == "", "it ends with the work"
 
 
 def test_mesh_writes_what_meshio_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
