@@ -108,7 +108,7 @@ def reduce_stage(
 
 def _together(jobs: list[tuple[Any, int, Path]]) -> list[Job]:
     """The gears that are worth processes of their own (`side_by_side`)."""
-    works = [gear_work(own.gears[index], _geometry(own, index)) for own, index, _ in jobs]
+    works = [gear_work(own.gears[index], gear_geometry(own, index)) for own, index, _ in jobs]
     return side_by_side(list(zip(works, jobs, strict=True)))
 
 
@@ -132,13 +132,14 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
     try:
-        geometry = _geometry(spec, gear_index)
+        geometry = gear_geometry(spec, gear_index)
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
         raise MeshError(f"{spec.source}: {gear_table(spec, gear.name)}: {error}") from error
 
 
-def _geometry(spec: Any, gear_index: int) -> Geometry:
+def gear_geometry(spec: Any, gear_index: int) -> Geometry:
+    """The geometry of a gear of a pair, or of a gear or ring of a general stage as a pair."""
     gear = spec.gears[gear_index]
     if isinstance(gear, RingSpec):
         return InternalGearGeometry.of(gear, spec.pair, hand=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from gearfmu.fem import hex20
@@ -11,6 +12,8 @@ from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_orde
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_carrier import imported_carrier
 from gearfmu.reduction.memory import Need, whole_need
+
+FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 
 
 def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
@@ -26,9 +29,12 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
 
 
 def carrier_need(spec: Any) -> Need:
-    """Memory that the reduction of a carrier meshed here takes, from its counts."""
+    """Memory that the reduction of a carrier meshed here takes, from its counts: the whole body, or the sector of the
+    finer mesh (`FINER`) by which its error is measured."""
     sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh)
-    return whole_need(3 * sector.teeth * (len(sector.nodes) - len(sector.cut_plus)), spec.carrier.modes)
+    own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * spec.carrier.modes
+    whole, finer = whole_need(own * sector.teeth, vectors), whole_need(round(own * FINER**3), vectors)
+    return replace(whole, memory=max(whole.memory, finer.memory))
 
 
 def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:

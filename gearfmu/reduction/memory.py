@@ -11,7 +11,7 @@ from gearfmu.errors import MeshError
 _BASE = 0.2e9  # bytes of the program with its packages, and of what is small
 _FACTOR = 21.0  # entries of the factor per unknown to the power 4/3; measured 19 to 25 on sectors of 5 to 34 thousand
 _SPARSE = 3000.0  # bytes per unknown of finite-element matrices, on the sector and in its coordinates
-_WHOLE_FACTOR = 30.0  # entries of the factor of a whole body per unknown to the power 4/3
+_WHOLE_FACTOR = 150.0  # the same of all factors of a carrier together: measured 145 to 165 on 5 to 152 thousand
 _SPACE = 36  # fields of the space of low modes per mode of a family
 MESH_COARSER = "mesh the body coarser"  # the remedy for finite elements made elsewhere
 _MEMORY_TABLE = Path("/proc/meminfo")
@@ -71,7 +71,8 @@ def available_memory() -> float | None:
 
 
 def whole_need(unknowns: int, vectors: int) -> Need:
-    """Need of a body that is reduced as a whole, with so many full vectors beside the factors of its matrices."""
+    """Need of a body that is reduced as a whole, with so many full vectors beside the factors of its matrices (K and
+    its shifts at three points)."""
     numbers = _WHOLE_FACTOR * unknowns ** (4 / 3) + unknowns * vectors
     return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
 

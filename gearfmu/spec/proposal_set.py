@@ -25,6 +25,7 @@ from gearfmu.spec.proposal_pair import SHIFT_RULE, out_of_reach, reference_dista
 
 NAMES = ("sun", "planet", "ring")
 _SHARING = {2: 1.1, 3: 1.1, 4: 1.25, 5: 1.35, 6: 1.44}  # mesh load factor of IEC 61400-4 by the number of planets
+_CARRIER_SCALE = 0.75
 
 
 def draft_set(wish: Wish) -> Draft:
@@ -153,6 +154,7 @@ def _put_carrier(draft: Draft, wish: Wish, mesh: RingMesh) -> None:
     thickness = rounded_up(0.6 * (wish.width or 0.0), 2)
     propose(draft, "carrier.thickness", millimetres(thickness), "0.6 of the face width")
     propose(draft, "carrier.gap", millimetres(rounded_up(0.8 * mesh.planet.m, 2)), "0.8 m_n")
+    propose(draft, "carrier.mesh.scale", _CARRIER_SCALE, "a third of the memory of 1")
     inputs = 6 * ((wish.planets or 1) + 1)
     propose(draft, "carrier.modes", max(4 * inputs, 120), "four moments of every bolt and the bore")
 
