@@ -11,7 +11,7 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_carrier import imported_carrier
-from gearfmu.reduction.memory import Need, whole_need
+from gearfmu.reduction.memory import CARRIER_FACTORS, Need, whole_need
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 
@@ -33,7 +33,9 @@ def carrier_need(spec: Any) -> Need:
     finer mesh (`FINER`) by which its error is measured."""
     sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh)
     own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * spec.carrier.modes
-    whole, finer = whole_need(own * sector.teeth, vectors), whole_need(round(own * FINER**3), vectors)
+    whole, finer = (
+        whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (own * sector.teeth, round(own * FINER**3))
+    )
     return replace(whole, memory=max(whole.memory, finer.memory))
 
 

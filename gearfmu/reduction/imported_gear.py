@@ -118,7 +118,7 @@ def _need(found: CheckedGear, wanted: Wanted) -> Need:
     sized = ReductionSize(wanted.teeth, wanted.modes, 2 * len(wanted.points.rolls) * wanted.points.functions)
     if found.cut is not None:
         return sector_need(found.cut, sized)
-    return whole_need(found.mesh.nodes.size, sized.modes + 3 * sized.loads)
+    return whole_need(found.mesh.nodes.size, sized.modes + 3 * sized.loads, 1)
 
 
 def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:

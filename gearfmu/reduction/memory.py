@@ -11,8 +11,9 @@ from gearfmu.errors import MeshError
 _BASE = 0.2e9  # bytes of the program with its packages, and of what is small
 _FACTOR = 21.0  # entries of the factor per unknown to the power 4/3; measured 19 to 25 on sectors of 5 to 34 thousand
 _SPARSE = 3000.0  # bytes per unknown of finite-element matrices, on the sector and in its coordinates
-_WHOLE_FACTOR = 150.0  # the same of all factors of a carrier together: measured 145 to 165 on 5 to 152 thousand
+_WHOLE_FACTOR = 30.0  # the same of a whole body: measured 29 to 33
 _SPACE = 36  # fields of the space of low modes per mode of a family
+CARRIER_FACTORS = 5  # of K, at the three points of Krylov's method and at one of the reference
 MESH_COARSER = "mesh the body coarser"  # the remedy for finite elements made elsewhere
 _MEMORY_TABLE = Path("/proc/meminfo")
 
@@ -70,10 +71,9 @@ def available_memory() -> float | None:
     return 1024.0 * float(found[0]) if found else None
 
 
-def whole_need(unknowns: int, vectors: int) -> Need:
-    """Need of a body that is reduced as a whole, with so many full vectors beside the factors of its matrices (K and
-    its shifts at three points)."""
-    numbers = _WHOLE_FACTOR * unknowns ** (4 / 3) + unknowns * vectors
+def whole_need(unknowns: int, vectors: int, factors: int) -> Need:
+    """Need of a body that is reduced as a whole: so many factors of its matrices and full vectors beside them."""
+    numbers = factors * _WHOLE_FACTOR * unknowns ** (4 / 3) + unknowns * vectors
     return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
 
 
