@@ -18,7 +18,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 VERBS = {
     "new": (
         "gearfmu.commands.new:new",
-        "Write a commented stage.toml of your own, from a few numbers or a shipped one.",
+        "Write a commented stage.toml of your own, from a few numbers.",
     ),
     "mesh": ("gearfmu.commands.stages:mesh", "Mesh the gears of a stage, print the quality, write .vtu files."),
     "reduce": (
