@@ -18,7 +18,7 @@ from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.pair import PairGeometry
 from gearfmu.geometry.planetary import RingMesh
 
-ADDENDUM, DEDENDUM, FILLET = 1.0, 1.25, 0.38  # of the basic rack (ISO 53, profile A with the usual fillet)
+ADDENDUM, DEDENDUM, FILLET = 1.0, 1.25, 0.38  # of the basic rack (ISO 53, profile A); the fillet where it fits
 CLEARANCE = DEDENDUM - ADDENDUM
 RING_FILLET = 0.3
 LEAST_TIP = 0.2  # of the module: thinner tips break out
@@ -56,17 +56,23 @@ class Rack:
     alpha: float
     beta: float = 0.0
 
+    @property
+    def fillet(self) -> float:
+        """Tip rounding of the rack in factors of the module: the usual one, or what a large pressure angle leaves."""
+        room = (math.pi / 4 - DEDENDUM * math.tan(self.alpha)) * math.cos(self.alpha) / (1 - math.sin(self.alpha))
+        return min(FILLET, math.floor(100 * room) / 100)
+
     def gear(self, z: int, x: float, r_a: float) -> GearGeometry:
         """An external gear made by this rack, tip circle of radius r_a (m)."""
         return GearGeometry(
             z=z, m=self.m, alpha=self.alpha, x=x, r_a=r_a, r_bore=0.0, tip_edge=TIP_EDGE * self.m,
-            h_fp=DEDENDUM * self.m, rho_fp=FILLET * self.m, beta=self.beta,
+            h_fp=DEDENDUM * self.m, rho_fp=self.fillet * self.m, beta=self.beta,
         )  # fmt: skip
 
     def least_shift(self, z: int) -> float:
         """Smallest profile shift without undercut."""
         r_sin = self.gear(z, 0.0, self.m).r * math.sin(self.gear(z, 0.0, self.m).alpha_t) ** 2 / self.m
-        return DEDENDUM - FILLET * (1 - math.sin(self.alpha)) - r_sin
+        return DEDENDUM - self.fillet * (1 - math.sin(self.alpha)) - r_sin
 
 
 @dataclass(frozen=True)
@@ -177,6 +183,12 @@ def _can_be_made(pair: OpenPair) -> bool:
     if math.isnan(pair.total):
         return False
     return any(not list(shortcomings(pair.at(x))) for x in _steps(*pair.range_of_shifts(), 0.1))
+
+
+def flank_length(gear: GearGeometry | InternalGearGeometry) -> float:
+    """Arc length (m) of the involute between form point and tip edge."""
+    ends = (float(involute.arc_length(roll, gear.r_b)) for roll in (gear.s_form, gear.s_tip))
+    return abs(next(ends) - next(ends))
 
 
 def ring_of(planet: GearGeometry, z: int, a: float) -> InternalGearGeometry:

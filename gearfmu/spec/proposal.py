@@ -16,7 +16,8 @@ from pathlib import Path
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import contact_modulus, half_width
-from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, FILLET, Rack
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, flank_length
 from gearfmu.ranges import range_of, range_problems
 from gearfmu.spec.checks import STRIP_PER_HERTZ, rounded_up
 from gearfmu.spec.draft import BACKLASH_PER_MODULE, STRIP_PER_MODULE, Draft, degrees, millimetres
@@ -25,6 +26,7 @@ from gearfmu.spec.stage import load_stage
 
 GIVEN = "given"
 _E_STAR = contact_modulus((206e9, 206e9), (0.3, 0.3))  # Pa, the steel of the shipped stages
+_LEAST_FILLET = 0.05  # of the module
 _ELEMENT_WIDTH = 1.25  # of the module, at most, across the face
 
 
@@ -88,7 +90,7 @@ def draft_of(wish: Wish) -> Draft:
     from gearfmu.spec.proposal_set import draft_set
 
     wish = replace(wish, teeth=tuple(abs(z) for z in wish.teeth))
-    if problems := [*_missing(wish), *_beyond(wish)]:
+    if problems := [*_missing(wish), *_beyond(wish), *_no_fillet(wish)]:
         raise SpecError(problems)
     return draft_set(wish) if wish.planets else draft_pair(wish)
 
@@ -104,6 +106,12 @@ def _missing(wish: Wish) -> Iterator[Problem]:
         yield Problem("", "width", "", 'this number is missing: give the common face width, such as "20 mm"')
     if wish.unequal and not wish.planets:
         yield Problem("", "unequal", "", "this is about the places of planets: give their number")
+
+
+def _no_fillet(wish: Wish) -> Iterator[Problem]:
+    if wish.rack.fillet < _LEAST_FILLET:
+        remedy = f"the tips of a rack with dedendum {DEDENDUM:g} m_n are pointed: take less, such as 25 deg"
+        yield Problem("", "pressure_angle", degrees(wish.pressure_angle), remedy)
 
 
 def _beyond(wish: Wish) -> list[Problem]:
@@ -154,7 +162,7 @@ def put_gear(draft: Draft, place: str, gear: GearGeometry, shift: str) -> None:
     propose(draft, f"{place}.profile_shift", round(gear.x, 6) + 0.0, shift)
     why = f"tip clearance 0.25 m_n kept; root diameter {millimetres(round(2 * gear.r_f, 6))}"
     propose(draft, f"{place}.tip_diameter", millimetres(2 * gear.r_a), why)
-    rack = {"addendum": ADDENDUM, "dedendum": DEDENDUM, "fillet_radius": FILLET}
+    rack = {"addendum": ADDENDUM, "dedendum": DEDENDUM, "fillet_radius": round(gear.rho_fp / gear.m, 6)}
     draft.put(f"{place}.rack", rack, "proposed: ISO 53, profile A")
     propose(draft, f"{place}.bore_diameter", millimetres(round(gear.r_f, 4)), "half the root diameter")
 
@@ -172,13 +180,17 @@ def put_load(draft: Draft, wish: Wish, torque: float, speed: float) -> tuple[flo
     return found[0], found[1]
 
 
-def put_patch(draft: Draft, place: str, module: float, load: float, radius: float) -> None:
+def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometry, load: float, radius: float) -> None:
     """Half-width of the load patch. load: N/m at torque_max, of helical flanks in the transverse section; radius: the
-    largest relative radius of curvature normal to the line of contact, m."""
-    least = STRIP_PER_HERTZ * half_width(load, radius, _E_STAR)
-    usual = STRIP_PER_MODULE * module
+    largest relative radius of curvature, there too, m. SpecError where the patch is longer than the flank."""
+    least = STRIP_PER_HERTZ * half_width(load, radius / math.cos(gear.beta_b), _E_STAR)
+    usual, most = STRIP_PER_MODULE * gear.m, 0.5 * flank_length(gear)
+    if least > most:
+        shown = f"1.5 Hertz half-widths, {millimetres(least)}, are more than half the flank, {millimetres(most)}"
+        remedy = f"{shown}: at most {100 * (most / least) ** 2:.2g} % of this torque, or a larger module or width"
+        raise SpecError([Problem("", "torque", draft.at("torque_max"), remedy)])
     why = "0.12 m_n" if usual >= least else "1.5 Hertz half-widths at torque_max"
-    propose(draft, f"{place}.body.strip_half_width", millimetres(max(usual, rounded_up(least, 2))), why)
+    propose(draft, f"{place}.body.strip_half_width", millimetres(max(usual, min(rounded_up(least, 2), most))), why)
 
 
 def put_slices(draft: Draft, rack: Rack, width: float) -> None:

@@ -47,8 +47,8 @@ def _put_loads(draft: Draft, wish: Wish, geometry: PairGeometry, width: float) -
     usual = usual_torque(2 * pinion.r, ratio, width), PITCH_SPEED / pinion.r
     torque, _ = put_load(draft, wish, *usual)
     radius = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
-    for name in NAMES:
-        put_patch(draft, f"gears.{name}", pinion.m, torque / pinion.r_b / width, radius / math.cos(pinion.beta_b))
+    for name, gear in zip(NAMES, geometry.gears, strict=True):
+        put_patch(draft, f"gears.{name}", gear, torque / pinion.r_b / width, radius)
     for name, own in zip(NAMES, (torque, torque * ratio), strict=True):
         stiffness = rounded_up(own / _TWIST, 2)
         propose(draft, f"ports.{name}.k", f"{stiffness:g} N*m/rad", "twisted by 0.03 rad at torque_max")

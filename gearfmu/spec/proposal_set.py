@@ -171,5 +171,6 @@ def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: Rin
     load = _SHARING[count] * torque / ratio / count / sun.r_b / width
     outer = largest_relative_radius(geometry.length, geometry.path["A"], geometry.path["E"])
     inner = mesh.largest_relative_radius()
-    for name, radius in (("sun", outer), ("planet", max(outer, inner)), ("ring", inner)):
-        put_patch(draft, name, sun.m, load, radius / math.cos(sun.beta_b))
+    put_patch(draft, "sun", sun, load, outer)
+    put_patch(draft, "planet", planet, load, max(outer, inner))
+    put_patch(draft, "ring", mesh.ring, load, inner)

@@ -61,6 +61,7 @@ def test_every_value_is_marked_and_every_optional_table_has_its_heading(wish: Wi
         Wish((25, 25), 4.5e-3, 14e-3),
         Wish((17, 120), 6e-3, 80e-3, helix=-0.3),
         Wish((31, 73), 2.5e-3, 30e-3, torque=900.0, speed=300.0),
+        Wish((43, 103), 1e-3, 20e-3, pressure_angle=math.radians(25)),
         Wish((18, 18, 54), 2.5e-3, 20e-3, planets=4),
         Wish((26, 19, 64), 1.75e-3, 20e-3, planets=3, helix=math.radians(20)),
         Wish((30, 20, 70), 2e-3, 20e-3, planets=6, unequal=True),
@@ -106,6 +107,18 @@ def test_a_centre_distance_out_of_reach_is_refused_with_what_can_be_reached() ->
         assert found.startswith("center = ") and "out of reach" in found and "can be made from 13" in found
     (found,) = refused(Wish((8, 9), 2e-3, 10e-3))
     assert "give more teeth" in found
+
+
+def test_a_torque_that_needs_a_patch_longer_than_the_flank_is_refused() -> None:
+    (found,) = refused(replace(PAIR, torque=1e5))
+    assert found.startswith("torque = 100000 N*m: 1.5 Hertz half-widths") and "% of this torque" in found
+    share = float(found.split("at most ")[1].split(" %")[0]) / 100
+    assert draft_of(replace(PAIR, torque=0.98 * share * 1e5)).at("torque_max")
+
+
+def test_a_pressure_angle_that_leaves_no_rack_tip_is_refused() -> None:
+    (found,) = refused(replace(PAIR, pressure_angle=math.radians(33)))
+    assert found.startswith("pressure_angle = 33 deg")
 
 
 def test_a_ring_that_does_not_fit_is_refused() -> None:
