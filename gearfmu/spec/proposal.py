@@ -19,7 +19,7 @@ from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.shifts import ADDENDUM, DEDENDUM, Rack, flank_length
 from gearfmu.ranges import range_of, range_problems
-from gearfmu.spec.checks import STRIP_PER_HERTZ, rounded_up
+from gearfmu.spec.checks import STRIP_PER_HERTZ, rounded_down, rounded_up
 from gearfmu.spec.draft import BACKLASH_PER_MODULE, STRIP_PER_MODULE, Draft, degrees, millimetres
 from gearfmu.spec.new import free_target, write_drafted
 from gearfmu.spec.stage import load_stage
@@ -27,6 +27,7 @@ from gearfmu.spec.stage import load_stage
 GIVEN = "given"
 _E_STAR = contact_modulus((206e9, 206e9), (0.3, 0.3))  # Pa, the steel of the shipped stages
 _LEAST_FILLET = 0.05  # of the module
+_PATCH_PER_HERTZ = 2.0  # slices of tilted or helical teeth carry more than the mean
 _ELEMENT_WIDTH = 1.25  # of the module, at most, across the face
 
 
@@ -189,8 +190,10 @@ def put_patch(draft: Draft, place: str, gear: GearGeometry | InternalGearGeometr
         shown = f"1.5 Hertz half-widths, {millimetres(least)}, are more than half the flank, {millimetres(most)}"
         remedy = f"{shown}: at most {100 * (most / least) ** 2:.2g} % of this torque, or a larger module or width"
         raise SpecError([Problem("", "torque", draft.at("torque_max"), remedy)])
-    why = "0.12 m_n" if usual >= least else "1.5 Hertz half-widths at torque_max"
-    propose(draft, f"{place}.body.strip_half_width", millimetres(max(usual, min(rounded_up(least, 2), most))), why)
+    wide = min(_PATCH_PER_HERTZ / STRIP_PER_HERTZ * least, most)
+    why = "0.12 m_n" if usual >= wide else "2 Hertz half-widths at torque_max"
+    value = usual if usual >= wide else max(least, rounded_down(wide, 3))
+    propose(draft, f"{place}.body.strip_half_width", millimetres(value), why)
 
 
 def put_slices(draft: Draft, rack: Rack, width: float) -> None:
