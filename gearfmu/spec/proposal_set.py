@@ -47,7 +47,7 @@ def draft_set(wish: Wish) -> Draft:
         raise SpecError(problems)
     draft = begun("helical_set" if rack.beta else "planetary54", wish, "set", NAMES)
     if wish.center is None:
-        same = "no sums of profile shifts" if distances[0] == distances[1] else "the larger one of both meshes"
+        same = "no sums of profile shifts" if math.isclose(*distances) else "the larger one of both meshes"
         propose(draft, "set.center_distance", millimetres(distance), same)
     else:
         draft.put("set.center_distance", millimetres(distance), GIVEN)
