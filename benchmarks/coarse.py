@@ -2,7 +2,8 @@
 
     python benchmarks/coarse.py [STAGE …] [--out coarse.csv]
 
-A stage is a path or a shipped name; without one, a pair z 31/73 is proposed (m_n = 2.5 mm, beta = 22 deg, b = 30 mm, 180 N*m).
+A stage is a path or a shipped name; without one, a pair z 31/73 is proposed (m_n = 2.5 mm, beta = 22 deg,
+b = 30 mm, 180 N*m).
 Bodies of the stage that are up to date are read, all others made in folders that do not stay. Frequencies: the lowest
 elastic ones, 0 to 20 kHz, counted within their nodal diameter. Compliance: own tooth, load uniform across the width, on
 every stored roll point (largest difference) and at mid flank.
