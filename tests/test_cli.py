@@ -332,7 +332,7 @@ def test_long_work_shows_a_progress_bar_on_a_terminal_and_only_there(tmp_path: P
     os.close(near)
     plain = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, check=True)
     assert "fzg_c" in shown and "━" in shown and "━" not in done.stdout.decode()
-    assert plain.stderr == b""
+    assert "━" not in plain.stderr.decode(), "lines at most, where the machine is slow"
 
 
 @pytest.fixture
