@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.commands import variables
+from gearfmu.commands import shared, variables
 from gearfmu.stage.trace import Channel, Trace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -182,7 +182,7 @@ def test_bodies_that_are_being_made_are_named_where_there_is_no_terminal(capsys:
 def test_bodies_that_are_being_made_are_told_how_far_every_ten_seconds(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gearfmu.commands import models, shared
+    from gearfmu.commands import models
 
     now = [0.0]
     monkeypatch.setattr(shared.time, "monotonic", lambda: now[0])
@@ -201,8 +201,6 @@ def test_bodies_that_are_being_made_are_told_how_far_every_ten_seconds(
 def test_long_work_is_told_of_while_nothing_is_heard(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from gearfmu.commands import shared
-
     monkeypatch.setattr(shared, "_EVERY", 0.1)
     with shared.progress_bar("te") as progress:
         progress(None, "statics")
@@ -337,7 +335,8 @@ def test_long_work_shows_a_progress_bar_on_a_terminal_and_only_there(tmp_path: P
 
 @pytest.fixture
 def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The working folder, with a file of every kind in it that cannot be used."""
+    """The working folder, with a file of every kind in it that cannot be used; no lines of progress on slow machines."""
+    monkeypatch.setattr(shared, "_EVERY", 1e9)
     stage = (ROOT / "reduced_models" / "fzg_c" / "stage.toml").read_text(encoding="utf-8")
     (tmp_path / "stage.toml").write_text(stage.replace("teeth = 16", 'teeth = "many"'), encoding="utf-8")
     scene = (ROOT / "gearfmu" / "scenes" / "pair_light.toml").read_text(encoding="utf-8")
