@@ -335,7 +335,7 @@ def test_long_work_shows_a_progress_bar_on_a_terminal_and_only_there(tmp_path: P
 
 @pytest.fixture
 def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The working folder, with a file of every kind in it that cannot be used; no lines of progress on slow machines."""
+    """The working folder, with a file of every kind in it that cannot be used; no lines of progress here."""
     monkeypatch.setattr(shared, "_EVERY", 1e9)
     stage = (ROOT / "reduced_models" / "fzg_c" / "stage.toml").read_text(encoding="utf-8")
     (tmp_path / "stage.toml").write_text(stage.replace("teeth = 16", 'teeth = "many"'), encoding="utf-8")
