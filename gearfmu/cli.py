@@ -16,7 +16,10 @@ USAGE_ERROR = 100
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 VERBS = {
-    "new": ("gearfmu.commands.stages:new", "Write a commented stage.toml of your own, from a shipped one."),
+    "new": (
+        "gearfmu.commands.new:new",
+        "Write a commented stage.toml of your own, from a few numbers.",
+    ),
     "mesh": ("gearfmu.commands.stages:mesh", "Mesh the gears of a stage, print the quality, write .vtu files."),
     "reduce": (
         "gearfmu.commands.stages:reduce",

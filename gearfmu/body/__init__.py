@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gearfmu.body.bodies import body_hashes, current_bodies, load_bodies, reduce_apart, reduce_bodies
+from gearfmu.body.bodies import body_hashes, body_needs, current_bodies, load_bodies, reduce_apart, reduce_bodies
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
@@ -16,6 +16,7 @@ __all__ = [
     "MountedRing",
     "ReducedBody",
     "body_hashes",
+    "body_needs",
     "body_path",
     "current_bodies",
     "inspect_file",

@@ -15,21 +15,45 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import BodyError
+from gearfmu.reduction.memory import Need, available_memory
 
 Progress = Callable[[str, float], None]
-Job = tuple[Any, int, Path]
+Job = tuple[Any, "int | str", Path]  # a stage, the number of the gear (of a set its name), the file of the body
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SERVE = "from gearfmu.body.apart import serve; serve()"
 _FAILED = "failed"
+_AT_ONCE = 2  # gears in processes of their own
+_WORTH = 8000  # unknowns of a sector from which on that is faster
 
 
-def reduce_apart_together(jobs: Sequence[Job], at_once: int, progress: Progress | None = None) -> None:
-    """Reduce and store gears, `at_once` at the same time; a job is (stage, number of the gear, file).
+@dataclass(frozen=True)
+class Work:
+    """What the reduction of a gear takes: memory for one of its sectors, and how many sectors it has."""
+
+    need: Need
+    sectors: int
+
+
+def side_by_side(jobs: Sequence[tuple[Work | None, Job]]) -> list[Job]:
+    """The jobs that are worth processes of their own, the longest first; none where processors or memory are for one
+    only. A job whose work is not known is none of them."""
+    found = [(work, job) for work, job in jobs if work is not None and work.need.unknowns > _WORTH]
+    found.sort(key=lambda entry: -entry[0].need.unknowns * entry[0].sectors)
+    most = sum(sorted((work.need.memory for work, _ in found), reverse=True)[:_AT_ONCE])
+    there = available_memory()
+    if len(found) < 2 or (os.cpu_count() or 1) < 2 or (there is not None and most > there):
+        return []
+    return [job for _, job in found]
+
+
+def reduce_apart_together(jobs: Sequence[Job], progress: Progress | None = None) -> None:
+    """Reduce and store gears, `_AT_ONCE` at the same time.
 
     Raises what the reduction raised, and BodyError where a process ended without a word.
     """
@@ -37,7 +61,7 @@ def reduce_apart_together(jobs: Sequence[Job], at_once: int, progress: Progress 
     heard: queue.Queue[tuple[subprocess.Popen[bytes], str | None]] = queue.Queue()
     try:
         while waiting or running:
-            while waiting and len(running) < at_once:
+            while waiting and len(running) < _AT_ONCE:
                 running.append(_started(waiting.pop(0), heard))
             process, line = heard.get()
             if line is None:
@@ -58,6 +82,7 @@ def reduce_apart_together(jobs: Sequence[Job], at_once: int, progress: Progress 
 
 def serve() -> None:
     """What the process does: a job from standard input, progress and failure to standard output, a line each."""
+    from gearfmu.body.planetary import reduce_set_body
     from gearfmu.body.reduce import reduce_gear
     from gearfmu.body.store import save_body
 
@@ -65,9 +90,10 @@ def serve() -> None:
         print(json.dumps([what, value]), flush=True)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started it ends it
-    spec, index, path = pickle.load(sys.stdin.buffer)
+    spec, which, path = pickle.load(sys.stdin.buffer)
+    reduce: Callable[..., Any] = reduce_set_body if isinstance(which, str) else reduce_gear
     try:
-        save_body(reduce_gear(spec, index, tell), path)
+        save_body(reduce(spec, which, tell), path)
     except Exception as error:
         tell(_FAILED, pickle.dumps(error).hex())
 

@@ -8,7 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.body.planetary import is_current_in_set, load_set_bodies, reduce_set, set_hashes
-from gearfmu.body.reduce import Progress, gears_of, is_current, load_stage_bodies, reduce_stage, stage_hashes
+from gearfmu.body.reduce import (
+    Progress,
+    gear_geometry,
+    gear_work,
+    gears_of,
+    is_current,
+    load_stage_bodies,
+    reduce_stage,
+    stage_hashes,
+)
+from gearfmu.geometry.planetary import set_geometry
+from gearfmu.reduction.carrier import carrier_need
+from gearfmu.reduction.memory import Need
 from gearfmu.spec.library import model_folder
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.planetary_body import SET_BODIES
@@ -47,6 +59,18 @@ def load_bodies(spec: Any, folder: str | os.PathLike[str] | None = None) -> list
     if isinstance(spec, PlanetarySpec):
         return list(load_set_bodies(spec, folder))
     return list(load_stage_bodies(spec, folder))
+
+
+def body_needs(spec: Any) -> dict[str, Need]:
+    """Memory that the reduction of every body takes, estimated from its mesh; bodies meshed elsewhere are not among
+    them. Raises MeshError."""
+    if isinstance(spec, PlanetarySpec):
+        works = {gear.name: gear_work(gear, set_geometry(spec, gear.name)) for gear in spec.gears}
+        own = {} if spec.carrier.imported is not None else {"carrier": carrier_need(spec)}
+    else:
+        works = {stage.gears[i].name: gear_work(stage.gears[i], gear_geometry(stage, i)) for stage, i in gears_of(spec)}
+        own = {}
+    return {name: work.need for name, work in works.items() if work is not None} | own
 
 
 def body_hashes(spec: Any) -> tuple[str, ...]:

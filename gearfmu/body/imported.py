@@ -56,7 +56,7 @@ def _wanted(gear: Any, geometry: Any) -> Wanted:
     internal = isinstance(geometry, InternalGearGeometry)
     flank, points = tooth_flank(geometry, gear, internal)
     held = gear.rim_diameter if internal else gear.bore_diameter
-    return Wanted(geometry.z, flank, points, 0.5 * held, gear.material)
+    return Wanted(geometry.z, flank, points, 0.5 * held, gear.material, gear.body.modes)
 
 
 def imported_full_order(gear: Any, geometry: Any) -> FullOrder:

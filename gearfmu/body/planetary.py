@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gearfmu.body.apart import Job, Work, reduce_apart_together, side_by_side
 from gearfmu.body.imported import imported_carrier_order
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body, save_interface_body
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.body.provenance import provenance
-from gearfmu.body.reduce import reduced_gear
+from gearfmu.body.reduce import gear_work, reduced_gear
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.stale import refuse_stale
 from gearfmu.body.store import load_body, save_body
@@ -25,8 +25,9 @@ from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.planetary import set_geometry
 from gearfmu.reduction.basis import Size
-from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.carrier import carrier_full_order, carrier_need
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.reduction.memory import lower_counts, require_memory
 from gearfmu.reduction.mesh_error import carrier_mesh_error
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import Oscillators, oscillators
@@ -74,23 +75,21 @@ def reduce_set(
     force: bool = False,
     progress: Progress | None = None,
 ) -> list[Body]:
-    """Reduce what is missing or stale of a set and store it: gears in two processes where there are two processors,
-    then the carrier, which takes the most memory, alone.
+    """Reduce what is missing or stale of a set and store it: two large gears at the same time where processors and
+    memory are there, then what is left, the carrier, which takes the most memory, last.
 
-    Where processes are spawned (Windows, macOS) a script that calls this needs `if __name__ == "__main__":`.
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
     wanted = [name for name in SET_BODIES if force or not is_current_in_set(spec, name, folder)]
     paths = {name: set_body_path(spec, name, folder) for name in wanted}
+    gears = [name for name in wanted if name != "carrier"]
+    jobs: list[tuple[Work | None, Job]] = [
+        (gear_work(getattr(spec, name), set_geometry(spec, name)), (spec, name, paths[name])) for name in gears
+    ]
+    if apart := side_by_side(jobs):
+        reduce_apart_together(apart, progress)
+    together = {which for _, which, _ in apart}
     longest_first = sorted(wanted, key=("ring", "sun", "planet", "carrier").index)
-    gears = [name for name in longest_first if name != "carrier"]
-    together = gears if len(gears) > 1 and (os.cpu_count() or 1) > 1 else []
-    if together:
-        with ProcessPoolExecutor(2) as pool:
-            jobs = [pool.submit(_make, spec, name, paths[name]) for name in together]
-            for number, (name, job) in enumerate(zip(together, jobs, strict=True)):
-                _tell(progress, f"reducing {name}", number / len(jobs))
-                job.result()
     for name in longest_first:
         if name not in together:
             _make(spec, name, paths[name], progress)
@@ -132,6 +131,9 @@ def _carrier(spec: PlanetarySpec, progress: Progress | None) -> InterfaceBody:
     started = time.process_time()
     _tell(progress, "carrier: mesh and finite elements", 0.0)
     if spec.carrier.imported is None:
+        need = carrier_need(spec)
+        require_memory(need, lower_counts(spec.carrier.mesh, "carrier.mesh"))
+        _tell(progress, f"carrier: finite elements, {need.text}", 0.0)
         full, mesh = carrier_full_order(spec), None
     else:
         full, mesh = imported_carrier_order(spec)

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.apart import Job, reduce_apart_together
+from gearfmu.body.apart import Job, Work, reduce_apart_together, side_by_side
 from gearfmu.body.imported import imported_parts
 from gearfmu.body.layout import ALGORITHM_VERSION
-from gearfmu.body.memory import available_memory, gear_need, require_memory
 from gearfmu.body.parts import (
     Parts,
     drawn_counts,
@@ -37,6 +36,7 @@ from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.display import outline
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfCase, frf_error
+from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
 from gearfmu.reduction.modal import elastic_modes
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.statics import static_tables
@@ -47,10 +47,6 @@ from gearfmu.spec.planetary import RingSpec
 from gearfmu.spec.stage import StageSpec, require_pair
 
 FRF_CUT = 120e3  # Hz, the cut of level `standard`
-
-_AT_ONCE = 2  # gears in processes of their own
-_WORTH = 8000  # unknowns of a sector from which on that is faster
-
 Progress = Callable[[str, float], None]
 Geometry = GearGeometry | InternalGearGeometry
 Stage = StageSpec | GeneralStage
@@ -101,7 +97,7 @@ def reduce_stage(
     missing = [(own, index, path) for own, index, path in gears if bodies[path] is None]
     together = _together(missing)
     if together:
-        reduce_apart_together(together, _AT_ONCE, progress)
+        reduce_apart_together(together, progress)
         bodies |= {path: load_body(path) for *_, path in together}
     for own, index, path in missing:
         if bodies[path] is None:
@@ -110,22 +106,17 @@ def reduce_stage(
     return [body for body in bodies.values() if body is not None]
 
 
-def _together(jobs: list[Job]) -> list[Job]:
-    """The gears that are worth processes of their own, the longest first; none where processors or memory are for one
-    only."""
-    found = []
-    for own, index, path in jobs:
-        gear, geometry = own.gears[index], _geometry(own, index)
-        if not getattr(gear, "imported", None):
-            need = gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body)
-            if need.unknowns > _WORTH:
-                found.append((need, geometry.z, (own, index, path)))
-    found.sort(key=lambda job: -job[0].unknowns * job[1])
-    most = sum(sorted((need.memory for need, _, _ in found), reverse=True)[:_AT_ONCE])
-    there = available_memory()
-    if len(found) < 2 or (os.cpu_count() or 1) < 2 or (there is not None and most > there):
-        return []
-    return [job for _, _, job in found]
+def _together(jobs: list[tuple[Any, int, Path]]) -> list[Job]:
+    """The gears that are worth processes of their own (`side_by_side`)."""
+    works = [gear_work(own.gears[index], gear_geometry(own, index)) for own, index, _ in jobs]
+    return side_by_side(list(zip(works, jobs, strict=True)))
+
+
+def gear_work(gear: Any, geometry: Geometry) -> Work | None:
+    """What the reduction of a gear meshed here takes; None of one meshed elsewhere."""
+    if getattr(gear, "imported", None):
+        return None
+    return Work(gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
 
 
 def gears_of(spec: Stage) -> list[tuple[Any, int]]:
@@ -141,13 +132,14 @@ def reduce_gear(spec: StageSpec, gear_index: int, progress: Progress | None = No
     """One gear's reduced body from the stage's numbers. Raises MeshError with the gear's name."""
     gear = spec.gears[gear_index]
     try:
-        geometry = _geometry(spec, gear_index)
+        geometry = gear_geometry(spec, gear_index)
         return reduced_gear(gear, geometry, expected_hash(spec, gear_index), progress)
     except MeshError as error:
         raise MeshError(f"{spec.source}: {gear_table(spec, gear.name)}: {error}") from error
 
 
-def _geometry(spec: Any, gear_index: int) -> Geometry:
+def gear_geometry(spec: Any, gear_index: int) -> Geometry:
+    """The geometry of a gear of a pair, or of a gear or ring of a general stage as a pair."""
     gear = spec.gears[gear_index]
     if isinstance(gear, RingSpec):
         return InternalGearGeometry.of(gear, spec.pair, hand=1)
@@ -208,7 +200,7 @@ def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Poi
     flank, points = load_points
     sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
     need = gear_need(sector, gear.body)
-    require_memory(need, gear.body.mesh)
+    require_memory(need, lower_counts(gear.body.mesh, "body.mesh"))
     report(f"finite elements, {need.text}", 0.0)
     rigid = getattr(gear, "rigid_bore", False)  # sun, planet and ring of a set are averaged
     body = SectorBody(sector, gear.material, flank, points, rigid)

@@ -153,6 +153,22 @@ def _toml(path: Path) -> dict[str, Any]:
         "kind": "stage",
         **spec.model_dump(mode="json", exclude={"kind"}),
         "derived": _derived(spec),
+        "reduction": _needs(spec),
+    }
+
+
+def _needs(spec: Any) -> Any:
+    """What the reduction of every body takes, estimated from its mesh; or why it cannot be meshed."""
+    from gearfmu.body import body_needs
+    from gearfmu.errors import MeshError
+
+    try:
+        needs = body_needs(spec)
+    except MeshError as error:
+        return str(error)
+    return {
+        name: {f"unknowns{'' if need.whole else '_a_sector'}": need.unknowns, "memory_GB": round(1e-9 * need.memory, 2)}
+        for name, need in needs.items()
     }
 
 
@@ -164,8 +180,8 @@ def _toml_with_units(path: Path) -> dict[str, Any]:
     found = _toml(path)
     spec = load_scene(path) if found["kind"] == "scene" else load_stage(path)
     own = {key: value for key, value in shown(spec).items() if key != "kind"}
-    derived = {"derived": found["derived"]} if "derived" in found else {}
-    return {"file": found["file"], "kind": found["kind"], **own, **derived}
+    after: dict[str, Any] = {key: found[key] for key in ("derived", "reduction") if key in found}
+    return {"file": found["file"], "kind": found["kind"], **own, **after}
 
 
 def in_units(found: Any, key: str = "") -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -13,8 +12,6 @@ from gearfmu.commands.shared import Progress, progress_bar
 
 if TYPE_CHECKING:
     from gearfmu.stage import StageModel
-
-_EVERY = 10.0  # s between lines of progress where there is no terminal
 
 
 def model_of(
@@ -64,27 +61,15 @@ def bodies_for_motion(stage: str, bores: str | None = None) -> tuple[Any, list[A
 def reducing(title: str = "reducing") -> Iterator[Progress]:
     """A progress function for the reduction of bodies: a bar on a terminal, else a line on standard error for every
     body that is being made, and every ten seconds one that says what is being done and how far it is."""
-    with progress_bar(title) as bar:
-        yield bar or _Told(title)
+    with progress_bar(title, named=_body) as progress:
+        yield progress
 
 
-class _Told:
-    """A line for each body, and one every `_EVERY` seconds."""
-
-    def __init__(self, title: str) -> None:
-        self.title, self._named, self._last = title, set[str](), time.monotonic()
-
-    def __call__(self, fraction: float, text: str = "") -> None:
-        told = text.removeprefix("reducing ")
-        name = told.split(":")[0]
-        if name not in self._named:
-            self._named.add(name)
-            click.echo(f"{self.title} {name} …", err=True)
-        elif time.monotonic() - self._last >= _EVERY:
-            self._last = time.monotonic()
-            click.echo(f"{self.title} {told}, {100 * fraction:.0f} %", err=True)
+def _body(text: str) -> str:
+    """The body that a line of progress is about."""
+    return text.split(":")[0]
 
 
-def by_text(progress: Progress | None) -> Callable[[str, float], None] | None:
+def by_text(progress: Progress) -> Callable[[str, float], None]:
     """The progress function of reduce_stage, called with (what is being done, share done)."""
-    return None if progress is None else lambda text, share: progress(share, text)
+    return lambda text, share: progress(share, text)

@@ -181,8 +181,7 @@ def _write(body: Any, out: Path) -> None:
     with progress_bar("pictures") as progress:
         write_contact_sheet(body, out / f"{body.name}_sheet.png")
         for done, mode in enumerate(body.modes):
-            if progress:
-                progress(done / len(body.modes))
+            progress(done / len(body.modes))
             base = out / f"{body.name}_mode_{mode.numbers[0]:02d}"
             write_mode_picture(body, mode, base.with_suffix(".png"))
             write_mode(body, mode, base.with_suffix(".vtu"))

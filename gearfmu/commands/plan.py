@@ -40,8 +40,8 @@ def plan(scene: str, outputs: tuple[str, ...], band: tuple[str, str], out: Path,
     spec = spec if step is None else with_step(spec, step)
     jobs, scheduler, force = how.pop("jobs"), how.pop("scheduler"), how.pop("force")
     with progress_bar(spec.name) as progress:
-        tell = None if progress is None else lambda text: progress(None, text)
-        found = make(spec, outputs, band, on=scheduler or jobs, may_drop=force, name=scene, tell=tell, **how)
+        how["tell"] = lambda text: progress(None, text)
+        found = make(spec, outputs, band, on=scheduler or jobs, may_drop=force, name=scene, **how)
     click.echo(plan_text(found))
     click.echo(found.save(out))
     return 0 if all(segment.kept for segment in found.segments) else 1

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -10,6 +12,7 @@ from typing import Any
 import click
 
 Progress = Callable[..., None]
+_EVERY = 9.0  # s between lines of progress where there is no terminal
 
 
 class Quantity(click.ParamType):
@@ -46,13 +49,14 @@ class Quantity(click.ParamType):
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator[Progress | None]:
-    """A progress bar on standard error when that is a terminal, else nothing.
+def progress_bar(title: str, named: Callable[[str], str] | None = None) -> Iterator[Progress]:
+    """A progress bar on standard error when that is a terminal, else lines (`Told`).
 
-    Yields `report(fraction, text="")` with fraction 0 … 1, or None: long functions take it as `progress`.
+    Yields `report(fraction, text="")` with fraction 0 … 1: long functions take it as `progress`.
     """
     if not sys.stderr.isatty():
-        yield None
+        with Told(title, named) as told:
+            yield told
         return
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -64,6 +68,48 @@ def progress_bar(title: str) -> Iterator[Progress | None]:
     ) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda fraction, text="": bar.update(task, completed=fraction, description=f"{title} {text}".strip())
+
+
+class Told:
+    """Lines of progress on standard error: one every `_EVERY` seconds that says what is being done, how far it is and
+    for how long nothing new was heard; and one for every new `named(text)`, where that is given."""
+
+    def __init__(self, title: str, named: Callable[[str], str] | None = None) -> None:
+        self.title, self._named = title, named
+        self._seen, self._doing = set[str](), ""
+        self._last = self._heard = time.monotonic()
+        self._end, self._lock = threading.Event(), threading.Lock()
+
+    def __enter__(self) -> Told:
+        threading.Thread(target=self._beat, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end.set()
+
+    def __call__(self, fraction: float | None, text: str = "") -> None:
+        """What is done now, and the share of it that is done; None where that is not known."""
+        text, share = text.removeprefix(f"{self.title} "), "" if fraction is None else f"{100 * fraction:.0f} %"
+        self._doing, self._heard = ", ".join(part for part in (text, share) if part), time.monotonic()
+        if self._named and (part := self._named(text)) not in self._seen:
+            self._seen.add(part)
+            click.echo(f"{self.title} {part} …", err=True)
+        else:
+            self._tell_if_due()
+
+    def _beat(self) -> None:
+        """Tells also while nothing is heard."""
+        while not self._end.wait(0.1 * _EVERY):
+            self._tell_if_due()
+
+    def _tell_if_due(self) -> None:
+        with self._lock:
+            now = time.monotonic()
+            if now - self._last < _EVERY:
+                return
+            self._last, silent = now, now - self._heard
+            since = f", for {silent:.0f} s" if silent > 0.5 * _EVERY else ""
+            click.echo(f"{self.title} {self._doing or 'at work'}{since}", err=True)
 
 
 def echo_pairs(pairs: Mapping[str, Any], indent: str = "") -> None:

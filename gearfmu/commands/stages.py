@@ -1,8 +1,7 @@
-"""Verbs from numbers to reduced bodies: new, mesh, reduce."""
+"""Verbs from a stage file to reduced bodies: mesh, reduce."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,64 +9,6 @@ import click
 
 from gearfmu.commands.models import by_text, reducing
 from gearfmu.commands.shared import echo_pairs
-
-
-@click.command()
-@click.argument("name")
-@click.option("--like", default="fzg_c", show_default=True, metavar="STAGE", help="Shipped stage to start from.")
-@click.option(
-    "--rexs", type=click.Path(path_type=Path), metavar="FILE", help="Gear data from a REXS file (.rexs, .rexsz)."
-)
-@click.option("--stage", default="", metavar="ID", help="With --rexs: identifier or name of one of several stages.")
-def new(name: str, like: str, rexs: Path | None, stage: str) -> int:
-    """Write NAME/stage.toml, every field commented, as a copy of a shipped stage or from gear data of a REXS file.
-    Never overwrites."""
-    from gearfmu.spec.new import new_stage
-    from gearfmu.spec.stage import load_stage
-
-    if rexs is not None:
-        return _new_from_rexs(name, rexs, stage)
-    path = new_stage(name, like)
-    further = "" if load_stage(path).kind == "planetary_set" else f" and 'gearfmu export {path}'"
-    click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}'{further}.")
-    return 0
-
-
-def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
-    """The stage file of a REXS file, and what of it was assumed or left unread (also as a table beside it)."""
-    from gearfmu.errors import SpecError
-    from gearfmu.rexs import draft_from_rexs
-    from gearfmu.spec.new import write_drafted
-    from gearfmu.spec.stage import load_stage
-
-    draft = draft_from_rexs(rexs, stage)
-    path = write_drafted(name, draft.tables, draft.marks, f"read from the REXS file {rexs.name}")
-    table = path.with_name("rexs_unread.csv")
-    _write_unread(table, draft.unread)
-    click.echo(f"{path}\nassumed, because the file does not say it:")
-    echo_pairs({place: mark.removeprefix("assumed: ") for place, mark in draft.assumptions().items()}, "  ")
-    click.echo(f"  everything else that is marked so in the file: as in {draft.like}")
-    for note in draft.notes:
-        click.echo(f"note: {note}")
-    click.echo(f"not used: {len(draft.unread)} attributes of {rexs.name}, listed in {table}")
-    try:
-        load_stage(path)
-    except SpecError as error:
-        click.echo(f"The file is written but is no valid stage yet:\n{error}", err=True)
-        return 1
-    click.echo(f"Next: edit it, then 'gearfmu reduce {path}'.")
-    return 0
-
-
-def _write_unread(path: Path, unread: Iterable[Any]) -> None:
-    import csv
-
-    from gearfmu.files import written_whole
-
-    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("component", "attribute", "value", "unit"))
-        writer.writerows((entry.component, entry.attribute, entry.value, entry.unit) for entry in unread)
 
 
 @click.command()
@@ -103,13 +44,23 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     "--out", type=click.Path(path_type=Path), help="Folder of the .h5 files; beside the stage file when not given."
 )
 @click.option("--force", is_flag=True, help="Reduce again even where a body is up to date.")
-def reduce(stage: str, out: Path | None, force: bool) -> None:
+@click.option(
+    "--coarse",
+    is_flag=True,
+    help="Make the coarse sister of STAGE, coarse/stage.toml beside its file (or in --out): half the element counts, "
+    "bodies in seconds.",
+)
+def reduce(stage: str, out: Path | None, force: bool, coarse: bool) -> None:
     """Reduce the bodies of STAGE to <body>.h5; a body whose input hash matches is left as it is."""
     import time
 
     from gearfmu.body import current_bodies, reduce_bodies
+    from gearfmu.spec.coarse import STATED_ERROR, coarse_stage
     from gearfmu.spec.stage import load_stage
 
+    if coarse:
+        stage, out = str(coarse_stage(stage, out)), None
+        click.echo(f"{stage}\n{STATED_ERROR}")
     spec, started = load_stage(stage), time.perf_counter()
     kept = set() if force else current_bodies(spec, out)
     with reducing() as progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from gearfmu.fem import hex20
@@ -10,6 +11,9 @@ from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_carrier import imported_carrier
+from gearfmu.reduction.memory import CARRIER_FACTORS, Need, whole_need
+
+FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 
 
 def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
@@ -22,6 +26,17 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
         return imported_carrier(spec).full
     geometry = CarrierGeometry.of(spec)
     return full_order("carrier", *carrier_elements(spec, scale), Judgement(("bore",), geometry.a))
+
+
+def carrier_need(spec: Any) -> Need:
+    """Memory that the reduction of a carrier meshed here takes, from its counts: the whole body, or the sector of the
+    finer mesh (`FINER`) by which its error is measured."""
+    sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh)
+    own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * spec.carrier.modes
+    whole, finer = (
+        whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (own * sector.teeth, round(own * FINER**3))
+    )
+    return replace(whole, memory=max(whole.memory, finer.memory))
 
 
 def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:

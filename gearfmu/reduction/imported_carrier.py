@@ -20,6 +20,7 @@ from gearfmu.reduction.couplings import Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported import Matrices, SetInterface, set_coupling
 from gearfmu.reduction.imported_files import mesh_facts, naming, ready_matrices, sound_mesh
+from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
 
 _OFF = 2e-3  # of the bolt circle's radius: how far an axis may lie from where the stage file has it
 
@@ -41,6 +42,7 @@ def imported_carrier(spec: Any) -> ImportedCarrier:
     source, geometry, carrier = spec.carrier.imported, CarrierGeometry.of(spec), spec.carrier
     mesh = sound_mesh(source)
     with naming(Path(source.file)):
+        require_memory(whole_need(mesh.nodes.size, 3 * carrier.modes, CARRIER_FACTORS), MESH_COARSER)
         names = {f"bolt{k}": name for k, name in enumerate(source.bolts)} | {"bore": source.bore}
         members = {interface: mesh.node_set(name) for interface, name in names.items()}
         points = _points(mesh, members, names, geometry)

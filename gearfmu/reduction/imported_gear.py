@@ -21,6 +21,7 @@ from gearfmu.reduction.imported_files import mesh_facts, naming, ready_matrices,
 from gearfmu.reduction.imported_flank import FitRange, fit_flanks, tooth_loads
 from gearfmu.reduction.imported_sector import ImportedSector
 from gearfmu.reduction.mean_tooth import WholeGear
+from gearfmu.reduction.memory import MESH_COARSER, Need, ReductionSize, require_memory, sector_need, whole_need
 
 BORE = "bore"
 _ON_BORE = 0.02  # of the bore's radius: how far a node of the bore may lie off it (chords)
@@ -31,13 +32,14 @@ _HINGE = 1e-9  # of √(largest K_ii/M_ii): a lower first frequency is no vibrat
 @dataclass(frozen=True)
 class Wanted:
     """The gear that the stage file describes: teeth, flank and its load points, radius (m) of the bore (internal: of
-    the rim), material."""
+    the rim), material, number of modes that will be stored."""
 
     teeth: int
     flank: ToothFlank
     points: Points
     bore_radius: float
     material: Any
+    modes: int
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
     """`checked_gear` with the loads of its teeth, ready to be reduced. Raises MeshError."""
     found = checked_gear(source, wanted)
     with naming(Path(source.file)):
+        require_memory(_need(found, wanted), MESH_COARSER)
         body: ImportedSector | WholeGear
         if found.cut is None:
             body = _whole(found.mesh, found.matrices, source.bore_coupling, wanted)
@@ -108,6 +111,14 @@ def imported_gear(source: Any, wanted: Wanted) -> ImportedGear:
             elastic = wanted.material if ready is None else (ready.stiffness, ready.mass)
             body = ImportedSector(found.cut, bore, wanted.teeth, elastic, (wanted.flank, wanted.points))
     return ImportedGear(body, found.mesh.nodes, found.facts)
+
+
+def _need(found: CheckedGear, wanted: Wanted) -> Need:
+    """Memory that the reduction of checked finite elements takes."""
+    sized = ReductionSize(wanted.teeth, wanted.modes, 2 * len(wanted.points.rolls) * wanted.points.functions)
+    if found.cut is not None:
+        return sector_need(found.cut, sized)
+    return whole_need(found.mesh.nodes.size, sized.modes + 3 * sized.loads, 1)
 
 
 def _fit(mesh: ImportedMesh, source: Any, wanted: Wanted) -> InvoluteFit:

@@ -11,10 +11,9 @@ from gearfmu.fem.cyclic import Sector, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.reduction.carrier import carrier_full_order
+from gearfmu.reduction.carrier import FINER, carrier_full_order
 from gearfmu.reduction.elastic import Elastic
 
-FINER = 1.6  # factor on all element counts
 COMPARED = 20  # lowest elastic modes
 
 

@@ -10,9 +10,8 @@ import math
 from dataclasses import dataclass
 
 from gearfmu.errors import Problem
-from gearfmu.geometry import involute
-from gearfmu.rexs.draft import Draft, millimetres
 from gearfmu.rexs.model import Component, RexsModel
+from gearfmu.spec.draft import Draft, millimetres
 
 FLANKS = ("cylindrical_gear_flank", "flank_geometry")
 TOOLS = ("rack_shaped_tool", "cutter_wheel_tool")
@@ -81,19 +80,6 @@ def _agreed(model: RexsModel, places: list[Component], name: str, unit: str) -> 
         remedy = "left and right flank, or gear and flank, differ; gears with unequal flanks are not known here"
         model.problems.append(Problem(str(model.path), f"{places[0]}: {name}", shown, remedy))
     return values[0] if values else None
-
-
-def sum_of_shifts(module: float, alpha: float, beta: float, teeth: int, distance: float) -> float:
-    """Σx of a pair without backlash at the centre distance (m), ISO 21771: (inv α_wt − inv α_t) Σz / (2 tan α_n).
-
-    teeth: z₁ + z₂, of an internal pair z_ring − z_pinion (then it is x_ring − x_pinion, positive outwards).
-    """
-    alpha_t = math.atan(math.tan(alpha) / math.cos(beta))
-    cosine = module * teeth / math.cos(beta) / 2 * math.cos(alpha_t) / distance
-    if not cosine < 1:
-        return math.nan
-    working = float(involute.inv(math.acos(cosine)))
-    return (working - float(involute.inv(alpha_t))) * teeth / (2 * math.tan(alpha))
 
 
 def put_teeth(model: RexsModel, draft: Draft, place: str, gear: RexsGear) -> None:

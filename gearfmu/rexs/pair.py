@@ -7,7 +7,7 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import PairGeometry
-from gearfmu.rexs.draft import Draft, millimetres
+from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -17,18 +17,22 @@ from gearfmu.rexs.gears import (
     put_teeth,
     shaft_speed,
     shaft_torque,
-    sum_of_shifts,
 )
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.spec.base import validate
 from gearfmu.spec.checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.spec.draft import (
+    BACKLASH_PER_MODULE,
+    PITCH_SPEED,
+    STRIP_PER_MODULE,
+    Draft,
+    degrees,
+    millimetres,
+    usual_torque,
+)
 from gearfmu.spec.gear import GearSpec, PairSpec
 from gearfmu.units import to_si
 
-LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
-PITCH_SPEED = 20.0  # m/s at the pitch circle
-BACKLASH_PER_MODULE = 0.02
-STRIP_PER_MODULE = 0.12
 NAMES = ("pinion", "wheel")
 
 
@@ -93,11 +97,6 @@ def put_rack_data(draft: Draft, place: str, gears: list[RexsGear]) -> None:
                 draft.notes.append(f"{gear.component} has another {name} than {first.component}: that one is taken")
 
 
-def degrees(angle: float) -> str:
-    """An angle in rad as text for a stage file."""
-    return f"{round(math.degrees(angle), 9):.10g} deg"
-
-
 def place_shifts(draft: Draft, gears: list[RexsGear], place: Any, distance: float) -> None:
     """Profile shifts as given; missing ones from the centre distance of a pair without backlash."""
     first = gears[0]
@@ -140,10 +139,9 @@ def root_diameter(draft: Draft, place: str, gear: RexsGear) -> float:
 
 
 def assumed_torque(gears: list[RexsGear]) -> float:
-    """Torque (N·m) on the first gear at the usual load K: K b d₁² u / (2 (u + 1))."""
-    diameter, ratio = 2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth
+    """Torque (N·m) on the first gear at the usual load K."""
     width = min(gear.face_width for gear in gears)
-    return LOAD_PER_FACE * width * diameter**2 * ratio / (ratio + 1) / 2
+    return usual_torque(2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth, width)
 
 
 def _put_loads(model: RexsModel, draft: Draft, gears: list[RexsGear]) -> None:

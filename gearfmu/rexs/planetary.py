@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from gearfmu.errors import Problem
-from gearfmu.rexs.draft import Draft, millimetres
+from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
     gear_of,
@@ -19,18 +19,15 @@ from gearfmu.rexs.gears import (
     shaft_diameters,
     shaft_speed,
     shaft_torque,
-    sum_of_shifts,
 )
 from gearfmu.rexs.model import Component, RexsModel
 from gearfmu.rexs.pair import (
-    BACKLASH_PER_MODULE,
-    PITCH_SPEED,
-    STRIP_PER_MODULE,
     assumed_torque,
     put_rack_data,
     root_diameter,
 )
 from gearfmu.spec.checks import rounded_up
+from gearfmu.spec.draft import BACKLASH_PER_MODULE, PITCH_SPEED, STRIP_PER_MODULE, Draft, millimetres
 
 _PLACES = ("sun", "planet", "ring")
 _STEP_TOLERANCE = 0.02  # of a step in which planets can be placed

@@ -58,6 +58,14 @@ def write_drafted(
     return _write_new(target, stage_text(tables | own, _HEAD.format(name=name, origin=origin), shown))
 
 
+def free_target(name: str, folder: str | os.PathLike[str] = ".") -> Path:
+    """Where the stage `name` will be written. SpecError when it is no name, or the file exists already."""
+    target = _target(name, folder)
+    if target.exists():
+        raise SpecError([_exists(target)])
+    return target
+
+
 def stage_text(raw: dict[str, Any], head: str, marks: Mapping[str, str] = MappingProxyType({})) -> str:
     """The commented file for these tables."""
     tables = {key: value for key, value in raw.items() if key != "source"}
@@ -92,12 +100,14 @@ def _write_new(target: Path, text: str) -> Path:
                 raise FileExistsError(target) from None
             os.rename(temporary, target)
     except FileExistsError:
-        raise SpecError(
-            [Problem(str(target), "", "", "this file exists already: choose another name, or edit it")]
-        ) from None
+        raise SpecError([_exists(target)]) from None
     finally:
         temporary.unlink(missing_ok=True)
     return target
+
+
+def _exists(target: Path) -> Problem:
+    return Problem(str(target), "", "", "this file exists already: choose another name, or edit it")
 
 
 def _table(

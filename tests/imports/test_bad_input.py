@@ -18,6 +18,7 @@ from gearfmu.fem import solids
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.factor import FactorError
 from gearfmu.femesh.imported import read_mesh
+from gearfmu.reduction import memory
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_gear import hinge_problem
@@ -294,3 +295,14 @@ def test_decks_that_would_be_read_wrongly_are_refused(tmp_path: Path, case: str)
     path.write_text(text + "\n", encoding="utf-8")
     with pytest.raises(MeshError, match=wanted):
         read_mesh(path, MM)
+
+
+@pytest.mark.parametrize(("whole", "size"), [(False, "unknowns a sector"), (True, "unknowns")])
+def test_what_does_not_fit_the_memory_is_refused_before_the_work(
+    whole: bool, size: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tmp_path.mkdir(exist_ok=True)
+    hex20_deck(tmp_path / "pinion.inp", whole=whole)
+    monkeypatch.setattr(memory, "available_memory", lambda: 1e8)
+    text = refused(tmp_path, SECTION + ('bore = "BORE"\nbore_coupling = "rigid"' if whole else ""))
+    assert re.search(rf"about 0\.\d GB of memory \(\d+ {size}\), 0\.1 GB are free: mesh the body coarser", text)

@@ -10,6 +10,7 @@ import pytest
 from scipy.sparse.linalg import eigsh
 
 from gearfmu import cli
+from gearfmu.commands import shared
 from gearfmu.fem import solids
 from gearfmu.femesh.carrier import whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
@@ -22,6 +23,12 @@ def call(*arguments: object, capsys: pytest.CaptureFixture[str]) -> tuple[int, s
     code = cli.outcome(["modes", *map(str, arguments)])
     captured = capsys.readouterr()
     return code, captured.out, captured.err
+
+
+@pytest.fixture(autouse=True)
+def no_lines_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slow machine takes more than the time between two of them."""
+    monkeypatch.setattr(shared, "_EVERY", 1e9)
 
 
 @pytest.fixture(scope="module")

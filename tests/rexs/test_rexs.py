@@ -12,8 +12,8 @@ import pytest
 from gearfmu.cli import outcome
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs import draft_from_rexs
-from gearfmu.rexs.gears import sum_of_shifts
 from gearfmu.rexs.model import read_rexs
 from gearfmu.spec.new import write_drafted
 from gearfmu.spec.stage import load_pair, load_stage

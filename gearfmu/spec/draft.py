@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.spec.layers import read_layers
 from gearfmu.spec.library import find_stage
+
+LOAD_PER_FACE = 4e6  # Pa, K = F_t/(b d₁)·(u + 1)/u: the order of case-hardened industrial gears
+PITCH_SPEED = 20.0  # m/s at the pitch circle
+BACKLASH_PER_MODULE = 0.02
+STRIP_PER_MODULE = 0.12
 
 
 @dataclass(frozen=True)
@@ -34,10 +40,10 @@ class Draft:
     like: str = ""
 
     @classmethod
-    def after(cls, stage: str) -> Draft:
-        """A draft that assumes of everything what the shipped `stage` says."""
+    def after(cls, stage: str, word: str = "assumed") -> Draft:
+        """A draft that assumes (or does what `word` says) of everything what the shipped `stage` says."""
         draft = cls(copy.deepcopy(read_layers(find_stage(stage)).tables), like=stage)
-        draft._mark((), draft.tables, f"assumed, as in {stage}")
+        draft._mark((), draft.tables, f"{word}, as in {stage}")
         return draft
 
     def put(self, place: str, value: Any, origin: str) -> None:
@@ -52,6 +58,13 @@ class Draft:
     def assume(self, place: str, value: Any, why: str) -> None:
         """`put` for a value that the file does not give."""
         self.put(place, value, f"assumed: {why}")
+
+    def at(self, place: str) -> Any:
+        """The value or table at a place."""
+        found: Any = self.tables
+        for step in place.split("."):
+            found = found[step]
+        return found
 
     def drop(self, place: str) -> None:
         """Take a field or table out."""
@@ -75,3 +88,14 @@ class Draft:
 def millimetres(value: float) -> str:
     """A length in m as text for a stage file, to a nanometre."""
     return f"{round(1e3 * value, 6):.10g} mm"
+
+
+def degrees(angle: float) -> str:
+    """An angle in rad as text for a stage file."""
+    return f"{round(math.degrees(angle), 9):.10g} deg"
+
+
+def usual_torque(diameter: float, ratio: float, width: float) -> float:
+    """Torque (N·m) on a gear of reference diameter d₁ (m) and face width b (m), its mate u times as large, at the usual
+    load K: K b d₁² u / (2 (u + 1))."""
+    return LOAD_PER_FACE * width * diameter**2 * ratio / (ratio + 1) / 2

@@ -1,0 +1,145 @@
+"""The verb new: a stage file from a shipped one, from gear data of a REXS file, or from a few numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gearfmu.commands.shared import Quantity, echo_pairs
+
+_WHOLE = re.compile(r"[+-]?\d+$")
+
+
+class _WithTeeth(click.Command):
+    """Takes `--teeth 31 73`: all whole numbers that follow are the option's value."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click does, with those numbers as one word."""
+        if "--teeth" in args:
+            first = args.index("--teeth") + 1
+            last = first
+            while last < len(args) and _WHOLE.match(args[last]):
+                last += 1
+            args = [*args[:first], " ".join(args[first:last]), *args[last:]] if last > first else args
+        return super().parse_args(ctx, args)
+
+
+class _Teeth(click.ParamType):
+    """Whole numbers as one word, "31 73" or "31/73"."""
+
+    name = "Z Z [Z]"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        """As it is written."""
+        return self.name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
+        """The numbers; a usage error where they are none."""
+        if isinstance(value, tuple):
+            return value
+        words = re.split(r"[\s/,]+", value.strip())
+        if not all(_WHOLE.match(word) for word in words):
+            self.fail(f'"{value}": whole numbers, such as --teeth 31 73', param, ctx)
+        return tuple(int(word) for word in words)
+
+
+@click.command(cls=_WithTeeth)
+@click.argument("name")
+@click.option("--like", metavar="STAGE", help="Shipped stage to start from.  [default: fzg_c]")
+@click.option(
+    "--rexs", type=click.Path(path_type=Path), metavar="FILE", help="Gear data from a REXS file (.rexs, .rexsz)."
+)
+@click.option("--stage", default="", metavar="ID", help="With --rexs: identifier or name of one of several stages.")
+@click.option("--teeth", type=_Teeth(), help="Of pinion and wheel; with --planets of sun, planet and ring.")
+@click.option("--planets", type=int, metavar="N", help="A planetary set with so many planets.")
+@click.option("--unequal", is_flag=True, help="Planets at the places nearest to even ones at which teeth fit.")
+@click.option("--module", type=Quantity("module"), help='Normal module: "2.5 mm".')
+@click.option("--width", type=Quantity("face_width"), help='Common face width: "30 mm".')
+@click.option("--center", type=Quantity("center_distance"), help="Centre distance; without it one is proposed.")
+@click.option("--helix", type=Quantity("helix_angle"), help='Helix angle of pinion or sun: "22 deg".')
+@click.option("--pressure-angle", type=Quantity("pressure_angle"), help="Normal pressure angle, 20 deg without it.")
+@click.option("--torque", type=Quantity("torque_max"), help="Largest torque of the pinion or the carrier.")
+@click.option("--speed", type=Quantity("speed_max"), help="Largest speed of the pinion or the carrier.")
+def new(name: str, like: str | None, rexs: Path | None, stage: str, **numbers: Any) -> int:
+    """Write NAME/stage.toml, every field commented: from numbers of teeth, module and face width with everything else
+    proposed and marked so, from gear data of a REXS file, or as a copy of a shipped stage. Never overwrites."""
+    from gearfmu.spec.new import new_stage
+    from gearfmu.spec.stage import load_stage
+
+    given = {key: value for key, value in numbers.items() if value not in (None, False)}
+    forms = [word for word, there in (("--like", like), ("--rexs", rexs), ("--teeth", given)) if there]
+    if len(forms) > 1:
+        raise click.UsageError(f"{' and '.join(forms)} are different ways to begin: choose one")
+    if given:
+        return _new_from_numbers(name, given)
+    if rexs is not None:
+        return _new_from_rexs(name, rexs, stage)
+    path = new_stage(name, like or "fzg_c")
+    further = "" if load_stage(path).kind == "planetary_set" else f" and 'gearfmu export {path}'"
+    click.echo(f"{path}\nNext: edit it, then 'gearfmu reduce {path}'{further}.")
+    return 0
+
+
+def _new_from_numbers(name: str, given: dict[str, Any]) -> int:
+    """The stage file of teeth, module and width, and the shape that it proposes."""
+    from gearfmu.spec.proposal import Wish, new_from_numbers
+    from gearfmu.spec.stage import load_stage
+
+    path = new_from_numbers(name, Wish(**({"teeth": ()} | given)))
+    spec = load_stage(path)
+    shared = spec.set if spec.kind == "planetary_set" else spec.pair
+    shape = {
+        "centre distance": f"{1e3 * shared.center_distance:.6g} mm",
+        "profile shifts": ", ".join(f"{gear.profile_shift:.4f}" for gear in spec.gears),
+        "tip diameters": ", ".join(f"{1e3 * gear.tip_diameter:.6g}" for gear in spec.gears) + " mm",
+        "backlash": f"{1e3 * shared.backlash:.4g} mm",
+        "torque_max": f"{spec.torque_max:.4g} N*m",
+        "speed_max": f"{30 / math.pi * spec.speed_max:.4g} rpm",
+    }
+    click.echo(f"{path}\nproposed, like everything that is marked so in the file, with the rule behind it:")
+    echo_pairs(shape, "  ")
+    home = path.parent
+    click.echo(f"Next: 'gearfmu inspect {home}', then 'gearfmu reduce {home} --coarse' or 'gearfmu reduce {home}'.")
+    return 0
+
+
+def _new_from_rexs(name: str, rexs: Path, stage: str) -> int:
+    """The stage file of a REXS file, and what of it was assumed or left unread (also as a table beside it)."""
+    from gearfmu.errors import SpecError
+    from gearfmu.rexs import draft_from_rexs
+    from gearfmu.spec.new import write_drafted
+    from gearfmu.spec.stage import load_stage
+
+    draft = draft_from_rexs(rexs, stage)
+    path = write_drafted(name, draft.tables, draft.marks, f"read from the REXS file {rexs.name}")
+    table = path.with_name("rexs_unread.csv")
+    _write_unread(table, draft.unread)
+    click.echo(f"{path}\nassumed, because the file does not say it:")
+    echo_pairs({place: mark.removeprefix("assumed: ") for place, mark in draft.assumptions().items()}, "  ")
+    click.echo(f"  everything else that is marked so in the file: as in {draft.like}")
+    for note in draft.notes:
+        click.echo(f"note: {note}")
+    click.echo(f"not used: {len(draft.unread)} attributes of {rexs.name}, listed in {table}")
+    try:
+        load_stage(path)
+    except SpecError as error:
+        click.echo(f"The file is written but is no valid stage yet:\n{error}", err=True)
+        return 1
+    click.echo(f"Next: edit it, then 'gearfmu reduce {path}'.")
+    return 0
+
+
+def _write_unread(path: Path, unread: Iterable[Any]) -> None:
+    import csv
+
+    from gearfmu.files import written_whole
+
+    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("component", "attribute", "value", "unit"))
+        writer.writerows((entry.component, entry.attribute, entry.value, entry.unit) for entry in unread)

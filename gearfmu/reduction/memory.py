@@ -1,0 +1,95 @@
+"""How much memory the reduction of a body takes, known from its mesh before the work, and whether it is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gearfmu.errors import MeshError
+
+_BASE = 0.2e9  # bytes of the program with its packages, and of what is small
+_FACTOR = 21.0  # entries of the factor per unknown to the power 4/3; measured 19 to 25 on sectors of 5 to 34 thousand
+_SPARSE = 3000.0  # bytes per unknown of finite-element matrices, on the sector and in its coordinates
+_WHOLE_FACTOR = 30.0  # the same of a whole body: measured 29 to 33
+_SPACE = 36  # fields of the space of low modes per mode of a family
+CARRIER_FACTORS = 5  # of K, at the three points of Krylov's method and at one of the reference
+MESH_COARSER = "mesh the body coarser"  # the remedy for finite elements made elsewhere
+_MEMORY_TABLE = Path("/proc/meminfo")
+
+
+@dataclass(frozen=True)
+class Need:
+    """Unknowns of a sector or (`whole`) of a body, and bytes of memory that its reduction takes at most, estimated
+    within a quarter."""
+
+    unknowns: int
+    memory: float
+    whole: bool = False
+
+    @property
+    def size(self) -> str:
+        """The unknowns in words."""
+        return f"{self.unknowns} unknowns" + ("" if self.whole else " a sector")
+
+    @property
+    def text(self) -> str:
+        """For a line of progress."""
+        return f"{self.size}, about {self.memory / 1e9:.1f} GB"
+
+
+@dataclass(frozen=True)
+class ReductionSize:
+    """What the memory of a gear's reduction grows with beside its mesh: teeth, modes stored, loads on one tooth."""
+
+    teeth: int
+    modes: int
+    loads: int
+
+
+def gear_need(sector: Any, body: Any) -> Need:
+    """Need of a gear: its sector (FeMesh) and what a spec says about the reduction (BodySpec)."""
+    return sector_need(sector, ReductionSize(sector.teeth, body.modes, 2 * body.roll_points * body.width_functions))
+
+
+def sector_need(sector: Any, size: ReductionSize) -> Need:
+    """Need of a gear that is reduced by cyclic symmetry; sector: its nodes, cut_minus and cut_plus."""
+    cut, unknowns = 3 * len(sector.cut_minus), 3 * (len(sector.nodes) - len(sector.cut_plus))
+    loads, family = 2 * size.loads, size.modes / size.teeth + 4
+    matrices = 3 * (2 * cut) ** 2 + loads**2 * (size.teeth / 2 + 4)
+    fields = unknowns * (3 * loads + 2 * _SPACE * family)
+    return Need(unknowns, _BASE + 8 * (_FACTOR * unknowns ** (4 / 3) + matrices + fields) + _SPARSE * unknowns)
+
+
+def available_memory() -> float | None:
+    """Bytes that programs can still take (MemAvailable); None where the system does not tell."""
+    try:
+        lines = _MEMORY_TABLE.read_text(encoding="ascii").splitlines()
+    except OSError:
+        return None
+    found = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
+    return 1024.0 * float(found[0]) if found else None
+
+
+def whole_need(unknowns: int, vectors: int, factors: int) -> Need:
+    """Need of a body that is reduced as a whole: so many factors of its matrices and full vectors beside them."""
+    numbers = factors * _WHOLE_FACTOR * unknowns ** (4 / 3) + unknowns * vectors
+    return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
+
+
+def require_memory(need: Need, remedy: str) -> None:
+    """MeshError where the memory is not there. remedy: what to lower."""
+    there = available_memory()
+    if there is None or need.memory <= there:
+        return
+    raise MeshError(
+        f"the reduction takes about {need.memory / 1e9:.1f} GB of memory ({need.size}), "
+        f"{there / 1e9:.1f} GB are free: {remedy}, or end other programs"
+    )
+
+
+def lower_counts(counts: Any, table: str) -> str:
+    """The remedy where element counts (MeshSpec, CarrierMeshSpec) of `table` can be lowered."""
+    own = {name: value for name, value in counts.model_dump().items() if isinstance(value, int)}
+    named = ", ".join(f"{name} = {value}" for name, value in own.items())
+    return f"lower the counts of {table} ({named}, times scale = {counts.scale:g})"

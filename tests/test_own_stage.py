@@ -1,0 +1,98 @@
+"""The walk of docs/howto-own-stage.md: its fast commands run as they stand there, the slow ones on tiny gears."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from gearfmu import cli
+from gearfmu.spec.coarse import coarse_stage
+from gearfmu.spec.scene import load_scene
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "howto-own-stage.md"
+TINY = {"modes": 40, "roll_points": 8, "width_functions": 3, "flank": 6, "thickness": 2, "width": 2}
+
+
+def call(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    code = cli.outcome(words)
+    return code, *capsys.readouterr()
+
+
+def commands(text: str) -> list[list[str]]:
+    """The command lines of a page as words, without `gearfmu`."""
+    lines = re.findall(r"^gearfmu (.+)$", text, flags=re.MULTILINE)
+    return [[a or b for a, b in re.findall(r'"([^"]*)"|(\S+)', line)] for line in lines]
+
+
+def test_the_page_goes_from_numbers_to_stages_that_are_valid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = PAGE.read_text(encoding="utf-8")
+    fast = [words for words in commands(text) if words[0] in ("new", "inspect")]
+    assert [words[0] for words in fast] == ["new", "inspect", "new", "inspect"]
+    told = ""
+    for words in fast:
+        code, out, err = call(words, capsys)
+        assert code == 0, err
+        told += out
+    assert "0.2484, 0.0735" in told and "89.8, 202.17 mm" in told and told.count("memory_GB") == 6
+    coarse_stage("my_set")
+    (scene,) = re.findall(r"```toml\n(name = .+?)```", text, flags=re.DOTALL)
+    Path("my_set_run.toml").write_text(scene, encoding="utf-8")
+    assert load_scene(Path("my_set_run.toml")).name == "my_set_run"
+
+
+def test_every_option_on_the_page_is_one_of_its_verb() -> None:
+    import importlib
+
+    for verb, *words in commands(PAGE.read_text(encoding="utf-8")):
+        module, name = cli.VERBS[verb][0].split(":")
+        known = {option for param in getattr(importlib.import_module(module), name).params for option in param.opts}
+        assert {word for word in words if word.startswith("--")} <= known
+
+
+def test_a_tiny_pair_is_coarse_in_seconds_and_meshes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = 'new tiny --teeth 17 19 --module "1 mm" --width "5 mm"'
+    assert call(commands(f"gearfmu {words}")[0], capsys)[0] == 0
+    path = tmp_path / "tiny" / "stage.toml"
+    text = path.read_text(encoding="utf-8")
+    for key, value in TINY.items():
+        text = re.sub(rf"^{key} = \d+", f"{key} = {value}", text, flags=re.MULTILINE)
+    path.write_text(text, encoding="utf-8")
+    code, out, err = call(["reduce", "tiny", "--coarse"], capsys)
+    assert code == 0, err
+    assert "benchmarks/coarse.csv" in out and "2 bodies reduced, 0 read" in out
+    assert sorted(p.name for p in (tmp_path / "tiny" / "coarse").iterdir()) == ["pinion.h5", "stage.toml", "wheel.h5"]
+    assert "0 bodies reduced, 2 read" in call(["reduce", "tiny", "--coarse"], capsys)[1]
+    code, out, err = call("te tiny/coarse --positions 4 --torque".split() + ["1 N*m", "--out", "te.csv"], capsys)
+    assert code == 0 and "mesh stiffness" in out, err
+    shown = json.loads(call(["inspect", "tiny/coarse", "--json"], capsys)[1])
+    assert shown["name"] == "tiny_coarse" and shown["reduction"]["pinion"]["memory_GB"] > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        ("--teeth 31 73", 1, ("module: this number is missing", "width: this number is missing")),
+        ("--teeth 30 20 -71 --planets 4 --module 2~mm --width 20~mm", 1, ("101/4 is no integer",)),
+        ("--teeth 31,73 --module 2~mm --width 20~mm --center 90~mm", 1, ("center = 90 mm: out of reach",)),
+        ("--planets 3 --module 2~mm --width 20~mm", 1, ("teeth: a planetary set has three",)),
+        ("--teeth x --module 2~mm", 100, ("whole numbers, such as --teeth 31 73",)),
+        ("--teeth 31 73 --like fzg_c", 100, ("different ways to begin",)),
+    ],
+)
+def test_bad_numbers_are_one_clear_message(
+    words: str, code: int, told: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    found, out, err = call(["new", "mine", *(word.replace("~", " ") for word in words.split())], capsys)
+    assert found == code and out == "" and all(text in err for text in told), err
+    assert not list(tmp_path.iterdir())
