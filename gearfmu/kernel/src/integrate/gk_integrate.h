@@ -15,6 +15,8 @@ const gk_scheme *gk_scheme_of(gk_integrator integrator);
 /* gk_wide.c */
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
 gk_tally_function *gk_wide_count(int widest);
+gk_fill_function *gk_wide_fill(int widest);
+gk_moves_function *gk_wide_moves(int widest);
 /* gk_memory.c */
 int gk_memory_find(const gk_meshing *meshing, gk_key key);
 void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);

@@ -85,6 +85,15 @@ static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *w
     return outcome;
 }
 
+/* tables of the step that was chosen for the setup, which most runs take; of any other they are made at the first step */
+static void make_tables(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    const double h = setup->h, gamma = setup->gamma_at[0];
+    if (!GK_ON(setup, elastic) || gk_scheme_of(setup->integrator)->is_explicit) return;
+    if (work->table_h == h && work->table_gamma == gamma) return;
+    gk_wide_moves(1)(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
+}
+
 gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time)
 {
     GK_ASSERT(model && setup && work && data);
@@ -98,6 +107,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *
     data->count = 0;
     data->amplitudes = (int64_t)setup->amplitudes;
     gk_outputs_start(model, setup, work, data);
+    make_tables(model, setup, work);
     return GK_OK;
 }
 

@@ -6,20 +6,45 @@
 enum { CHUNK = 64 };
 
 /* ---- which gears ------------------------------------------------------------------------------------------------- */
-/* gears of one body share the bytes of its tables in the blob */
+/* gears of one body: of one shape, with modes of the same numbers, and with one copy of its tables in the blob; patterns
+ * of far teeth are each gear's own */
+static int same_shape(const gk_gear *a, const gk_gear *b)
+{
+    const double of_a[] = {a->r_b,    a->s_form, a->s_tip, a->psi_b,         a->width,       a->local,
+                           a->strip,  a->edge,   a->helix, a->corner_radius, a->corner_angle};
+    const double of_b[] = {b->r_b,    b->s_form, b->s_tip, b->psi_b,         b->width,       b->local,
+                           b->strip,  b->edge,   b->helix, b->corner_radius, b->corner_angle};
+    return a->z == b->z && !memcmp(of_a, of_b, sizeof of_a);
+}
+
+static int same_modes(const gk_gear *a, const gk_gear *b)
+{
+    const size_t n = (size_t)a->modes;
+    return a->modes == b->modes && a->low == b->low && !memcmp(a->omega, b->omega, n * sizeof *a->omega) &&
+           !memcmp(a->diameter, b->diameter, n * sizeof *a->diameter) &&
+           !memcmp(a->member, b->member, n * sizeof *a->member) &&
+           !memcmp(a->low_member, b->low_member, (size_t)a->low * sizeof *a->low_member);
+}
+
 static int same_tables(const gk_gear *a, const gk_gear *b)
 {
-    return a->resample == b->resample && a->rows == b->rows && a->low_rows == b->low_rows && a->node == b->node &&
-           a->far_rows == b->far_rows && a->residual_own == b->residual_own && a->residual_next == b->residual_next &&
-           a->residual_across == b->residual_across && a->along_rows == b->along_rows && a->along_low == b->along_low &&
-           a->along_normal == b->along_normal && a->along_own == b->along_own && a->along_across == b->along_across;
+    return a->points == b->points && a->mirrored == b->mirrored && a->resample == b->resample && a->rows == b->rows &&
+           a->low_rows == b->low_rows && a->node == b->node && a->residual_own == b->residual_own &&
+           a->residual_next == b->residual_next && a->residual_across == b->residual_across &&
+           a->along_rows == b->along_rows && a->along_low == b->along_low && a->along_normal == b->along_normal &&
+           a->along_own == b->along_own && a->along_across == b->along_across;
+}
+
+static int same_body(const gk_gear *a, const gk_gear *b)
+{
+    return a == b || (same_tables(a, b) && same_shape(a, b) && same_modes(a, b));
 }
 
 int gk_spread_leader(const gk_model *model, int g)
 {
     GK_ASSERT(gk_is_gear(model, g));
     int first = 0;
-    while (!same_tables(&model->gear[first], &model->gear[g])) first++;
+    while (!same_body(&model->gear[first], &model->gear[g])) first++;
     return first;
 }
 
@@ -49,11 +74,11 @@ void gk_spread_rows(const gk_model *model, gk_setup *setup, int g)
     const gk_flank_tables *to = &setup->flank[g];
     const size_t A = (size_t)model->functions;
     spread_rows(model, gear, 2, A * (size_t)model->ports, gear->port_residual, to->port);
+    spread_rows(model, gear, 2, A * FAR, gear->far_rows, to->far);
     if (gk_spread_leader(model, g) != g) return;
     spread_rows(model, gear, 2, A * (size_t)gear->modes, gear->rows, to->rows);
     spread_rows(model, gear, 2, A * (size_t)gear->low, gear->low_rows, to->low);
     spread_rows(model, gear, 6, A * 6, gear->node, to->node);
-    spread_rows(model, gear, 2, A * FAR, gear->far_rows, to->far);
     spread_rows(model, gear, 2, A * (size_t)gear->modes, gear->along_rows, to->along_rows);
     spread_rows(model, gear, 2, A * (size_t)gear->low, gear->along_low, to->along_low);
 }
