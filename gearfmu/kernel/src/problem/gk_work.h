@@ -203,6 +203,8 @@ int gk_side_twins(const gk_model *model, int e, int f);
 typedef void gk_fill_function(const gk_model *model, gk_setup *setup, gk_work *work, const gk_twins *twins);
 gk_fill_function gk_side_fill;
 size_t gk_side_scratch(const gk_model *model);
+/* gk_limit.c */
+size_t gk_limit_scratch(const gk_model *model);
 /* gk_push.c */
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     int gear, flank, tooth, strips;

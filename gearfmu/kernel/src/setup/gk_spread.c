@@ -1,7 +1,7 @@
 /* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (gearfmu/stage/compact.py).
  * A model stores rows at P points and each number of a compliance once; on the grid they are several times as large.
  * Rows are kept in the setup, compliances only while the sides of their gear are filled. */
-#include "setup/gk_node.h"
+#include "setup/gk_grounded.h"
 
 enum { CHUNK = 64 };
 
@@ -124,7 +124,8 @@ size_t gk_spread_scratch(const gk_model *model, size_t *reals)
     for (int g = 0; g < model->gears; g++) {
         gk_compliance counted;
         const size_t n = places_of(model, &model->gear[g]);
-        const size_t own = n * n + n * (size_t)(model->rolls * model->functions);
+        const size_t packed = (size_t)((model->rolls + model->gear[g].points) * gk_padded(model->functions * model->functions));
+        const size_t own = n * n + n * (size_t)(model->rolls * model->functions) + packed;
         const size_t blocks = lay_out(model, &model->gear[g], model->gear[g].along_rows != NULL, NULL, &counted) *
                               block_size(model);
         doubles = own > doubles ? own : doubles;
@@ -137,7 +138,24 @@ typedef struct spreader {
     const gk_model *model;
     const gk_gear *gear;
     double *square, *between; /* (places, places); (rolls, functions, places) */
+    double *packed;           /* (points + rolls, functions² in whole quads) */
 } spreader;
+
+/* (rolls, functions, functions) from (functions, points, functions): a product of matrices once the functions stand
+ * together */
+static void spread_points(const spreader *s, const double *from, gk_real *out)
+{
+    const int A = s->model->functions, rolls = s->model->rolls, points = s->gear->points, columns = gk_padded(A * A);
+    const size_t n = places_of(s->model, s->gear);
+    const gk_matrix packed = {s->packed, points, columns};
+    memset(s->packed, 0, (size_t)((points + rolls) * columns) * sizeof *s->packed);
+    for (int j = 0; j < points; j++)
+        for (int c = 0; c < A * A; c++) s->packed[j * columns + c] = from[(size_t)(c / A) * n + (size_t)(j * A + c % A)];
+    double *sum = s->packed + points * columns;
+    gk_grounded_times(s->gear->resample, &packed, rolls, sum);
+    for (int l = 0; l < rolls; l++)
+        for (int c = 0; c < A * A; c++) out[l * A * A + c] = (gk_real)sum[l * columns + c];
+}
 
 /* (rolls, rolls, functions, functions) of the square */
 static void spread_square(const spreader *s, gk_real *out)
@@ -153,14 +171,7 @@ static void spread_square(const spreader *s, gk_real *out)
             for (size_t c = 0; c < (size_t)A * n && weight != 0.0; c++) to[c] += weight * from[c];
         }
     for (int k = 0; k < rolls; k++)
-        for (int l = 0; l < rolls; l++)
-            for (int a = 0; a < A; a++, out += A) {
-                const double *from = s->between + (size_t)(k * A + a) * n, *weight = s->gear->resample + l * points;
-                double sum[MAX_FUNCTIONS] = {0};
-                for (int j = 0; j < points; j++, from += A)
-                    for (int b = 0; b < A; b++) sum[b] += weight[j] * from[b];
-                for (int b = 0; b < A; b++) out[b] = (gk_real)sum[b];
-            }
+        spread_points(s, s->between + (size_t)(k * A) * n, out + (size_t)k * (size_t)(rolls * A * A));
 }
 
 static const float *spread_whole(const spreader *s, const float *from, gk_real *out)
@@ -197,7 +208,8 @@ void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work 
     const gk_gear *gear = &model->gear[g];
     const int flanks = gear->mirrored ? 1 : 2, along = GK_ON(setup, friction) && gear->along_rows;
     const size_t n = places_of(model, gear);
-    const spreader s = {model, gear, work->spread, work->spread + n * n};
+    double *between = work->spread + n * n;
+    const spreader s = {model, gear, work->spread, between, between + n * (size_t)(model->rolls * model->functions)};
     gk_compliance *to = &work->compliance;
     lay_out(model, gear, along, work->blocks, to);
     const float *own = gear->residual_own, *next = gear->residual_next, *across = gear->residual_across;
