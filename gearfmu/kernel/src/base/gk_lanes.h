@@ -37,6 +37,7 @@ enum { GK_CHUNK = 4 };
 enum { GK_CHUNK = 2 };
 #endif
 typedef double gk_chunk __attribute__((vector_size(GK_CHUNK * sizeof(double)), may_alias, aligned(sizeof(double))));
+typedef gk_real gk_some __attribute__((vector_size(GK_CHUNK * sizeof(gk_real)), may_alias, aligned(sizeof(gk_real))));
 #define GK_INLINE static inline __attribute__((always_inline))
 /* macros, because compilers differ in how they pass vectors and say so */
 #define GK_ALL(x) ((gk_quad){(x), (x), (x), (x)})
