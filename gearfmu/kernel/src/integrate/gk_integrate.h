@@ -2,6 +2,7 @@
 #ifndef GK_INTEGRATE_H
 #define GK_INTEGRATE_H
 #include "problem/gk_work.h"
+#include "setup/gk_tables.h"
 
 /* what an integrator is; gk_scheme.c */
 typedef struct gk_scheme {

@@ -5,11 +5,6 @@
 #include "problem/gk_system.h"
 #include "setup/gk_spread.h"
 
-/* sides whose tables have much in common: which of their engagements */
-typedef struct gk_twins {
-    int count, engagement[2 * MAX_ENGAGEMENTS], which[2 * MAX_ENGAGEMENTS];
-} gk_twins;
-
 /* phases of a step, for the profile */
 enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to quads */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
@@ -197,14 +192,6 @@ int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *whic
 void gk_layout_plan(const gk_model *model, gk_setup *setup);
 void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
 void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work);
-/* gk_side.c */
-void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
-int gk_side_twins(const gk_model *model, int e, int f);
-typedef void gk_fill_function(const gk_model *model, gk_setup *setup, gk_work *work, const gk_twins *twins);
-gk_fill_function gk_side_fill;
-size_t gk_side_scratch(const gk_model *model);
-/* gk_limit.c */
-size_t gk_limit_scratch(const gk_model *model);
 /* gk_push.c */
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     int gear, flank, tooth, strips;
@@ -215,7 +202,6 @@ void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_l
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */
-size_t gk_moves_scratch(size_t points, size_t lanes, size_t ground);
 typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 gk_moves_function gk_side_step;
 /* gk_rows.c */

@@ -86,28 +86,28 @@ gk_grounded gk_grounded_side(const gk_node *n, double *room)
 }
 
 /* ---- products ---------------------------------------------------------------------------------------------------- */
-/* `count` rows of x (n) times some chunks of columns of a matrix with rows of m, added to rows of out; sums stay in
- * registers and run over n in order */
-GK_INLINE void times_block(const double *x, const double *matrix, int n, int m, double *out, int count, int chunks)
+/* `count` rows of x times some chunks of columns of a matrix, from column j on, added to rows of out; sums stay in
+ * registers and run in order */
+GK_INLINE void times_block(const double *x, const gk_matrix *by, int j, double *out, int count, int chunks)
 {
+    const size_t n = (size_t)by->rows, m = (size_t)by->columns;
     gk_chunk sum[4][2];
     for (int p = 0; p < count; p++)
-        for (int q = 0; q < chunks; q++) sum[p][q] = ((const gk_chunk *)(out + (size_t)p * (size_t)m))[q];
-    for (int i = 0; i < n; i++) {
-        const gk_chunk *row = (const gk_chunk *)(matrix + (size_t)i * (size_t)m);
+        for (int q = 0; q < chunks; q++) sum[p][q] = ((const gk_chunk *)(out + (size_t)p * m + j))[q];
+    for (size_t i = 0; i < n; i++) {
+        const gk_chunk *row = (const gk_chunk *)(by->entry + i * m + j);
         for (int p = 0; p < count; p++)
-            for (int q = 0; q < chunks; q++) sum[p][q] += x[(size_t)p * (size_t)n + (size_t)i] * row[q];
+            for (int q = 0; q < chunks; q++) sum[p][q] += x[(size_t)p * n + i] * row[q];
     }
     for (int p = 0; p < count; p++)
-        for (int q = 0; q < chunks; q++) ((gk_chunk *)(out + (size_t)p * (size_t)m))[q] = sum[p][q];
+        for (int q = 0; q < chunks; q++) ((gk_chunk *)(out + (size_t)p * m + j))[q] = sum[p][q];
 }
 
 GK_INLINE void times_rows(const double *x, const gk_matrix *by, double *out, int count)
 {
     int j = 0;
-    for (; j + 2 * GK_CHUNK <= by->columns; j += 2 * GK_CHUNK)
-        times_block(x, by->entry + j, by->rows, by->columns, out + j, count, 2);
-    if (j < by->columns) times_block(x, by->entry + j, by->rows, by->columns, out + j, count, 1);
+    for (; j + 2 * GK_CHUNK <= by->columns; j += 2 * GK_CHUNK) times_block(x, by, j, out, count, 2);
+    if (j < by->columns) times_block(x, by, j, out, count, 1);
 }
 
 void gk_grounded_times(const double *x, const gk_matrix *by, int points, double *out)

@@ -1,6 +1,9 @@
 /* What ground oscillators and supports do to a side of an engagement (gk_grounded.c). */
 #ifndef GK_GROUNDED_H
 #define GK_GROUNDED_H
+#include "base/gk_check.h"
+#include "gk.h"
+#include "model/gk_model.h"
 #include "setup/gk_node.h"
 
 typedef struct gk_matrix {

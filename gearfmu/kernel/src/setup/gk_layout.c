@@ -1,5 +1,6 @@
 /* Where everything of gk_setup and gk_work lies: one block each, arrays behind the head. */
 #include "problem/gk_work.h"
+#include "setup/gk_tables.h"
 
 static int share_rotor(const gk_model *model, const gk_engagement *a, const gk_engagement *b)
 {

@@ -5,6 +5,7 @@
  * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "integrate/gk_integrate.h"
+#include "setup/gk_tables.h"
 
 static const double MU_MOST = 0.9;                        /* μ′ of a step */
 static const double AT_NYQUIST = 2.0 / (1.0 - GK_MEMORY); /* f_d over half of η_d where forces alternate */

@@ -2,6 +2,7 @@
  * A row between two nodes is linear, so both are quadratic there: tabulated as squares of nodes and products of
  * neighbours, they are exactly the bilinear form of the interpolated rows. */
 #include "problem/gk_work.h"
+#include "setup/gk_tables.h"
 
 /* Σ a b over modes between all points: rows of one node, and mixed with those of the next (NULL: none) */
 static void store_products(const gk_side *side, const gk_real *scaled, const gk_real *rows, const gk_real *next_scaled,
@@ -51,10 +52,10 @@ static int common_rows(const gk_model *model, const gk_setup *setup, const gk_si
  * by columns have the points, then what gaps and bores read; sums over the oscillators stay in order. */
 typedef struct ground_part {
     const gk_side *side;
-    int from, width, points, padded, count; /* padded: points in whole quads; count: of what gaps and bores read */
-    const double *by[2], *common[COMMON];
-    double *here, *next;                /* (width, padded + COMMON): rows of this node and of the next, by columns */
-    double *square[2], *mixed[2];       /* (points, padded + COMMON): here · here, here · next, each oscillator weighed */
+    int from, width, points, padded, count;      /* padded: points in whole quads; count: of what gaps and bores read */
+    const double *by[2], *common[COMMON], *rows; /* rows: of the node in hand */
+    double *here, *next;          /* (width, padded + COMMON): rows of this node and of the next, by columns */
+    double *square[2], *mixed[2]; /* (points, padded + COMMON): here · here, here · next, each oscillator weighed */
 } ground_part;
 
 #ifndef GK_WIDE
@@ -105,12 +106,11 @@ static void by_columns(const ground_part *p, int at, double *out)
 }
 
 /* `count` rows, from row i on, times a chunk of columns from j on, weighed by mobility and by κ */
-GK_INLINE void weigh_block(const ground_part *p, const double *rows, const double *columns, int i, int j, int count,
-                           double *const out[2])
+GK_INLINE void weigh_block(const ground_part *p, const double *columns, int i, int j, int count, double *const out[2])
 {
     const int n = p->width, stride = columns_of(p);
     gk_chunk sum[2][4] = {{{0}}};
-    const double *a = rows + (size_t)i * n, *b = columns + j;
+    const double *a = p->rows + (size_t)i * n, *b = columns + j;
     for (int k = 0; k < n; k++, b += stride) {
         const gk_chunk column = *(const gk_chunk *)b;
         const double mobility = p->by[0][k], kappa = p->by[1][k];
@@ -124,16 +124,16 @@ GK_INLINE void weigh_block(const ground_part *p, const double *rows, const doubl
         for (int r = 0; r < count; r++) *(gk_chunk *)(out[kind] + (size_t)(i + r) * stride + j) = sum[kind][r];
 }
 
-/* rows of node `at` times columns, each row from its own column on where the product is symmetric, up to column `end` */
-static void weigh(const ground_part *p, int at, const double *columns, int symmetric, double *const out[2])
+/* rows of a node times columns, each row from its own column on where the product is symmetric, up to column `end` */
+static void weigh(const ground_part *p, const double *columns, int symmetric, double *const out[2])
 {
-    const double *rows = rows_of(p, at);
     const int end = symmetric ? columns_of(p) : p->padded;
     int i = 0;
     for (; i + 4 <= p->points; i += 4)
-        for (int j = symmetric ? i : 0; j < end; j += GK_CHUNK) weigh_block(p, rows, columns, i, j, 4, out);
+        for (int j = symmetric ? i : 0; j < end; j += GK_CHUNK) weigh_block(p, columns, i, j, 4, out);
     for (; i < p->points; i++)
-        for (int j = symmetric ? i / GK_CHUNK * GK_CHUNK : 0; j < end; j += GK_CHUNK) weigh_block(p, rows, columns, i, j, 1, out);
+        for (int j = symmetric ? i / GK_CHUNK * GK_CHUNK : 0; j < end; j += GK_CHUNK)
+            weigh_block(p, columns, i, j, 1, out);
 }
 
 /* adds the ground group to the products of a node: rows with rows, and rows with what the gap reads as rigid motion */
@@ -156,7 +156,7 @@ static void add_ground_node(const ground_part *p, gk_step_side *table, int at, i
     }
 }
 
-static void add_ground_part(const gk_setup *setup, ground_part *p, gk_step_side *table)
+static void add_ground_products(const gk_setup *setup, ground_part *p, gk_step_side *table)
 {
     for (int kind = 0; kind < 2; kind++)
         for (int c = 0; c < p->count; c++)
@@ -166,10 +166,11 @@ static void add_ground_part(const gk_setup *setup, ground_part *p, gk_step_side 
     by_columns(p, 0, p->here);
     for (int at = 0; at <= p->side->nodes; at++) {
         double *const was = p->here;
-        weigh(p, at, p->here, 1, p->square);
+        p->rows = rows_of(p, at);
+        weigh(p, p->here, 1, p->square);
         if (at < p->side->nodes) {
             by_columns(p, at + 1, p->next);
-            weigh(p, at, p->next, 0, p->mixed);
+            weigh(p, p->next, 0, p->mixed);
         }
         add_ground_node(p, table, at, gk_common(setup));
         p->here = p->next, p->next = was;
@@ -251,7 +252,7 @@ void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, c
         gk_step_side *table = &work->engaged[side / 2].table[side % 2];
         const size_t points = (size_t)(of->candidates * setup->strips);
         ground_part part = part_of(model, setup, k, of, work->columns);
-        add_ground_part(setup, &part, table);
+        add_ground_products(setup, &part, table);
         for (int at = 0; at <= of->nodes; at++)
             add_residual(of, at, (int)points, table->moves + (size_t)at * points * 4 * (size_t)of->columns);
     }

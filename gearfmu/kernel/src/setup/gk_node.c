@@ -20,8 +20,6 @@ double gk_node_roll(const gk_side *side, int flank, double position, int offset)
 /* ---- where, and what is read there ------------------------------------------------------------------------------- */
 static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
 
-
-
 /* what gk_node_begin hands out */
 size_t gk_node_size(const gk_model *model, const gk_gear *gear)
 {
@@ -73,7 +71,8 @@ static void blend_strip(const gk_node *n, const gk_real *table, const gk_spot *p
 static void turn_row(const gk_node *n, int candidate, double *row)
 {
     const gk_gear *gear = n->gear;
-    const double *cosine = n->cosine + (size_t)candidate * gear->modes, *sine = n->sine + (size_t)candidate * gear->modes;
+    const double *cosine = n->cosine + (size_t)candidate * gear->modes,
+                 *sine = n->sine + (size_t)candidate * gear->modes;
     for (int k = 0; k < gear->modes; k++) {
         if (gear->member[k] == 1) {
             const double a = row[k], b = row[k + 1];
@@ -100,7 +99,7 @@ static void fill_tooth_turns(const gk_node *n)
         }
 }
 
-typedef struct heading { /* of a candidate's tooth, in ground axes */
+typedef struct heading {                                  /* of a candidate's tooth, in ground axes */
     double angle, angle_cosine, angle_sine, cosine, sine; /* of the tooth; of its line of action */
 } heading;
 
@@ -109,10 +108,7 @@ typedef struct direction {     /* in ground axes, at the nominal place of contac
     double along[3], lever[3]; /* the same against the direction in which gear A slides past B */
 } direction;
 
-static double facing_of(const gk_node *n)
-{
-    return n->e->kind == MESH_EXTERNAL && n->side->which == 1 ? -1.0 : 1.0;
-}
+static double facing_of(const gk_node *n) { return n->e->kind == MESH_EXTERNAL && n->side->which == 1 ? -1.0 : 1.0; }
 
 static heading heading_of(const gk_node *n, const gk_spot *p)
 {

@@ -63,11 +63,11 @@ void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, in
     GK_ASSERT(setup->mesh[e].side[which].gear == load->gear);
     const gk_mesh *mesh = &setup->mesh[e];
     gk_node n = {.model = model,
-                       .setup = setup,
-                       .e = &model->engagement[e],
-                       .gear = &model->gear[load->gear],
-                       .side = &mesh->side[which],
-                       .flank = &setup->flank[load->gear]};
+                 .setup = setup,
+                 .e = &model->engagement[e],
+                 .gear = &model->gear[load->gear],
+                 .side = &mesh->side[which],
+                 .flank = &setup->flank[load->gear]};
     const int set = setup->base.set, reads = n.gear->ground[set].reads, motions = gk_node_motions(n.gear);
     const int32_t *list = n.gear->ground[set].list;
     double motion[12 + MAX_LOW], all[12 + MAX_LOW] = {0};

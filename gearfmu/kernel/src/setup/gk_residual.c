@@ -8,8 +8,7 @@ size_t gk_residual_size(const gk_model *model, const gk_gear *gear, size_t point
 {
     GK_ASSERT(model && gear);
     const size_t square = points * points, along = model->rubbing ? 2 * square : 0;
-    return 2 * square + along + (2 * points + 1) * most_lanes(gear) +
-           points * (size_t)gk_padded(gk_node_motions(gear));
+    return 2 * square + along + (2 * points + 1) * most_lanes(gear) + points * (size_t)gk_padded(gk_node_motions(gear));
 }
 
 double *gk_residual_begin(gk_residual *r, const gk_node *n, double *room)
@@ -102,8 +101,7 @@ static void gather_block(const gk_residual *r, const gk_node *n, int at, int hal
         const int i = p * strips + c / strips, j = q * strips + c % strips;
         const size_t here = (size_t)i * (size_t)n->points + (size_t)j;
         const double stored = !near || (p == q && !halfway) ? carried(n, i, j, n->gear->modes) : 0.0;
-        if (p == q && !halfway)
-            side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
+        if (p == q && !halfway) side->path[((size_t)at * side->candidates + p) * square + c] = cell[c] - stored;
         if (p == q && j > i) continue; /* it is symmetric */
         r->whole[here] = near ? cell[c] : stored;
         r->taken[here] = halfway ? carried_halfway(r, n, i, j) : carried(n, i, j, dynamic);

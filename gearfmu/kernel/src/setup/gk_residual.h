@@ -1,8 +1,11 @@
 /* Compliance of what is not dynamic between the points of a node (gk_residual.c). */
 #ifndef GK_RESIDUAL_H
 #define GK_RESIDUAL_H
+#include "gk.h"
+#include "model/gk_model.h"
 #include "setup/gk_block.h"
 #include "setup/gk_grounded.h"
+#include "setup/gk_node.h"
 
 typedef struct gk_residual {
     double *whole, *taken;  /* (points, points): of the gear group, all of it; what its dynamic modes carry of that */

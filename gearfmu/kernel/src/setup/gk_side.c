@@ -1,6 +1,7 @@
 /* Which teeth of a gear may touch those of its partner in an engagement, which sides are twins, and what the making of
  * their tables takes. */
 #include "setup/gk_residual.h"
+#include "setup/gk_tables.h"
 
 static const double MARGIN = 0.15, CORNER = 0.5; /* base pitches beyond the ends of the flanks: play; tip corners */
 
@@ -74,15 +75,12 @@ int gk_side_twins(const gk_model *model, int e, int f)
 {
     GK_ASSERT(gk_is_engagement(model, e) && gk_is_engagement(model, f));
     const gk_engagement *a = &model->engagement[e], *b = &model->engagement[f];
-    return a->kind == b->kind && a->width == b->width &&
-           squared_distance(a) == squared_distance(b) && same_body(model, a, b, 0) && same_body(model, a, b, 1);
+    return a->kind == b->kind && a->width == b->width && squared_distance(a) == squared_distance(b) &&
+           same_body(model, a, b, 0) && same_body(model, a, b, 1);
 }
 
 /* ---- scratch ------------------------------------------------------------------------------------------------------ */
-static size_t most_points(const gk_model *model)
-{
-    return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES);
-}
+static size_t most_points(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
 
 /* doubles that a maker takes, and those of what a step has in hand (gk_moves.c) */
 size_t gk_side_scratch(const gk_model *model)

@@ -10,10 +10,10 @@ enum { CHUNK = 64 };
  * of far teeth are each gear's own */
 static int same_shape(const gk_gear *a, const gk_gear *b)
 {
-    const double of_a[] = {a->r_b,    a->s_form, a->s_tip, a->psi_b,         a->width,       a->local,
-                           a->strip,  a->edge,   a->helix, a->corner_radius, a->corner_angle};
-    const double of_b[] = {b->r_b,    b->s_form, b->s_tip, b->psi_b,         b->width,       b->local,
-                           b->strip,  b->edge,   b->helix, b->corner_radius, b->corner_angle};
+    const double of_a[] = {a->r_b,   a->s_form, a->s_tip, a->psi_b,         a->width,       a->local,
+                           a->strip, a->edge,   a->helix, a->corner_radius, a->corner_angle};
+    const double of_b[] = {b->r_b,   b->s_form, b->s_tip, b->psi_b,         b->width,       b->local,
+                           b->strip, b->edge,   b->helix, b->corner_radius, b->corner_angle};
     return a->z == b->z && !memcmp(of_a, of_b, sizeof of_a);
 }
 
@@ -124,7 +124,8 @@ size_t gk_spread_scratch(const gk_model *model, size_t *reals)
     for (int g = 0; g < model->gears; g++) {
         gk_compliance counted;
         const size_t n = places_of(model, &model->gear[g]);
-        const size_t packed = (size_t)((model->rolls + model->gear[g].points) * gk_padded(model->functions * model->functions));
+        const size_t packed = (size_t)((model->rolls + model->gear[g].points) *
+                                       gk_padded(model->functions * model->functions));
         const size_t own = n * n + n * (size_t)(model->rolls * model->functions) + packed;
         const size_t blocks = lay_out(model, &model->gear[g], model->gear[g].along_rows != NULL, NULL, &counted) *
                               block_size(model);
@@ -150,7 +151,8 @@ static void spread_points(const spreader *s, const double *from, gk_real *out)
     const gk_matrix packed = {s->packed, points, columns};
     memset(s->packed, 0, (size_t)((points + rolls) * columns) * sizeof *s->packed);
     for (int j = 0; j < points; j++)
-        for (int c = 0; c < A * A; c++) s->packed[j * columns + c] = from[(size_t)(c / A) * n + (size_t)(j * A + c % A)];
+        for (int c = 0; c < A * A; c++)
+            s->packed[j * columns + c] = from[(size_t)(c / A) * n + (size_t)(j * A + c % A)];
     double *sum = s->packed + points * columns;
     gk_grounded_times(s->gear->resample, &packed, rolls, sum);
     for (int l = 0; l < rolls; l++)

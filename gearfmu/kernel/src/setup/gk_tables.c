@@ -5,6 +5,7 @@
  * at the same places of gears of one body, as those of a sun at equal planets: what depends on bodies alone is made
  * once for all of them, to the same bits. */
 #include "setup/gk_residual.h"
+#include "setup/gk_tables.h"
 
 /* ---- what twins have in common ----------------------------------------------------------------------------------- */
 static void store_modes(const gk_node *n, int at, const double *rows, gk_real *table)
@@ -109,8 +110,7 @@ typedef struct maker { /* of the tables of twins */
 static void begin(maker *m, const gk_model *model, gk_setup *setup, const gk_work *work, const gk_twins *twins)
 {
     m->twins = twins;
-    for (int i = 0; i < twins->count; i++)
-        m->side[i] = &setup->mesh[twins->engagement[i]].side[twins->which[i]];
+    for (int i = 0; i < twins->count; i++) m->side[i] = &setup->mesh[twins->engagement[i]].side[twins->which[i]];
     m->n = gk_node_begin(model, setup, work, twins->engagement[0], m->side[0]);
     double *room = gk_node_room(&m->n);
     room = gk_residual_begin(&m->r, &m->n, room);
