@@ -18,6 +18,17 @@ _SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ":
 _PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
 _NEWTON_METRE = re.compile(r"\b([kM]?)Nm\b")
 _IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi)}
+_USUAL = {  # what stage files say most: without pint, which takes a second to load
+    ("mm", "m"): 1e-3,
+    ("µm", "m"): 1e-6,
+    ("um", "m"): 1e-6,
+    ("ms", "s"): 1e-3,
+    ("us", "s"): 1e-6,
+    ("deg", "rad"): 0.017453292519943295,
+    ("rpm", "rad/s"): 0.10471975511965977,
+    ("kHz", "Hz"): 1e3,
+    ("GPa", "Pa"): 1e9,
+}
 _SCALES = {"m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)), "s": ((1.0, "s", 1.0), (1e-3, "ms", 1e3), (0.0, "µs", 1e6))}
 
 
@@ -68,6 +79,12 @@ def _factor(unit_text: str, unit: str) -> float:
     """How many `unit` one `unit_text` is."""
     if unit_text == unit:
         return 1.0
+    if (unit_text, unit) in _USUAL:
+        return _USUAL[unit_text, unit]
+    return _factor_by_pint(unit_text, unit)
+
+
+def _factor_by_pint(unit_text: str, unit: str) -> float:
     if not _UNIT_TEXT.match(unit_text):
         raise UnitError(f'"{unit_text}" is no unit: use one like "{unit}"')
     registry = _registry()

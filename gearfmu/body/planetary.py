@@ -60,13 +60,7 @@ def set_body_path(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str]
 
 def load_set_bodies(spec: PlanetarySpec, folder: str | os.PathLike[str] | None = None) -> list[Body]:
     """The stored bodies: sun, planet, ring, carrier. Raises BodyError when one is missing, damaged or stale."""
-    bodies = []
-    for name in SET_BODIES:
-        path = set_body_path(spec, name, folder)
-        body = _load(name, path)
-        refuse_stale(path, body, set_hash(spec, name), spec.source)
-        bodies.append(body)
-    return bodies
+    return [_load_current(spec, name, folder) for name in SET_BODIES]
 
 
 def reduce_set(
@@ -80,7 +74,8 @@ def reduce_set(
 
     progress : called with (what is being done, share done of it). Raises MeshError and BodyError.
     """
-    wanted = [name for name in SET_BODIES if force or not is_current_in_set(spec, name, folder)]
+    stored = {} if force else {name: _current_in_set(spec, name, folder) for name in SET_BODIES}
+    wanted = [name for name in SET_BODIES if stored.get(name) is None]
     paths = {name: set_body_path(spec, name, folder) for name in wanted}
     gears = [name for name in wanted if name != "carrier"]
     jobs: list[tuple[Work | None, Job]] = [
@@ -93,7 +88,7 @@ def reduce_set(
     for name in longest_first:
         if name not in together:
             _make(spec, name, paths[name], progress)
-    return load_set_bodies(spec, folder)
+    return [stored.get(name) or _load_current(spec, name, folder) for name in SET_BODIES]
 
 
 def reduce_set_body(spec: PlanetarySpec, name: str, progress: Progress | None = None) -> Body:
@@ -121,10 +116,23 @@ def _load(name: str, path: Path) -> Body:
 
 def is_current_in_set(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None = None) -> bool:
     """Is the stored body sound and made from these numbers?"""
+    return _current_in_set(spec, name, folder) is not None
+
+
+def _current_in_set(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None) -> Body | None:
+    """The stored body; None where it is missing, damaged or made from other numbers."""
     try:
-        return _load(name, set_body_path(spec, name, folder)).input_hash == set_hash(spec, name)
+        return _load_current(spec, name, folder)
     except BodyError:
-        return False
+        return None
+
+
+def _load_current(spec: PlanetarySpec, name: str, folder: str | os.PathLike[str] | None) -> Body:
+    """The stored body. Raises BodyError when it is missing, damaged or stale."""
+    path = set_body_path(spec, name, folder)
+    body = _load(name, path)
+    refuse_stale(path, body, set_hash(spec, name), spec.source)
+    return body
 
 
 def _carrier(spec: PlanetarySpec, progress: Progress | None) -> InterfaceBody:

@@ -16,9 +16,11 @@ from small_stage import small_model
 
 from gearfmu.errors import FmuError
 from gearfmu.fmu import export
+from gearfmu.fmu.description import DEFAULT_STEP
 from gearfmu.fmu.package import content_identifier, write_archive
 from gearfmu.fmu.units import ATOMS, base_exponents, unit_of
 from gearfmu.kernel import library_path
+from gearfmu.ranges import HEADER
 
 
 @pytest.mark.parametrize(
@@ -172,3 +174,8 @@ def test_unknown_options_are_named(model, tmp_path, options, word):
     with pytest.raises(Exception, match=word):
         export(model, tmp_path / "x.fmu", **options)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_kernel_makes_ready_for_the_step_of_the_description():
+    row = next(line for line in HEADER.read_text(encoding="utf-8").splitlines() if "GK_USUAL_H" in line)
+    assert float(row.split()[2]) == DEFAULT_STEP

@@ -1,5 +1,6 @@
 /* SHA-256, FIPS 180-4 §4.1.2 (functions), §4.2.2 (constants), §5.1.1 (padding), §6.2.2 (rounds). */
 #include "base/gk_check.h"
+#include "base/gk_lanes.h"
 #include "base/gk_sha256.h"
 #include <stdint.h>
 #include <string.h>
@@ -23,6 +24,19 @@ static inline uint32_t big_endian(const unsigned char *p)
     return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | (uint32_t)p[3];
 }
 
+/* Round t of eight: the variables a … h stay where they are, and their names move on instead. Inline, so that places
+ * are known and the variables are registers. */
+GK_INLINE void one_round(uint32_t v[8], int t, uint32_t added)
+{
+    const uint32_t a = v[(8 - t) % 8], b = v[(9 - t) % 8], c = v[(10 - t) % 8];
+    const uint32_t e = v[(12 - t) % 8], f = v[(13 - t) % 8], g = v[(14 - t) % 8];
+    const uint32_t choice = (e & f) ^ (~e & g), majority = (a & b) ^ (a & c) ^ (b & c);
+    const uint32_t t1 = v[(15 - t) % 8] + (rotate(e, 6) ^ rotate(e, 11) ^ rotate(e, 25)) + choice + added;
+    const uint32_t t2 = (rotate(a, 2) ^ rotate(a, 13) ^ rotate(a, 22)) + majority;
+    v[(11 - t) % 8] += t1;
+    v[(15 - t) % 8] = t1 + t2;
+}
+
 static void compress(uint32_t state[8], const unsigned char *block)
 {
     uint32_t w[64], v[8];
@@ -33,14 +47,15 @@ static void compress(uint32_t state[8], const unsigned char *block)
                (rotate(b, 17) ^ rotate(b, 19) ^ b >> 10);
     }
     memcpy(v, state, sizeof v);
-    for (int t = 0; t < 64; t++) {
-        uint32_t a = v[0], e = v[4];
-        uint32_t choice = (e & v[5]) ^ (~e & v[6]), majority = (a & v[1]) ^ (a & v[2]) ^ (v[1] & v[2]);
-        uint32_t t1 = v[7] + (rotate(e, 6) ^ rotate(e, 11) ^ rotate(e, 25)) + choice + K[t] + w[t];
-        uint32_t t2 = (rotate(a, 2) ^ rotate(a, 13) ^ rotate(a, 22)) + majority;
-        memmove(v + 1, v, 7 * sizeof v[0]);
-        v[0] = t1 + t2;
-        v[4] += t1;
+    for (int t = 0; t < 64; t += 8) {
+        one_round(v, 0, K[t] + w[t]);
+        one_round(v, 1, K[t + 1] + w[t + 1]);
+        one_round(v, 2, K[t + 2] + w[t + 2]);
+        one_round(v, 3, K[t + 3] + w[t + 3]);
+        one_round(v, 4, K[t + 4] + w[t + 4]);
+        one_round(v, 5, K[t + 5] + w[t + 5]);
+        one_round(v, 6, K[t + 6] + w[t + 6]);
+        one_round(v, 7, K[t + 7] + w[t + 7]);
     }
     for (int i = 0; i < 8; i++) state[i] += v[i];
 }

@@ -2,6 +2,7 @@
 #ifndef GK_INTEGRATE_H
 #define GK_INTEGRATE_H
 #include "problem/gk_work.h"
+#include "setup/gk_tables.h"
 
 /* what an integrator is; gk_scheme.c */
 typedef struct gk_scheme {
@@ -15,6 +16,8 @@ const gk_scheme *gk_scheme_of(gk_integrator integrator);
 /* gk_wide.c */
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
 gk_tally_function *gk_wide_count(int widest);
+gk_fill_function *gk_wide_fill(int widest);
+gk_moves_function *gk_wide_moves(int widest);
 /* gk_memory.c */
 int gk_memory_find(const gk_meshing *meshing, gk_key key);
 void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
@@ -51,9 +54,8 @@ void gk_limit_compliance(const gk_system *s, const double *Q, double full, int d
 void gk_limit_solve(const double *L, double *x, int n);
 int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
                    int e, double position);
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
 double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h);
-void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
+void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, double h);
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
                            char message[GK_MESSAGE]);
 /* gk_static.c */

@@ -35,6 +35,31 @@
 #define gk_rows_turn_back gk_rows_turn_back_avx2
 #define gk_rows_turn_forth gk_rows_turn_forth_avx2
 #define gk_side_step gk_side_step_avx2
+#define gk_block_of gk_block_of_avx2
+#define gk_block_tabulate gk_block_tabulate_avx2
+#define gk_block_along_normal gk_block_along_normal_avx2
+#define gk_block_along_own gk_block_along_own_avx2
+#define gk_block_between gk_block_between_avx2
+#define gk_node_tan gk_node_tan_avx2
+#define gk_node_roll gk_node_roll_avx2
+#define gk_node_size gk_node_size_avx2
+#define gk_node_blend gk_node_blend_avx2
+#define gk_node_motion_at gk_node_motion_at_avx2
+#define gk_node_gather gk_node_gather_avx2
+#define gk_node_turn gk_node_turn_avx2
+#define gk_node_take gk_node_take_avx2
+#define gk_node_begin gk_node_begin_avx2
+#define gk_node_room gk_node_room_avx2
+#define gk_grounded_room gk_grounded_room_avx2
+#define gk_grounded_side gk_grounded_side_avx2
+#define gk_grounded_times gk_grounded_times_avx2
+#define gk_residual_size gk_residual_size_avx2
+#define gk_residual_begin gk_residual_begin_avx2
+#define gk_residual_gather gk_residual_gather_avx2
+#define gk_residual_gather_along gk_residual_gather_along_avx2
+#define gk_residual_store gk_residual_store_avx2
+#define gk_residual_store_along gk_residual_store_along_avx2
+#define gk_side_fill gk_side_fill_avx2
 #define gk_compliance_form gk_compliance_form_avx2
 #define gk_compliance_mirror gk_compliance_mirror_avx2
 #define gk_ground_add gk_ground_add_avx2
@@ -121,6 +146,11 @@
 #include "force/gk_flank.c"
 #include "force/gk_frozen.c"
 #include "force/gk_rows.c"
+#include "setup/gk_block.c"
+#include "setup/gk_node.c"
+#include "setup/gk_grounded.c"
+#include "setup/gk_residual.c"
+#include "setup/gk_tables.c"
 #include "setup/gk_moves.c"
 #include "problem/gk_compliance.c"
 #include "problem/gk_ground.c"
@@ -145,6 +175,8 @@
 #undef gk_central_step
 #undef gk_rk45_step
 #undef gk_tally_count
+#undef gk_side_fill
+#undef gk_side_step
 #if defined(__clang__)
 #pragma clang attribute pop
 #else
@@ -153,6 +185,8 @@
 
 gk_step_function gk_step_once, gk_central_step, gk_rk45_step;
 gk_tally_function gk_tally_count;
+gk_fill_function gk_side_fill;
+gk_moves_function gk_side_step;
 
 /* AVX2 in the processor, and its registers kept by the system over a task switch */
 static int has_avx2(void)
@@ -175,12 +209,24 @@ gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
 }
 
 gk_tally_function *gk_wide_count(int widest) { return widest > 0 && has_avx2() ? gk_tally_count_avx2 : gk_tally_count; }
+gk_fill_function *gk_wide_fill(int widest) { return widest > 0 && has_avx2() ? gk_side_fill_avx2 : gk_side_fill; }
+gk_moves_function *gk_wide_moves(int widest) { return widest > 0 && has_avx2() ? gk_side_step_avx2 : gk_side_step; }
 #else
 #include "run/gk_run.h"
 gk_tally_function *gk_wide_count(int widest)
 {
     (void)widest;
     return gk_tally_count;
+}
+gk_fill_function *gk_wide_fill(int widest)
+{
+    (void)widest;
+    return gk_side_fill;
+}
+gk_moves_function *gk_wide_moves(int widest)
+{
+    (void)widest;
+    return gk_side_step;
 }
 gk_step_function *gk_wide_step(int widest, gk_integrator integrator)
 {

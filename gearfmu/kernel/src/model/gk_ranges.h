@@ -18,7 +18,8 @@
 #define GK_HIGH_SUPPORTS 64
 #define GK_LOW_TEETH 1
 #define GK_HIGH_TEETH 1000
-#define GK_LOW_NODES 2 /* of a flank, along or across */
+#define GK_USUAL_H 1e-4 /* s: communication step of a model description */
+#define GK_LOW_NODES 2  /* of a flank, along or across */
 #define GK_HIGH_NODES 513
 
 /* gears: m, but for the relief's curvature, 1/m */

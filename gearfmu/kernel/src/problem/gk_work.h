@@ -192,11 +192,7 @@ int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *whic
 void gk_layout_plan(const gk_model *model, gk_setup *setup);
 void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
 void gk_layout_work(const gk_model *model, const gk_setup *setup, gk_work *work);
-/* gk_side.c */
-void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
-void gk_side_fill(const gk_model *model, gk_setup *setup, gk_work *work, int e, int which);
-/* gk_node.c */
-size_t gk_node_scratch(const gk_model *model);
+/* gk_push.c */
 typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     int gear, flank, tooth, strips;
     double force[MAX_SLICES], roll[MAX_SLICES];
@@ -206,7 +202,8 @@ void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_l
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */
-void gk_side_step(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
+typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
+gk_moves_function gk_side_step;
 /* gk_rows.c */
 void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
 void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);

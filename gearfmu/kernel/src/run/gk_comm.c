@@ -85,11 +85,35 @@ static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *w
     return outcome;
 }
 
+/* a communication step in whole internal ones, at least as short as that of the setup: ceil, guarded against rounding
+ * of H / h; 0 where they are too many */
+static double internal_step(const gk_setup *setup, double H, int64_t *steps)
+{
+    const double count = H / setup->h * (1.0 - 1e-12);
+    if (!(count < 1e9)) return 0.0;
+    const int64_t whole = 1 + (int64_t)count;
+    if (steps) *steps = whole;
+    return H / (double)whole;
+}
+
+/* Tables of the internal step that communication steps of the usual length have, so that the first one costs no more
+ * than others. After a communication step of another length they are made anew. */
+static void make_tables(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    const double h = internal_step(setup, GK_USUAL_H, NULL);
+    if (!GK_ON(setup, elastic) || gk_scheme_of(setup->integrator)->is_explicit) return;
+    gk_limit_run(model, setup, work, h);
+    const double gamma = gk_scheme_of(setup->integrator)->corrected ? work->run_gamma : 0.0;
+    if (work->table_h == h && work->table_gamma == gamma) return;
+    gk_wide_moves(1)(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
+}
+
 gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time)
 {
     GK_ASSERT(model && setup && work && data);
     if (setup->magic != GK_SETUP_MAGIC || data->magic != GK_DATA_MAGIC || data->phase != PHASE_NEW) return GK_BAD_CALL;
     if (!gk_finite(time)) return GK_BAD_VALUE;
+    make_tables(model, setup, work);
     const gk_outcome outcome = start(model, setup, work, data);
     if (outcome) return outcome;
     data->phase = PHASE_RUNNING;
@@ -198,17 +222,16 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     if (setup->magic != GK_SETUP_MAGIC) return GK_BAD_CALL;
     gk_outcome outcome = accept_step(data, time, wished);
     if (outcome) return outcome;
-    const double count = data->step_H / setup->h * (1.0 - 1e-12);
-    if (!(count < 1e9)) return GK_BAD_STEP;
+    int64_t steps = 0;
+    const double h = internal_step(setup, data->step_H, &steps);
+    if (!steps) return GK_BAD_STEP;
     if (data->steps == 0 && starts_late(model, data)) data->status |= STATUS_JUMP;
     const span c = begin(model, work, data);
-    const int64_t steps = 1 + (int64_t)count; /* ceil, guarded against rounding of H / h */
-    const double h = c.H / (double)steps;
     int first = data->steps == 0; /* the balance begins after the run's first whole step */
     gk_tally tally;
     gk_tally_begin(model, setup, work, data, &tally);
     if (!(data->table_h > 0.0)) data->table_h = h;
-    gk_limit_run(model, setup, work, data);
+    gk_limit_run(model, setup, work, data->table_h);
     for (int64_t i = 0; i < steps; i++) {
         if (i + 1 == steps) gk_outputs_bores(model, setup, data);
         outcome = advance(model, setup, work, data, &c, (double)i * h, h, 0);

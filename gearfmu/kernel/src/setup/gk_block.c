@@ -21,18 +21,38 @@ gk_block gk_block_of(const gk_node *n, int from, int to, int offset)
     return b;
 }
 
+/* out (n) = Σ of weighed cells (n), in order; a chunk of sums stays in a register */
+static void blend_cells(const gk_real *const cell[16], const double weight[16], int n, double *out)
+{
+    int c = 0;
+    for (; c + 2 * GK_CHUNK <= n; c += 2 * GK_CHUNK) {
+        gk_chunk a = {0}, b = {0};
+        for (int i = 0; i < 16; i++) {
+            const gk_some *from = (const gk_some *)(cell[i] + c);
+            a += weight[i] * __builtin_convertvector(from[0], gk_chunk);
+            b += weight[i] * __builtin_convertvector(from[1], gk_chunk);
+        }
+        ((gk_chunk *)(out + c))[0] = a, ((gk_chunk *)(out + c))[1] = b;
+    }
+    for (; c < n; c++) {
+        out[c] = 0.0;
+        for (int i = 0; i < 16; i++) out[c] += weight[i] * cell[i][c];
+    }
+}
+
 /* compliance between two points by a block, by width function, (functions, functions) */
 void gk_block_tabulate(const gk_node *n, gk_block b, const gk_spot *p, const gk_spot *q, double *cell)
 {
     const int A = n->model->functions, R = n->model->rolls;
     const gk_grid *first = b.swapped ? &q->grid : &p->grid, *second = b.swapped ? &p->grid : &q->grid;
-    double sum[MAX_FUNCTIONS * MAX_FUNCTIONS] = {0};
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const double w = first->weight[i] * second->weight[j];
-            const gk_real *t = b.table + (size_t)((first->index + i) * R + second->index + j) * (size_t)(A * A);
-            for (int c = 0; c < A * A; c++) sum[c] += w * t[c];
-        }
+    double sum[MAX_FUNCTIONS * MAX_FUNCTIONS], weight[16];
+    const gk_real *table[16];
+    for (int c = 0; c < 16; c++) {
+        const int i = c / 4, j = c % 4;
+        weight[c] = first->weight[i] * second->weight[j];
+        table[c] = b.table + (size_t)((first->index + i) * R + second->index + j) * (size_t)(A * A);
+    }
+    blend_cells(table, weight, A * A, sum);
     for (int a = 0; a < A; a++)
         for (int c = 0; c < A; c++) {
             const double value = sum[b.swapped ? c * A + a : a * A + c];

@@ -10,12 +10,25 @@ int gk_far_known(const gk_model *model, const gk_setup *setup, int g)
     return model->gear[g].far_rows && setup->engagements_of[g] > 1;
 }
 
-/* sum += f a bᵀ of columns a and b of coefficients with that many columns */
-static void add_product(double *sum, double f, const float *a, const float *b, int columns)
+/* a column of coefficients */
+typedef struct column {
+    double at[FAR];
+} column;
+
+static column column_of(const float *from, int columns)
 {
-    for (int i = 0; i < FAR; i++)
-        for (int j = 0; j < FAR; j++)
-            sum[i * FAR + j] += f * (double)a[(size_t)i * columns] * (double)b[(size_t)j * columns];
+    column c;
+    for (int i = 0; i < FAR; i++) c.at[i] = (double)from[(size_t)i * (size_t)columns];
+    return c;
+}
+
+/* sum += f a bᵀ */
+static void add_product(double *sum, double f, const column *a, const column *b)
+{
+    for (int i = 0; i < FAR; i++) {
+        const double by = f * a->at[i];
+        for (int j = 0; j < FAR; j++) sum[i * FAR + j] += by * b->at[j];
+    }
 }
 
 /* modes of the gear group that are not dynamic, m teeth after the load: those of a pair turn into each other */
@@ -23,15 +36,16 @@ static void add_modes(const gk_gear *gear, int dynamic, int m, double *sum)
 {
     for (int k = dynamic; k < gear->modes; k++) {
         const double f = 1.0 / (gear->omega[k] * gear->omega[k]);
-        const float *a = gear->far_modes + k, *b = a + 1;
+        const column a = column_of(gear->far_modes + k, gear->modes);
         const int64_t turned = (int64_t)gear->diameter[k] * m % gear->z;
         double sine, cosine;
         gk_sincos(2.0 * GK_PI * (double)turned / gear->z, &sine, &cosine);
-        add_product(sum, f * cosine, a, a, gear->modes);
+        add_product(sum, f * cosine, &a, &a);
         if (gear->member[k] != 1) continue;
-        add_product(sum, f * cosine, b, b, gear->modes);
-        add_product(sum, -f * sine, b, a, gear->modes);
-        add_product(sum, f * sine, a, b, gear->modes);
+        const column b = column_of(gear->far_modes + k + 1, gear->modes);
+        add_product(sum, f * cosine, &b, &b);
+        add_product(sum, -f * sine, &b, &a);
+        add_product(sum, f * sine, &a, &b);
         k++;
     }
 }
@@ -49,13 +63,14 @@ static void add_ground(const gk_model *model, const gk_setup *setup, int g, int 
     for (int k = 0; k < reads; k++) {
         if (base->slot[list[k]] >= 0) continue;
         const double f = 1.0 / (omega[list[k]] * omega[list[k]]);
-        const float *all = model->gear[g].ground[base->set].far + k, *c = all + (size_t)FAR * reads,
-                    *s = c + (size_t)FAR * reads;
-        add_product(sum, f, all, all, reads);
-        add_product(sum, 0.5 * f * cosine, c, c, reads);
-        add_product(sum, 0.5 * f * cosine, s, s, reads);
-        add_product(sum, 0.5 * f * sine, s, c, reads);
-        add_product(sum, -0.5 * f * sine, c, s, reads);
+        const float *from = model->gear[g].ground[base->set].far + k;
+        const column all = column_of(from, reads), c = column_of(from + (size_t)FAR * reads, reads),
+                     s = column_of(from + 2 * (size_t)FAR * reads, reads);
+        add_product(sum, f, &all, &all);
+        add_product(sum, 0.5 * f * cosine, &c, &c);
+        add_product(sum, 0.5 * f * cosine, &s, &s);
+        add_product(sum, 0.5 * f * sine, &s, &c);
+        add_product(sum, -0.5 * f * sine, &c, &s);
     }
 }
 

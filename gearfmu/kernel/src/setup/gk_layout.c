@@ -1,5 +1,6 @@
 /* Where everything of gk_setup and gk_work lies: one block each, arrays behind the head. */
 #include "problem/gk_work.h"
+#include "setup/gk_tables.h"
 
 static int share_rotor(const gk_model *model, const gk_engagement *a, const gk_engagement *b)
 {
@@ -102,11 +103,11 @@ static void lay_out_flank(bump *b, const gk_model *model, gk_setup *setup, int g
     gk_flank_tables *to = &setup->flank[g];
     *to = leader < g ? setup->flank[leader] : (gk_flank_tables){0};
     to->port = reals(b, cells * (size_t)model->ports);
+    to->far = gear->far_rows ? reals(b, cells * FAR) : NULL;
     if (leader < g) return;
     to->rows = reals(b, cells * (size_t)gear->modes);
     to->low = reals(b, cells * (size_t)gear->low);
     to->node = reals(b, 3 * cells * 6);
-    if (gear->far_rows) to->far = reals(b, cells * FAR);
     if (!gear->along_rows || !GK_ON(setup, friction)) return;
     to->along_rows = reals(b, cells * (size_t)gear->modes);
     to->along_low = reals(b, cells * (size_t)gear->low);
@@ -321,7 +322,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         unknowns += shared ? MAX_SOFT : 0;
     }
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
-    work->columns = doubles(&b, gk_node_scratch(model));
+    work->columns = doubles(&b, gk_side_scratch(model) + gk_limit_scratch(model));
     size_t blocks;
     work->spread = doubles(&b, gk_spread_scratch(model, &blocks));
     work->blocks = reals(&b, blocks);

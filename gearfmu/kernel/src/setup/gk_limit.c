@@ -5,6 +5,7 @@
  * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
 #include <stdio.h>
 #include "integrate/gk_integrate.h"
+#include "setup/gk_tables.h"
 
 static const double MU_MOST = 0.9;                        /* μ′ of a step */
 static const double AT_NYQUIST = 2.0 / (1.0 - GK_MEMORY); /* f_d over half of η_d where forces alternate */
@@ -150,21 +151,47 @@ int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, 
     return 1;
 }
 
-static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
-                    const gk_coefficients *k, int e, double position)
+/* room for what forces do at once at every position, which does not depend on h: A of the explicit rows */
+size_t gk_limit_scratch(const gk_model *model)
 {
+    GK_ASSERT(model);
+    return (size_t)(model->engagements * POSITIONS) * MAX_STRIDE * MAX_STRIDE;
+}
+
+static double *kept_at(const gk_work *work, int e, int i)
+{
+    return work->columns + (size_t)(e * POSITIONS + i) * MAX_STRIDE * MAX_STRIDE;
+}
+
+static int positions_of(const gk_engagement *e) { return e->kind == MESH_FLAT ? 1 : POSITIONS; }
+
+static void keep_all(const gk_model *model, const gk_setup *setup, gk_work *work)
+{
+    gk_data empty;
+    memset(&empty, 0, sizeof empty);
+    for (int e = 0; e < model->engagements; e++)
+        for (int i = 0; i < positions_of(&model->engagement[e]); i++) {
+            const gk_system *s = &work->engaged[e].system;
+            if (!gk_limit_place(model, setup, work, &empty, &work->explicit_rows, e, (double)i / POSITIONS)) continue;
+            memcpy(kept_at(work, e, i), s->A, (size_t)(s->n * s->stride) * sizeof *s->A);
+        }
+}
+
+static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+                    const gk_coefficients *k, int e, int i)
+{
+    const double position = (double)i / POSITIONS;
     const gk_system *s = &work->engaged[e].system;
     const gk_engagement *engagement = &model->engagement[e];
-    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS], Q[MAX_STRIDE * MAX_STRIDE];
-    if (!gk_limit_place(model, setup, work, data, &work->explicit_rows, e, position)) return INFINITY;
-    memcpy(Q, s->A, (size_t)(s->n * s->stride) * sizeof *Q);
+    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
+    const double *Q = kept_at(work, e, i);
     if (!gk_limit_place(model, setup, work, data, k, e, position)) return INFINITY;
     gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
     kappa_part(s, Q, K);
     return gk_limit_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
 }
 
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+static double limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
 {
     GK_ASSERT(h > 0.0 && gk_finite(h));
     GK_ASSERT(gamma >= 0.0 && gamma <= 1.0);
@@ -173,19 +200,19 @@ double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, 
     gk_data empty;
     memset(&empty, 0, sizeof empty);
     for (int e = 0; e < model->engagements; e++)
-        for (int i = 0; i < (model->engagement[e].kind == MESH_FLAT ? 1 : POSITIONS); i++)
-            worst = gk_max(worst, mu_at(model, setup, work, &empty, k, e, (double)i / POSITIONS));
+        for (int i = 0; i < positions_of(&model->engagement[e]); i++)
+            worst = gk_max(worst, mu_at(model, setup, work, &empty, k, e, i));
     return worst;
 }
 
 /* γ for which μ′ stays at its bound */
 static double gamma_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
 {
-    if (gk_limit_mu(model, setup, work, h, 1.0) <= MU_MOST) return 1.0;
+    if (limit_mu(model, setup, work, h, 1.0) <= MU_MOST) return 1.0;
     double low = 0.0, high = 1.0;
     for (int i = 0; i < 12; i++) {
         double middle = 0.5 * (low + high);
-        if (gk_limit_mu(model, setup, work, h, middle) <= MU_MOST)
+        if (limit_mu(model, setup, work, h, middle) <= MU_MOST)
             low = middle;
         else
             high = middle;
@@ -210,12 +237,13 @@ double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data 
 }
 
 /* γ of the internal step of the run */
-void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
+void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
 {
-    GK_ASSERT(data->table_h > 0.0);
-    if (!gk_scheme_of(setup->integrator)->corrected || work->run_h == data->table_h) return;
-    work->run_gamma = data->table_h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, data->table_h);
-    work->run_h = data->table_h;
+    GK_ASSERT(h > 0.0);
+    if (!gk_scheme_of(setup->integrator)->corrected || work->run_h == h) return;
+    if (h != setup->h) keep_all(model, setup, work);
+    work->run_gamma = h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, h);
+    work->run_h = h;
 }
 
 gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
@@ -230,11 +258,12 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work
     const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work)
                                                        : INFINITY; /* explicit: a limit of stability */
     double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
+    if (corrected) keep_all(model, setup, work);
     if (!(wished > 0.0))
         for (int i = 0; i < rungs; i++) {
             h = gk_min(ladder[i], limit);
             if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) &&
-                (!corrected || gk_limit_mu(model, setup, work, h, 1.0) <= MU_MOST))
+                (!corrected || limit_mu(model, setup, work, h, 1.0) <= MU_MOST))
                 break;
         }
     if (h > period / 8.0) {

@@ -20,30 +20,13 @@ double gk_node_roll(const gk_side *side, int flank, double position, int offset)
 /* ---- where, and what is read there ------------------------------------------------------------------------------- */
 static size_t points_of(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
 
-static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
-
 /* what gk_node_begin hands out */
-static size_t node_size(const gk_model *model, const gk_gear *gear)
+size_t gk_node_size(const gk_model *model, const gk_gear *gear)
 {
     const size_t modes = (size_t)gear->modes, motions = (size_t)gk_node_motions(gear);
-    return points_of(model) * (2 * modes + 2 * motions + 1) + (1 + (size_t)model->functions) * modes +
-           2 * (size_t)gear->z;
-}
-
-size_t gk_node_scratch(const gk_model *model)
-{
-    size_t most = 0;
-    for (int g = 0; g < model->gears; g++) {
-        const gk_gear *gear = &model->gear[g];
-        const size_t motions = (size_t)gk_node_motions(gear);
-        size_t ground = 0;
-        for (int s = 0; s < model->sets; s++) ground = larger(ground, (size_t)model->ground[s].n);
-        const size_t of_side = motions * (motions + points_of(model) + (size_t)model->supports + 1) +
-                               motions * (ground + 4 * (MAX_ROTORS + 1));
-        const size_t of_step = 4 * points_of(model) * ((size_t)gear->modes + LANES);
-        most = larger(most, larger(node_size(model, gear) + of_side, of_step));
-    }
-    return most;
+    const size_t still = 2 * (size_t)gear->low + GK_NODE_PARTS;
+    return points_of(model) * (2 * modes + still + 2 * motions + 1) +
+           (1 + (size_t)model->functions + 2 * MAX_CANDIDATES) * modes;
 }
 
 void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out)
@@ -84,100 +67,139 @@ static void blend_strip(const gk_node *n, const gk_real *table, const gk_spot *p
     blend_width(n, n->cells, p, n->gear->modes, out);
 }
 
-static void turn_row(const gk_node *n, int offset, double *row)
+/* rows of tooth 0 on that of a candidate: members of a pair turn into each other */
+static void turn_row(const gk_node *n, int candidate, double *row)
 {
     const gk_gear *gear = n->gear;
+    const double *cosine = n->cosine + (size_t)candidate * gear->modes,
+                 *sine = n->sine + (size_t)candidate * gear->modes;
     for (int k = 0; k < gear->modes; k++) {
-        const int turned = (int)((int64_t)gear->diameter[k] * offset % gear->z),
-                  at = turned < 0 ? turned + gear->z : turned;
         if (gear->member[k] == 1) {
             const double a = row[k], b = row[k + 1];
-            row[k] = a * n->cosine[at] - b * n->sine[at];
-            row[k + 1] = a * n->sine[at] + b * n->cosine[at];
+            row[k] = a * cosine[k] - b * sine[k];
+            row[k + 1] = a * sine[k] + b * cosine[k];
             k++;
         } else {
-            row[k] *= n->cosine[at];
+            row[k] *= cosine[k];
         }
     }
 }
 
+static void fill_tooth_turns(const gk_node *n)
+{
+    double cosine[MAX_TEETH], sine[MAX_TEETH];
+    const int z = n->gear->z;
+    for (int m = 0; m < z; m++) gk_sincos(2.0 * GK_PI * m / z, &sine[m], &cosine[m]);
+    for (int c = 0; c < n->side->candidates; c++)
+        for (int k = 0; k < n->gear->modes; k++) {
+            const int turned = (int)((int64_t)n->gear->diameter[k] * gk_node_offset(n->side, c) % z);
+            const int at = turned < 0 ? turned + z : turned;
+            n->cosine[(size_t)c * n->gear->modes + k] = cosine[at];
+            n->sine[(size_t)c * n->gear->modes + k] = sine[at];
+        }
+}
+
+typedef struct heading {                                  /* of a candidate's tooth, in ground axes */
+    double angle, angle_cosine, angle_sine, cosine, sine; /* of the tooth; of its line of action */
+} heading;
+
 typedef struct direction {     /* in ground axes, at the nominal place of contact */
-    double angle;              /* of the tooth */
     double n[3], arm[3];       /* outward normal; point of contact from the gear's centre × normal */
     double along[3], lever[3]; /* the same against the direction in which gear A slides past B */
 } direction;
 
-static direction direction_of(const gk_node *n, const gk_spot *p)
+static double facing_of(const gk_node *n) { return n->e->kind == MESH_EXTERNAL && n->side->which == 1 ? -1.0 : 1.0; }
+
+static heading heading_of(const gk_node *n, const gk_spot *p)
 {
     const gk_engagement *e = n->e;
     const double dx = e->position[1][0] - e->position[0][0], dy = e->position[1][1] - e->position[0][1];
-    const double R = gk_base_reach(n->model, e), sg = p->flank ? -1.0 : 1.0, second = n->side->which == 1 ? -1.0 : 1.0;
-    const int ring = e->kind == MESH_INTERNAL && n->side->which == 1;
-    const double facing = e->kind == MESH_EXTERNAL ? second : 1.0, hollow = ring ? -1.0 : 1.0;
-    direction d;
-    double sine, cosine, helix_sine, helix_cosine, t = gk_atan2(dy, dx);
+    const double R = gk_base_reach(n->model, e), sg = p->flank ? -1.0 : 1.0;
+    double t = gk_atan2(dy, dx);
+    heading h;
     if (e->kind == MESH_INTERNAL) t = gk_atan2(-dy, -dx);
     t -= sg * gk_acos(R / sqrt(dx * dx + dy * dy));
-    gk_sincos(t, &sine, &cosine);
-    gk_sincos(n->gear->helix, &helix_sine, &helix_cosine);
-    const double nx = -second * sg * sine, ny = second * sg * cosine, r_b = n->gear->r_b;
-    d.angle = (facing < 0.0 ? t + GK_PI : t) + sg * (p->middle / r_b - n->gear->psi_b);
-    d.n[0] = helix_cosine * nx, d.n[1] = helix_cosine * ny, d.n[2] = -hollow * sg * helix_sine;
-    const double x = facing * r_b * cosine + hollow * p->nominal * nx,
-                 y = facing * r_b * sine + hollow * p->nominal * ny;
+    gk_sincos(t, &h.sine, &h.cosine);
+    h.angle = (facing_of(n) < 0.0 ? t + GK_PI : t) + sg * (p->middle / n->gear->r_b - n->gear->psi_b);
+    gk_sincos(h.angle, &h.angle_sine, &h.angle_cosine);
+    return h;
+}
+
+static direction direction_of(const gk_node *n, const gk_spot *p, const heading *h)
+{
+    const double sg = p->flank ? -1.0 : 1.0, second = n->side->which == 1 ? -1.0 : 1.0, facing = facing_of(n);
+    const double hollow = n->e->kind == MESH_INTERNAL && n->side->which == 1 ? -1.0 : 1.0, r_b = n->gear->r_b;
+    const double nx = -second * sg * h->sine, ny = second * sg * h->cosine;
+    direction d;
+    d.n[0] = n->helix_cosine * nx, d.n[1] = n->helix_cosine * ny, d.n[2] = -hollow * sg * n->helix_sine;
+    const double x = facing * r_b * h->cosine + hollow * p->nominal * nx,
+                 y = facing * r_b * h->sine + hollow * p->nominal * ny;
     d.arm[0] = y * d.n[2] - p->z * d.n[1];
     d.arm[1] = p->z * d.n[0] - x * d.n[2];
-    d.arm[2] = helix_cosine * hollow * sg * r_b;
-    d.along[0] = -second * cosine, d.along[1] = -second * sine, d.along[2] = 0.0;
+    d.arm[2] = n->helix_cosine * hollow * sg * r_b;
+    d.along[0] = -second * h->cosine, d.along[1] = -second * h->sine, d.along[2] = 0.0;
     d.lever[0] = -p->z * d.along[1], d.lever[1] = p->z * d.along[0];
     d.lever[2] = x * d.along[1] - y * d.along[0];
     return d;
 }
 
 /* rows of modes of nodal diameter 0 and 1 on tooth 0 → on the tooth at an angle, in axes that do not turn */
-static void turn_low(const gk_gear *gear, double cosine, double sine, double *row)
+static void turn_low(const gk_gear *gear, const heading *h, double *row)
 {
     for (int k = 0; k < gear->low; k++)
         if (gear->low_member[k] == 1) {
             const double a = row[k], b = row[k + 1];
-            row[k] = a * cosine - b * sine;
-            row[k + 1] = a * sine + b * cosine;
+            row[k] = a * h->angle_cosine - b * h->angle_sine;
+            row[k + 1] = a * h->angle_sine + b * h->angle_cosine;
         }
 }
 
-/* motion outward at a point */
-static void ground_point(const gk_node *n, const gk_spot *p, double *motion)
+/* what motion outward at a point is made of: rows of modes of nodal diameter 0 and 1 on tooth 0; parts of the node */
+static void still_point(const gk_node *n, const gk_spot *p, double *still)
 {
     const size_t size = 2 * (size_t)n->model->rolls * n->model->functions * 6;
-    const direction d = direction_of(n, p);
-    double trig[3] = {1.0, 0.0, 0.0}, part[6], *low = motion + 6, *node = low + n->gear->low;
-    gk_sincos(d.angle, &trig[2], &trig[1]);
+    gk_node_blend(n, n->flank->low, p, n->gear->low, still);
+    for (int c = 0; c < 3; c++) gk_node_blend(n, n->flank->node + c * size, p, 6, still + n->gear->low + 6 * c);
+}
+
+/* motion outward at a point */
+static void turn_point(const gk_node *n, const gk_spot *p, const heading *h, const double *still, double *motion)
+{
+    const direction d = direction_of(n, p, h);
+    const double trig[3] = {1.0, h->angle_cosine, h->angle_sine}, *part = still + n->gear->low;
+    double *low = motion + 6, *node = low + n->gear->low;
     for (int c = 0; c < 3; c++) motion[c] = d.n[c], motion[3 + c] = d.arm[c];
-    gk_node_blend(n, n->flank->low, p, n->gear->low, low);
-    turn_low(n->gear, trig[1], trig[2], low);
+    memcpy(low, still, (size_t)n->gear->low * sizeof *low);
+    turn_low(n->gear, h, low);
     memset(node, 0, 6 * sizeof *node);
-    for (int c = 0; c < 3; c++) {
-        gk_node_blend(n, n->flank->node + c * size, p, 6, part);
-        for (int k = 0; k < 6; k++) node[k] += trig[c] * part[k];
-    }
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 6; k++) node[k] += trig[c] * part[6 * c + k];
+}
+
+void gk_node_motion_at(const gk_node *n, const gk_spot *p, double *motion)
+{
+    GK_ASSERT(n->gear->low <= MAX_LOW && n->e->kind != MESH_FLAT);
+    double still[MAX_LOW + GK_NODE_PARTS];
+    const heading h = heading_of(n, p);
+    still_point(n, p, still);
+    turn_point(n, p, &h, still, motion);
 }
 
 /* motion along the profile at a point; what the supports' forces displace there is not known */
-static void along_point(const gk_node *n, const gk_spot *p, double *motion)
+static void turn_along(const gk_node *n, const gk_spot *p, const heading *h, const double *still, double *motion)
 {
-    const direction d = direction_of(n, p);
-    double cosine, sine, *low = motion + 6;
-    gk_sincos(d.angle, &sine, &cosine);
+    const direction d = direction_of(n, p, h);
+    double *low = motion + 6;
     memset(motion, 0, (size_t)gk_node_motions(n->gear) * sizeof *motion);
     for (int c = 0; c < 3; c++) motion[c] = d.along[c], motion[3 + c] = d.lever[c];
     if (!n->flank->along_low) return;
-    gk_node_blend(n, n->flank->along_low, p, n->gear->low, low);
-    turn_low(n->gear, cosine, sine, low);
+    memcpy(low, still, (size_t)n->gear->low * sizeof *low);
+    turn_low(n->gear, h, low);
     for (int k = 0; k < n->gear->low; k++) low[k] *= gk_node_along(n);
 }
 
 /* rows along the profile of a point */
-static void gather_along(gk_node *n, const gk_spot *p, int i)
+static void gather_along(const gk_node *n, const gk_spot *p, int i)
 {
     const int modes = n->gear->modes;
     double *row = n->along_rows + (size_t)i * modes;
@@ -186,8 +208,9 @@ static void gather_along(gk_node *n, const gk_spot *p, int i)
     else
         memset(row, 0, (size_t)modes * sizeof *row);
     for (int k = 0; k < modes; k++) row[k] *= gk_node_along(n);
-    if (p->offset) turn_row(n, p->offset, row);
-    if (n->e->kind != MESH_FLAT) along_point(n, p, n->along_motion + (size_t)i * gk_node_motions(n->gear));
+    if (p->offset) turn_row(n, i / n->setup->strips, row);
+    if (n->e->kind != MESH_FLAT && n->flank->along_low)
+        gk_node_blend(n, n->flank->along_low, p, n->gear->low, n->along_still + (size_t)i * n->gear->low);
 }
 
 /* Where contact is on this side when the other gear's tooth has gone past its tip: at the edge's arc, off the line of
@@ -229,58 +252,107 @@ static void find_part(const gk_node *n, const gk_mesh *mesh, gk_spot *p, int str
     gk_strips_row(n->model, n->side->gear, middle - half, middle + half, p->width);
 }
 
-void gk_node_gather(gk_node *n, double position)
+/* where the points of a candidate lie */
+static void place(gk_node *n, const gk_mesh *mesh, double position, int c)
+{
+    const int strips = n->setup->strips;
+    for (int strip = 0; strip < strips; strip++) {
+        gk_spot *p = &n->at[c * strips + strip];
+        p->flank = c >= n->side->count[0];
+        p->offset = gk_node_offset(n->side, c);
+        p->middle = n->e->kind == MESH_FLAT ? n->gear->s_form : gk_node_roll(n->side, p->flank, position, p->offset);
+        find_part(n, mesh, p, strip);
+        p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * n->helix_tan;
+        p->roll = corner_roll(n, p);
+        p->grid = gk_grid_at(n->model, n->gear, p->roll);
+    }
+}
+
+/* Places the points and reads what twins have in common (gk_side_twins). Rows of all candidates, or only of those with
+ * teeth beyond the tables. */
+void gk_node_gather(gk_node *n, double position, int all)
 {
     GK_ASSERT(position >= 0.0 && position <= 1.0);
     GK_ASSERT(n->points >= 0 && n->points <= MAX_CANDIDATES * MAX_SLICES);
     const int strips = n->setup->strips, modes = n->gear->modes;
     const gk_mesh *mesh = &n->setup->mesh[n->e - n->model->engagement];
+    for (int c = 0; c < n->side->candidates; c++) {
+        place(n, mesh, position, c);
+        for (int i = c * strips; i < (c + 1) * strips; i++) {
+            const gk_spot *p = &n->at[i];
+            if (n->e->kind != MESH_FLAT) still_point(n, p, n->still + (size_t)i * gk_node_still(n->gear));
+            if (!all && !n->beyond[c]) continue;
+            blend_strip(n, n->flank->rows, p, i - c * strips, n->rows + (size_t)i * modes);
+            if (p->offset) turn_row(n, c, n->rows + (size_t)i * modes);
+            if (GK_ON(n->setup, friction)) gather_along(n, p, i);
+        }
+    }
+}
+
+/* the rest, of the side in hand: ports, and motion in ground axes, along the profile too where that is wanted */
+void gk_node_turn(gk_node *n, int along)
+{
+    GK_ASSERT(n->setup && n->points == n->side->candidates * n->setup->strips);
+    const size_t motions = (size_t)gk_node_motions(n->gear);
     double ports[MAX_PORTS];
+    heading h = {0};
     for (int i = 0; i < n->points; i++) {
-        gk_spot *p = &n->at[i];
-        const int c = i / strips, strip = i % strips;
-        p->flank = c >= n->side->count[0];
-        p->offset = n->side->first[p->flank] + n->side->step * (p->flank ? c - n->side->count[0] : c);
-        p->middle = n->e->kind == MESH_FLAT ? n->gear->s_form : gk_node_roll(n->side, p->flank, position, p->offset);
-        find_part(n, mesh, p, strip);
-        p->nominal = p->middle + (p->flank ? -1.0 : 1.0) * p->z * gk_node_tan(n->gear->helix);
-        p->roll = corner_roll(n, p);
-        p->grid = gk_grid_at(n->model, n->gear, p->roll);
-        blend_strip(n, n->flank->rows, p, strip, n->rows + (size_t)i * modes);
-        if (p->offset) turn_row(n, p->offset, n->rows + (size_t)i * modes);
+        const gk_spot *p = &n->at[i];
         gk_node_blend(n, n->flank->port, p, n->model->ports, ports);
         n->port[i] = n->side->port_of >= 0 ? ports[n->side->port_of] : 0.0;
-        if (n->e->kind != MESH_FLAT) ground_point(n, p, n->motion + (size_t)i * gk_node_motions(n->gear));
-        if (GK_ON(n->setup, friction)) gather_along(n, p, i);
+        if (n->e->kind == MESH_FLAT) continue;
+        if (i % n->setup->strips == 0) h = heading_of(n, p);
+        turn_point(n, p, &h, n->still + (size_t)i * gk_node_still(n->gear), n->motion + i * motions);
+        if (!along) continue;
+        turn_along(n, p, &h, n->along_still + (size_t)i * n->gear->low, n->along_motion + i * motions);
     }
+}
+
+/* teeth of the same side too far apart for the tables: what stored modes carry is all there is then */
+static void find_beyond(gk_node *n)
+{
+    memset(n->beyond, 0, sizeof n->beyond);
+    for (int c = 0; c < n->side->candidates; c++)
+        for (int d = 0; d < n->side->candidates; d++) {
+            const int offset = gk_node_offset(n->side, d) - gk_node_offset(n->side, c);
+            if (offset < -FURTHER || offset > FURTHER) n->beyond[c] = 1;
+        }
+}
+
+void gk_node_take(gk_node *n, int e, const gk_side *side)
+{
+    GK_ASSERT(gk_is_engagement(n->model, e) && side->candidates <= MAX_CANDIDATES);
+    n->e = &n->model->engagement[e];
+    n->gear = &n->model->gear[side->gear];
+    n->side = side;
+    n->flank = &n->setup->flank[side->gear];
 }
 
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side)
 {
     GK_ASSERT(work->columns && gk_is_engagement(model, e));
-    GK_ASSERT(side->candidates <= MAX_CANDIDATES);
-    gk_node n = {.model = model,
-                 .setup = setup,
-                 .e = &model->engagement[e],
-                 .gear = &model->gear[side->gear],
-                 .side = side,
-                 .flank = &setup->flank[side->gear],
-                 .compliance = &work->compliance};
+    gk_node n = {.model = model, .setup = setup, .compliance = &work->compliance};
+    gk_node_take(&n, e, side);
     double *room = work->columns;
     const size_t most = points_of(model), modes = (size_t)n.gear->modes, motions = (size_t)gk_node_motions(n.gear);
     n.points = side->candidates * setup->strips;
     n.rows = room, room += most * modes;
     n.along_rows = room, room += most * modes;
+    n.still = room, room += most * (size_t)gk_node_still(n.gear);
+    n.along_still = room, room += most * (size_t)n.gear->low;
     n.motion = room, room += most * motions;
     n.along_motion = room, room += most * motions;
     n.port = room, room += most;
     n.cells = room, room += (size_t)model->functions * modes;
-    n.cosine = room, room += n.gear->z;
-    n.sine = room, room += n.gear->z;
+    n.cosine = room, room += MAX_CANDIDATES * modes;
+    n.sine = room, room += MAX_CANDIDATES * modes;
     n.flexibility = room;
-    for (int m = 0; m < n.gear->z; m++) gk_sincos(2.0 * GK_PI * m / n.gear->z, &n.sine[m], &n.cosine[m]);
     for (int k = 0; k < n.gear->modes; k++) n.flexibility[k] = 1.0 / (n.gear->omega[k] * n.gear->omega[k]);
+    fill_tooth_turns(&n);
+    find_beyond(&n);
     gk_strips_rows(model, setup, n.e, side->gear, n.weight);
+    gk_sincos(n.gear->helix, &n.helix_sine, &n.helix_cosine);
+    n.helix_tan = n.helix_sine / n.helix_cosine;
     const double x = n.e->position[1][0] - n.e->position[0][0], y = n.e->position[1][1] - n.e->position[0][1];
     const double R = gk_base_reach(model, n.e);
     n.length = sqrt(gk_max(x * x + y * y - R * R, 0.0));
@@ -288,90 +360,3 @@ gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_wor
 }
 
 double *gk_node_room(const gk_node *n) { return n->flexibility + n->gear->modes; }
-
-/* ---- loads ------------------------------------------------------------------------------------------------------- */
-/* adds Σ over rolls and width functions of weighted rows, modes from `first` on */
-static void add_rows(const gk_node *n, const gk_spot *p, int first, double weight[4][MAX_FUNCTIONS], double *sum)
-{
-    const int modes = n->gear->modes, A = n->model->functions;
-    const gk_real *row = n->flank->rows + (size_t)((p->flank * n->model->rolls + p->grid.index) * A) * (size_t)modes;
-    for (int i = 0; i < 4; i++)
-        for (int a = 0; a < A; a++, row += modes) {
-            for (int k = first; k < modes; k++) sum[k] += weight[i][a] * row[k];
-            weight[i][a] = 0.0;
-        }
-}
-
-/* adds a row of tooth 0 turned to another tooth, modes from `first` on, which begins no pair's second */
-static void add_turned(const gk_gear *gear, int tooth, int first, const double *row, double *sum)
-{
-    double cosine[MAX_TEETH], sine[MAX_TEETH];
-    for (int m = 0; m < gear->z; m++) gk_sincos(2.0 * GK_PI * m / gear->z, &sine[m], &cosine[m]);
-    for (int k = first; k < gear->modes; k++) {
-        const int m = (int)((int64_t)gear->diameter[k] * tooth % gear->z);
-        if (gear->member[k] == 1) {
-            sum[k] += row[k] * cosine[m] - row[k + 1] * sine[m];
-            sum[k + 1] += row[k] * sine[m] + row[k + 1] * cosine[m];
-            k++;
-        } else {
-            sum[k] += row[k] * cosine[m];
-        }
-    }
-}
-
-/* Adds the modal forces of a gear group, modes from `first` on, by outward forces on the strips of a tooth at these
- * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
-void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum)
-{
-    GK_ASSERT(gk_is_gear(model, load->gear) && load->strips <= MAX_SLICES);
-    GK_ASSERT(first >= 0 && first <= model->gear[load->gear].modes);
-    const gk_gear *gear = &model->gear[load->gear];
-    const gk_node n = {.model = model, .gear = gear, .flank = &setup->flank[load->gear]};
-    double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
-    gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
-    memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
-    for (int strip = 0; strip < load->strips; strip++) {
-        next.grid = gk_grid_at(model, gear, load->roll[strip]);
-        if (p.grid.index >= 0 && next.grid.index != p.grid.index) add_rows(&n, &p, first, weight, row);
-        p = next;
-        for (int i = 0; i < 4; i++)
-            for (int a = 0; a < model->functions; a++)
-                weight[i][a] += load->force[strip] * p.grid.weight[i] * load->width[strip][a];
-    }
-    add_rows(&n, &p, first, weight, row);
-    add_turned(gear, load->tooth, first, row, sum);
-}
-
-/* adds the forces on ground oscillators that are not dynamic, by outward forces on the strips of a tooth of one gear */
-void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
-                         double *sum)
-{
-    GK_ASSERT(gk_is_mesh(setup, e));
-    GK_ASSERT(which == 0 || which == 1);
-    GK_ASSERT(setup->mesh[e].side[which].gear == load->gear);
-    const gk_mesh *mesh = &setup->mesh[e];
-    const gk_node n = {.model = model,
-                       .setup = setup,
-                       .e = &model->engagement[e],
-                       .gear = &model->gear[load->gear],
-                       .side = &mesh->side[which],
-                       .flank = &setup->flank[load->gear]};
-    const int set = setup->base.set, reads = n.gear->ground[set].reads, motions = gk_node_motions(n.gear);
-    const int32_t *list = n.gear->ground[set].list;
-    double motion[12 + MAX_LOW], all[12 + MAX_LOW] = {0};
-    for (int strip = 0; strip < load->strips; strip++) {
-        const double roll = load->roll[strip], z = mesh->strip_middle[strip], sg = load->flank ? -1.0 : 1.0;
-        gk_spot p = {
-            .flank = load->flank, .grid = gk_grid_at(model, n.gear, roll), .nominal = roll, .roll = roll, .z = z};
-        p.middle = roll - sg * z * gk_node_tan(n.gear->helix);
-        memcpy(p.width, load->width[strip], sizeof p.width);
-        if (load->force[strip] == 0.0) continue;
-        ground_point(&n, &p, motion);
-        for (int i = 0; i < motions; i++) all[i] += load->force[strip] * motion[i];
-    }
-    for (int i = 0; i < motions; i++) {
-        const double *row = gk_node_motion(n.gear, set, i);
-        for (int k = 0; k < reads; k++)
-            if (setup->base.slot[list[k]] < 0) sum[list[k]] += all[i] * row[k];
-    }
-}

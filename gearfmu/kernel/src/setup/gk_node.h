@@ -28,11 +28,16 @@ typedef struct gk_node { /* what a node's tables are made from */
     double *rows;   /* (points, modes): all stored modes, tooth offset included */
     double *motion; /* (points, gk_node_motions): what ground oscillators displace outward is motion · M */
     double *along_rows, *along_motion; /* rows and motion along the profile (gk_node_along) */
+    double *still, *along_still;       /* what motion is turned from: (points, gk_node_still), (points, low) */
     double *port;                      /* (points) */
     double *flexibility;               /* (modes) 1/ω² */
     double *cells;                     /* (functions, modes): rows at one length of roll */
-    double *cosine, *sine;             /* (z) of whole teeth */
+    double *cosine, *sine;             /* (candidates, modes) of the turn to a candidate's tooth */
+    double helix_cosine, helix_sine, helix_tan;
+    int beyond[MAX_CANDIDATES]; /* there is a tooth too far from this one for the tables of compliance */
 } gk_node;
+
+enum { GK_NODE_PARTS = 18 }; /* three of the node: c0, c_c, c_s */
 
 /* Motion at a flank by ground oscillators is a row of 12 + low numbers times M (12 + low, reads): rigid motion of the
  * gear (centre), modes of nodal diameter 0 and 1 (low), and forces on its node (node). */
@@ -46,12 +51,23 @@ static inline const double *gk_node_motion(const gk_gear *gear, int set, int i)
     return i < gear->low ? gear->ground[set].low + (size_t)i * (size_t)reads
                          : gear->ground[set].node + (i - gear->low) * reads;
 }
+static inline int gk_node_still(const gk_gear *gear) { return gear->low + GK_NODE_PARTS; }
+static inline int gk_node_offset(const gk_side *side, int candidate)
+{
+    const int flank = candidate >= side->count[0];
+    return side->first[flank] + side->step * (flank ? candidate - side->count[0] : candidate);
+}
 gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side);
-/* the scratch of a node that is left for what is made of it: (gk_node_motions)² + gk_node_motions (points, of supports
- * and ports, of dynamic oscillators) */
+/* goes on to another side whose points lie at the same places of a gear of the same body */
+void gk_node_take(gk_node *n, int e, const gk_side *side);
+/* doubles of a node; the scratch that is left for what is made of it */
+size_t gk_node_size(const gk_model *model, const gk_gear *gear);
 double *gk_node_room(const gk_node *n);
 /* `position`: share of the pitch */
-void gk_node_gather(gk_node *n, double position);
+void gk_node_gather(gk_node *n, double position, int all);
+void gk_node_turn(gk_node *n, int along);
+/* motion outward at a point of a gear in an engagement, by the node's angles of helix alone */
+void gk_node_motion_at(const gk_node *n, const gk_spot *p, double *motion);
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
 void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out);
 /* sense of growing roll on this side against the direction in which gear B slides past A */

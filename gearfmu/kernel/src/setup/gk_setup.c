@@ -309,15 +309,42 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
     memset(work->ground_zero, 0, ground);
 }
 
-/* gear by gear, those of one body together: each body's compliances are spread once */
+/* the sides of gears of body g */
+static gk_twins sides_of(const gk_model *model, int g)
+{
+    gk_twins sides = {.count = 0};
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++) {
+            if (gk_spread_leader(model, model->engagement[e].gear[w]) != g) continue;
+            sides.engagement[sides.count] = e, sides.which[sides.count++] = w;
+        }
+    return sides;
+}
+
+/* moves the first of these sides and its twins to `out` */
+static void take_twins(const gk_model *model, gk_twins *sides, gk_twins *out)
+{
+    const int e = sides->engagement[0], w = sides->which[0], all = sides->count;
+    out->count = sides->count = 0;
+    for (int i = 0; i < all; i++) {
+        const int f = sides->engagement[i], v = sides->which[i];
+        gk_twins *to = w == v && gk_side_twins(model, e, f) ? out : sides;
+        to->engagement[to->count] = f, to->which[to->count++] = v;
+    }
+}
+
+/* gear by gear, those of one body together: each body's compliances are spread once, and each place on it is read once */
 static void fill_sides(const gk_model *model, gk_setup *setup, gk_work *work)
 {
+    gk_fill_function *const fill = gk_wide_fill(1);
     for (int g = 0; g < model->gears; g++) {
         if (gk_spread_leader(model, g) != g) continue;
+        gk_twins sides = sides_of(model, g), twins;
         if (setup->on.residual) gk_spread_compliance(model, setup, work, g);
-        for (int e = 0; e < model->engagements; e++)
-            for (int w = 0; w < 2; w++)
-                if (gk_spread_leader(model, setup->mesh[e].side[w].gear) == g) gk_side_fill(model, setup, work, e, w);
+        while (sides.count) {
+            take_twins(model, &sides, &twins);
+            fill(model, setup, work, &twins);
+        }
     }
 }
 

@@ -1,25 +1,50 @@
 /* Tables of a gear's flanks on the even grid of rolls, from those at the points of its body (gearfmu/stage/compact.py).
  * A model stores rows at P points and each number of a compliance once; on the grid they are several times as large.
  * Rows are kept in the setup, compliances only while the sides of their gear are filled. */
-#include "setup/gk_node.h"
+#include "setup/gk_grounded.h"
 
 enum { CHUNK = 64 };
 
 /* ---- which gears ------------------------------------------------------------------------------------------------- */
-/* gears of one body share the bytes of its tables in the blob */
+/* gears of one body: of one shape, with modes of the same numbers, and with one copy of its tables in the blob; patterns
+ * of far teeth are each gear's own */
+static int same_shape(const gk_gear *a, const gk_gear *b)
+{
+    const double of_a[] = {a->r_b,   a->s_form, a->s_tip, a->psi_b,         a->width,       a->local,
+                           a->strip, a->edge,   a->helix, a->corner_radius, a->corner_angle};
+    const double of_b[] = {b->r_b,   b->s_form, b->s_tip, b->psi_b,         b->width,       b->local,
+                           b->strip, b->edge,   b->helix, b->corner_radius, b->corner_angle};
+    return a->z == b->z && !memcmp(of_a, of_b, sizeof of_a);
+}
+
+static int same_modes(const gk_gear *a, const gk_gear *b)
+{
+    const size_t n = (size_t)a->modes;
+    return a->modes == b->modes && a->low == b->low && !memcmp(a->omega, b->omega, n * sizeof *a->omega) &&
+           !memcmp(a->diameter, b->diameter, n * sizeof *a->diameter) &&
+           !memcmp(a->member, b->member, n * sizeof *a->member) &&
+           !memcmp(a->low_member, b->low_member, (size_t)a->low * sizeof *a->low_member);
+}
+
 static int same_tables(const gk_gear *a, const gk_gear *b)
 {
-    return a->resample == b->resample && a->rows == b->rows && a->low_rows == b->low_rows && a->node == b->node &&
-           a->far_rows == b->far_rows && a->residual_own == b->residual_own && a->residual_next == b->residual_next &&
-           a->residual_across == b->residual_across && a->along_rows == b->along_rows && a->along_low == b->along_low &&
-           a->along_normal == b->along_normal && a->along_own == b->along_own && a->along_across == b->along_across;
+    return a->points == b->points && a->mirrored == b->mirrored && a->resample == b->resample && a->rows == b->rows &&
+           a->low_rows == b->low_rows && a->node == b->node && a->residual_own == b->residual_own &&
+           a->residual_next == b->residual_next && a->residual_across == b->residual_across &&
+           a->along_rows == b->along_rows && a->along_low == b->along_low && a->along_normal == b->along_normal &&
+           a->along_own == b->along_own && a->along_across == b->along_across;
+}
+
+static int same_body(const gk_gear *a, const gk_gear *b)
+{
+    return a == b || (same_tables(a, b) && same_shape(a, b) && same_modes(a, b));
 }
 
 int gk_spread_leader(const gk_model *model, int g)
 {
     GK_ASSERT(gk_is_gear(model, g));
     int first = 0;
-    while (!same_tables(&model->gear[first], &model->gear[g])) first++;
+    while (!same_body(&model->gear[first], &model->gear[g])) first++;
     return first;
 }
 
@@ -49,11 +74,11 @@ void gk_spread_rows(const gk_model *model, gk_setup *setup, int g)
     const gk_flank_tables *to = &setup->flank[g];
     const size_t A = (size_t)model->functions;
     spread_rows(model, gear, 2, A * (size_t)model->ports, gear->port_residual, to->port);
+    spread_rows(model, gear, 2, A * FAR, gear->far_rows, to->far);
     if (gk_spread_leader(model, g) != g) return;
     spread_rows(model, gear, 2, A * (size_t)gear->modes, gear->rows, to->rows);
     spread_rows(model, gear, 2, A * (size_t)gear->low, gear->low_rows, to->low);
     spread_rows(model, gear, 6, A * 6, gear->node, to->node);
-    spread_rows(model, gear, 2, A * FAR, gear->far_rows, to->far);
     spread_rows(model, gear, 2, A * (size_t)gear->modes, gear->along_rows, to->along_rows);
     spread_rows(model, gear, 2, A * (size_t)gear->low, gear->along_low, to->along_low);
 }
@@ -99,7 +124,9 @@ size_t gk_spread_scratch(const gk_model *model, size_t *reals)
     for (int g = 0; g < model->gears; g++) {
         gk_compliance counted;
         const size_t n = places_of(model, &model->gear[g]);
-        const size_t own = n * n + n * (size_t)(model->rolls * model->functions);
+        const size_t packed = (size_t)((model->rolls + model->gear[g].points) *
+                                       gk_padded(model->functions * model->functions));
+        const size_t own = n * n + n * (size_t)(model->rolls * model->functions) + packed;
         const size_t blocks = lay_out(model, &model->gear[g], model->gear[g].along_rows != NULL, NULL, &counted) *
                               block_size(model);
         doubles = own > doubles ? own : doubles;
@@ -112,7 +139,25 @@ typedef struct spreader {
     const gk_model *model;
     const gk_gear *gear;
     double *square, *between; /* (places, places); (rolls, functions, places) */
+    double *packed;           /* (points + rolls, functions² in whole quads) */
 } spreader;
+
+/* (rolls, functions, functions) from (functions, points, functions): a product of matrices once the functions stand
+ * together */
+static void spread_points(const spreader *s, const double *from, gk_real *out)
+{
+    const int A = s->model->functions, rolls = s->model->rolls, points = s->gear->points, columns = gk_padded(A * A);
+    const size_t n = places_of(s->model, s->gear);
+    const gk_matrix packed = {s->packed, points, columns};
+    memset(s->packed, 0, (size_t)((points + rolls) * columns) * sizeof *s->packed);
+    for (int j = 0; j < points; j++)
+        for (int c = 0; c < A * A; c++)
+            s->packed[j * columns + c] = from[(size_t)(c / A) * n + (size_t)(j * A + c % A)];
+    double *sum = s->packed + points * columns;
+    gk_grounded_times(s->gear->resample, &packed, rolls, sum);
+    for (int l = 0; l < rolls; l++)
+        for (int c = 0; c < A * A; c++) out[l * A * A + c] = (gk_real)sum[l * columns + c];
+}
 
 /* (rolls, rolls, functions, functions) of the square */
 static void spread_square(const spreader *s, gk_real *out)
@@ -128,14 +173,7 @@ static void spread_square(const spreader *s, gk_real *out)
             for (size_t c = 0; c < (size_t)A * n && weight != 0.0; c++) to[c] += weight * from[c];
         }
     for (int k = 0; k < rolls; k++)
-        for (int l = 0; l < rolls; l++)
-            for (int a = 0; a < A; a++, out += A) {
-                const double *from = s->between + (size_t)(k * A + a) * n, *weight = s->gear->resample + l * points;
-                double sum[MAX_FUNCTIONS] = {0};
-                for (int j = 0; j < points; j++, from += A)
-                    for (int b = 0; b < A; b++) sum[b] += weight[j] * from[b];
-                for (int b = 0; b < A; b++) out[b] = (gk_real)sum[b];
-            }
+        spread_points(s, s->between + (size_t)(k * A) * n, out + (size_t)k * (size_t)(rolls * A * A));
 }
 
 static const float *spread_whole(const spreader *s, const float *from, gk_real *out)
@@ -172,7 +210,8 @@ void gk_spread_compliance(const gk_model *model, const gk_setup *setup, gk_work 
     const gk_gear *gear = &model->gear[g];
     const int flanks = gear->mirrored ? 1 : 2, along = GK_ON(setup, friction) && gear->along_rows;
     const size_t n = places_of(model, gear);
-    const spreader s = {model, gear, work->spread, work->spread + n * n};
+    double *between = work->spread + n * n;
+    const spreader s = {model, gear, work->spread, between, between + n * (size_t)(model->rolls * model->functions)};
     gk_compliance *to = &work->compliance;
     lay_out(model, gear, along, work->blocks, to);
     const float *own = gear->residual_own, *next = gear->residual_next, *across = gear->residual_across;

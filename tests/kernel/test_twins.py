@@ -1,0 +1,61 @@
+"""Sides of equal planets share what depends on bodies alone: the same numbers, to the last bit, as without sharing.
+
+The kernel takes gears for ones of one body where their tables are one copy in the blob. The same model with a copy for
+every gear is read without sharing anything.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from golden_models import golden_model
+
+from gearfmu.kernel import Kernel
+from gearfmu.stage import blob as blobs
+
+FAST, STANDARD = 1.0, 2.0
+STEP = 2e-5
+MODELS = ("helical_set", "pin_errors")  # equal planets; planets that stand at different distances
+
+
+def stored(blob: bytes, repeated_from: int, monkeypatch: pytest.MonkeyPatch) -> bytes:
+    """The model with equal sections of at least so many bytes stored once."""
+    with monkeypatch.context() as patch:
+        patch.setattr(blobs, "REPEATED_FROM", repeated_from)
+        return blobs.write_blob(blobs.read_blob(blob))
+
+
+def both_ways(blob: bytes, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:
+    """With one copy of the tables of equal planets, and with a copy for every gear."""
+    shared, alone = stored(blob, 1, monkeypatch), stored(blob, 1 << 60, monkeypatch)
+    assert len(shared) < len(alone)
+    return shared, alone
+
+
+def moved(blob: bytes) -> bytes:
+    """One planet farther out by 10 µm in its engagement with the sun alone: it is a twin in the ring still."""
+    sections = dict(blobs.read_blob(blob))
+    engagement = np.array(sections["engagement"])
+    engagement.reshape(-1, 10)[1, 2:4] *= 1.0 + 1e-5 / np.hypot(*engagement.reshape(-1, 10)[1, 2:4])
+    return blobs.write_blob(sections | {"engagement": engagement})
+
+
+def state_after_steps(blob: bytes, level: float, friction: float) -> bytes:
+    kernel = Kernel(blob, {"level": level, "slices": 1.0, "effect.friction": friction})
+    kernel.initialize()
+    for k in range(3):
+        kernel.step(k * STEP, STEP)
+    return kernel.save()
+
+
+@pytest.mark.parametrize("level", [FAST, STANDARD])
+@pytest.mark.parametrize("change", [bytes, moved])
+@pytest.mark.parametrize("name", MODELS)
+def test_shared_tables_are_those_of_every_gear_alone(name, change, level, monkeypatch) -> None:
+    shared, alone = both_ways(change(golden_model(name)), monkeypatch)
+    assert state_after_steps(shared, level, 0.0) == state_after_steps(alone, level, 0.0)
+
+
+def test_shared_tables_along_the_profile_are_those_of_every_gear_alone(monkeypatch) -> None:
+    shared, alone = both_ways(golden_model("pin_errors"), monkeypatch)
+    assert state_after_steps(shared, FAST, 1.0) == state_after_steps(alone, FAST, 1.0)
