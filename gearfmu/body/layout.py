@@ -30,7 +30,7 @@ class Entry:
     each: bool = False
 
 
-TABLE_BITS = 23  # of compliances: a step is 1.2e-7 of the largest entry or less, like the singles of a model
+TABLE_BITS = 23  # of compliances; what this costs a model: docs/decisions/bodies.md
 ROW_BITS = 21  # of rows in modes and of the coupling of modes
 PICTURE_BITS = 7
 

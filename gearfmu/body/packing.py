@@ -1,10 +1,10 @@
 """How the datasets of a body lie in its file: the numbers of `layout.Entry` packed and unpacked.
 
-What a model reads is single precision, what a picture shows a few hundredths of a tooth's height: doubles of the finite
-elements would be noise in most of their bits, which no compression takes. So tables are rounded to whole multiples of a
-power of two; what follows from them in a float is exact, and packing twice gives the same bytes. Along the roll points,
-Chebyshev points of the first kind, functions are smooth: their cosine transform, the coefficients of their Chebyshev
-polynomials, falls off, and what falls below a step costs nothing.
+A model holds singles, and a picture shows a hundredth of a displacement: the lower bits of the finite elements' doubles
+are noise, which nothing compresses. So numbers are rounded to whole multiples of a power of two, and packing what was
+unpacked gives the same bytes. Along the roll points, Chebyshev points of the first kind, rows and tables are smooth:
+their cosine transform, the coefficients of their Chebyshev polynomials, falls off, and what lies below a step costs
+nothing.
 """
 
 from __future__ import annotations
