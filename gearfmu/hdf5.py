@@ -28,20 +28,21 @@ _DAMAGE = (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeErro
 @dataclass(frozen=True)
 class Format:
     """A kind of file: `name` and `version` as they stand in it, `noun` for people, the error and the remedy when it
-    cannot be read."""
+    cannot be read. form: version of HDF5 whose form it has, by h5py's name, None: the oldest that will do."""
 
     name: str
     version: int
     noun: str
     error: type[GearfmuError]
     remedy: str
+    form: str | None = None
 
 
 @contextmanager
 def writing(path: str | os.PathLike[str], kind: Format) -> Iterator[h5py.File]:
     """An open file under a temporary name; sealed and renamed to `path` when the block succeeds."""
     with written_whole(path) as temporary:
-        with h5py.File(temporary, "w", userblock_size=USER_BLOCK) as file:
+        with h5py.File(temporary, "w", libver=kind.form, userblock_size=USER_BLOCK) as file:
             file.attrs["format"] = kind.name
             file.attrs["format_version"] = kind.version
             yield file

@@ -18,6 +18,7 @@ import pytest
 from gearfmu.stage.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[1]
+LARGEST_WHEEL = 20e6  # bytes, with both kernels
 SHORT = """
 name = "short"
 description = "the first milliseconds of a clutch closure"
@@ -185,6 +186,12 @@ def test_the_wheel_runs_the_demo_in_an_empty_environment(wheel: Path, tmp_path: 
     command = [tmp_path / "venv" / "bin" / "gearfmu", "demo", "--out", tmp_path / "out"]
     subprocess.run(command, check=True, cwd=tmp_path, env={**environment, "CC": "false"}, capture_output=True)
     assert (tmp_path / "out" / "report.html").is_file()
+
+
+@pytest.mark.full
+@pytest.mark.needs("ziglang", "build")
+def test_the_wheel_is_small(wheel: Path) -> None:
+    assert wheel.stat().st_size <= LARGEST_WHEEL
 
 
 @pytest.mark.full

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "gearfmu").rglob("*.py"))
+LARGEST_FILE = 1e6  # bytes: history keeps every version of it
+LARGER = {  # files that may be, up to 1.4 MB: tests/body/test_shipped.py
+    "reduced_models/helical_demo/pinion.h5",
+    "reduced_models/helical_demo/wheel.h5",
+    "reduced_models/two_stage/pinion1.h5",
+    "reduced_models/two_stage/pinion2.h5",
+}
 KERNEL_MAY_IMPORT = {"errors", "files", "kernel"}
 
 
@@ -101,3 +109,11 @@ def test_modules_say_what_they_are(path: Path) -> None:
     public = [n for n in tree.body if isinstance(n, (ast.FunctionDef, ast.ClassDef)) and not n.name.startswith("_")]
     silent = [n.name for n in public if not ast.get_docstring(n)]
     assert not silent, f"public without docstring: {silent}"
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a checkout")
+def test_no_file_of_the_repository_is_large_without_being_listed() -> None:
+    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    paths = [ROOT / name for name in names.split("\0") if name]
+    large = {str(path.relative_to(ROOT)) for path in paths if path.is_file() and path.stat().st_size > LARGEST_FILE}
+    assert large == LARGER, f"not listed: {sorted(large - LARGER)}; no longer large: {sorted(LARGER - large)}"

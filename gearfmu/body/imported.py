@@ -9,7 +9,6 @@ from scipy.spatial import cKDTree
 
 from gearfmu.body.parts import (
     DRAWN,
-    PICTURE_MODES,
     Parts,
     pictured_loads,
     rim_of,
@@ -41,7 +40,7 @@ from gearfmu.reduction.imported_gear import (
 from gearfmu.reduction.imported_sector import ImportedSector
 from gearfmu.reduction.imported_whole import Held, imported_gear_order
 from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
-from gearfmu.reduction.modal import Modes, Progress, elastic_modes
+from gearfmu.reduction.modal import Progress, elastic_modes
 from gearfmu.reduction.statics import Statics, static_tables
 
 
@@ -141,7 +140,7 @@ def _by_sector(found: ImportedGear, gear: Any, case: FrfCase, drawing: tuple[Any
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
-    display, shapes = sector_display(surface, body, modes, statics), sector_shapes(surface, modes)
+    display, shapes = sector_display(surface, body, statics), sector_shapes(surface, modes)
     return Parts(modes, statics, frf, found.facts, display, body.inertia, rim, shapes)
 
 
@@ -156,10 +155,10 @@ def _by_mean_tooth(found: ImportedGear, count: int, case: FrfCase, drawing: tupl
     report("frequency response", 0.0)
     frf = mean_frf(gear, space, modes, statics, case)
     facts = found.facts | {"teeth_deviation": deviation, "compliance_left_to_residual": left}
-    return Parts(modes, statics, frf, facts, _whole_display(drawn, found, modes, statics), gear.inertia)
+    return Parts(modes, statics, frf, facts, _whole_display(drawn, found, statics), gear.inertia)
 
 
-def _whole_display(drawn: Any, found: ImportedGear, modes: Modes, statics: Statics) -> Display:
+def _whole_display(drawn: Any, found: ImportedGear, statics: Statics) -> Display:
     """Pictures on the drawn surface: every point moves like the nearest node of the whole mesh."""
     gear = found.body
     assert isinstance(gear, WholeGear)
@@ -168,9 +167,7 @@ def _whole_display(drawn: Any, found: ImportedGear, modes: Modes, statics: Stati
     kept = np.unique(gear.body.node_of_dof[gear.body.node_of_dof < len(found.nodes)])
     nearest = cKDTree(found.nodes[kept]).query(points)[1]
     dofs = 3 * nearest[:, None] + np.arange(3)
-    index = [k for k in sorted(modes.shapes) if k < PICTURE_MODES]
-    shapes = np.array([modes.shapes[k][dofs] for k in index], "f4").reshape(-1, *points.shape)
     pictured = pictured_loads(gear.points)
     loads = np.array([picture[dofs] for picture in statics.pictures], "f4")
     rolls = gear.points.rolls[[load // gear.points.functions for load in pictured]]
-    return Display(points.astype("f4"), quads, shapes, np.array(index, int), loads, rolls)
+    return Display(points.astype("f4"), quads, loads, rolls)

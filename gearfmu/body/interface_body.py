@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.layout import ALGORITHM_VERSION, Entry
+from gearfmu.body.packing import write_entry
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
 
 FORMAT = "gearfmu-interface-body"
 FORMAT_VERSION = 1
 FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, "make it again with 'gearfmu reduce STAGE'")
-_PACKED = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "fletcher32": True}
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,7 @@ def save_interface_body(body: InterfaceBody, path: str | os.PathLike[str]) -> No
         for text in TEXTS:
             file.attrs[text] = json.dumps(getattr(body, text), sort_keys=True)
         for entry in ENTRIES:
-            value = np.asarray(getattr(body, entry.field), dtype=entry.kind)
-            dataset = file.create_dataset(entry.path, data=value, **(_PACKED if value.size > 36 else {}))
-            dataset.attrs["unit"], dataset.attrs["meaning"] = entry.unit, entry.meaning
+            write_entry(file, entry, np.asarray(getattr(body, entry.field), dtype=entry.kind))
 
 
 def load_interface_body(path: str | os.PathLike[str]) -> InterfaceBody:

@@ -6,15 +6,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 FORMAT = "gearfmu-body"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 ALGORITHM_VERSION = 2  # raise it when the numbers of a body change: every stored body is then stale
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One dataset: path in the file, attribute path in ReducedBody, shape in symbols or numbers, unit, meaning.
+    """One dataset: path in the file, attribute path in ReducedBody, shape in symbols or numbers, unit, meaning, and how
+    it is stored (`gearfmu/body/packing.py`).
 
-    kind: "f8" doubles, "f4" singles (pictures), "i8" integers.
+    kind: in memory, "f8" doubles, "f4" singles (pictures), "i8" integers. bits: 0, the file holds the numbers
+    themselves; else whole multiples of a step, which the largest number has fewer than 2^bits of, and along the roll
+    points (R) those of its cosine transform. each: a step for every index of the first axis instead of one for all.
     """
 
     path: str
@@ -23,6 +26,13 @@ class Entry:
     unit: str
     meaning: str
     kind: str = "f8"
+    bits: int = 0
+    each: bool = False
+
+
+TABLE_BITS = 23  # of compliances; what this costs a model: docs/decisions/bodies.md
+ROW_BITS = 21  # of rows in modes and of the coupling of modes
+PICTURE_BITS = 7
 
 
 def _entries() -> tuple[Entry, ...]:
@@ -67,6 +77,7 @@ def _mode_entries() -> tuple[Entry, ...]:
             "kg-1/2",
             "tooth 0: load-weighted mean displacement along the outward normal; "
             "flank (0: sg = +1), roll point, width function, mode",
+            bits=ROW_BITS,
         ),
         Entry(
             "modes/bore_rows",
@@ -86,8 +97,9 @@ def _static_entries() -> tuple[Entry, ...]:
             (2, 2, "M", "R", "R", "A", "A"),
             "m/N",
             "compliance [f, g, m, i, j, a, b]: tooth 0, flank f, roll i, function a under the load of tooth m, "
-            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … z/2, or "
-            "0 … K where more do not fit, the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+            "flank g, roll j, function b; inertia relief, mean-axis gauge. The file holds the offsets m = 0 … 3, or "
+            "0 … z/2 where all are needed, the others follow: C[f, g, m, i, j, a, b] = C[g, f, −m, j, i, b, a]",
+            bits=TABLE_BITS,
         ),
         Entry(
             "static/c_fb",
@@ -118,14 +130,24 @@ def _frf_entries() -> tuple[Entry, ...]:
 
 def _display_entries() -> tuple[Entry, ...]:
     return (
-        Entry("display/points", "display.points", ("P", 3), "m", "surface points of the whole gear", "f4"),
-        Entry("display/quads", "display.quads", ("Q", 4), "", "quadrilaterals of the surface, point numbers", "i8"),
-        Entry("display/modes", "display.modes", ("D", "P", 3), "kg-1/2", "displacement in the lowest modes", "f4"),
-        Entry("display/mode_index", "display.mode_index", ("D",), "", "which modes these are", "i8"),
         Entry(
-            "display/loads", "display.loads", ("L", "P", 3), "m/N", "displacement, unit load on flank 0, tooth 0", "f4"
+            "display/loads",
+            "display.loads",
+            ("L", "P", 3),
+            "m/N",
+            "displacement of the surface of the whole gear, unit load on flank 0, tooth 0",
+            "f4",
+            bits=PICTURE_BITS,
+            each=True,
         ),
         Entry("display/load_roll", "display.load_roll", ("L",), "m", "roll point of these loads"),
+    )
+
+
+def _surface_entries() -> tuple[Entry, ...]:
+    return (
+        Entry("surface/points", "display.points", ("P", 3), "m", "surface points of the whole gear", "f4"),
+        Entry("surface/quads", "display.quads", ("Q", 4), "", "quadrilaterals of the surface, point numbers", "i8"),
     )
 
 
@@ -140,6 +162,7 @@ def _rim_entries() -> tuple[Entry, ...]:
             (2, "z", "R", "A", 3),
             "m/N",
             "flank rows of space 0 per unit force x, y, z on the patch of sector m, in its frame",
+            bits=TABLE_BITS,
         ),
         Entry("rim/c_pp", "rim.static_pp", ("z", 3, 3), "m/N", "patch of sector 0 per unit force on that of sector m"),
         Entry("rim/mounts", "rim.mounts", (), "", "number of mounts, at the sectors k z/mounts; 0: none", "i8"),
@@ -168,6 +191,7 @@ def _tangent_entries() -> tuple[Entry, ...]:
             (2, "R", "A", "n"),
             "kg-1/2",
             "tooth 0: like modes/flank_rows, displacement along the profile towards growing roll",
+            bits=ROW_BITS,
         ),
         Entry(
             "tangent/c_nt",
@@ -176,8 +200,16 @@ def _tangent_entries() -> tuple[Entry, ...]:
             "m/N",
             "compliance [f, g, i, j, a, b] of tooth 0 alone: flank f, roll i, function a along the outward normal "
             "under the load along the profile at flank g, roll j, function b",
+            bits=TABLE_BITS,
         ),
-        Entry("tangent/c_tt", "tangent.static_tt", table, "m/N", "the same, displacement along the profile"),
+        Entry(
+            "tangent/c_tt",
+            "tangent.static_tt",
+            table,
+            "m/N",
+            "the same, displacement along the profile",
+            bits=TABLE_BITS,
+        ),
     )
 
 
@@ -186,14 +218,28 @@ def _shape_entries() -> tuple[Entry, ...]:
         Entry("shapes/points", "shapes.points", ("S", 3), "m", "surface points of sector 0", "f4"),
         Entry("shapes/quads", "shapes.quads", ("T", 4), "", "quadrilaterals of its surface, point numbers", "i8"),
         Entry("shapes/ahead", "shapes.ahead", ("T", 4), "", "1: the point of that number in the next sector", "i8"),
-        Entry("shapes/modes", "shapes.modes", ("n", "S", 3), "kg-1/2", "displacement on sector 0 in every mode", "f4"),
+        Entry(
+            "shapes/modes",
+            "shapes.modes",
+            ("n", "S", 3),
+            "kg-1/2",
+            "displacement on sector 0 in every mode",
+            "f4",
+            bits=PICTURE_BITS,
+            each=True,
+        ),
     )
 
 
 def _spin_entries() -> tuple[Entry, ...]:
     return (
         Entry(
-            "spin/coupling", "spin.coupling", ("n", "n"), "", "integral of density times mode k . (e_z x mode l), skew"
+            "spin/coupling",
+            "spin.coupling",
+            ("n", "n"),
+            "",
+            "integral of density times mode k . (e_z x mode l), skew",
+            bits=ROW_BITS,
         ),
         Entry(
             "spin/tilt", "spin.tilt", (2, "n"), "kg1/2.m", "the same with rigid tilt about x and y: of z u_x and z u_y"
@@ -224,14 +270,16 @@ GROUPS = {
     "helix": _helix_entries(),
     "tangent": _tangent_entries(),
     "shapes": _shape_entries(),
+    "surface": _surface_entries(),
     "spin": _spin_entries(),
 }
 
 
 def entries_of(groups: Iterable[str]) -> tuple[Entry, ...]:
     """The datasets of a body: those of every gear, and of the `groups` that it has besides: "rim" (an internal gear),
-    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface in all modes),
-    "spin" (what modes feel when the body turns)."""
+    "helix" (a helical one), "tangent" (one that is loaded along the profile too), "shapes" (surface of a
+    sector, in all modes), "surface" (that of the whole gear, where no sector stands for it), "spin" (what modes feel
+    when the body turns)."""
     return (*ENTRIES, *(entry for name in GROUPS if name in groups for entry in GROUPS[name]))
 
 

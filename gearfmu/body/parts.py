@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body.reduced import Rim, Tangent
-from gearfmu.reduction.display import Display, Outline, Shapes, unfold_mode, unfold_sectors, whole_surface
+from gearfmu.reduction.display import Display, Outline, Shapes, unfold_sectors, whole_surface
 from gearfmu.reduction.flank import Points, ToothFlank
 from gearfmu.reduction.frf import FrfError
 from gearfmu.reduction.modal import Modes
@@ -18,11 +18,9 @@ from gearfmu.reduction.statics import Statics
 from gearfmu.spec.gear import MeshSpec
 
 DRAWN = MeshSpec(flank=8, thickness=2, root=4, rim=4, width=1, thickness_grading=1.25)
-PICTURE_MODES = 12
 _PICTURE_LOADS = 5
 _DRAWN_TWIST = 0.08  # rad: largest turn of the section within a drawn layer
-_TABLE_BYTES = 3.5e6  # of static_ff before compression, unless all tooth offsets are needed
-_FEWEST_OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
+_OFFSETS = 3  # the kernel reads tooth offsets −3 … 3
 
 
 @dataclass(frozen=True)
@@ -64,13 +62,11 @@ def drawn_counts(geometry: Any, face_width: float) -> MeshSpec:
 
 
 def kept_offsets(static_ff: np.ndarray, whole: bool) -> np.ndarray:
-    """The table (2, 2, z, …) of all tooth offsets, or those of −K … K only (2, 2, 2K + 1, …): as many as fit into
-    `_TABLE_BYTES` in the file, which holds 0 … K, and never fewer than the kernel reads. whole: all are needed."""
-    teeth, each = static_ff.shape[2], 8 * static_ff[:, :, 0].size
-    most = max(_FEWEST_OFFSETS, int(_TABLE_BYTES // each) - 1)
-    if whole or 2 * most + 1 >= teeth:
+    """Of the table (2, 2, z, …) of all tooth offsets those that the kernel reads (2, 2, 7, …). whole: all are
+    needed."""
+    if whole or static_ff.shape[2] <= 2 * _OFFSETS + 1:
         return static_ff
-    return np.concatenate([static_ff[:, :, : most + 1], static_ff[:, :, -most:]], axis=2)
+    return np.concatenate([static_ff[:, :, : _OFFSETS + 1], static_ff[:, :, -_OFFSETS:]], axis=2)
 
 
 def tangent_of(modes: Modes, statics: Statics, points: Points) -> Tangent | None:
@@ -110,18 +106,14 @@ def sector_shapes(sector: Outline, modes: Modes) -> Shapes | None:
     return Shapes(sector.points.astype("f4"), sector.quads, sector.ahead.astype(int), modes.surface.astype("f4"))
 
 
-def sector_display(sector: Outline, body: SectorBody, modes: Modes, statics: Statics) -> Display:
+def sector_display(sector: Outline, body: SectorBody, statics: Statics) -> Display:
     """Pictures of a gear reduced on one sector, from the outline of a coarse sector mesh of the same gear."""
     pictured = pictured_loads(body.points)
     points, quads = whole_surface(sector, body.teeth)
-    index = [k for k in sorted(modes.shapes) if k < PICTURE_MODES]
-    shapes = [unfold_mode(modes.shapes[k], int(modes.nodal_diameter[k]), sector, body.teeth) for k in index]
     loads = [unfold_sectors(picture, sector) for picture in statics.pictures]
     return Display(
         points.astype("f4"),
         quads,
-        np.array(shapes, "f4").reshape(-1, *points.shape),
-        np.array(index, int),
         np.array(loads, "f4"),
         body.points.rolls[[load // body.points.functions for load in pictured]],
     )

@@ -101,8 +101,8 @@ def reduce_stage(
         bodies |= {path: load_body(path) for *_, path in together}
     for own, index, path in missing:
         if bodies[path] is None:
-            bodies[path] = body = reduce_gear(own, index, progress)
-            save_body(body, path)
+            save_body(reduce_gear(own, index, progress), path)
+            bodies[path] = load_body(path)  # rounded as the file is
     return [body for body in bodies.values() if body is not None]
 
 
@@ -210,7 +210,7 @@ def _made_here(gear: Any, geometry: Geometry, load_points: tuple[ToothFlank, Poi
     statics = static_tables(body, pictured_loads(points), _within(report, 0.6, 0.8))
     case = FrfCase(gear.modal_damping, FRF_CUT, geometry.r)
     frf = frf_error(body, modes, statics, case, _within(report, 0.8, 1.0))
-    display = sector_display(surface, body, modes, statics)
+    display = sector_display(surface, body, statics)
     rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
     shapes = sector_shapes(surface, modes)
     return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim, shapes)

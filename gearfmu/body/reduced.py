@@ -120,6 +120,7 @@ class ReducedBody:
             "helix": self.base_helix_angle != 0,
             "tangent": self.knows_profile,
             "shapes": self.shapes is not None,
+            "surface": self.shapes is None,
             "spin": self.spin is not None,
         }
         return tuple(name for name, there in has.items() if there)
@@ -201,6 +202,7 @@ def _meaning_problems(body: ReducedBody) -> list[str]:
         ),
         "shapes/quads names a point that is not there": body.shapes is None
         or bool(np.all((body.shapes.quads >= 0) & (body.shapes.quads < len(body.shapes.points)))),
+        "display/loads does not fit the surface": body.display.loads.shape[1] == len(body.display.points),
         "display/quads names a point that is not there": bool(
             np.all((body.display.quads >= 0) & (body.display.quads < len(body.display.points)))
         ),

@@ -11,15 +11,17 @@ import h5py
 import numpy as np
 
 from gearfmu.body.layout import FORMAT, FORMAT_VERSION, GROUPS, TEXTS, Entry, entries_of
+from gearfmu.body.packing import read_entry, write_entry
 from gearfmu.body.reduced import ReducedBody, Rim, Tangent, value_of
 from gearfmu.errors import BodyError
 from gearfmu.hdf5 import Format, reading, writing
-from gearfmu.reduction.display import Display, Shapes
+from gearfmu.reduction.display import Display, Shapes, whole_surface
 from gearfmu.reduction.frf import FrfError
 from gearfmu.reduction.spin import Spin
 
-FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, "make it again with 'gearfmu reduce STAGE'")
-_PACKED = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "fletcher32": True}
+REMEDY = "make it again with 'gearfmu reduce STAGE'"
+FORM = "v110"  # HDF5 1.10: a dataset in one piece needs no index, which takes 2 kB in older forms
+FILE = Format(FORMAT, FORMAT_VERSION, "body", BodyError, REMEDY, FORM)
 
 
 def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
@@ -34,9 +36,7 @@ def save_body(body: ReducedBody, path: str | os.PathLike[str]) -> None:
             value = np.asarray(value_of(body, entry.field), dtype=entry.kind)
             if entry.field == "static_ff":
                 value = value[:, :, : value.shape[2] // 2 + 1]
-            dataset = file.create_dataset(entry.path, data=value, **(_PACKED if value.size > 16 else {}))
-            dataset.attrs["unit"] = entry.unit
-            dataset.attrs["meaning"] = entry.meaning
+            write_entry(file, entry, value)
 
 
 def load_body(path: str | os.PathLike[str]) -> ReducedBody:
@@ -52,7 +52,7 @@ def load_body(path: str | os.PathLike[str]) -> ReducedBody:
 def _read(file: h5py.File, entry: Entry) -> Any:
     if not isinstance(file.get(entry.path), h5py.Dataset):
         raise BodyError(f"dataset {entry.path} is missing")
-    value = file[entry.path][()]
+    value = read_entry(file[entry.path], entry)
     if not entry.shape and np.ndim(value) == 0:
         return value.item()
     return np.ascontiguousarray(value)
@@ -68,8 +68,17 @@ def _all_offsets(half: np.ndarray, teeth: int) -> np.ndarray:
     return np.concatenate([half, mirrored[:, :, ::-1]], axis=2)
 
 
+def _whole_surface(values: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Surface of all sectors from that of sector 0."""
+    sector = Shapes(**{f.name: values[f"shapes.{f.name}"] for f in fields(Shapes)})
+    points, quads = whole_surface(sector, values["teeth"])
+    return {"display.points": points.astype("f4"), "display.quads": quads}
+
+
 def _body(values: dict[str, Any], heads: dict[str, Any]) -> ReducedBody:
     values["static_ff"] = _all_offsets(values["static_ff"], values["teeth"])
+    if "shapes.points" in values:
+        values |= _whole_surface(values)
     parts: dict[str, Any] = {}
     for group, kind in (
         ("frf", FrfError),

@@ -1,4 +1,4 @@
-"""A small surface of the whole gear for pictures, and how it moves in the lowest modes and under tooth loads."""
+"""A small surface of the gear for pictures, and how it moves in its modes and under tooth loads."""
 
 from __future__ import annotations
 
@@ -14,14 +14,11 @@ from gearfmu.fem import surface
 
 @dataclass(frozen=True)
 class Display:
-    """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; modes (k, P, 3):
-    displacement of mode k, kg^-½, `mode_index` (k,) its number in the body; loads (p, P, 3): displacement under a
-    unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m."""
+    """Pictures of a gear, float32. points (P, 3) m; quads (Q, 4) indices, normals outward; loads (p, P, 3):
+    displacement under a unit load on flank 0 of tooth 0, m/N, at roll `load_roll` (p,), m."""
 
     points: np.ndarray
     quads: np.ndarray
-    modes: np.ndarray
-    mode_index: np.ndarray
     loads: np.ndarray
     load_roll: np.ndarray
 
@@ -70,12 +67,6 @@ def whole_surface(sector: Outline | Shapes, teeth: int) -> tuple[np.ndarray, np.
     quads = [((j + sector.ahead) % teeth) * per_sector + sector.quads for j in range(teeth)]
     points = turn_sectors(np.broadcast_to(sector.points, (teeth, per_sector, 3)))
     return points.reshape(-1, 3), np.concatenate(quads)
-
-
-def unfold_mode(shape: np.ndarray, nodal_diameter: int, sector: Outline, teeth: int) -> np.ndarray:
-    """Displacement (z·P, 3) of the first (real) part of a mode from its sector shape (3N,)."""
-    turn = np.exp(2j * np.pi * nodal_diameter * np.arange(teeth) / teeth)
-    return turn_sectors(np.multiply.outer(turn, sector.sample @ shape.reshape(-1, 3)).real).reshape(-1, 3)
 
 
 def unfold_sectors(shapes: np.ndarray, sector: Outline) -> np.ndarray:

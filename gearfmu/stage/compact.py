@@ -18,7 +18,7 @@ from gearfmu.stage.free import Flank, products, read_tables, turn_tables
 from gearfmu.stage.groups import Group, node_directions
 from gearfmu.stage.tables import OFFSETS
 
-EQUAL = 1e-9  # of the largest compliance: what parts the flanks of a mirrored gear
+EQUAL = 1e-6  # of the largest compliance: what may part the flanks of a mirrored gear, whose tables are rounded
 FURTHER = range(1, max(OFFSETS) + 1)
 ACROSS = [(0, 1, 0)] + [(f, 1 - f, m) for m in FURTHER for f in (0, 1)]  # from flank, to flank, offset
 

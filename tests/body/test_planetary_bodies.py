@@ -29,7 +29,7 @@ from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.planetary_body import SET_BODIES
 from gearfmu.spec.stage import load_stage
 
-LARGEST = 10e6  # bytes of a file, as of other shipped bodies
+LARGEST = 1.4e6  # bytes of a file, as of other shipped bodies
 SPEC = load_stage("planetary54")
 COARSE = SPEC.model_copy(
     update={"carrier": SPEC.carrier.model_copy(update={
