@@ -24,7 +24,8 @@ from gearfmu.study.bench import Point, measure
 from gearfmu.study.norm import errors
 
 ROOT = Path(__file__).resolve().parents[1]
-CUTS, STEPS, REFERENCE = (40e3, 60e3, 80e3, 100e3, 120e3, 150e3), (10e-6, 5e-6), Point("full", "dg4", 0.4e-6, 5)  # Hz, s
+CUTS, STEPS = (40e3, 60e3, 80e3, 100e3, 120e3, 150e3), (10e-6, 5e-6)  # Hz, s
+REFERENCE = Point("full", "dg4", 0.4e-6, 5)
 
 
 def main() -> None:

@@ -240,11 +240,10 @@ static void check_modes(reader *r, const gk_gear *g)
         demand(r, counted(g->diameter + k, 0, g->z) && counted(g->member + k, 0, 2), "nodal diameters or members");
         if ((g->member[k] == 1 && next != 2) || (g->member[k] == 2 && before != 1)) refuse(r, "mode pairs", "are torn");
     }
-    for (int level = 0, fewest = 0; level < 3 && !r->outcome; level++) {
-        const int count = g->level_modes[level];
-        demand(r, counted(&count, fewest, g->modes), "modes of a level");
-        if (!r->outcome && count < g->modes && g->member[count] == 2) refuse(r, "mode pairs", "are torn by a level");
-        fewest = count;
+    for (int level = 0; level < 3 && !r->outcome; level++) {
+        const int *count = g->level_modes + level;
+        demand(r, counted(count, level ? count[-1] : 0, g->modes) && (*count == g->modes || g->member[*count] != 2),
+               "modes of a level");
     }
 }
 

@@ -48,8 +48,8 @@ static int common_rows(const gk_model *model, const gk_setup *setup, const gk_si
     return directions + 1;
 }
 
-/* What the rows of a node have in common in the ground group: numbers of one side, in the room of gk_moves_scratch. Rows
- * by columns have the points, then what gaps and bores read; sums over the oscillators stay in order. */
+/* What the rows of a node have in common in the ground group: numbers of one side, in the room of gk_moves_scratch.
+ * Rows by columns have the points, then what gaps and bores read; sums over the oscillators stay in order. */
 typedef struct ground_part {
     const gk_side *side;
     int from, width, points, padded, count;      /* padded: points in whole quads; count: of what gaps and bores read */

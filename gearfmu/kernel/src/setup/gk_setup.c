@@ -333,7 +333,7 @@ static void take_twins(const gk_model *model, gk_twins *sides, gk_twins *out)
     }
 }
 
-/* gear by gear, those of one body together: each body's compliances are spread once, and each place on it is read once */
+/* gear by gear, those of one body together: each body's compliances are spread once, each place on it is read once */
 static void fill_sides(const gk_model *model, gk_setup *setup, gk_work *work)
 {
     gk_fill_function *const fill = gk_wide_fill(1);

@@ -79,7 +79,7 @@ int gk_side_twins(const gk_model *model, int e, int f)
            same_body(model, a, b, 0) && same_body(model, a, b, 1);
 }
 
-/* ---- scratch ------------------------------------------------------------------------------------------------------ */
+/* ---- scratch ----------------------------------------------------------------------------------------------------- */
 static size_t most_points(const gk_model *model) { return MAX_CANDIDATES * (size_t)gk_strips_count(model, MAX_SLICES); }
 
 /* doubles that a maker takes, and those of what a step has in hand (gk_moves.c) */

@@ -6,8 +6,8 @@
 enum { CHUNK = 64 };
 
 /* ---- which gears ------------------------------------------------------------------------------------------------- */
-/* gears of one body: of one shape, with modes of the same numbers, and with one copy of its tables in the blob; patterns
- * of far teeth are each gear's own */
+/* gears of one body: of one shape, with modes of the same numbers, and with one copy of its tables in the blob;
+ * patterns of far teeth are each gear's own */
 static int same_shape(const gk_gear *a, const gk_gear *b)
 {
     const double of_a[] = {a->r_b,   a->s_form, a->s_tip, a->psi_b,         a->width,       a->local,
