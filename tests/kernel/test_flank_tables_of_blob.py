@@ -44,7 +44,7 @@ def larger(values: np.ndarray) -> np.ndarray:
         ("size0", sized("mirrored", 1), "residual_own has the wrong length"),
         ("low_member1", lambda member: member * 0 + 1, "pairs of modes of nodal diameter 0 and 1 are out of range"),
         ("low_member1", lambda member: member * 0 + 2, "pairs of modes of nodal diameter 0 and 1 are out of range"),
-        ("counts", lambda c: np.where(c == 3, 2, c).astype(np.int32), "make the model again"),  # an older model
+        ("counts", lambda c: np.concatenate([c[:1] - 1, c[1:]]), "make the model again"),  # an older model
     ]
     + [
         (name, change, f"{name.rstrip('01_')} {words}")

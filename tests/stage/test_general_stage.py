@@ -14,7 +14,7 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.expand import expand_pair
 from gearfmu.spec.general import EngagementSpec, GeneralStage, PlacedPort, RotorSpec, SupportSpec
-from gearfmu.stage.assembly import general_sections
+from gearfmu.stage.assembly import MODEL_VERSION, general_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.groups import mount
 from gearfmu.stage.layout import stage_layout
@@ -80,7 +80,7 @@ def test_sections_of_a_train_are_complete(train, sections):
     counts = dict(
         zip(("version", "slices", "rotors", "gears", "engagements", "ports"), ordered["counts"][:6], strict=True)
     )
-    assert counts == {"version": 3, "slices": 5, "rotors": 3, "gears": 4, "engagements": 2, "ports": 2}
+    assert counts == {"version": MODEL_VERSION, "slices": 5, "rotors": 3, "gears": 4, "engagements": 2, "ports": 2}
     assert ordered["support_names"].split("|")[:6] == [
         f"seat.pinion1.{d}" for d in ("fx", "fy", "fz", "mx", "my", "mz")
     ]

@@ -205,6 +205,14 @@ static double limit_mu(const gk_model *model, const gk_setup *setup, gk_work *wo
     return worst;
 }
 
+/* μ′ of a step of length h with γ */
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+{
+    GK_ASSERT(gk_scheme_of(setup->integrator)->corrected);
+    keep_all(model, setup, work);
+    return limit_mu(model, setup, work, h, gamma);
+}
+
 /* γ for which μ′ stays at its bound */
 static double gamma_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
 {
