@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -109,6 +110,12 @@ def test_modules_say_what_they_are(path: Path) -> None:
     public = [n for n in tree.body if isinstance(n, (ast.FunctionDef, ast.ClassDef)) and not n.name.startswith("_")]
     silent = [n.name for n in public if not ast.get_docstring(n)]
     assert not silent, f"public without docstring: {silent}"
+
+
+def test_names_of_test_modules_are_their_own() -> None:
+    """Folders of tests are no packages: pytest refuses two modules of one name, but says so only in a whole run."""
+    names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
+    assert names and not [name for name, count in names.items() if count > 1]
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not a checkout")

@@ -5,7 +5,7 @@
 #include "integrate/gk_integrate.h"
 
 static const double RELATIVE = 1e-6, SMALLEST = 1e-12, POSITION = 1e-10, SPEED = 1e-6;
-enum { STAGES = 7 };
+enum { STAGES = 7, TRIALS = 20000 };
 static const double NODE[STAGES] = {0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1, 1};
 static const double A[STAGES][6] = {{0},
                                     {0.2},
@@ -260,7 +260,7 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
 }
 
 /* Over h, in as many inner steps as the error control wants; outer ends move linearly between outer_before and outer. γ
- * has no meaning here. GK_OK or GK_DIVERGED. */
+ * has no meaning here. GK_OK, or GK_DIVERGED: inner steps of less than a picosecond, or more than TRIALS of them. */
 gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double h,
                         double gamma)
 {
@@ -272,7 +272,8 @@ gk_outcome gk_rk45_step(const gk_model *model, const gk_setup *setup, gk_work *w
     memcpy(from, work->outer_before, sizeof from);
     memcpy(to, work->outer, sizeof to);
     for (int p = 0; p < model->ports; p++) work->outer_speed[p] = (to[p] - from[p]) / h;
-    while (done < h) {
+    for (int trial = 0; done < h; trial++) {
+        if (trial == TRIALS) return GK_DIVERGED;
         step = gk_min(step, h - done);
         int good = 1;
         for (int i = 0; i < STAGES && good; i++) {
