@@ -107,6 +107,12 @@ def test_a_thousand_damaged_blobs(fuzzer: Path) -> None:
     assert found.outcomes[REFUSED] > 300 and found.outcomes["step", "0"] > 100
 
 
+def test_inner_steps_of_rk45_have_an_end(fuzzer: Path) -> None:
+    """Case 6172 drives the steps of the error control down to picoseconds that are never refused one by one."""
+    found = feed(fuzzer, damaged, [6172])
+    assert found.outcomes == {("step", "8"): 1}
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("part", range(10))
 def test_a_hundred_thousand_damaged_blobs(fuzzer: Path, part: int) -> None:

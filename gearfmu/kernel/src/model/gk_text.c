@@ -40,7 +40,7 @@ const char *gk_outcome_text(gk_outcome outcome)
         "communication step refused: not positive, not finite or not at the current time",
         "internal step too large for this model",
         "no static equilibrium found for the start",
-        "diverged: state not finite even with the smallest step and the fallback scheme",
+        "diverged: state not finite or rk45 steps without end, even with the smallest step and the fallback scheme",
         "teeth overlap beyond what the model can mean",
         "energy balance broken"};
     return (int)outcome >= 0 && outcome < GK_OUTCOMES ? text[outcome] : "unknown outcome";
