@@ -122,7 +122,9 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *
     data->count = 0;
     data->amplitudes = (int64_t)setup->amplitudes;
     gk_outputs_start(model, setup, work, data);
-    return GK_OK;
+    if (gk_finite(data->stage[V_ENERGY])) return GK_OK;
+    data->phase = PHASE_NEW;
+    return GK_NO_EQUILIBRIUM;
 }
 
 /* ---- guarded internal step --------------------------------------------------------------------------------------- */
