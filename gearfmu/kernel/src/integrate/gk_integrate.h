@@ -13,38 +13,36 @@ typedef struct gk_scheme {
 } gk_scheme;
 const gk_scheme *gk_scheme_of(gk_integrator integrator);
 
-/* gk_wide.c */
-gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
-gk_tally_function *gk_wide_count(int widest);
-gk_fill_function *gk_wide_fill(int widest);
-gk_moves_function *gk_wide_moves(int widest);
 /* gk_memory.c */
-int gk_memory_find(const gk_meshing *meshing, gk_key key);
-void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
-void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
-void gk_memory_forget(gk_engaged *engaged);
+GK_HOT int gk_memory_find(const gk_meshing *meshing, gk_key key);
+GK_HOT void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
+GK_HOT void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
+GK_HOT void gk_memory_forget(gk_engaged *engaged);
 /* gk_step.c */
-gk_step_function gk_step_once;
-double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
-const double *gk_step_force(const gk_system *s);
-const double *gk_step_z(const gk_system *s);
+GK_HOT gk_step_function gk_step_once;
+GK_HOT double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data,
+                             const gk_coefficients *k);
+GK_HOT const double *gk_step_force(const gk_system *s);
+GK_HOT const double *gk_step_z(const gk_system *s);
 /* gk_frame.c */
-void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
-void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
-void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a);
-double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
-                      double *v);
-void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v, double *a);
-void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force);
+GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
+GK_HOT void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
+GK_HOT void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a);
+GK_HOT double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
+                             const gk_data *data, double *v);
+GK_HOT void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v,
+                           double *a);
+GK_HOT void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force);
 /* gk_rk45.c */
-int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,
-                     const double *outer);
-void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, double *y);
-void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data);
-void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double step);
-gk_step_function gk_rk45_step;
+GK_HOT int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,
+                            const double *outer);
+GK_HOT void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, double *y);
+GK_HOT void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data);
+GK_HOT void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
+                            double step);
+GK_HOT gk_step_function gk_rk45_step;
 /* gk_central.c */
-gk_step_function gk_central_step;
+GK_HOT gk_step_function gk_central_step;
 double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                          double h);
 double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work);

@@ -105,7 +105,7 @@ static void make_tables(const gk_model *model, const gk_setup *setup, gk_work *w
     gk_limit_run(model, setup, work, h);
     const double gamma = gk_scheme_of(setup->integrator)->corrected ? work->run_gamma : 0.0;
     if (work->table_h == h && work->table_gamma == gamma) return;
-    gk_wide_moves(1)(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
+    setup->moves(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
 }
 
 gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time)

@@ -1,6 +1,7 @@
 /* Tables of the sides of engagements: which teeth they are of, and what making them takes. */
 #ifndef GK_TABLES_H
 #define GK_TABLES_H
+#include "base/gk_lanes.h"
 #include "gk.h"
 #include "model/gk_model.h"
 #include "setup/gk_setup.h"
@@ -12,7 +13,7 @@ typedef struct gk_twins {
 
 typedef void gk_fill_function(const gk_model *model, gk_setup *setup, gk_work *work, const gk_twins *twins);
 /* gk_tables.c */
-gk_fill_function gk_side_fill;
+GK_HOT gk_fill_function gk_side_fill;
 /* gk_side.c */
 void gk_side_plan(const gk_model *model, const gk_setup *setup, int e, gk_side *side, int which);
 int gk_side_twins(const gk_model *model, int e, int f);
