@@ -1,29 +1,14 @@
 /* The time integrators, statics and the choice of the step. */
 #ifndef GK_INTEGRATE_H
 #define GK_INTEGRATE_H
+#include "problem/gk_engage.h"
 #include "problem/gk_work.h"
 #include "setup/gk_tables.h"
 
-/* what an integrator is; gk_scheme.c */
-typedef struct gk_scheme {
-    int is_explicit;  /* forces follow from positions; limited by stability; no account of work; knows no clutch */
-    int corrected;    /* γ > 0: corrected for time within the step */
-    int linear_force; /* forces are linear in the step, else constant */
-    int adaptive;     /* chooses its own inner steps */
-} gk_scheme;
-const gk_scheme *gk_scheme_of(gk_integrator integrator);
-
-/* gk_memory.c */
-GK_HOT int gk_memory_find(const gk_meshing *meshing, gk_key key);
-GK_HOT void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
-GK_HOT void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
-GK_HOT void gk_memory_forget(gk_engaged *engaged);
 /* gk_step.c */
 GK_HOT gk_step_function gk_step_once;
 GK_HOT double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data,
                              const gk_coefficients *k);
-GK_HOT const double *gk_step_force(const gk_system *s);
-GK_HOT const double *gk_step_z(const gk_system *s);
 /* gk_frame.c */
 GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
 GK_HOT void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
@@ -45,17 +30,16 @@ GK_HOT gk_step_function gk_rk45_step;
 GK_HOT gk_step_function gk_central_step;
 double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                          double h);
-double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work);
+double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
 /* gk_limit.c */
-int gk_limit_cholesky(double *a, int n);
 void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C);
-void gk_limit_solve(const double *L, double *x, int n);
-int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
-                   int e, double position);
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
+int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                   const gk_coefficients *k, int e, double position);
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
+                   double gamma);
 double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h);
-void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, double h);
-gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
+void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h);
+gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,
                            char message[GK_MESSAGE]);
 /* gk_static.c */
 typedef struct gk_boundary {
@@ -64,13 +48,4 @@ typedef struct gk_boundary {
 } gk_boundary;
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                            const gk_boundary *b, int bare, int keep);
-
-#ifdef GK_PROFILE /* processor cycles by phase; the product has no clock in it */
-#include <x86intrin.h>
-#define GK_MARK(work) ((work)->mark = __rdtsc())
-#define GK_LAP(work, phase) ((work)->cycles[phase] -= (work)->mark, (work)->cycles[phase] += ((work)->mark = __rdtsc()))
-#else
-#define GK_MARK(work) ((void)(work))
-#define GK_LAP(work, phase) ((void)(work))
-#endif
 #endif

@@ -118,6 +118,18 @@ static inline int gk_system_is_sound(const gk_system *s)
 }
 static inline int gk_is_row(const gk_system *s, int i) { return i >= 0 && i < s->n; }
 
+/* what gk_rows_scatter may scatter: the forces at the end; those of the step */
+static inline const double *gk_step_force(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    return s->force;
+}
+static inline const double *gk_step_z(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    return s->z;
+}
+
 static inline int gk_film_on(const gk_system *s) { return GK_HAS(film) && s->films > 0; }
 /* flanks of a contact that carries touch: it is no film alone */
 static inline int gk_solve_touches(const gk_system *s, int i)

@@ -6,7 +6,8 @@
 #include "setup/gk_spread.h"
 
 /* phases of a step, for the profile */
-enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to quads */
+enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
+enum { COMMON = 8 };          /* motions of a gear and the angle of its bore, padded to quads */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
 typedef struct gk_point { /* of a strip */
     double gap, gradient[POSE];
@@ -162,7 +163,7 @@ struct gk_work {
     double *rest_ground;            /* displacement of the ground group */
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
     double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
-    double *columns; /* room for a node's rows and their products */
+    double *columns; /* room for a node's rows and their products; A of the explicit rows at all LIMIT_POSITIONS */
     double *spread;  /* room of gk_spread.c, and the compliances that it makes of one gear */
     gk_real *blocks;
     gk_compliance compliance;
@@ -181,13 +182,6 @@ GK_HOT int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_
 GK_HOT void gk_nodal_leave(gk_system *s);
 GK_HOT void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                            const gk_real *const speed[], double spin_rate[]);
-/* gk_frozen.c */
-GK_HOT int gk_frozen_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *frozen,
-                          const double *pose, gk_position position[2], gk_place *place);
-/* gk_choose.c */
-gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
-int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g);
-int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *which);
 /* gk_layout.c */
 void gk_layout_plan(const gk_model *model, gk_setup *setup);
 void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
@@ -286,4 +280,13 @@ GK_HOT void gk_form_system(const gk_model *model, const gk_setup *setup, const g
                            gk_work *work, int e);
 GK_HOT void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *const modal_speed[],
                           const double *ground_speed, const double *speed, double *rate);
+
+#ifdef GK_PROFILE /* processor cycles by phase; the product has no clock in it */
+#include <x86intrin.h>
+#define GK_MARK(work) ((work)->mark = __rdtsc())
+#define GK_LAP(work, phase) ((work)->cycles[phase] -= (work)->mark, (work)->cycles[phase] += ((work)->mark = __rdtsc()))
+#else
+#define GK_MARK(work) ((void)(work))
+#define GK_LAP(work, phase) ((void)(work))
+#endif
 #endif

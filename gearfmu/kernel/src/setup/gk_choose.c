@@ -1,6 +1,7 @@
 /* What a run is made of: level, integrator, effects and contact that go together, and the oscillators that are dynamic
  * then. */
-#include "integrate/gk_integrate.h"
+#include "setup/gk_choose.h"
+#include "setup/gk_setup.h"
 #include <stdio.h>
 
 /* ---- level and integrator ---------------------------------------------------------------------------------------- */

@@ -187,6 +187,23 @@ typedef struct gk_coefficients {
 /* share of the correction κ that a free mass has: γ lowers it below ½ only (gk_flow.c) */
 static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamma); }
 
+/* what an integrator is: the one place where they differ in more than their own file */
+typedef struct gk_scheme {
+    int is_explicit;  /* forces follow from positions; limited by stability; no account of work; knows no clutch */
+    int corrected;    /* γ > 0: corrected for time within the step */
+    int linear_force; /* forces are linear in the step, else constant */
+} gk_scheme;
+static inline const gk_scheme *gk_scheme_of(gk_integrator integrator)
+{
+    GK_ASSERT(integrator >= DG4 && integrator <= CENTRAL);
+    static const gk_scheme schemes[] = {[DG4] = {.corrected = 1},
+                                        [MIX4] = {.linear_force = 1},
+                                        [EM] = {0},
+                                        [RK45] = {.is_explicit = 1},
+                                        [CENTRAL] = {.is_explicit = 1}};
+    return &schemes[integrator];
+}
+
 typedef struct gk_tally gk_tally;
 typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
                                double h, gk_tally *tally);

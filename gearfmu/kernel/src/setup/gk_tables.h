@@ -20,6 +20,4 @@ int gk_side_twins(const gk_model *model, int e, int f);
 size_t gk_side_scratch(const gk_model *model);
 /* gk_moves.c: doubles of what a step has in hand */
 size_t gk_moves_scratch(size_t points, size_t lanes, size_t ground);
-/* gk_limit.c */
-size_t gk_limit_scratch(const gk_model *model);
 #endif
