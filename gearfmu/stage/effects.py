@@ -238,7 +238,7 @@ EFFECTS: tuple[Effect, ...] = (
             "always; a switch for conservation tests: what moves with the roll is work of the mesh, not of the scheme"
         ),
         off="all of it stays that of the start, gaps are linear in the coordinates",
-        code="gk_frozen.c, gk_step.c (gk_step_once)",
+        code="gk_engage.c",
         kept="a switch for conservation tests",
     ),
     Effect(
