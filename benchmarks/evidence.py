@@ -3,6 +3,7 @@
     python benchmarks/evidence.py check              lists what is stale; exit code 1 if README.md shows any of it
     python benchmarks/evidence.py make [TARGET …]    makes stale targets, all or those named, one after the other
     python benchmarks/evidence.py make --again TARGET …    current ones too
+    python benchmarks/evidence.py forget TARGET …    files made without a record are taken as they are, and are stale
 
 evidence.json has one entry a target: `command`; `needs`, input → hash when the target was made, "" where unknown;
 `makes`, file → hash; `made` (date), `minutes`, `ended` (last line that the command printed). Inputs: `kernel` (the
@@ -127,16 +128,18 @@ class Ledger:
         needs = {need: self.digest(need) for need in entry["needs"]}
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         code, last = run(entry["command"], self.root, os.environ | {"PATH": path, BEHAVIOUR: self.digest("kernel")})
-        entries = self.read()  # again: others may have recorded theirs
-        entries[name] |= {
-            "needs": dict.fromkeys(needs, "") if code else needs,
-            "makes": {file: self.digest(file) for file in entry["makes"]},
-            "made": f"{datetime.date.today()}",
-            "minutes": round((time.monotonic() - started) / 60, 1),
-            "ended": f"exit {code}: {last}" if code else last,
-        }
-        write_text(self.file, json.dumps(entries, indent=1, ensure_ascii=False) + "\n")
+        ended = f"exit {code}: {last}" if code else last
+        minutes = round((time.monotonic() - started) / 60, 1)
+        self.record(name, {} if code else needs, made=f"{datetime.date.today()}", minutes=minutes, ended=ended)
         return not code
+
+    def record(self, name: str, needs: Mapping[str, str], **more: Any) -> None:
+        """Write the files of a target as they are, made from `needs`; those not given are unknown."""
+        entries = self.read()  # again: others may have recorded theirs
+        known = {need: needs.get(need, "") for need in entries[name]["needs"]}
+        files = {file: self.digest(file) for file in entries[name]["makes"]}
+        entries[name] |= {"needs": known, "makes": files, **more}
+        write_text(self.file, json.dumps(entries, indent=1, ensure_ascii=False) + "\n")
 
 
 def run(command: str, folder: Path, setting: Mapping[str, str]) -> tuple[int, str]:
@@ -190,12 +193,16 @@ def make(ledger: Ledger, names: list[str], again: bool = False, tell: Callable[[
 def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("verb", choices=("check", "make"))
+    parser.add_argument("verb", choices=("check", "make", "forget"))
     parser.add_argument("targets", nargs="*", metavar="TARGET")
     parser.add_argument("--again", action="store_true", help="current targets too")
     chosen, ledger = parser.parse_args(), Ledger()
     if chosen.verb == "check":
         return check(ledger)
+    if chosen.verb == "forget":
+        for name in chosen.targets:
+            ledger.record(name, {})
+        return 0
     return min(make(ledger, chosen.targets, chosen.again), 99)
 
 

@@ -32,7 +32,7 @@ def test_no_file_was_written_without_a_record() -> None:
     ledger = Ledger()
     touched = {name: ledger.touched(entry) for name, entry in ledger.read().items()}
     wrong = {name: files for name, files in touched.items() if files}
-    assert not wrong, f"python benchmarks/evidence.py make --again {' '.join(wrong)}"
+    assert not wrong, f"python benchmarks/evidence.py make --again {' '.join(wrong)} (or forget)"
 
 
 def test_inputs_exist_and_are_made_before_they_are_used() -> None:
@@ -83,6 +83,8 @@ def test_what_is_stale_is_made_and_only_that(small: Ledger, monkeypatch: pytest.
     assert make(small, ["table"], tell=said.append) == 0 and list(small.stale()) == ["picture"]
     (small.root / "table.csv").write_text("by hand")
     assert small.stale()["table"] == ["table.csv is not what was recorded"]
+    small.record("table", {})
+    assert small.stale()["table"] == ["made from what is not known"]
 
 
 def test_nothing_is_made_by_a_kernel_with_other_runs(small: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
