@@ -3,6 +3,7 @@ to. Links are those of the checkout; here they are turned into those of the site
 
 from __future__ import annotations
 
+import csv
 import re
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -12,6 +13,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).resolve().parents[1]
 OUTER_PAGES = {"README.md": "index.md", "CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 LINK = re.compile(r"\[([^\[\]]*)\]\(([^)#\s]+)(#[^)\s]*)?\)")
+CSV = re.compile(r"<!-- csv: (\S+) -->")
 LIST_OR_TABLE = re.compile(r"(- |\d+\. |\|)")
 
 
@@ -29,9 +31,18 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Links as the site has them; lists and tables begin after an empty line, which GitHub does not ask for."""
+    """Links as the site has them, named CSV files as tables; lists and tables begin after an empty line, which GitHub
+    does not ask for."""
     folder = _folder(page.file)
+    markdown = CSV.sub(lambda match: _table(ROOT / match[1]), markdown)
     return _spaced(LINK.sub(lambda match: _relinked(match, folder, page.file.src_uri), markdown))
+
+
+def _table(path: Path) -> str:
+    """A CSV file as a Markdown table."""
+    with path.open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows))
 
 
 def _relinked(match: re.Match[str], folder: PurePosixPath, page: str) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
+import prose
 import pytest
 
 from gearfmu import cli
@@ -116,3 +118,26 @@ def test_make_targets_named_in_the_readme_exist() -> None:
     for page in PAGES:
         for target in re.findall(r"`make ([a-z-]+)`", page.read_text(encoding="utf-8")):
             assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), f"{page.name}: make {target}"
+
+
+def test_prose_gets_no_worse() -> None:
+    """Long sentences and banned words of each page, and the words of all: tests/prose.json may only fall."""
+    limits = json.loads(prose.LIMITS.read_text(encoding="utf-8"))
+    assert prose.words() <= limits["words"][0]
+    worse = []
+    for page in prose.PAGES:
+        found, most = prose.counts(page), limits.get(prose.name(page), [0, 0])
+        if found[0] > most[0] or found[1] > most[1]:
+            worse.append(
+                f"{prose.name(page)}: {found} instead of {most}; see `python tests/prose.py {prose.name(page)}`"
+            )
+    assert not worse, "\n".join(worse)
+
+
+def test_prose_is_counted() -> None:
+    long = "A sentence " + "of words " * 20 + "ends."
+    text = (
+        f"# What a head\n\n{long} It is short.\n\n- it [goes on](what.md) `what`\n\n```\nwhat\n```\n| what | {long} |\n"
+    )
+    assert [s.split()[0] for s in prose.too_long(text)] == ["A", "A"]
+    assert prose.banned(text) == ["goes on", "what"]

@@ -24,7 +24,7 @@ KERNEL_MAY_IMPORT = {"errors", "files", "kernel"}
 
 def packages() -> list[str]:
     """Package and file names in reading order, from the list in docs/architecture.md."""
-    block = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
+    block = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[3]
     words = [word for line in block.splitlines() for word in line.split("  ")[0].split()]
     return [word.removeprefix("gearfmu/").removesuffix("/").removesuffix(".py") for word in words]
 

@@ -46,13 +46,17 @@ class StepSize(Quantity):
     show_default="number of processors",
     help="Processes.",
 )
+@click.option("--list", "listed", is_flag=True, help="Describe the scenes and run nothing.")
 def stability(
-    levels: tuple[str, ...], steps: tuple[Any, ...], scenes: tuple[str, ...], out: Path | None, jobs: int
+    levels: tuple[str, ...], steps: tuple[Any, ...], scenes: tuple[str, ...], out: Path | None, jobs: int, listed: bool
 ) -> int:
     """Run the hard cases. Exit code: the number of failures (at most 99), 0 for none."""
     from gearfmu.stability import suite
-    from gearfmu.stability.scenes import SCENES
+    from gearfmu.stability.scenes import SCENES, what
 
+    if listed:
+        click.echo("\n".join(f"{name}: {what(name)}" for name in scenes or SCENES))
+        return 0
     wanted = suite.tasks(scenes or tuple(SCENES), levels or LEVELS, steps or tuple(STEPS))
     with progress_bar("stability") as progress:
         rows = suite.run_suite(wanted, out, jobs, progress)

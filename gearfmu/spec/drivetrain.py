@@ -26,10 +26,9 @@ class PassengerCar(Spec):
     """Four-cylinder car with manual gearbox: engine – dual-mass flywheel – clutch – input shaft – gear pair – output
     shaft – half shafts – wheels – vehicle.
 
-    The gear pair is the loaded pair of the engaged gear, pinion on the input shaft. What lies behind the output shaft
-    is lumped with the final drive taken as a rigid ratio: inertias, stiffnesses and torques there are referred to the
-    output shaft by its square or by it, and turn with the wheel gear (negative for a pinion that turns positively).
-    The gearbox's other pairs and its synchronisers are not modelled.
+    The gear pair is the loaded pair of the engaged gear, pinion on the input shaft. Everything behind the output
+    shaft is lumped and referred to it by the rigid final drive ratio, and turns with the wheel gear. The gearbox's
+    other pairs and its synchronisers are not modelled.
     """
 
     chain_in_fmu: Annotated[
@@ -81,7 +80,7 @@ class TestRig(Spec):
     """A rig: a drive with torque control on the pinion's shaft, a shaft of constant speed on the wheel.
 
     The drive's controller adds `speed_droop` times the deviation from the nominal speed. It damps the drive against
-    the shafts and leaves the gears alone, so that the mean torque is reached within the settling time.
+    the shafts, so that the mean torque is reached within the settling time.
     """
 
     __test__ = False  # not a test class, whatever its name

@@ -72,7 +72,7 @@ class Drivetrain(Spec):
     """Parts by name. A stage's port hangs on the inertia that `ports` names; ports without an entry stay as the stage
     has them, fixed or without torque."""
 
-    ports: dict[Name, PortShaft] = Field(description="what every port of the stage hangs on")
+    ports: dict[Name, PortShaft] = Field(description="part on each port of the stage")
     inertias: dict[Name, InertiaPart] = Field(description="rigid inertias")
     shafts: dict[Name, ShaftPart] = Field(default={}, description="shafts between inertias")
     clutches: dict[Name, ClutchPart] = Field(default={}, description="clutches and brakes")

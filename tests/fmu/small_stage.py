@@ -38,7 +38,7 @@ def unpack(fmu: Path, target: Path) -> str:
 
 
 def body(gear, shape) -> SimpleNamespace:
-    """Fields of a ReducedBody as docs/architecture.md lists them."""
+    """Fields of a ReducedBody as docs/file-formats.md lists them."""
     z = gear.teeth
     diameters = np.concatenate([[0], np.repeat(np.arange(1, (z + 1) // 2), 2), [z // 2] * (z % 2 == 0)])
     n = diameters.size

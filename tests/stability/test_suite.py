@@ -35,6 +35,12 @@ def test_what_counts_as_a_failure() -> None:
     assert row(drifted, "half").failed and row(drifted, "given", 5e-6).failed
 
 
+def test_scenes_are_listed_without_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.outcome(["stability", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(": ")[0] for line in lines] == list(SCENES)
+
+
 def test_a_table_is_written_and_gone_on_with(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Rows of the same kernel, bodies and scenes stay; others are run again."""
     out = tmp_path / "hard.csv"
