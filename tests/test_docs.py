@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 import json
 import re
 from pathlib import Path
@@ -38,6 +40,32 @@ def test_verbs_it_shows_are_real(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     shown = re.findall(r"(?:^|`)gearfmu ([a-z]+)\b", text, flags=re.MULTILINE)
     assert not set(shown) - set(cli.VERBS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_options_it_shows_are_those_of_their_verb(page: Path) -> None:
+    """In code blocks and code spans; remarks behind # and other commands of a line are no options."""
+    shown = re.findall(
+        r"(?:^|`|\$ )gearfmu ([a-z]+)\b([^`\n#|;]*)", page.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    wrong = [(verb, option) for verb, rest in shown for option in _options(rest) if option not in _known(verb)]
+    assert not wrong
+
+
+def _options(text: str) -> list[str]:
+    return re.findall(r"(?:^| )(--[a-z-]+)", re.sub(r'"[^"]*"', "", text))
+
+
+@functools.cache
+def _known(verb: str) -> set[str]:
+    module, name = cli.VERBS[verb][0].split(":")
+    command = getattr(importlib.import_module(module), name)
+    return {"--help", *(option for param in command.params for option in param.opts)}
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if "docs" in p.relative_to(ROOT).parts], ids=lambda p: p.name)
+def test_a_page_begins_with_its_reader(page: Path) -> None:
+    assert re.match(r"# .+\n\nFor ", page.read_text(encoding="utf-8"))
 
 
 def test_every_claim_names_what_shows_it() -> None:
