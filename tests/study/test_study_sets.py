@@ -91,6 +91,36 @@ def test_the_page_has_the_numbers_of_the_list() -> None:
         assert shown in page
 
 
+LEFT_OUT = {
+    "tip edges": "tip_contact",
+    "tip relief": "tip_relief",
+    "elastic bodies": "elastic",
+    "Hertz's law": "hertz",
+    "contact damping": "contact_damping",
+    "Centrifugal load": "centrifugal",
+    "Coriolis forces": "coriolis",
+}
+
+
+def test_the_page_says_what_effects_are_worth() -> None:
+    """Errors without single effects in docs/study.md, at 85 rad/s and, in brackets, at 300."""
+    page = (LIST.parents[2] / "docs" / "study.md").read_text(encoding="utf-8").split("*Left out*")[1].split("\n")[0]
+    rows = {(row.off, row.speed): row for row in read_rows(LIST, SetRow) if row.off}
+    assert len(rows) == 9
+    for words, effect in LEFT_OUT.items():
+        said = re.search(rf"{words} ([\d.]+) and ([\d.]+) %(?: \(300 rad/s: ([\d.]+) and ([\d.]+) %\))?", page)
+        assert said is not None
+        for speed, numbers in ((85.0, said.groups()[:2]), (300.0, said.groups()[2:])):
+            assert ((effect, speed) in rows) == (numbers[0] is not None)
+            for number, error in zip(numbers, _errors(rows.get((effect, speed))), strict=False):
+                digits = len(number.partition(".")[2])
+                assert f"{100 * error:.{digits}f}" == number, (effect, speed)
+
+
+def _errors(row: SetRow | None) -> tuple[float, ...]:
+    return () if row is None else (row.te_error, row.force_error)
+
+
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("planetary_*.toml")))
 def test_a_scene_of_a_set_says_how_far_its_level_errs(scene: str) -> None:
     rows = {row.level: row for row in ladder(read_rows(LIST, SetRow), 4) if row.h_s == 5e-6}
