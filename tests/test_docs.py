@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import functools
 import importlib
 import json
@@ -94,6 +95,20 @@ def test_a_tolerance_of_a_claim_stands_in_its_test() -> None:
         assert wanted <= {float(number) for number in re.findall(r"\b\d[\d.]*e-\d+", text)}, claim
         checked += len(wanted)
     assert checked >= 3
+
+
+@pytest.mark.parametrize("name", ["frf_carrier", "frf_carrier_free", "frf_ring"])
+def test_tables_of_reduction_are_those_of_the_benchmarks(name: str) -> None:
+    """Below each chart of docs/reduction.md: largest error, its frequency, median, both other errors, price."""
+    page = (ROOT / "docs" / "reduction.md").read_text(encoding="utf-8").split(f"(pictures/{name}.svg)")[1]
+    shown = re.findall(r"^\| [\w –/]+ \| (\d+ \| .+) \|$", page, flags=re.M)[:4]
+    with (ROOT / "benchmarks" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    errors = ("max_error", "median_error", "max_with_residual", "max_loaded_only")
+    for line, row in zip(shown, rows, strict=True):
+        most, *others = (f"{float(row[column]):.1e}" for column in errors)
+        price = (f"{float(row[column]):.0f}" for column in ("seconds", "memory_MB"))
+        assert line.split(" | ") == [row["n"], most, f"{float(row['at_Hz']):.0f}", *others, *price]
 
 
 def test_every_theme_of_decisions_is_listed_once_with_its_newest_record() -> None:
