@@ -7,6 +7,8 @@ JOBS   ?= 2
 BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
 OUT    ?= out
 STAGES ?= $(notdir $(patsubst %/stage.toml,%,$(wildcard reduced_models/*/stage.toml)))
+EVIDENCE = $(RUN) benchmarks/evidence.py
+export JOBS
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -21,30 +23,33 @@ demo: $(VENV)/.base
 test: lint
 	$(RUN) -m pytest -n $(JOBS) --dist worksteal --durations 60 -rs
 
-## make test-full   all tests, the slow ones too
+## make test-full   all tests, the slow ones too; how it ended is kept in benchmarks/evidence.json
 test-full: $(STAMP)
-	$(RUN) -m pytest -n $(JOBS) -rs -m "full or not full"
+	$(EVIDENCE) make --again test-full
 
 ## make bench       speed and error on this machine: the tables beside the benchmarks and the stages' price lists
 bench: $(STAMP)
-	for benchmark in $(BENCHMARKS); do echo "== $$benchmark"; $(RUN) benchmarks/$$benchmark.py || exit 1; done
+	$(EVIDENCE) make --again $(BENCHMARKS)
 
 ## make stability   the hard cases at every level and step: benchmarks/stability.csv and .json, docs/stability.md
 stability: $(STAMP)
-	$(RUN) -m gearfmu.cli stability --out benchmarks/stability.csv --jobs $(JOBS); failures=$$?; \
-	$(RUN) -m gearfmu.stability.page benchmarks/stability.csv docs/stability.md && exit $$failures
+	$(EVIDENCE) make --again stability
 
 ## make study       what accuracy costs: tables and charts of docs/study.md in benchmarks/study (bodies alone: make study-bodies)
 study: $(STAMP)
-	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --jobs $(JOBS)
-	$(RUN) -m gearfmu.cli study planetary_paper --out benchmarks/study
-	$(RUN) -m gearfmu.cli study pair_loaded pair_light --out benchmarks/study --table cuts
-	$(RUN) -m gearfmu.cli study pair_loaded --out benchmarks/study --table order --table limits
-	$(RUN) benchmarks/levels.py
+	$(EVIDENCE) make --again study study_sets study_cuts study_limits levels cost
 
 ## make study-bodies  how far the shipped bodies are from refined ones (reduces six gears: up to an hour)
 study-bodies: $(STAMP)
-	$(RUN) -m gearfmu.cli study pair_loaded pair_light clutch_closure --out benchmarks/study --table bodies
+	$(EVIDENCE) make --again study_bodies
+
+## make evidence    what is stale of all tables, pictures and pages, and only that; some by name: TARGETS="phases study"
+evidence: $(STAMP)
+	$(EVIDENCE) make $(TARGETS)
+
+## make evidence-check  lists what is stale; fails where README.md shows any of it
+evidence-check: $(STAMP)
+	$(EVIDENCE) check
 
 ## make wheel       dist/*.whl with the linux64 and win64 kernels
 wheel: $(STAMP)
@@ -57,8 +62,7 @@ models: $(STAMP)
 
 ## make docs        regenerate docs/variables.md and docs/effects.md from the tables in the code
 docs: $(VENV)/.base
-	$(RUN) -m gearfmu.cli schema variables --out docs/variables.md
-	$(RUN) -m gearfmu.cli schema effects --out docs/effects.md
+	$(EVIDENCE) make --again pages
 
 ## make site        the documentation as a site, out/site/index.html; warnings are errors
 site: $(STAMP)
@@ -81,4 +85,4 @@ $(STAMP): $(VENV)/.base
 	$(RUN) -m pip install --quiet -e ".[test]"
 	@touch $@
 
-.PHONY: help demo test test-full bench study study-bodies stability wheel models docs site lint
+.PHONY: help demo test test-full bench study study-bodies stability evidence evidence-check wheel models docs site lint

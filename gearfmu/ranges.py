@@ -75,6 +75,13 @@ def kernel_limits() -> dict[str, tuple[float, float]]:
     return {name: (ends["LOW"], ends["HIGH"]) for name, ends in found.items()}
 
 
+def kernel_number(name: str) -> float:
+    """A number of the kernel's header that is no limit."""
+    found = re.search(rf"^#define GK_{name} (\S+)", HEADER.read_text(encoding="utf-8"), re.MULTILINE)
+    assert found is not None, name
+    return float(found[1])
+
+
 def range_of(name: str) -> Range:
     """The range of that name. KeyError where there is none: a number of the spec without a range is our mistake."""
     return all_ranges()[name]

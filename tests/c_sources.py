@@ -30,7 +30,7 @@ _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]+"([^"]+)"', re.M)
 _DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.M)
 _OTHERWISE = re.compile(r"^[ \t]*#[ \t]*(?:else|elif)\b.*?(?=^[ \t]*#[ \t]*endif\b)", re.M | re.S)
 _DEFINE = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", re.M)
-_ATTRIBUTE = re.compile(r"__(?:attribute|declspec)(?:__)?\s*\(\((?:[^()]|\([^()]*\))*\)\)")
+_ATTRIBUTE = re.compile(r"\bGK_HOT\b|__(?:attribute|declspec)(?:__)?\s*\(\((?:[^()]|\([^()]*\))*\)\)")
 _ASSERT = re.compile(r"\bGK_ASSERT\((?:[^()]|\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))*\);")  # not in the product
 _FUNCTION = re.compile(r"\b(\w+)\s*\(")
 _BY_TYPE = re.compile(r"^\s*\w+_function\s+(\w+)\s*;?$")

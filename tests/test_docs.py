@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import functools
 import importlib
 import json
@@ -97,18 +96,16 @@ def test_a_tolerance_of_a_claim_stands_in_its_test() -> None:
     assert checked >= 3
 
 
-@pytest.mark.parametrize("name", ["frf_carrier", "frf_carrier_free", "frf_ring"])
-def test_tables_of_reduction_are_those_of_the_benchmarks(name: str) -> None:
-    """Below each chart of docs/reduction.md: largest error, its frequency, median, both other errors, price."""
-    page = (ROOT / "docs" / "reduction.md").read_text(encoding="utf-8").split(f"(pictures/{name}.svg)")[1]
-    shown = re.findall(r"^\| [\w –/]+ \| (\d+ \| .+) \|$", page, flags=re.M)[:4]
-    with (ROOT / "benchmarks" / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    errors = ("max_error", "median_error", "max_with_residual", "max_loaded_only")
-    for line, row in zip(shown, rows, strict=True):
-        most, *others = (f"{float(row[column]):.1e}" for column in errors)
-        price = (f"{float(row[column]):.0f}" for column in ("seconds", "memory_MB"))
-        assert line.split(" | ") == [row["n"], most, f"{float(row['at_Hz']):.0f}", *others, *price]
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_files_and_functions_of_the_kernel_that_it_names_exist(page: Path) -> None:
+    """`gk_flank.c`, with or without names of its functions in brackets."""
+    sources = {path.name: path for path in (ROOT / "gearfmu" / "kernel" / "src").rglob("gk_*.*")}
+    text = page.read_text(encoding="utf-8").replace("`", "")
+    named = re.findall(r"\b(gk_\w+\.(?:c|h|inc))\b(?: \(([\w, ]+)\))?", text)
+    missing = [file for file, _ in named if file not in sources]
+    functions = [(file, name) for file, names in named if file in sources for name in names.split(", ") if "_" in name]
+    missing += [f"{file}: {name}" for file, name in functions if name not in sources[file].read_text(encoding="utf-8")]
+    assert not missing
 
 
 def test_every_theme_of_decisions_is_listed_once_with_its_newest_record() -> None:

@@ -46,6 +46,7 @@ FLAGS = (
     "-Werror",
 )
 REBUILD = "python -m gearfmu.kernel"
+BEHAVIOUR = "GEARFMU_BEHAVIOUR"
 _PAGE = 14  # Apple processors have pages of 2^14 bytes
 CROSS = 'pip install "gearfmu[cross]"'
 
@@ -81,6 +82,12 @@ def source_hash(files: Sequence[Path]) -> str:
     for path in files:
         digest.update(b"\0" + path.name.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n"))
     return digest.hexdigest()
+
+
+def fingerprint() -> str:
+    """The kernel's part of the key of stored results, hex: the variable GEARFMU_BEHAVIOUR (`make evidence` sets it to
+    the hash of the golden runs, after it has checked them), else the SHA-256 of the host's library."""
+    return os.environ.get(BEHAVIOUR) or hashlib.sha256(library_path().read_bytes()).hexdigest()
 
 
 def library_path(platform: str = "host") -> Path:

@@ -7,15 +7,17 @@ import hashlib
 import io
 import json
 import multiprocessing
+import re
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import GearfmuError, ModelError, SimulationError
 from gearfmu.files import write_text
-from gearfmu.kernel.build import library_path
+from gearfmu.kernel.build import fingerprint
 from gearfmu.spec.scene import scene_path
 from gearfmu.stability.bench import PLAIN, RELIEVED, Variant, geometry, model
 from gearfmu.stability.case import COMPLETED, LEVELS, STEPS, Case, Finding
@@ -27,8 +29,6 @@ from gearfmu.stability.sets import BACKFIRE, planetary
 from gearfmu.stability.trains import CLOSING, train
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
-JUDGES = ("bench", "record", "motion", "checks", "loads", "speeds", "clutches", "stepping", "trains", "sets", "rubbing")
-SET_JUDGES = ("bench", "loads", "speeds", "faults", "shifts", "stepping", "effects", "rubbing")  # set_*.py
 GIVEN = "given"  # the step of a case whose h was named
 Progress = Callable[..., None]
 
@@ -75,11 +75,14 @@ def tasks(scenes: Sequence[str], levels: Sequence[str], steps: Sequence[str | fl
 def run_suite(wanted: Sequence[Task], out: Path | None, jobs: int, progress: Progress | None = None) -> list[Row]:
     """Rows of `wanted` in its order. out: the table (CSV) with its facts beside it (JSON), brought up to date after
     every row; rows that are there already with the same fingerprint are not run again. jobs: processes."""
-    key, kept = fingerprint(), read(out) if out else []
-    done = {Task(row.scene, row.case): row for row in kept if row.key == key}
+    kept = read(out) if out else []
+    keys = {
+        scene: key_of(scene) for scene in {task.scene for task in wanted} | {row.scene for row in kept} & set(SCENES)
+    }
+    done = {Task(row.scene, row.case): row for row in kept if row.key == keys.get(row.scene)}
     left = [task for task in wanted if task not in done]
     for count, (task, found) in enumerate(_judged(left, jobs), 1):
-        done[task] = Row(task.scene, task.case, found, key)
+        done[task] = Row(task.scene, task.case, found, keys[task.scene])
         if out:
             write(out, list(done.values()))
         if progress:
@@ -116,19 +119,40 @@ def _nothing(outcome: str, case: Case, message: str) -> Finding:
     return Finding(outcome, case.h, 0.0, 0.0, 0.0, (message,) if case.step == "default" else ())
 
 
-def fingerprint() -> str:
-    """SHA-256 (12 hex digits) over the kernel library, the assembled stages (bodies, damping, cuts), the clutch scene
-    and the scenes with their checks."""
-    digest = hashlib.sha256(library_path().read_bytes())
-    for stage in (PLAIN, RELIEVED):
-        digest.update(model(Variant(stage)).blob)
-    digest.update(train().blob)
-    digest.update(planetary().blob)
-    for scene in (DUMP, CLOSING, BACKFIRE):
-        digest.update(scene_path(scene).read_bytes())
-    for name in (*JUDGES, *(f"set_{name}" for name in SET_JUDGES)):
-        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
+def key_of(scene: str) -> str:
+    """SHA-256 (12 hex digits) over the kernel (`kernel.build.fingerprint`) and what the scene is made from: the file of
+    the scene and those of this package that it imports, the assembled stages (bodies, damping, cuts), files of scenes.
+    """
+    used, left = set[str](), [SCENES[scene].__module__.rpartition(".")[2]]
+    digest = hashlib.sha256(fingerprint().encode())
+    while left:
+        name = left.pop()
+        if name not in used:
+            used.add(name)
+            left += re.findall(r"^from gearfmu\.stability\.(\w+) import", _source(name), flags=re.MULTILINE)
+    for name in sorted(used):
+        digest.update(_source(name).encode())
+        digest.update(_made_from(name))
     return digest.hexdigest()[:12]
+
+
+@cache
+def _source(name: str) -> str:
+    """A file of this package."""
+    return (Path(__file__).parent / f"{name}.py").read_text(encoding="utf-8")
+
+
+def _made_from(name: str) -> bytes:
+    """Models and scene files that a file of this package uses."""
+    if name == "clutches":
+        return scene_path(DUMP).read_bytes()
+    if name == "bench":
+        return b"".join(model(Variant(stage)).blob for stage in (PLAIN, RELIEVED))
+    if name == "trains":
+        return train().blob + scene_path(CLOSING).read_bytes()
+    if name in ("sets", "set_bench"):
+        return planetary().blob + scene_path(BACKFIRE).read_bytes()
+    return b""
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -112,7 +112,7 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
         code=(
-            "gk_choose.c (modes_below), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
+            "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
             "correct_damped)"
         ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
@@ -129,7 +129,7 @@ EFFECTS: tuple[Effect, ...] = (
         equation="1 (eq. 2)",
         matters="always: beside 400 modes a gear it is a fifth of the pair's compliance (fzg_c)",
         off="truncated modes, as in the paper; allowed at level `paper` alone, with a warning",
-        code="gk_side.c (store_residual), gk_compliance.c (between_contacts, joint_rows)",
+        code="gk_residual.c (gk_residual_store), gk_compliance.c (between_contacts, joint_residual)",
         switch="level `paper`; `effect.residual` = false is refused at every other level",
         off_setting={"level": 4.0, "integrator": 2.0},
         on_setting={"level": 3.0, "integrator": 2.0},
@@ -234,9 +234,9 @@ EFFECTS: tuple[Effect, ...] = (
         title="motion of the contact along the flanks",
         formula="places, rows, stiffness, normals and curvatures at the rolls of the moment",
         equation="3.3",
-        matters=("always; a switch for conservation tests, because a moving mesh does work of its own"),
+        matters="always; a switch for conservation tests, because a moving mesh does work of its own",
         off="all of it stays as at the start, gaps are linear in the coordinates",
-        code="gk_frozen.c, gk_step.c (gk_step_once)",
+        code="gk_engage.c",
         kept="a switch for conservation tests",
     ),
     Effect(
@@ -336,7 +336,7 @@ EFFECTS: tuple[Effect, ...] = (
             "Off unless the stage says `[contact] friction = {…}`"
         ),
         off="flanks slide without resistance",
-        code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_side.c (store_along)",
+        code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_residual.c (gk_residual_store_along)",
         test="tests/stage/test_friction.py::test_force_across_the_line_of_action_jumps_at_the_pitch_point",
         kept=DISSIPATION,
     ),

@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from gearfmu.ranges import kernel_number
 from gearfmu.spec.ports import LevelSpec
 
 RIGID, FAST, STANDARD, FULL = range(4)
-SHARED_BELOW = 0.25  # of the cut of level fast: modes below are dynamic at every level (rigid: of shared gears only)
+SHARED_BELOW = kernel_number(
+    "SHARED_BELOW"
+)  # of the cut of level fast: modes below are dynamic at every level (rigid: of shared gears only)
 FELT = 3e-4  # of the compliance of all modes: modes below are static at levels fast and standard
 WITHIN = 0.15  # of a cut: where the widest gap between two modes is looked for
 

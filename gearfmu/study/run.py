@@ -17,7 +17,7 @@ import numpy as np
 from gearfmu.cosim.coupled import OK
 from gearfmu.errors import ModelError
 from gearfmu.files import write_text
-from gearfmu.kernel import library_path
+from gearfmu.kernel.build import fingerprint
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.study.bench import Point, Price, Run, default_step, measure, models_for, paired_price
@@ -128,7 +128,7 @@ class _Study:
         self.job, self.tell, self.scene = job, tell, job.window
         self.text = self.scene.model_dump_json()
         self.model = models_for(self.scene)
-        self.kernel = hashlib.sha256(library_path().read_bytes()).hexdigest()
+        self.kernel = fingerprint()
         self.identity = identity(self.scene, self.model, self.kernel)
         self.tables = {kind: KeptTable(job.out / name, kind) for name, kind in FILES.items()}
         kept = _facts(job.out).get(self.scene.name, {})

@@ -8,7 +8,6 @@ five slices and all effects, so that their error is what they change and not tha
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -21,7 +20,7 @@ from gearfmu.body import load_bodies
 from gearfmu.body.planetary import reduce_set_body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.files import write_text
-from gearfmu.kernel import library_path
+from gearfmu.kernel.build import fingerprint
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
@@ -159,7 +158,7 @@ class _SetStudy:
         self.model = self._model_of(spec, self.bodies)
         self.base = Point("fast", h=self._fitting(BASE_STEP), slices=self.slices)
         self.table = KeptTable(out / "sets.csv", SetRow)
-        self.identity = identity(self.scene, self.model, hashlib.sha256(library_path().read_bytes()).hexdigest())
+        self.identity = identity(self.scene, self.model, fingerprint())
         kept = self._facts().get(scene.name, {})
         fits = kept.get("identity") == self.identity
         self.said: list[str] = kept.get("said", []) if fits else []

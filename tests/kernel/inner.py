@@ -57,5 +57,5 @@ class Inner:
 
     def mu(self, h: float, gamma: float = 1.0) -> float:
         """μ′ at step h (s)."""
-        work = ctypes.c_void_p(self.kernel._work)
-        return self._lib.probe_mu(*self._handles(), work, ctypes.c_double(h), ctypes.c_double(gamma))
+        memory = ctypes.c_void_p(self.kernel._work), ctypes.c_void_p(self.kernel._data)
+        return self._lib.probe_mu(*self._handles(), *memory, ctypes.c_double(h), ctypes.c_double(gamma))

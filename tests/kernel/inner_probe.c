@@ -39,9 +39,10 @@ GK_API void probe_law(const gk_model *model, const gk_setup *setup, double curva
     out[2] = s.potential[0];
 }
 
-GK_API double probe_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+GK_API double probe_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
+                       double gamma)
 {
-    return gk_limit_mu(model, setup, work, h, gamma);
+    return gk_limit_mu(model, setup, work, data, h, gamma);
 }
 
 /* a prepared setup keeps this γ, whatever its limit is */

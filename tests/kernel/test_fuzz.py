@@ -107,10 +107,16 @@ def test_a_thousand_damaged_blobs(fuzzer: Path) -> None:
     assert found.outcomes[REFUSED] > 300 and found.outcomes["step", "0"] > 100
 
 
-def test_inner_steps_of_rk45_have_an_end(fuzzer: Path) -> None:
-    """Case 6172 drives the steps of the error control down to picoseconds that are never refused one by one."""
-    found = feed(fuzzer, damaged, [6172])
-    assert found.outcomes == {("step", "8"): 1}
+@pytest.mark.parametrize(
+    ("case", "end"),
+    [
+        pytest.param(6172, ("step", "8"), id="rk45 goes down to picoseconds that are never refused one by one"),
+        pytest.param(71842, ("initialize", "7"), id="energy at rest overflows"),
+    ],
+)
+def test_cases_that_were_wrong_once(fuzzer: Path, case: int, end: tuple[str, str]) -> None:
+    check(found := feed(fuzzer, damaged, [case]), case, 1)
+    assert found.outcomes == {end: 1}
 
 
 @pytest.mark.full

@@ -61,15 +61,28 @@ def test_a_table_is_written_and_gone_on_with(tmp_path: Path, capsys: pytest.Capt
     assert float(next(csv.DictReader(out.open()))["penetration_m"]) < 1e-3
 
 
-def test_a_table_is_of_its_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Contact damping changes no body, and yet the rows are others."""
+def test_a_row_is_of_its_kernel_its_stage_and_its_own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Contact damping changes no body, and yet the rows are others; a check of sets is none of pairs."""
     (tmp_path / "stage.toml").write_text(
         f'base = "{bench.model(bench.Variant(bench.PLAIN)).spec.source}"\n[contact]\ndamping = "100e3 N*s/m^2"\n'
     )
-    before = suite.fingerprint()
-    assert suite.fingerprint() == before
-    monkeypatch.setattr(suite, "PLAIN", str(tmp_path / "stage.toml"))
-    assert suite.fingerprint() != before
+    scenes = ("jammed", "set_jammed", "train_reversal")
+
+    def moved(before: list[str]) -> list[str]:
+        return [scene for scene, key in zip(scenes, before, strict=True) if suite.key_of(scene) != key]
+
+    before = [suite.key_of(scene) for scene in scenes]
+    assert not moved(before)
+    with monkeypatch.context() as changed:
+        changed.setattr(suite, "PLAIN", str(tmp_path / "stage.toml"))
+        assert "jammed" in moved(before)
+    sources = suite._source
+    for file, touched in {"set_loads": ["set_jammed"], "trains": ["train_reversal"], "checks": list(scenes)}.items():
+        with monkeypatch.context() as changed:
+            changed.setattr(suite, "_source", lambda name, file=file: sources(name) + "#" * (name == file))
+            assert moved(before) == touched
+    monkeypatch.setenv("GEARFMU_BEHAVIOUR", "other golden runs")
+    assert moved(before) == list(scenes)
 
 
 def test_failures_are_counted_and_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -313,6 +314,12 @@ def test_the_table_has_every_switch_of_the_kernel(plain: StageModel) -> None:
     for effect in EFFECTS:
         if effect.name not in of_others:
             plain.kernel(**effect.off_setting).prepare()
+
+
+def test_builds_leave_out_the_effects_of_the_kernels_table() -> None:
+    table = (ROOT / "gearfmu" / "kernel" / "src" / "model" / "gk_effects.inc").read_text(encoding="utf-8")
+    names = re.findall(r"^GK_(?:EFFECT|PART)\((\w+)", table, re.MULTILINE)
+    assert sorted(names) == sorted(effect.build for effect in EFFECTS)
 
 
 def test_the_verb_prints_the_table_with_the_numbers_of_a_stage(capsys: pytest.CaptureFixture[str]) -> None:

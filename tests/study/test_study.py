@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -205,31 +204,6 @@ def test_larger_steps_are_warned_of_and_refused(scene: SceneSpec) -> None:
     assert kinds == ["default", "above", "above", "above", "refused"] and "use h <=" in rows[-1].message
     assert [row.gamma_lowered for row in rows] == [False, False, True, True, True]
     assert rows[2].gamma > rows[3].gamma and rows[3].te_error > rows[0].te_error
-
-
-def test_the_page_has_the_numbers_of_the_table() -> None:
-    """The loaded pair in docs/study.md, rounded to the digits it shows."""
-    root = Path(__file__).parents[2]
-    page = (root / "docs" / "study.md").read_text(encoding="utf-8").split("## Loaded pair")[1].split("## Planetary")[0]
-    rows = {
-        (row.level, row.integrator, round(1e6 * row.h_s, 2)): row
-        for row in read_rows(root / "benchmarks" / "study" / "study.csv", Row)
-        if (row.scene, row.slices) == ("pair_loaded", 5)
-    }
-    table = re.findall(r"^\| `(\w+)`(?:, `(\w+)`)? \| (\d+) \| ([\d.]+)(?: \(default\))? \| (.+) \|$", page, flags=re.M)
-    assert len(table) == 10
-    for level, integrator, modes, step, numbers in table:
-        row = rows[level, integrator or "dg4", float(step)]
-        values = [
-            100 * row.te_error,
-            100 * row.force_error,
-            100 * row.bearing_error,
-            row.realtime_factor,
-            row.cpu_ratio,
-        ]
-        shown = numbers.split(" | ")
-        assert int(modes) == row.n_dyn
-        assert shown == [f"{v:.{len(s.partition('.')[2])}f}" for v, s in zip(values, shown, strict=True)]
 
 
 def test_committed_tables_have_the_columns(tmp_path: Path) -> None:

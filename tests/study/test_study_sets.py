@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from gearfmu import cli
 from gearfmu.commands.study import set_table
 from gearfmu.report.study import write_chart
 from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.scene import SHIPPED, load_scene
+from gearfmu.spec.scene import load_scene
 from gearfmu.spec.stage import load_stage
 from gearfmu.study.sets import DURATION, SETTLE, SetRow, at_speed, ladder, window, with_planets
 from gearfmu.study.table import read_rows, write_rows
@@ -72,61 +71,6 @@ def test_the_list_in_the_repository_says_what_the_page_says() -> None:
     fast = next(row for row in ladder(rows, 4) if row.level == "fast" and row.h_s == pytest.approx(5e-6))
     dropped = {row.speed: row for row in rows if row.off == "coriolis"}
     assert fast.realtime_factor > 1 and dropped[300.0].force_error > 2 * dropped[85.0].force_error > 0
-
-
-def test_the_page_has_the_numbers_of_the_list() -> None:
-    """The table of sets in docs/study.md and the sentence on other numbers of planets, rounded to what they show."""
-    page = (LIST.parents[2] / "docs" / "study.md").read_text(encoding="utf-8").split("## Planetary sets")[1]
-    rows = [row for row in read_rows(LIST, SetRow) if row.against.startswith("full") and not row.off]
-    known = {(row.planets, row.level, f"{1e6 * row.h_s:g}"): row for row in rows}
-    table = re.findall(r"^\| `(\w+)` \| ([\d.]+)(?: \(default\))? \| (.+) \|$", page, flags=re.MULTILINE)
-    assert len(table) == 8
-    for level, step, numbers in table:
-        row = known[4, level, step]
-        errors = (100 * row.te_error, 100 * row.force_error, 100 * row.pin_error, row.realtime_factor, row.cpu_ratio)
-        assert numbers.split(" | ") == [f"{value:.2g}" if value < 99.5 else f"{value:.0f}" for value in errors]
-    three, five = known[3, "fast", "5"], known[5, "fast", "5"]
-    for name, row in (("Three planets at `fast`", three), ("Five", five)):
-        shown = f"{name}: {100 * row.te_error:.1f} and {100 * row.force_error:.0f} %, {row.realtime_factor:.0f} s"
-        assert shown in page
-
-
-LEFT_OUT = {
-    "tip edges": "tip_contact",
-    "tip relief": "tip_relief",
-    "elastic bodies": "elastic",
-    "Hertz's law": "hertz",
-    "contact damping": "contact_damping",
-    "Centrifugal load": "centrifugal",
-    "Coriolis forces": "coriolis",
-}
-
-
-def test_the_page_says_what_effects_are_worth() -> None:
-    """Errors without single effects in docs/study.md, at 85 rad/s and, in brackets, at 300."""
-    page = (LIST.parents[2] / "docs" / "study.md").read_text(encoding="utf-8").split("*Left out*")[1].split("\n")[0]
-    rows = {(row.off, row.speed): row for row in read_rows(LIST, SetRow) if row.off}
-    assert len(rows) == 9
-    for words, effect in LEFT_OUT.items():
-        said = re.search(rf"{words} ([\d.]+) and ([\d.]+) %(?: \(300 rad/s: ([\d.]+) and ([\d.]+) %\))?", page)
-        assert said is not None
-        for speed, numbers in ((85.0, said.groups()[:2]), (300.0, said.groups()[2:])):
-            assert ((effect, speed) in rows) == (numbers[0] is not None)
-            for number, error in zip(numbers, _errors(rows.get((effect, speed))), strict=False):
-                digits = len(number.partition(".")[2])
-                assert f"{100 * error:.{digits}f}" == number, (effect, speed)
-
-
-def _errors(row: SetRow | None) -> tuple[float, ...]:
-    return () if row is None else (row.te_error, row.force_error)
-
-
-@pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("planetary_*.toml")))
-def test_a_scene_of_a_set_says_how_far_its_level_errs(scene: str) -> None:
-    rows = {row.level: row for row in ladder(read_rows(LIST, SetRow), 4) if row.h_s == 5e-6}
-    fast, standard = (f"{100 * rows[level].force_error:.0f} %" for level in ("fast", "standard"))
-    text = (SHIPPED / f"{scene}.toml").read_text(encoding="utf-8")
-    assert f"err by {fast} of their alternating part at level fast, by {standard} at" in text
 
 
 @pytest.mark.full

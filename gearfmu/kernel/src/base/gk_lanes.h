@@ -30,11 +30,14 @@ static inline int gk_finite(double x) { return x - x == 0.0; }
 typedef double gk_quad __attribute__((vector_size(4 * sizeof(double)), may_alias, aligned(sizeof(double))));
 typedef int64_t gk_bits __attribute__((vector_size(4 * sizeof(int64_t)), may_alias, aligned(sizeof(double))));
 typedef uint64_t gk_unsigned __attribute__((vector_size(4 * sizeof(uint64_t)), may_alias, aligned(sizeof(double))));
-/* as many doubles as one register holds: a block of sums that stays in registers is some of these */
+/* GK_CHUNK: as many doubles as one register holds: a block of sums that stays in registers is some of these. GK_HOT
+ * marks what a step runs through, which is compiled for wider vectors too (run/gk_wide.c). */
 #ifdef GK_WIDE
 enum { GK_CHUNK = 4 };
+#define GK_HOT static __attribute__((unused))
 #else
 enum { GK_CHUNK = 2 };
+#define GK_HOT
 #endif
 typedef double gk_chunk __attribute__((vector_size(GK_CHUNK * sizeof(double)), may_alias, aligned(sizeof(double))));
 typedef gk_real gk_some __attribute__((vector_size(GK_CHUNK * sizeof(gk_real)), may_alias, aligned(sizeof(gk_real))));

@@ -8,6 +8,7 @@
  *
  * 2nd order while contacts keep their status; stable while ¼h²ω² + hχ < 1 with all contacts closed (eq. 16a): ω² of the
  * stiffness, χ of the dashpots, which are taken explicitly. Accelerations are kept where dg4 keeps forces. */
+#include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"
 
 enum { PLACES_TRIED = 8, POWER = 150 };
@@ -67,14 +68,6 @@ static void arrive(const gk_model *model, const gk_setup *setup, const gk_work *
     }
 }
 
-static int overlaps(const gk_model *model, const gk_work *work)
-{
-    for (int e = 0; e < model->engagements; e++)
-        for (int p = 0; p < work->engaged[e].places; p++)
-            if (work->engaged[e].place[p].gap < -model->engagement[e].overlap_max) return 1;
-    return 0;
-}
-
 /* a given torque is not that of the last step */
 static int torque_jumps(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data)
 {
@@ -103,7 +96,8 @@ gk_outcome gk_central_step(const gk_model *model, const gk_setup *setup, gk_work
     }
     approach(model, setup, work, data, h);
     if (!gk_rk45_evaluate(model, setup, work, data, 0, outer)) return GK_DIVERGED;
-    if (overlaps(model, work)) return GK_PENETRATION;
+    for (int e = 0; e < model->engagements; e++)
+        if (gk_engage_overlaps(model, work, e)) return GK_PENETRATION;
     arrive(model, setup, work, data, h);
     gk_rk45_squeeze(model, setup, work, data, h);
     for (int e = 0; e < model->engagements; e++) gk_memory_keep(setup, &work->engaged[e], data, e);
@@ -138,13 +132,12 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
 
 /* Cholesky factor of the whole quasi-static compliance of an engagement at a position, contacts closed under the
  * full load (that is stiffest); 0: not positive */
-static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, int e, double position)
+static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e,
+                  double position)
 {
     gk_system *s = &work->engaged[e].system;
-    gk_data empty;
     const double full = model->engagement[e].force_max / model->engagement[e].width;
-    memset(&empty, 0, sizeof empty);
-    if (!gk_limit_place(model, setup, work, &empty, &work->explicit_rows, e, position)) return 0;
+    if (!gk_limit_place(model, setup, work, data, &work->explicit_rows, e, position)) return 0;
     for (int i = 0; i < s->n; i++) {
         s->active[i] = s->kind[i] == ROW_CONTACT || s->kind[i] == ROW_SPRING;
         s->slope[i] = i < s->contacts ? gk_law_slope(s, i, full * s->width[i]) : 0.0;
@@ -155,7 +148,7 @@ static int closed(const gk_model *model, const gk_setup *setup, gk_work *work, i
         s->J[i * s->n + i] += slope - s->slope[i];
         s->slope[i] = slope;
     }
-    return gk_limit_cholesky(s->J, s->n);
+    return gk_cholesky(s->J, s->n);
 }
 
 typedef struct quotient {
@@ -175,11 +168,11 @@ static void press(const gk_model *model, const gk_setup *setup, gk_work *work, i
     for (int g = 0; g < model->gears; g++) u[g] = work->trial[g] + setup->modal[g].n;
     gk_form_rates(setup, work, e, u, work->ground_trial + setup->base.n, work->trial_spin + MAX_SPINS, rate);
     for (int i = 0; i < s->n; i++) y[i] = s->active[i] ? rate[i] : 0.0;
-    gk_limit_solve(s->J, y, s->n);
+    gk_cholesky_solve(s->J, y, s->n);
     memcpy(c, y, (size_t)s->n * sizeof *c);
     gk_rk45_resist(setup, &setup->mesh[e], s, c);
     for (int i = 0; i < s->n; i++) of->up_damped += y[i] * c[i];
-    gk_limit_solve(s->J, c, s->n);
+    gk_cholesky_solve(s->J, c, s->n);
     for (int i = 0; i < s->n; i++) both[i] = 0.25 * h * h * y[i] + h * c[i];
 }
 
@@ -267,14 +260,15 @@ static void first_shape(const gk_model *model, const gk_setup *setup, gk_work *w
 
 /* Largest stable step over the roll positions, all candidate contacts closed (fewer are softer): ¼h²ω² + hχ = 1 (eq.
  * 16a) for the shape that is worst at this h */
-double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work)
+double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
     GK_ASSERT(setup->integrator == CENTRAL && work);
     double smallest = INFINITY;
     for (int i = 0; i < PLACES_TRIED; i++) {
         double h = FIRST;
         int all = model->engagements > 0;
-        for (int e = 0; e < model->engagements; e++) all &= closed(model, setup, work, e, (double)i / PLACES_TRIED);
+        for (int e = 0; e < model->engagements; e++)
+            all &= closed(model, setup, work, data, e, (double)i / PLACES_TRIED);
         if (!all) continue;
         first_shape(model, setup, work);
         for (int round = 0; round < POWER; round++) {

@@ -1,63 +1,45 @@
 /* The time integrators, statics and the choice of the step. */
 #ifndef GK_INTEGRATE_H
 #define GK_INTEGRATE_H
+#include "problem/gk_engage.h"
 #include "problem/gk_work.h"
 #include "setup/gk_tables.h"
 
-/* what an integrator is; gk_scheme.c */
-typedef struct gk_scheme {
-    int is_explicit;  /* forces follow from positions; limited by stability; no account of work; knows no clutch */
-    int corrected;    /* γ > 0: corrected for time within the step */
-    int linear_force; /* forces are linear in the step, else constant */
-    int adaptive;     /* chooses its own inner steps */
-} gk_scheme;
-const gk_scheme *gk_scheme_of(gk_integrator integrator);
-
-/* gk_wide.c */
-gk_step_function *gk_wide_step(int widest, gk_integrator integrator);
-gk_tally_function *gk_wide_count(int widest);
-gk_fill_function *gk_wide_fill(int widest);
-gk_moves_function *gk_wide_moves(int widest);
-/* gk_memory.c */
-int gk_memory_find(const gk_meshing *meshing, gk_key key);
-void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data *data, int e, gk_system *s);
-void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *data, int e);
-void gk_memory_forget(gk_engaged *engaged);
 /* gk_step.c */
-gk_step_function gk_step_once;
-double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k);
-const double *gk_step_force(const gk_system *s);
-const double *gk_step_z(const gk_system *s);
+GK_HOT gk_step_function gk_step_once;
+GK_HOT double gk_step_energy(const gk_model *model, const gk_setup *setup, const gk_data *data,
+                             const gk_coefficients *k);
 /* gk_frame.c */
-void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
-void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
-void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a);
-double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, const gk_data *data,
-                      double *v);
-void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v, double *a);
-void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force);
+GK_HOT void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_data *data, int back, double *v);
+GK_HOT void gk_frame_turn_gear(const gk_modal *m, double angle, const gk_real *from, gk_real *to);
+GK_HOT void gk_frame_gear_rates(const gk_modal *m, double speed, const gk_real *v, gk_real *a);
+GK_HOT double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coefficients *k,
+                             const gk_data *data, double *v);
+GK_HOT void gk_frame_rates(const gk_model *model, const gk_setup *setup, const double *spin, const double *v,
+                           double *a);
+GK_HOT void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *data, double *force);
 /* gk_rk45.c */
-int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,
-                     const double *outer);
-void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, double *y);
-void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data);
-void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double step);
-gk_step_function gk_rk45_step;
+GK_HOT int gk_rk45_evaluate(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int i,
+                            const double *outer);
+GK_HOT void gk_rk45_resist(const gk_setup *setup, const gk_mesh *mesh, const gk_system *s, double *y);
+GK_HOT void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data);
+GK_HOT void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
+                            double step);
+GK_HOT gk_step_function gk_rk45_step;
 /* gk_central.c */
-gk_step_function gk_central_step;
+GK_HOT gk_step_function gk_central_step;
 double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
                          double h);
-double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work);
+double gk_central_limit(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data);
 /* gk_limit.c */
-int gk_limit_cholesky(double *a, int n);
 void gk_limit_compliance(const gk_system *s, const double *Q, double full, int dashpots, double *C);
-void gk_limit_solve(const double *L, double *x, int n);
-int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
-                   int e, double position);
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
+int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                   const gk_coefficients *k, int e, double position);
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
+                   double gamma);
 double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data *data, double h);
-void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, double h);
-gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
+void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h);
+gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,
                            char message[GK_MESSAGE]);
 /* gk_static.c */
 typedef struct gk_boundary {
@@ -66,13 +48,4 @@ typedef struct gk_boundary {
 } gk_boundary;
 gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                            const gk_boundary *b, int bare, int keep);
-
-#ifdef GK_PROFILE /* processor cycles by phase; the product has no clock in it */
-#include <x86intrin.h>
-#define GK_MARK(work) ((work)->mark = __rdtsc())
-#define GK_LAP(work, phase) ((work)->cycles[phase] -= (work)->mark, (work)->cycles[phase] += ((work)->mark = __rdtsc()))
-#else
-#define GK_MARK(work) ((void)(work))
-#define GK_LAP(work, phase) ((void)(work))
-#endif
 #endif

@@ -56,22 +56,9 @@ static void add_dashpots(const gk_setup *setup, const gk_mesh *mesh, gk_system *
 /* problem of an engagement at the trial state; 0 when the poses mean nothing */
 static int engage(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
 {
-    const gk_meshing *meshing = &data->meshing[e];
-    const gk_mesh *mesh = &setup->mesh[e];
-    gk_engaged *engaged = &work->engaged[e];
-    gk_system *s = &engaged->system;
-    gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
-    engaged->places = setup->on.roll_motion
-                          ? gk_flank_find(model, setup, mesh, engaged->pose,
-                                          GK_ON(setup, film) ? gk_max(meshing->search_distance, GK_FILM_REACH)
-                                                             : gk_max(meshing->search_distance, 50e-6),
-                                          engaged->position, engaged->place)
-                          : gk_frozen_find(model, setup, mesh, meshing->frozen, engaged->pose, engaged->position,
-                                           engaged->place);
-    if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
-    gk_rows_form(setup, work, e);
-    gk_form_system(model, setup, data, &work->explicit_rows, work, e);
+    const gk_search how = {.k = &work->explicit_rows, .reach = 50e-6};
+    gk_system *s = &work->engaged[e].system;
+    if (!gk_engage(model, setup, work, data, &how, e)) return 0;
     for (int r = 0; r < s->contacts; r++) s->damping[r] = 0.0;
     if (setup->nodal) gk_nodal_leave(s);
     gk_memory_recall(setup, work, data, e, s);

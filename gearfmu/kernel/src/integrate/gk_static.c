@@ -4,6 +4,7 @@
  * everything else being compliance: the gear groups' modes too, by κ = −1/ω². Newton on the forces that are left,
  * with the tangents of the engagements, K = diag(0, ω²) + Σ Wᵀ J⁻¹ W; islands come to rest one after the other: they
  * know nothing of each other. */
+#include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"
 #include "setup/gk_kinematics.h"
 
@@ -213,29 +214,6 @@ static void unroll(rest *r)
 }
 
 /* ---- one iteration ----------------------------------------------------------------------------------------------- */
-static int form(rest *r, int e)
-{
-    gk_work *work = r->work;
-    gk_engaged *engaged = &work->engaged[e];
-    double here[POSE], moved[POSE];
-    gk_rows_pose(r->model, &r->setup, e, work->spin, work->rest_ground, engaged->pose);
-    gk_rows_pose(r->model, &r->setup, e, r->data->x, work->rest_ground, here);
-    for (int d = 0; d < POSE; d++)
-        moved[d] = engaged->pose[d] - here[d]; /* given torques move the pose, not the place */
-    engaged->places = gk_flank_find(r->model, &r->setup, &r->setup.mesh[e], here, SEE, engaged->position,
-                                    engaged->place);
-    if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++) {
-        gk_place *place = &engaged->place[p];
-        gk_flank_move(&r->setup, place, moved);
-        place->memory = gk_memory_find(&r->data->meshing[e], place->key);
-    }
-    gk_rows_form(&r->setup, work, e);
-    gk_form_system(r->model, &r->setup, r->data, &r->k, work, e);
-    gk_memory_recall(&r->setup, work, r->data, e, &engaged->system);
-    return 1;
-}
-
 /* all engagements of the island at the present spins and ground oscillators; 0: meaningless poses */
 static int press(rest *r)
 {
@@ -247,7 +225,11 @@ static int press(rest *r)
     for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->zero;
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
-        if (searched(r, e) && !form(r, e)) return 0;
+        if (searched(r, e)) { /* given torques move the pose, not the place */
+            const gk_search how = {.k = &r->k, .spin = r->data->x, .reach = SEE};
+            if (!gk_engage(r->model, &r->setup, work, r->data, &how, e)) return 0;
+            gk_memory_recall(&r->setup, work, r->data, e, &work->engaged[e].system);
+        }
     gk_coupled coupled = {r->model, &r->setup, work, &r->k, r->island, 0, STATIC_SWEEPS, 1.0};
     const gk_island island = gk_couple_island(&coupled);
     gk_balance_plain(&island);
@@ -461,8 +443,8 @@ static double relax(rest *r)
     find_forces(r);
     find_tangent(r);
     memcpy(r->move, r->force, (size_t)r->unknowns * sizeof *r->move);
-    if (!gk_limit_cholesky(r->tangent, r->unknowns)) return NAN;
-    gk_limit_solve(r->tangent, r->move, r->unknowns);
+    if (!gk_cholesky(r->tangent, r->unknowns)) return NAN;
+    gk_cholesky_solve(r->tangent, r->move, r->unknowns);
     const double length = length_of(r, r->move), least = gk_min(1.0, r->trust / gk_max(length, 1e-300));
     if (!gk_finite(length)) return NAN;
     r->gain = along(r);

@@ -166,28 +166,6 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
     return 1;
 }
 
-/* places of an engagement at the predicted poses, and their rows */
-static gk_outcome find_places(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
-{
-    const gk_meshing *meshing = &data->meshing[e];
-    const gk_mesh *mesh = &setup->mesh[e];
-    gk_engaged *engaged = &work->engaged[e];
-    gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
-    engaged->places = GK_ON(setup, roll_motion)
-                          ? gk_flank_find(model, setup, mesh, engaged->pose,
-                                          GK_ON(setup, film) ? gk_max(meshing->search_distance, GK_FILM_REACH)
-                                                             : meshing->search_distance,
-                                          engaged->position, engaged->place)
-                          : gk_frozen_find(model, setup, mesh, meshing->frozen, engaged->pose, engaged->position,
-                                           engaged->place);
-    if (engaged->places < 0) return engaged->places = 0, GK_DIVERGED;
-    for (int p = 0; p < engaged->places; p++) {
-        engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
-        if (engaged->place[p].gap < -model->engagement[e].overlap_max) return GK_PENETRATION;
-    }
-    return GK_OK;
-}
-
 /* A torque that is given anew acts from the start of the step: its mean in the step is the new value, so that the force
  * at the end that a prediction with the old one needs is as far beyond it (docs/theory.md, 3.3) */
 static void find_jumps(const gk_setup *setup, const gk_work *work, gk_system *s)
@@ -221,16 +199,6 @@ static int all_finite(const gk_system *s)
 }
 
 /* ---- the end of the step ----------------------------------------------------------------------------------------- */
-const double *gk_step_force(const gk_system *s)
-{
-    GK_ASSERT(gk_system_is_sound(s));
-    return s->force;
-}
-const double *gk_step_z(const gk_system *s)
-{
-    GK_ASSERT(gk_system_is_sound(s));
-    return s->z;
-}
 /* forces at the end that the next prediction is made with, where forces are linear in the step */
 static const double *force_with_dampers(const gk_system *s) { return s->last; }
 
@@ -492,19 +460,16 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
     const double damped = predict(model, setup, work, data, k);
     if (!passable(model, work, data)) return GK_DIVERGED;
     GK_LAP(work, PHASE_PREDICT);
-    for (int e = 0; e < model->engagements; e++)
-        if ((outcome = find_places(model, setup, work, data, e)) != GK_OK) return outcome;
-    GK_LAP(work, PHASE_FIND);
-    for (int e = 0; e < model->engagements; e++) gk_rows_form(setup, work, e);
-    GK_LAP(work, PHASE_ROWS);
+    const gk_search how = {.k = k};
     for (int e = 0; e < model->engagements; e++) {
-        gk_form_system(model, setup, data, k, work, e);
+        if (!gk_engage(model, setup, work, data, &how, e)) return GK_DIVERGED;
+        if (gk_engage_overlaps(model, work, e)) return GK_PENETRATION;
         if (GK_ON(setup, friction)) gk_friction_form(model, setup, data, k, work, e);
         find_jumps(setup, work, &work->engaged[e].system);
         gk_memory_recall(setup, work, data, e, &work->engaged[e].system);
         if (GK_ON(setup, film)) gk_film_begin(setup, work, e, k->h);
+        GK_LAP(work, PHASE_SYSTEM);
     }
-    GK_LAP(work, PHASE_SYSTEM);
     if ((outcome = solve_all(model, setup, work, data, k)) != GK_OK) return outcome;
     GK_LAP(work, PHASE_SOLVE);
     data->energy.dissipated += damped;

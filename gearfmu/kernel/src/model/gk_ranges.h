@@ -79,6 +79,9 @@
 /* time */
 #define GK_LOW_CUT 1 /* Hz */
 #define GK_HIGH_CUT 1e9
+/* Oscillators below this share of the cut of level fast by which engagements of one gear feel each other (the ovals of
+ * a ring between planets) are dynamic at every level: far teeth (gk_far_fill.c) know those above it alone. */
+#define GK_SHARED_BELOW 0.25
 #define GK_LOW_STEP 0 /* s; 0: the default of model and level */
 #define GK_HIGH_STEP 1e-3
 

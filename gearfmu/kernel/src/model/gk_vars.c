@@ -341,12 +341,11 @@ gk_outcome gk_get(const gk_model *model, const gk_data *data, uint32_t reference
 gk_effects gk_effects_of(const gk_data *data)
 {
     GK_ASSERT(data && data->magic == GK_DATA_MAGIC);
-    const double *v = data->stage;
-    const gk_effects on = {v[V_E_ELASTIC] != 0,     v[V_E_RESIDUAL] != 0, v[V_E_LOCAL] != 0,
-                           v[V_E_COAST] != 0,       v[V_E_DAMPING] != 0,  v[V_E_RELIEF] != 0,
-                           v[V_E_CORNER] != 0,      v[V_E_BEARING] != 0,  v[V_E_MODAL_DAMPING] != 0,
-                           v[V_E_ROLL_MOTION] != 0, v[V_E_CORIOLIS] != 0, v[V_E_CENTRIFUGAL] != 0,
-                           v[V_E_GYROSCOPIC] != 0,  v[V_E_FLANKS] != 0,   v[V_E_RUNOUT] != 0,
-                           v[V_E_FRICTION] != 0,    v[V_E_FILM] != 0};
-    return on;
+    return (gk_effects){
+#define GK_EFFECT(name, variable, needs, refusal) .name = data->stage[V_##variable] != 0.0,
+#define GK_PART(name)
+#include "model/gk_effects.inc"
+#undef GK_EFFECT
+#undef GK_PART
+    };
 }

@@ -2,6 +2,7 @@
 #ifndef GK_VARS_H
 #define GK_VARS_H
 #include "gk.h"
+#include "model/gk_effects.h"
 
 typedef enum gk_scope { SCOPE_STAGE, SCOPE_SHAFT, SCOPE_ROTOR, SCOPE_MESH, SCOPE_SUPPORT, SCOPE_MODE, SCOPES } gk_scope;
 
@@ -81,4 +82,7 @@ enum {
 
 /* may a parameter of this model start with this value? */
 int gk_start_allowed(const gk_model *model, uint32_t reference, double value);
+
+gk_effects gk_effects_of(const gk_data *data);
+void gk_vars_take(const gk_model *model, gk_data *data, const gk_data *from);
 #endif

@@ -2,8 +2,8 @@
  * equilibrium, as matrices. What a row reads is what its unit force does, so that all rows come from those functions
  * that spread the forces of a step. */
 #include "problem/gk_linearise.h"
+#include "problem/gk_engage.h"
 #include "problem/gk_shared.h"
-#include "integrate/gk_integrate.h"
 
 static const double DAMPER_AT_UNIT_STEP = 0.5; /* c over 2c/h, h = 1 */
 
@@ -60,35 +60,19 @@ static void place_ground(const gk_setup *setup, const double *lanes, int first, 
 }
 
 /* ---- the problem at rest ----------------------------------------------------------------------------------------- */
-static int form(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, int e)
-{
-    const gk_meshing *meshing = &data->meshing[e];
-    const gk_mesh *mesh = &setup->mesh[e];
-    gk_engaged *engaged = &work->engaged[e];
-    gk_system *s = &engaged->system;
-    gk_rows_pose(model, setup, e, data->x, gk_ground_seen(data), engaged->pose);
-    engaged->places = GK_ON(setup, roll_motion)
-                          ? gk_flank_find(model, setup, mesh, engaged->pose, meshing->search_distance,
-                                          engaged->position, engaged->place)
-                          : gk_frozen_find(model, setup, mesh, meshing->frozen, engaged->pose, engaged->position,
-                                           engaged->place);
-    if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = gk_memory_find(meshing, engaged->place[p].key);
-    gk_rows_form(setup, work, e);
-    gk_form_system(model, setup, data, &work->explicit_rows, work, e);
-    memcpy(s->force, s->force0, (size_t)s->stride * sizeof *s->force);
-    gk_law_apply(s);
-    return 1;
-}
-
 static int form_all(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
     memcpy(work->spin, data->x, sizeof work->spin);
     memset(work->speed, 0, sizeof work->speed);
     for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
     work->ground_y = work->ground_zero;
-    for (int e = 0; e < model->engagements; e++)
-        if (!form(model, setup, work, data, e)) return 0;
+    const gk_search how = {.k = &work->explicit_rows, .ground = gk_ground_seen(data)};
+    for (int e = 0; e < model->engagements; e++) {
+        gk_system *s = &work->engaged[e].system;
+        if (!gk_engage(model, setup, work, data, &how, e)) return 0;
+        memcpy(s->force, s->force0, (size_t)s->stride * sizeof *s->force);
+        gk_law_apply(s);
+    }
     return 1;
 }
 

@@ -7,6 +7,7 @@
 #ifndef GK_SYSTEM_H
 #define GK_SYSTEM_H
 #include "base/gk_check.h"
+#include "model/gk_effects.h"
 #include "setup/gk_setup.h"
 
 /* how much of a damper's force at the end of the last step goes into that of this one (docs/theory.md, 3.2) */
@@ -117,6 +118,18 @@ static inline int gk_system_is_sound(const gk_system *s)
 }
 static inline int gk_is_row(const gk_system *s, int i) { return i >= 0 && i < s->n; }
 
+/* what gk_rows_scatter may scatter: the forces at the end; those of the step */
+static inline const double *gk_step_force(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    return s->force;
+}
+static inline const double *gk_step_z(const gk_system *s)
+{
+    GK_ASSERT(gk_system_is_sound(s));
+    return s->z;
+}
+
 static inline int gk_film_on(const gk_system *s) { return GK_HAS(film) && s->films > 0; }
 /* flanks of a contact that carries touch: it is no film alone */
 static inline int gk_solve_touches(const gk_system *s, int i)
@@ -143,21 +156,21 @@ static inline double gk_film_carried(const gk_system *s, int i)
 }
 
 /* gk_film.c */
-void gk_film_apply(gk_system *s);
-double gk_film_lost(const gk_system *s);
-double gk_film_grows(const gk_system *s, const double *p, const double *linear, double *square);
-double gk_film_power(const gk_system *s);
+GK_HOT void gk_film_apply(gk_system *s);
+GK_HOT double gk_film_lost(const gk_system *s);
+GK_HOT double gk_film_grows(const gk_system *s, const double *p, const double *linear, double *square);
+GK_HOT double gk_film_power(const gk_system *s);
 
 /* gk_solve.c */
-void gk_solve_contacts(gk_system *s);
-void gk_solve_clear(gk_system *s);
-void gk_solve_settle(gk_system *s);
-void gk_solve_begin(gk_system *s);
-void gk_solve_begin_dashpots(gk_system *s);
-void gk_solve_status(gk_system *s);
-void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
-void gk_solve_path(const gk_system *s, const double *x, double *y);
-double gk_solve_stored(const gk_system *s);
+GK_HOT void gk_solve_contacts(gk_system *s);
+GK_HOT void gk_solve_clear(gk_system *s);
+GK_HOT void gk_solve_settle(gk_system *s);
+GK_HOT void gk_solve_begin(gk_system *s);
+GK_HOT void gk_solve_begin_dashpots(gk_system *s);
+GK_HOT void gk_solve_status(gk_system *s);
+GK_HOT void gk_solve_times(const gk_system *s, const double *matrix, const double *x, double *y);
+GK_HOT void gk_solve_path(const gk_system *s, const double *x, double *y);
+GK_HOT double gk_solve_stored(const gk_system *s);
 /* gap at the end as the contact sees it, and the deflection of the quasi-static part under it: their sum is the
  * distance that is left */
 static inline double gk_solve_end_gap(const gk_system *s, int i)
@@ -182,14 +195,14 @@ static inline double gk_solve_quasi_static(const gk_system *s, int i)
     return s->Al[i] + s->approach[i] + s->beyond[i];
 }
 /* gk_tangent.c */
-void gk_tangent_factorise(gk_system *s);
-void gk_tangent_solve(const gk_system *s, double *x);
+GK_HOT void gk_tangent_factorise(gk_system *s);
+GK_HOT void gk_tangent_solve(const gk_system *s, double *x);
 /* gk_balance.c */
-void gk_balance_plain(const gk_island *island);
-void gk_balance_solve(const gk_island *island);
+GK_HOT void gk_balance_plain(const gk_island *island);
+GK_HOT void gk_balance_solve(const gk_island *island);
 /* gk_law.c */
-void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s);
-void gk_law_bounds(const gk_model *model, gk_mesh *mesh);
-double gk_law_slope(const gk_system *s, int i, double force);
-void gk_law_apply(gk_system *s);
+GK_HOT void gk_law_set(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, gk_system *s);
+GK_HOT void gk_law_bounds(const gk_model *model, gk_mesh *mesh);
+GK_HOT double gk_law_slope(const gk_system *s, int i, double force);
+GK_HOT void gk_law_apply(gk_system *s);
 #endif

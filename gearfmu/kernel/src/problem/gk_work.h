@@ -6,7 +6,8 @@
 #include "setup/gk_spread.h"
 
 /* phases of a step, for the profile */
-enum { COMMON = 8 }; /* motions of a gear and the angle of its bore, padded to quads */
+enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
+enum { COMMON = 8 };          /* motions of a gear and the angle of its bore, padded to quads */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
 typedef struct gk_point { /* of a strip */
     double gap, gradient[POSE];
@@ -162,7 +163,7 @@ struct gk_work {
     double *rest_ground;            /* displacement of the ground group */
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
     double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
-    double *columns; /* room for a node's rows and their products */
+    double *columns; /* room for a node's rows and their products; A of the explicit rows at all LIMIT_POSITIONS */
     double *spread;  /* room of gk_spread.c, and the compliances that it makes of one gear */
     gk_real *blocks;
     gk_compliance compliance;
@@ -173,21 +174,14 @@ struct gk_work {
 };
 
 /* gk_flank.c */
-void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
-void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
-int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
-                  double search_distance, gk_position position[2], gk_place *place);
+GK_HOT void gk_flank_clearance(const gk_model *model, const gk_setup *setup, gk_mesh *mesh);
+GK_HOT void gk_flank_move(const gk_setup *setup, gk_place *place, const double delta[POSE]);
+GK_HOT int gk_flank_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *pose,
+                         double search_distance, gk_position position[2], gk_place *place);
 /* gk_nodal.c */
-void gk_nodal_leave(gk_system *s);
-void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
-                    const gk_real *const speed[], double spin_rate[]);
-/* gk_frozen.c */
-int gk_frozen_find(const gk_model *model, const gk_setup *setup, const gk_mesh *mesh, const double *frozen,
-                   const double *pose, gk_position position[2], gk_place *place);
-/* gk_choose.c */
-gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup, char message[GK_MESSAGE]);
-int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g);
-int gk_choose_ground(const gk_model *model, const gk_setup *setup, int32_t *which);
+GK_HOT void gk_nodal_leave(gk_system *s);
+GK_HOT void gk_nodal_press(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                           const gk_real *const speed[], double spin_rate[]);
 /* gk_layout.c */
 void gk_layout_plan(const gk_model *model, gk_setup *setup);
 void gk_layout_setup(const gk_model *model, gk_setup *setup, const int *modes, int ground);
@@ -202,24 +196,23 @@ void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_l
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */
-typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
-gk_moves_function gk_side_step;
+GK_HOT gk_moves_function gk_side_step;
 /* gk_rows.c */
-void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
-void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);
-void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
-                  double *pose);
-void gk_rows_form(const gk_setup *setup, gk_work *work, int e);
-void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e);
-void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
-                  double *read);
-void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
-                           const double *ground, double *read);
-void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
-                        gk_real *out_x, gk_real *out_y);
-void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
-void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work, const double *(*x)(const gk_system *),
-                     const double *(*y)(const gk_system *));
+GK_HOT void gk_rows_turn_back(const gk_modal *m, int tooth, const gk_real *y, gk_real *out);
+GK_HOT void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_real *sum[2]);
+GK_HOT void gk_rows_pose(const gk_model *model, const gk_setup *setup, int e, const double *spin, const double *ground,
+                         double *pose);
+GK_HOT void gk_rows_form(const gk_setup *setup, gk_work *work, int e);
+GK_HOT void gk_rows_form_ground(const gk_setup *setup, gk_work *work, int e);
+GK_HOT void gk_rows_read(const gk_setup *setup, gk_work *work, int e, const gk_real *const y[], const double *ground,
+                         double *read);
+GK_HOT void gk_rows_without_rigid(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e,
+                                  const double *ground, double *read);
+GK_HOT void gk_rows_push_modes(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
+                               gk_real *out_x, gk_real *out_y);
+GK_HOT void gk_rows_read_modes(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
+GK_HOT void gk_rows_scatter(const gk_model *model, const gk_setup *setup, gk_work *work,
+                            const double *(*x)(const gk_system *), const double *(*y)(const gk_system *));
 /* does a joint pull at the bore of its port's rotor? */
 static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int i)
 {
@@ -227,36 +220,38 @@ static inline int gk_rows_at_bore(const gk_setup *setup, const gk_system *s, int
     GK_ASSERT(s->port_of[i] >= 0 && s->port_of[i] < MAX_PORTS);
     return s->joint_of[i] == (setup->chained[s->port_of[i]] ? JOINT_SHAFT : JOINT_PORT);
 }
-void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
-void gk_rows_push_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y, double *out_x,
-                        double *out_y);
-void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e);
-void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum);
-void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores, double *read);
-/* the same of the sliding of the contacts and of forces along the profile */
-void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e);
-void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
+GK_HOT void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
+GK_HOT void gk_rows_push_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
+                               double *out_x, double *out_y);
+GK_HOT void gk_rows_form_bores(const gk_setup *setup, gk_work *work, int e);
+GK_HOT void gk_rows_push_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const double *x, gk_bores *sum);
+GK_HOT void gk_rows_read_bores(const gk_setup *setup, const gk_engaged *engaged, int e, const gk_bores *bores,
                                double *read);
-void gk_rows_read_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
-void gk_rows_push_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
-                              double *out_x, double *out_y);
-void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x, const double *y,
-                              gk_real *out_x, gk_real *out_y);
-void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y, double *read);
+/* the same of the sliding of the contacts and of forces along the profile */
+GK_HOT void gk_rows_form_along(const gk_setup *setup, gk_work *work, int e);
+GK_HOT void gk_rows_read_ground_along(const gk_setup *setup, const gk_engaged *engaged, int e, const double *ground,
+                                      double *read);
+GK_HOT void gk_rows_read_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read);
+GK_HOT void gk_rows_push_local_along(const gk_mesh *mesh, const gk_engaged *engaged, const double *x, const double *y,
+                                     double *out_x, double *out_y);
+GK_HOT void gk_rows_push_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const double *x,
+                                     const double *y, gk_real *out_x, gk_real *out_y);
+GK_HOT void gk_rows_read_modes_along(const gk_setup *setup, gk_work *work, int e, int which, const gk_real *y,
+                                     double *read);
 /* gk_far.c */
-void gk_far_form(const gk_setup *setup, gk_work *work, int e);
-void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s);
+GK_HOT void gk_far_form(const gk_setup *setup, gk_work *work, int e);
+GK_HOT void gk_far_between(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_shared *s);
 /* gk_film.c */
-void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
-void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);
+GK_HOT void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
+GK_HOT void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);
 /* gk_friction.c */
-void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
-                      gk_work *work, int e);
-double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
-double gk_friction_held(const gk_glide *glide, const gk_system *s);
-double gk_friction_defect(const gk_glide *glide, const gk_system *s);
-void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
-double gk_friction_settle(gk_glide *glide, const gk_system *s);
+GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data,
+                             const gk_coefficients *k, gk_work *work, int e);
+GK_HOT double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
+GK_HOT double gk_friction_held(const gk_glide *glide, const gk_system *s);
+GK_HOT double gk_friction_defect(const gk_glide *glide, const gk_system *s);
+GK_HOT void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
+GK_HOT double gk_friction_settle(gk_glide *glide, const gk_system *s);
 /* gk_couple.c */
 typedef struct gk_coupled { /* an island in a step */
     const gk_model *model;
@@ -267,22 +262,31 @@ typedef struct gk_coupled { /* an island in a step */
     int sweeps;        /* at most; 0: as many as a step may take */
     double rate;       /* by which a sweep changed less than the one before */
 } gk_coupled;
-gk_island gk_couple_island(gk_coupled *coupled);
-void gk_couple_recall(gk_coupled *coupled);
+GK_HOT gk_island gk_couple_island(gk_coupled *coupled);
+GK_HOT void gk_couple_recall(gk_coupled *coupled);
 /* gk_compliance.c; columns of a row of D and A that are filled directly */
 static inline int gk_block_end(int i)
 {
     GK_ASSERT(i >= 0);
     return i / 4 * 4 + 4;
 }
-void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables);
-void gk_compliance_mirror(gk_system *s);
+GK_HOT void gk_compliance_form(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e, int tables);
+GK_HOT void gk_compliance_mirror(gk_system *s);
 /* gk_ground.c */
-void gk_ground_add(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
-                   int tables);
+GK_HOT void gk_ground_add(const gk_model *model, const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e,
+                          int tables);
 /* gk_form.c */
-void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
-                    gk_work *work, int e);
-void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *const modal_speed[],
-                   const double *ground_speed, const double *speed, double *rate);
+GK_HOT void gk_form_system(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
+                           gk_work *work, int e);
+GK_HOT void gk_form_rates(const gk_setup *setup, gk_work *work, int e, const gk_real *const modal_speed[],
+                          const double *ground_speed, const double *speed, double *rate);
+
+#ifdef GK_PROFILE /* processor cycles by phase; the product has no clock in it */
+#include <x86intrin.h>
+#define GK_MARK(work) ((work)->mark = __rdtsc())
+#define GK_LAP(work, phase) ((work)->cycles[phase] -= (work)->mark, (work)->cycles[phase] += ((work)->mark = __rdtsc()))
+#else
+#define GK_MARK(work) ((void)(work))
+#define GK_LAP(work, phase) ((void)(work))
+#endif
 #endif

@@ -98,14 +98,14 @@ static double internal_step(const gk_setup *setup, double H, int64_t *steps)
 
 /* Tables of the internal step that communication steps of the usual length have, so that the first one costs no more
  * than others. After a communication step of another length they are made anew. */
-static void make_tables(const gk_model *model, const gk_setup *setup, gk_work *work)
+static void make_tables(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
     const double h = internal_step(setup, GK_USUAL_H, NULL);
     if (!GK_ON(setup, elastic) || gk_scheme_of(setup->integrator)->is_explicit) return;
-    gk_limit_run(model, setup, work, h);
+    gk_limit_run(model, setup, work, data, h);
     const double gamma = gk_scheme_of(setup->integrator)->corrected ? work->run_gamma : 0.0;
     if (work->table_h == h && work->table_gamma == gamma) return;
-    gk_wide_moves(1)(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
+    setup->moves(model, setup, work, gk_flow_for(model, setup, work, h, gamma));
 }
 
 gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double time)
@@ -113,7 +113,7 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *
     GK_ASSERT(model && setup && work && data);
     if (setup->magic != GK_SETUP_MAGIC || data->magic != GK_DATA_MAGIC || data->phase != PHASE_NEW) return GK_BAD_CALL;
     if (!gk_finite(time)) return GK_BAD_VALUE;
-    make_tables(model, setup, work);
+    make_tables(model, setup, work, data);
     const gk_outcome outcome = start(model, setup, work, data);
     if (outcome) return outcome;
     data->phase = PHASE_RUNNING;
@@ -122,7 +122,9 @@ gk_outcome gk_initialize(const gk_model *model, const gk_setup *setup, gk_work *
     data->count = 0;
     data->amplitudes = (int64_t)setup->amplitudes;
     gk_outputs_start(model, setup, work, data);
-    return GK_OK;
+    if (gk_finite(data->stage[V_ENERGY])) return GK_OK;
+    data->phase = PHASE_NEW;
+    return GK_NO_EQUILIBRIUM;
 }
 
 /* ---- guarded internal step --------------------------------------------------------------------------------------- */
@@ -231,7 +233,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     gk_tally tally;
     gk_tally_begin(model, setup, work, data, &tally);
     if (!(data->table_h > 0.0)) data->table_h = h;
-    gk_limit_run(model, setup, work, data->table_h);
+    gk_limit_run(model, setup, work, data, data->table_h);
     for (int64_t i = 0; i < steps; i++) {
         if (i + 1 == steps) gk_outputs_bores(model, setup, data);
         outcome = advance(model, setup, work, data, &c, (double)i * h, h, 0);

@@ -174,7 +174,7 @@ int gk_outputs_balance(const gk_model *model, const gk_setup *setup, gk_work *wo
         data->energy.quasi_static = stored(model, work);
         v[V_ENERGY] = setup->integrator == CENTRAL ? gk_central_energy(model, setup, work, data, h)
                                                    : gk_step_energy(model, setup, data, &work->explicit_rows);
-        return 1;
+        return gk_finite(v[V_ENERGY]);
     }
     const double energy = gk_step_energy(model, setup, data,
                                          gk_flow_for(model, setup, work, data->state_h, data->state_gamma));

@@ -1,6 +1,7 @@
 /* Communication steps and their outputs. */
 #ifndef GK_RUN_H
 #define GK_RUN_H
+#include "base/gk_lanes.h"
 #include "base/gk_check.h"
 #include "integrate/gk_integrate.h"
 
@@ -27,18 +28,21 @@ void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, con
                                double *modes, double *ground);
 void gk_amplitudes_of_ports(const gk_model *model, const gk_setup *setup, const gk_work *work, double *ground);
 /* gk_supports.c: vectors of the ground oscillators, and of the supports */
-void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved, double *speed);
-void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved, const double *speed,
-                           double *out);
-void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                            double *out);
-void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
-                        double *out);
-void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force);
+GK_HOT void gk_supports_motion(const gk_setup *setup, const gk_work *work, const gk_data *data, double *moved,
+                               double *speed);
+GK_HOT void gk_supports_by_motion(const gk_model *model, const gk_setup *setup, const double *moved,
+                                  const double *speed, double *out);
+GK_HOT void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const gk_work *work,
+                                   const gk_data *data, double *out);
+GK_HOT void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data,
+                               double *out);
+GK_HOT void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, double *force);
 /* gk_tally.c */
-void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally);
-gk_tally_function gk_tally_count;
-void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data *data, double H, const gk_tally *tally);
+GK_HOT void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                           gk_tally *tally);
+GK_HOT gk_tally_function gk_tally_count;
+GK_HOT void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data *data, double H,
+                           const gk_tally *tally);
 /* gk_outputs.c */
 void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data);
 void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data);

@@ -11,12 +11,12 @@ typedef struct gk_block {
 } gk_block;
 
 /* compliance of a tooth's flank `to` by a load on flank `from` of the tooth `offset` before it */
-gk_block gk_block_of(const gk_node *n, int from, int to, int offset);
+GK_HOT gk_block gk_block_of(const gk_node *n, int from, int to, int offset);
 /* normal displacement at flank `from` per force along the profile at flank `to` of the same tooth; along the profile */
-gk_block gk_block_along_normal(const gk_node *n, int from, int to);
-gk_block gk_block_along_own(const gk_node *n, int from, int to);
+GK_HOT gk_block gk_block_along_normal(const gk_node *n, int from, int to);
+GK_HOT gk_block gk_block_along_own(const gk_node *n, int from, int to);
 /* (functions, functions) between two points */
-void gk_block_tabulate(const gk_node *n, gk_block b, const gk_spot *p, const gk_spot *q, double *cell);
+GK_HOT void gk_block_tabulate(const gk_node *n, gk_block b, const gk_spot *p, const gk_spot *q, double *cell);
 /* between points i and j */
-double gk_block_between(const gk_node *n, gk_block b, int i, int j);
+GK_HOT double gk_block_between(const gk_node *n, gk_block b, int i, int j);
 #endif

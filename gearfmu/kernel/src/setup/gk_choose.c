@@ -1,6 +1,7 @@
 /* What a run is made of: level, integrator, effects and contact that go together, and the oscillators that are dynamic
  * then. */
-#include "integrate/gk_integrate.h"
+#include "setup/gk_choose.h"
+#include "setup/gk_setup.h"
 #include <stdio.h>
 
 /* ---- level and integrator ---------------------------------------------------------------------------------------- */
@@ -43,17 +44,34 @@ static gk_outcome choose_contact(const gk_model *model, const gk_data *data, gk_
     return GK_OK;
 }
 
-/* friction is solved within the step, and bodies must know how they yield along the profile */
-static gk_outcome choose_friction(const gk_model *model, const gk_setup *setup, char message[GK_MESSAGE])
+/* an effect that is on and misses what it needs (gk_effects.inc) is refused */
+static gk_outcome check_needs(const gk_setup *setup, char message[GK_MESSAGE])
 {
-    if (!setup->on.friction) return GK_OK;
-    if (setup->integrator != DG4 && setup->integrator != EM) {
-        snprintf(message, GK_MESSAGE,
-                 "effect.friction is solved within the step: use integrator dg4 or em, at any level but paper and "
-                 "explicit, or effect.friction = false");
-        return GK_BAD_VALUE;
-    }
-    for (int g = 0; g < model->gears && setup->on.elastic; g++)
+    enum { NOTHING, SOLVED, LINES };
+    const int there[] = {
+        [NOTHING] = 1, [SOLVED] = setup->integrator == DG4 || setup->integrator == EM, [LINES] = !setup->nodal};
+    const struct {
+        int wanted, needs;
+        const char *refusal;
+    } rows[] = {
+#define GK_EFFECT(name, variable, needs, refusal) {setup->on.name, needs, refusal},
+#define GK_PART(name)
+#include "model/gk_effects.inc"
+#undef GK_EFFECT
+#undef GK_PART
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        if (rows[i].wanted && !there[rows[i].needs]) {
+            snprintf(message, GK_MESSAGE, "%s", rows[i].refusal);
+            return GK_BAD_VALUE;
+        }
+    return GK_OK;
+}
+
+/* bodies must know how they yield along the profile */
+static gk_outcome check_friction(const gk_model *model, const gk_setup *setup, char message[GK_MESSAGE])
+{
+    for (int g = 0; g < model->gears && setup->on.elastic && setup->on.friction; g++)
         if (!model->gear[g].along_rows) {
             snprintf(message, GK_MESSAGE,
                      "effect.friction: gear %d of this model does not know how it yields along the profile; reduce its "
@@ -89,13 +107,8 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
     }
     if (setup->level == LEVEL_PAPER && setup->integrator == DG4 && !model->chains) setup->integrator = RK45;
     gk_outcome outcome = choose_contact(model, data, setup, message);
-    if (!outcome) outcome = choose_friction(model, setup, message);
-    if (!outcome && setup->on.film && setup->nodal) {
-        snprintf(message, GK_MESSAGE,
-                 "effect.film stands on lines of contact: use contact line (level paper has nodes), or effect.film = "
-                 "false");
-        return GK_BAD_VALUE;
-    }
+    if (!outcome) outcome = check_needs(setup, message);
+    if (!outcome) outcome = check_friction(model, setup, message);
     if (outcome || setup->nodal) return outcome;
     if (setup->level == LEVEL_PAPER) {
         setup->on.residual = 0;
@@ -127,10 +140,6 @@ int gk_choose_modes(const gk_model *model, const gk_setup *setup, int g)
     }
 }
 
-/* Oscillators below a share of the cut of level fast by which engagements of one gear feel each other (the ovals of a
- * ring between planets) are dynamic at every level: far teeth (gk_far_fill.c) know those above it alone. */
-static const double SHARED_BELOW = 0.25;
-
 static int shares(const gk_model *model, const gk_setup *setup)
 {
     for (int g = 0; g < model->gears; g++)
@@ -147,7 +156,7 @@ static int is_dynamic(const gk_model *model, const gk_setup *setup, int k)
     if (ground->rigid_share[k] > 0.5) return 1;
     if (!setup->on.elastic) return 0;
     if (setup->level == LEVEL_RIGID)
-        return shares(model, setup) && ground->omega[k] < SHARED_BELOW * 2.0 * GK_PI * model->cut[0];
+        return shares(model, setup) && ground->omega[k] < GK_SHARED_BELOW * 2.0 * GK_PI * model->cut[0];
     if (setup->level != LEVEL_FAST && setup->level != LEVEL_STANDARD) return 1;
     return ground->omega[k] < 2.0 * GK_PI * model->cut[setup->level == LEVEL_STANDARD];
 }

@@ -1,6 +1,7 @@
 /* What ground oscillators and supports do to a side of an engagement (gk_grounded.c). */
 #ifndef GK_GROUNDED_H
 #define GK_GROUNDED_H
+#include "base/gk_lanes.h"
 #include "base/gk_check.h"
 #include "gk.h"
 #include "model/gk_model.h"
@@ -21,8 +22,8 @@ typedef struct gk_grounded {
 } gk_grounded;
 
 /* doubles of a gear with `columns` dynamic oscillators */
-size_t gk_grounded_room(const gk_model *model, const gk_gear *gear, int columns);
-gk_grounded gk_grounded_side(const gk_node *n, double *room);
+GK_HOT size_t gk_grounded_room(const gk_model *model, const gk_gear *gear, int columns);
+GK_HOT gk_grounded gk_grounded_side(const gk_node *n, double *room);
 static inline gk_matrix gk_grounded_yields(const gk_grounded *g)
 {
     GK_ASSERT(g->stride % 4 == 0);
@@ -39,5 +40,5 @@ static inline gk_matrix gk_grounded_dynamic(const gk_grounded *g)
     return (gk_matrix){g->dynamic, g->motions, g->columns};
 }
 /* out (points, columns) += x (points, rows) · matrix */
-void gk_grounded_times(const double *x, const gk_matrix *by, int points, double *out);
+GK_HOT void gk_grounded_times(const double *x, const gk_matrix *by, int points, double *out);
 #endif

@@ -1,7 +1,7 @@
 /* Speeds of rotors through the engagements: seen from the axes that its gears stand in, an engagement rolls like one on
  * fixed axes (Willis):  r_bA (ω_A − ω_f) + kind r_bB (ω_B − ω_f) = 0. */
 #include "setup/gk_kinematics.h"
-#include "integrate/gk_integrate.h"
+#include "base/gk_dense.h"
 
 /* rotors of an engagement: gear A's, gear B's, the frame's (−1: the ground) */
 static void rotors_of(const gk_model *model, const gk_engagement *e, int rotor[3])
@@ -121,8 +121,8 @@ void gk_kinematics_carrying(const gk_model *model, int coasts[MAX_ENGAGEMENTS])
     for (int a = 0; a < n; a++) trace += product[a * n + a];
     for (int a = 0; a < n; a++) product[a * n + a] += SMALL * trace;
     y[model->port[0].rotor] = 1.0;
-    if (!gk_limit_cholesky(product, n)) return;
-    gk_limit_solve(product, y, n);
+    if (!gk_cholesky(product, n)) return;
+    gk_cholesky_solve(product, y, n);
     for (int i = 0; i < model->engagements; i++) {
         force[i] = 0.0;
         for (int a = 0; a < n; a++) force[i] -= arms[i][a] * y[a];

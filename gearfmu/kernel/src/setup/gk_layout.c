@@ -322,7 +322,8 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         unknowns += shared ? MAX_SOFT : 0;
     }
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
-    work->columns = doubles(&b, gk_side_scratch(model) + gk_limit_scratch(model));
+    work->columns = doubles(&b, gk_side_scratch(model) +
+                                    (size_t)(model->engagements * LIMIT_POSITIONS) * MAX_STRIDE * MAX_STRIDE);
     size_t blocks;
     work->spread = doubles(&b, gk_spread_scratch(model, &blocks));
     work->blocks = reals(&b, blocks);

@@ -57,19 +57,20 @@ static inline int gk_node_offset(const gk_side *side, int candidate)
     const int flank = candidate >= side->count[0];
     return side->first[flank] + side->step * (flank ? candidate - side->count[0] : candidate);
 }
-gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e, const gk_side *side);
+GK_HOT gk_node gk_node_begin(const gk_model *model, const gk_setup *setup, const gk_work *work, int e,
+                             const gk_side *side);
 /* goes on to another side whose points lie at the same places of a gear of the same body */
-void gk_node_take(gk_node *n, int e, const gk_side *side);
+GK_HOT void gk_node_take(gk_node *n, int e, const gk_side *side);
 /* doubles of a node; the scratch that is left for what is made of it */
-size_t gk_node_size(const gk_model *model, const gk_gear *gear);
-double *gk_node_room(const gk_node *n);
+GK_HOT size_t gk_node_size(const gk_model *model, const gk_gear *gear);
+GK_HOT double *gk_node_room(const gk_node *n);
 /* `position`: share of the pitch */
-void gk_node_gather(gk_node *n, double position, int all);
-void gk_node_turn(gk_node *n, int along);
+GK_HOT void gk_node_gather(gk_node *n, double position, int all);
+GK_HOT void gk_node_turn(gk_node *n, int along);
 /* motion outward at a point of a gear in an engagement, by the node's angles of helix alone */
-void gk_node_motion_at(const gk_node *n, const gk_spot *p, double *motion);
+GK_HOT void gk_node_motion_at(const gk_node *n, const gk_spot *p, double *motion);
 /* out (width) = Σ over the four rolls and the width functions of a table (2, rolls, functions, width) at one point */
-void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out);
+GK_HOT void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int width, double *out);
 /* sense of growing roll on this side against the direction in which gear B slides past A */
 static inline double gk_node_along(const gk_node *n)
 {
@@ -92,6 +93,6 @@ static inline double gk_width_sign(const gk_model *model, int function)
     return model->degree[function] % 2 ? -1.0 : 1.0;
 }
 /* length of roll of a candidate on the line of action at mid-width */
-double gk_node_roll(const gk_side *side, int flank, double position, int offset);
-double gk_node_tan(double angle);
+GK_HOT double gk_node_roll(const gk_side *side, int flank, double position, int offset);
+GK_HOT double gk_node_tan(double angle);
 #endif

@@ -1,6 +1,7 @@
 /* Compliance of what is not dynamic between the points of a node (gk_residual.c). */
 #ifndef GK_RESIDUAL_H
 #define GK_RESIDUAL_H
+#include "base/gk_lanes.h"
 #include "gk.h"
 #include "model/gk_model.h"
 #include "setup/gk_block.h"
@@ -15,13 +16,13 @@ typedef struct gk_residual {
     double *loaded;         /* (points, stride): what the ground oscillators yield under a load at every point */
 } gk_residual;
 
-size_t gk_residual_size(const gk_model *model, const gk_gear *gear, size_t points);
+GK_HOT size_t gk_residual_size(const gk_model *model, const gk_gear *gear, size_t points);
 /* takes its place; returns what is left */
-double *gk_residual_begin(gk_residual *r, const gk_node *n, double *room);
+GK_HOT double *gk_residual_begin(gk_residual *r, const gk_node *n, double *room);
 /* of the gear group, at a node or halfway to the next: the same for twins */
-void gk_residual_gather(gk_residual *r, const gk_node *n, int at, int halfway);
-void gk_residual_gather_along(gk_residual *r, const gk_node *n);
+GK_HOT void gk_residual_gather(gk_residual *r, const gk_node *n, int at, int halfway);
+GK_HOT void gk_residual_gather_along(gk_residual *r, const gk_node *n);
 /* of a side, with its ground oscillators and supports */
-void gk_residual_store(gk_residual *r, const gk_node *n, int at, int halfway, const gk_grounded *g);
-void gk_residual_store_along(gk_residual *r, const gk_node *n, int at, const gk_grounded *g);
+GK_HOT void gk_residual_store(gk_residual *r, const gk_node *n, int at, int halfway, const gk_grounded *g);
+GK_HOT void gk_residual_store_along(gk_residual *r, const gk_node *n, int at, const gk_grounded *g);
 #endif

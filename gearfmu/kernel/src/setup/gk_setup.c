@@ -1,8 +1,6 @@
-/* Level, effects, slices and step → gk_setup with all its tables. */
+/* The choice of level, effects and oscillators → gk_setup, but for the tables of the sides of engagements. */
 #include "problem/gk_work.h"
-#include "integrate/gk_integrate.h"
 #include "setup/gk_kinematics.h"
-#include <stdio.h>
 
 /* ---- modes and ground group -------------------------------------------------------------------------------------- */
 static void fill_modal(const gk_gear *gear, gk_modal *m)
@@ -309,66 +307,10 @@ static void fill_explicit(const gk_model *model, const gk_setup *setup, gk_work 
     memset(work->ground_zero, 0, ground);
 }
 
-/* the sides of gears of body g */
-static gk_twins sides_of(const gk_model *model, int g)
+void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data, const int32_t *which)
 {
-    gk_twins sides = {.count = 0};
-    for (int e = 0; e < model->engagements; e++)
-        for (int w = 0; w < 2; w++) {
-            if (gk_spread_leader(model, model->engagement[e].gear[w]) != g) continue;
-            sides.engagement[sides.count] = e, sides.which[sides.count++] = w;
-        }
-    return sides;
-}
-
-/* moves the first of these sides and its twins to `out` */
-static void take_twins(const gk_model *model, gk_twins *sides, gk_twins *out)
-{
-    const int e = sides->engagement[0], w = sides->which[0], all = sides->count;
-    out->count = sides->count = 0;
-    for (int i = 0; i < all; i++) {
-        const int f = sides->engagement[i], v = sides->which[i];
-        gk_twins *to = w == v && gk_side_twins(model, e, f) ? out : sides;
-        to->engagement[to->count] = f, to->which[to->count++] = v;
-    }
-}
-
-/* gear by gear, those of one body together: each body's compliances are spread once, each place on it is read once */
-static void fill_sides(const gk_model *model, gk_setup *setup, gk_work *work)
-{
-    gk_fill_function *const fill = gk_wide_fill(1);
-    for (int g = 0; g < model->gears; g++) {
-        if (gk_spread_leader(model, g) != g) continue;
-        gk_twins sides = sides_of(model, g), twins;
-        if (setup->on.residual) gk_spread_compliance(model, setup, work, g);
-        while (sides.count) {
-            take_twins(model, &sides, &twins);
-            fill(model, setup, work, &twins);
-        }
-    }
-}
-
-gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setup, gk_work *work,
-                      char message[GK_MESSAGE])
-{
-    GK_ASSERT(model && data && setup && work && message);
-    int modes[MAX_GEARS], coasts[MAX_ENGAGEMENTS];
-    int32_t which[MAX_GROUND + 4 * MAX_ROTORS];
-    message[0] = 0;
-    if (data->magic != GK_DATA_MAGIC) {
-        snprintf(message, GK_MESSAGE, "gk_prepare before gk_defaults");
-        return GK_BAD_CALL;
-    }
-    memset(setup, 0, sizeof *setup);
-    gk_outcome outcome = gk_choose(model, data, setup, message);
-    if (outcome) return outcome;
-    gk_layout_plan(model, setup);
-    for (int g = 0; g < model->gears; g++) modes[g] = setup->on.elastic ? gk_choose_modes(model, setup, g) : 0;
-    gk_layout_setup(model, setup, modes, gk_choose_ground(model, setup, which));
-    memset(work, 0, sizeof *work);
-    gk_layout_work(model, setup, work);
-    setup->step = gk_wide_step(1, setup->integrator);
-    setup->count = gk_wide_count(1);
+    GK_ASSERT(model && setup && work && data && which);
+    int coasts[MAX_ENGAGEMENTS];
     for (int g = 0; g < model->gears; g++) {
         fill_modal(&model->gear[g], &setup->modal[g]);
         setup->modal[g].turns = GK_ON(setup, gyroscopic) && model->gear[g].turn_rate;
@@ -383,9 +325,5 @@ gk_outcome gk_prepare(const gk_model *model, const gk_data *data, gk_setup *setu
     for (int g = 0; g < model->gears; g++) gk_spread_rows(model, setup, g);
     for (int g = 0; g < model->gears && setup->nodal; g++) gk_nodal_rows(model, setup, g);
     for (int g = 0; g < model->gears; g++) gk_far_fill(model, setup, g);
-    fill_sides(model, setup, work);
     fill_explicit(model, setup, work);
-    outcome = gk_limit_choose(model, setup, work, data->stage[V_H], message);
-    if (outcome == GK_OK) setup->magic = GK_SETUP_MAGIC;
-    return outcome;
 }

@@ -5,6 +5,7 @@
 #include "base/gk_check.h"
 #include "base/gk_math.h"
 #include "model/gk_data.h"
+#include "model/gk_effects.h"
 #include "setup/gk_nodal.h"
 #include "setup/gk_spread.h"
 
@@ -20,43 +21,6 @@ enum {
     MAX_SOFT = 64 /* modes of a gear with several engagements that statics take as unknowns */
 };
 
-typedef struct gk_effects {
-    int elastic, residual, hertz, coast_flank, contact_damping, tip_relief, tip_contact, bearings, modal_damping,
-        roll_motion, coriolis, centrifugal, gyroscopic, flank_deviations, runout, friction, film;
-} gk_effects;
-
-/* A kernel built with -DGK_WITHOUT=tip_relief has no code for that effect: what an effect costs while it is off is
- * measured against it (benchmarks/effects_cost.py) */
-#ifndef GK_WITHOUT
-#define GK_WITHOUT nothing
-#endif
-enum {
-    EFFECT_nothing,
-    EFFECT_elastic,
-    EFFECT_modes,
-    EFFECT_residual,
-    EFFECT_hertz,
-    EFFECT_slices,
-    EFFECT_coast_flank,
-    EFFECT_contact_damping,
-    EFFECT_tip_relief,
-    EFFECT_tip_contact,
-    EFFECT_bearings,
-    EFFECT_modal_damping,
-    EFFECT_roll_motion,
-    EFFECT_pitch_errors,
-    EFFECT_coriolis,
-    EFFECT_centrifugal,
-    EFFECT_gyroscopic,
-    EFFECT_flank_deviations,
-    EFFECT_runout,
-    EFFECT_friction,
-    EFFECT_film
-};
-#define GK_EFFECT(name) EFFECT_##name
-#define GK_EFFECT_OF(name) GK_EFFECT(name)
-#define GK_HAS(effect) (GK_EFFECT_OF(GK_WITHOUT) != EFFECT_##effect)
-#define GK_ON(setup, effect) (GK_HAS(effect) && (setup)->on.effect)
 #define GK_LANES(setup, g) (GK_HAS(modes) && GK_HAS(elastic) ? (setup)->modal[g].n : 0)
 #define GK_STRIPS(of) (GK_HAS(slices) ? (of)->strips : 1)
 
@@ -223,9 +187,27 @@ typedef struct gk_coefficients {
 /* share of the correction κ that a free mass has: γ lowers it below ½ only (gk_flow.c) */
 static inline double gk_correction(double gamma) { return gk_min(1.0, 2.0 * gamma); }
 
+/* what an integrator is: the one place where they differ in more than their own file */
+typedef struct gk_scheme {
+    int is_explicit;  /* forces follow from positions; limited by stability; no account of work; knows no clutch */
+    int corrected;    /* γ > 0: corrected for time within the step */
+    int linear_force; /* forces are linear in the step, else constant */
+} gk_scheme;
+static inline const gk_scheme *gk_scheme_of(gk_integrator integrator)
+{
+    GK_ASSERT(integrator >= DG4 && integrator <= CENTRAL);
+    static const gk_scheme schemes[] = {[DG4] = {.corrected = 1},
+                                        [MIX4] = {.linear_force = 1},
+                                        [EM] = {0},
+                                        [RK45] = {.is_explicit = 1},
+                                        [CENTRAL] = {.is_explicit = 1}};
+    return &schemes[integrator];
+}
+
 typedef struct gk_tally gk_tally;
 typedef void gk_tally_function(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
                                double h, gk_tally *tally);
+typedef void gk_moves_function(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_coefficients *k);
 typedef gk_outcome gk_step_function(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
                                     double h, double gamma);
 
@@ -259,6 +241,7 @@ struct gk_setup {
     gk_point_rows point_rows[MAX_GEARS]; /* nodal contact */
     gk_step_function *step;              /* of the integrator, in the widest vectors of this processor */
     gk_tally_function *count;            /* what is summed after every step, likewise */
+    gk_moves_function *moves;            /* tables of a step's length, likewise */
     size_t amplitudes;                   /* their place in the data, in doubles from the first oscillator on */
     size_t state_size;
 };
@@ -305,15 +288,15 @@ static inline int gk_disc_of(const gk_model *model, int port)
     return model->rotors + 2 * model->port[port].chain - 1;
 }
 
-/* gk_vars.c */
-gk_effects gk_effects_of(const gk_data *data);
-void gk_vars_take(const gk_model *model, gk_data *data, const gk_data *from);
+/* gk_setup.c; which: the dynamic ground oscillators */
+void gk_setup_fill(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data, const int32_t *which);
 /* gk_far_fill.c */
 int gk_far_known(const gk_model *model, const gk_setup *setup, int g);
 void gk_far_fill(const gk_model *model, gk_setup *setup, int g);
 /* gk_flow.c */
-const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma);
-const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
+GK_HOT const gk_coefficients *gk_flow_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h,
+                                          double gamma);
+GK_HOT const gk_coefficients *gk_flow_known(const gk_work *work, double h, double gamma);
 /* gk_nodal_setup.c */
 void gk_nodal_rows(const gk_model *model, gk_setup *setup, int g);
 void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *data, gk_mesh *mesh);

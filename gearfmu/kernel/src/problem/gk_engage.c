@@ -1,12 +1,17 @@
-/* What an engagement remembers from step to step: forces, gaps and dampers of its tooth pairs and joints; the start of
- * the step with them. */
-#include "integrate/gk_integrate.h"
+/* The one place that finds contacts: pose → candidates → memory → rows → system. What an engagement remembers from step
+ * to step: forces, gaps and dampers of its tooth pairs and joints; the start of the step with them.
+ *
+ * Places of contact for conservation tests (effect.roll_motion off): teeth, rolls, normals and curvatures stay those of
+ * the start, gaps are linear in the coordinates. Then rows and C′ are constant, the mesh does no work of its own, and
+ * the scheme's invariant (docs/theory.md, eq. 11) must hold exactly. */
+#include "problem/gk_engage.h"
 
 static const double PAYABLE = 1e-4; /* of the energy of the quasi-static part: what a contact that only grazes cannot
                                        repay waits */
+static const double FROZEN_RANGE = 0.4e-3; /* m: every flank that the motion of a test can close is always there */
 
 /* entry of the memory that a tooth pair has, −1: none */
-int gk_memory_find(const gk_meshing *meshing, gk_key key)
+static int remembered(const gk_meshing *meshing, gk_key key)
 {
     GK_ASSERT(meshing->pairs >= 0 && meshing->pairs <= MAX_PAIRS);
     for (int i = 0; i < meshing->pairs; i++)
@@ -14,6 +19,48 @@ int gk_memory_find(const gk_meshing *meshing, gk_key key)
     return -1;
 }
 
+/* Finds the contacts of engagement e at work->spin and forms its problem; 0 when the poses mean nothing. Places that
+ * are found at another pose move to this one along their gradients. */
+int gk_engage(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, const gk_search *how,
+              int e)
+{
+    GK_ASSERT(gk_is_mesh(setup, e) && how && how->k);
+    const gk_meshing *meshing = &data->meshing[e];
+    const double *const ground = how->ground ? how->ground : work->ground_y;
+    gk_engaged *engaged = &work->engaged[e];
+    const int frozen = !how->anew && !setup->on.roll_motion;
+    const double least = gk_max(how->reach, GK_ON(setup, film) ? GK_FILM_REACH : 0.0);
+    const double reach = how->anew ? how->reach : frozen ? FROZEN_RANGE : gk_max(meshing->search_distance, least);
+    double there[POSE], moved[POSE];
+    GK_MARK(work);
+    gk_rows_pose(model, setup, e, work->spin, ground, engaged->pose);
+    const double *at = frozen ? meshing->frozen : how->spin ? there : engaged->pose;
+    if (how->spin) gk_rows_pose(model, setup, e, how->spin, ground, there);
+    engaged->places = gk_flank_find(model, setup, &setup->mesh[e], at, reach, engaged->position, engaged->place);
+    if (engaged->places < 0) return engaged->places = 0;
+    for (int d = 0; d < POSE && at != engaged->pose; d++) moved[d] = engaged->pose[d] - at[d];
+    for (int p = 0; p < engaged->places; p++) {
+        gk_place *place = &engaged->place[p];
+        if (at != engaged->pose) gk_flank_move(setup, place, moved);
+        place->memory = how->anew ? -1 : remembered(meshing, place->key);
+    }
+    GK_LAP(work, PHASE_FIND);
+    gk_rows_form(setup, work, e);
+    GK_LAP(work, PHASE_ROWS);
+    gk_form_system(model, setup, data, how->k, work, e);
+    return 1;
+}
+
+/* do teeth overlap beyond what the model can mean? */
+int gk_engage_overlaps(const gk_model *model, const gk_work *work, int e)
+{
+    GK_ASSERT(gk_is_engagement(model, e));
+    for (int p = 0; p < work->engaged[e].places; p++)
+        if (work->engaged[e].place[p].gap < -model->engagement[e].overlap_max) return 1;
+    return 0;
+}
+
+/* ---- memory ------------------------------------------------------------------------------------------------------ */
 /* λ0 without dashpots: quasi-static deflection and energy at the start; linear: forces of the step are (mix4) */
 static void recall_forces(const gk_data *data, gk_system *s, int linear)
 {

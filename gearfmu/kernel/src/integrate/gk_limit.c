@@ -3,48 +3,17 @@
  * dashpots let move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m). A closed contact is stable up to μ′ = 1. Modes above ωh = 1.2
  * have no κ, so μ′ goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and
  * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
-#include <stdio.h>
+#include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"
 #include "setup/gk_tables.h"
+#include <stdio.h>
 
 static const double MU_MOST = 0.9;                        /* μ′ of a step */
 static const double AT_NYQUIST = 2.0 / (1.0 - GK_MEMORY); /* f_d over half of η_d where forces alternate */
 static const double WITHIN = 0.9,
                     BEYOND = 1.5; /* of the limit of stability: the default; from where on a step is refused */
 static const double NEAR = 50e-6; /* m: flanks that count as closed */
-enum { POSITIONS = 8, POWER_ROUNDS = 60 };
-
-/* Cholesky of a (n, n), in place, lower; 0 when not positive */
-int gk_limit_cholesky(double *a, int n)
-{
-    GK_ASSERT(a && n >= 0);
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = a[i * n + j];
-            for (int k = 0; k < j; k++) sum -= a[i * n + k] * a[j * n + k];
-            if (i != j)
-                a[i * n + j] = sum / a[j * n + j];
-            else if (!(sum > 0.0))
-                return 0;
-            else
-                a[i * n + i] = sqrt(sum);
-        }
-    return 1;
-}
-
-/* x ← (L Lᵀ)⁻¹ x */
-void gk_limit_solve(const double *L, double *x, int n)
-{
-    GK_ASSERT(L && x && n >= 0);
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < i; k++) x[i] -= L[i * n + k] * x[k];
-        x[i] /= L[i * n + i];
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++) x[i] -= L[k * n + i] * x[k];
-        x[i] /= L[i * n + i];
-    }
-}
+enum { POWER_ROUNDS = 60 };
 
 /* largest eigenvalue of C⁻¹ K, C = L Lᵀ, K symmetric positive semidefinite */
 static double largest(const double *L, const double *K, int n)
@@ -56,7 +25,7 @@ static double largest(const double *L, const double *K, int n)
             y[i] = 0.0;
             for (int j = 0; j < n; j++) y[i] += K[i * n + j] * x[j];
         }
-        gk_limit_solve(L, y, n);
+        gk_cholesky_solve(L, y, n);
         value = 0.0;
         for (int i = 0; i < n; i++) value = gk_max(value, fabs(y[i]));
         if (!(value > 0.0)) return 0.0;
@@ -121,16 +90,16 @@ static void kappa_part(const gk_system *s, const double *Q, double *K)
 
 /* Forms the problem of engagement e at a position (in pitches) of its gears, unloaded, all places near contact; 0 when
  * there is none */
-int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, const gk_coefficients *k,
-                   int e, double position)
+int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
+                   const gk_coefficients *k, int e, double position)
 {
     GK_ASSERT(gk_is_mesh(setup, e));
     GK_ASSERT(gk_is_engagement(model, e));
     GK_ASSERT(position >= 0.0 && position <= 1.0);
     const gk_engagement *engagement = &model->engagement[e];
-    gk_engaged *engaged = &work->engaged[e];
     const gk_gear *A = &model->gear[engagement->gear[0]], *B = &model->gear[engagement->gear[1]];
     const double turned = 2.0 * GK_PI * position / A->z;
+    const gk_search near = {.k = k, .reach = NEAR, .anew = 1};
     memset(work->spin, 0, sizeof work->spin);
     memset(work->speed, 0, sizeof work->speed);
     work->spin[A->rotor] = turned;
@@ -141,46 +110,31 @@ int gk_limit_place(const gk_model *model, const gk_setup *setup, gk_work *work, 
     }
     for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
     work->ground_y = work->ground_zero;
-    gk_rows_pose(model, setup, e, work->spin, work->ground_y, engaged->pose);
-    engaged->places = gk_flank_find(model, setup, &setup->mesh[e], engaged->pose, NEAR, engaged->position,
-                                    engaged->place);
-    if (engaged->places < 0) return engaged->places = 0;
-    for (int p = 0; p < engaged->places; p++) engaged->place[p].memory = -1;
-    gk_rows_form(setup, work, e);
-    gk_form_system(model, setup, data, k, work, e);
-    return 1;
-}
-
-/* room for what forces do at once at every position, which does not depend on h: A of the explicit rows */
-size_t gk_limit_scratch(const gk_model *model)
-{
-    GK_ASSERT(model);
-    return (size_t)(model->engagements * POSITIONS) * MAX_STRIDE * MAX_STRIDE;
+    return gk_engage(model, setup, work, data, &near, e);
 }
 
 static double *kept_at(const gk_work *work, int e, int i)
 {
-    return work->columns + (size_t)(e * POSITIONS + i) * MAX_STRIDE * MAX_STRIDE;
+    return work->columns + (size_t)(e * LIMIT_POSITIONS + i) * MAX_STRIDE * MAX_STRIDE;
 }
 
-static int positions_of(const gk_engagement *e) { return e->kind == MESH_FLAT ? 1 : POSITIONS; }
+static int positions_of(const gk_engagement *e) { return e->kind == MESH_FLAT ? 1 : LIMIT_POSITIONS; }
 
-static void keep_all(const gk_model *model, const gk_setup *setup, gk_work *work)
+static void keep_all(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
-    gk_data empty;
-    memset(&empty, 0, sizeof empty);
     for (int e = 0; e < model->engagements; e++)
         for (int i = 0; i < positions_of(&model->engagement[e]); i++) {
             const gk_system *s = &work->engaged[e].system;
-            if (!gk_limit_place(model, setup, work, &empty, &work->explicit_rows, e, (double)i / POSITIONS)) continue;
+            if (!gk_limit_place(model, setup, work, data, &work->explicit_rows, e, (double)i / LIMIT_POSITIONS))
+                continue;
             memcpy(kept_at(work, e, i), s->A, (size_t)(s->n * s->stride) * sizeof *s->A);
         }
 }
 
-static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data,
+static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                     const gk_coefficients *k, int e, int i)
 {
-    const double position = (double)i / POSITIONS;
+    const double position = (double)i / LIMIT_POSITIONS;
     const gk_system *s = &work->engaged[e].system;
     const gk_engagement *engagement = &model->engagement[e];
     double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
@@ -188,39 +142,39 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work,
     if (!gk_limit_place(model, setup, work, data, k, e, position)) return INFINITY;
     gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
     kappa_part(s, Q, K);
-    return gk_limit_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
+    return gk_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
 }
 
-static double limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+static double limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
+                       double gamma)
 {
     GK_ASSERT(h > 0.0 && gk_finite(h));
     GK_ASSERT(gamma >= 0.0 && gamma <= 1.0);
     const gk_coefficients *k = gk_flow_for(model, setup, work, h, gamma);
     double worst = 0.0;
-    gk_data empty;
-    memset(&empty, 0, sizeof empty);
     for (int e = 0; e < model->engagements; e++)
         for (int i = 0; i < positions_of(&model->engagement[e]); i++)
-            worst = gk_max(worst, mu_at(model, setup, work, &empty, k, e, i));
+            worst = gk_max(worst, mu_at(model, setup, work, data, k, e, i));
     return worst;
 }
 
 /* μ′ of a step of length h with γ */
-double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, double h, double gamma)
+double gk_limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,
+                   double gamma)
 {
     GK_ASSERT(gk_scheme_of(setup->integrator)->corrected);
-    keep_all(model, setup, work);
-    return limit_mu(model, setup, work, h, gamma);
+    keep_all(model, setup, work, data);
+    return limit_mu(model, setup, work, data, h, gamma);
 }
 
 /* γ for which μ′ stays at its bound */
-static double gamma_for(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
+static double gamma_for(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h)
 {
-    if (limit_mu(model, setup, work, h, 1.0) <= MU_MOST) return 1.0;
+    if (limit_mu(model, setup, work, data, h, 1.0) <= MU_MOST) return 1.0;
     double low = 0.0, high = 1.0;
     for (int i = 0; i < 12; i++) {
         double middle = 0.5 * (low + high);
-        if (limit_mu(model, setup, work, h, middle) <= MU_MOST)
+        if (limit_mu(model, setup, work, data, h, middle) <= MU_MOST)
             low = middle;
         else
             high = middle;
@@ -245,33 +199,34 @@ double gk_limit_gamma(const gk_setup *setup, const gk_work *work, const gk_data 
 }
 
 /* γ of the internal step of the run */
-void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, double h)
+void gk_limit_run(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h)
 {
     GK_ASSERT(h > 0.0);
     if (!gk_scheme_of(setup->integrator)->corrected || work->run_h == h) return;
-    if (h != setup->h) keep_all(model, setup, work);
-    work->run_gamma = h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, h);
+    if (h != setup->h) keep_all(model, setup, work, data);
+    work->run_gamma = h == setup->h ? setup->gamma_at[0] : gamma_for(model, setup, work, data, h);
     work->run_h = h;
 }
 
-gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, double wished,
+gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work, const gk_data *data,
                            char message[GK_MESSAGE])
 {
     GK_ASSERT(message && model->period_min > 0.0);
+    const double wished = data->stage[V_H];
     GK_ASSERT(!(wished < 0.0));
     static const double ladder[] = {20e-6, 15e-6, 12.5e-6, 10e-6, 7.5e-6, 6e-6, 5e-6,
                                     4e-6,  3e-6,  2.5e-6,  2e-6,  1.5e-6, 1e-6, 0.5e-6};
     const double period = model->period_min;
     const int corrected = gk_scheme_of(setup->integrator)->corrected, rungs = (int)(sizeof ladder / sizeof *ladder);
-    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work)
+    const double stable = setup->integrator == CENTRAL ? gk_central_limit(model, setup, work, data)
                                                        : INFINITY; /* explicit: a limit of stability */
     double limit = gk_min(gk_min(model->h_max, period / 40.0), WITHIN * stable), h = wished;
-    if (corrected) keep_all(model, setup, work);
+    if (corrected) keep_all(model, setup, work, data);
     if (!(wished > 0.0))
         for (int i = 0; i < rungs; i++) {
             h = gk_min(ladder[i], limit);
             if ((ladder[i] <= limit || i + 1 == rungs || ladder[i + 1] < limit) &&
-                (!corrected || limit_mu(model, setup, work, h, 1.0) <= MU_MOST))
+                (!corrected || limit_mu(model, setup, work, data, h, 1.0) <= MU_MOST))
                 break;
         }
     if (h > period / 8.0) {
@@ -288,7 +243,7 @@ gk_outcome gk_limit_choose(const gk_model *model, gk_setup *setup, gk_work *work
     setup->h = h;
     double at = h;
     for (int i = 0; i < GAMMAS; i++, at *= QUARTER_OCTAVE)
-        setup->gamma_at[i] = corrected ? gamma_for(model, setup, work, at) : 0.0;
+        setup->gamma_at[i] = corrected ? gamma_for(model, setup, work, data, at) : 0.0;
     if (corrected && setup->gamma_at[0] < 0.7)
         snprintf(message, GK_MESSAGE,
                  "h = %.3g s exceeds the accuracy limit of dg4 for this model: gamma lowered to %.2f; a smaller h is "
