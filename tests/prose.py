@@ -15,16 +15,17 @@ LIMITS = ROOT / "tests" / "prose.json"
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 LONGEST = 30  # words a sentence
 BANNED = re.compile(  # private jargon, people's verbs for things, clauses with "what" as subject or object
-    r"\b(what|rooms?|squeezes?(?! film)|dash|ledgers?|owed?|owes|massless|troubles?|speaks?|knows?|knew|told|tells?"
-    r"|(?:cyclic|one|two|same|this) roads?|stands?|stood|at once|lets? go|goes on|go on|the same of|nothing of this)\b",
+    r"\b(what|rooms?|squeezes?(?! film)|dash|ledgers?|owed?|owes|massless(?!-boundary)|rounds|strips?|troubles?|speaks?"
+    r"|knows?|knew|told|tells?|(?:cyclic|two|same|this) roads?|stands?|stood|at once|lets? go|goes on|go on"
+    r"|the same of|nothing of this)\b",
     flags=re.IGNORECASE,
 )
 CODE_BLOCK = re.compile(r"^```.*?^```", flags=re.MULTILINE | re.DOTALL)
-NOT_PROSE = re.compile(r"<!--.*?-->|^\$\$.*?\$\$|^\|[-|: ]+\|$|^#[^\n]*$", flags=re.MULTILINE | re.DOTALL)
+NOT_PROSE = re.compile(r"<!--.*?-->|^\$\$.*?\$\$|^\|[-|: ]+\|$|^#[^\n]*$|^ {4}[^\n]*$", flags=re.MULTILINE | re.DOTALL)
 
 
 def prose(text: str) -> str:
-    """The text without code blocks, headings and comments; a code span is one word, a link its text."""
+    """The text without code blocks, equations, headings and comments; a code span is one word, a link its text."""
     text = NOT_PROSE.sub("", CODE_BLOCK.sub("", text))
     text = re.sub(r"`[^`\n]+`", "code", text)
     return re.sub(r"!?\[([^\[\]]*)\]\([^)]*\)", r"\1", text)
@@ -54,8 +55,8 @@ def counts(page: Path) -> tuple[int, int]:
 
 
 def words() -> int:
-    """All words of the pages, as `wc -w` counts them, in full thousands and one more."""
-    return sum(len(page.read_text(encoding="utf-8").split()) for page in PAGES) // 1000 * 1000 + 1000
+    """All words of the pages, as `wc -w` counts them."""
+    return sum(len(page.read_text(encoding="utf-8").split()) for page in PAGES)
 
 
 def name(page: Path) -> str:

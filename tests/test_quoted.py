@@ -71,11 +71,12 @@ def of_pairs() -> Iterator[Quote]:
         row = {"scene": "pair_loaded", "level": level, "slices": "5", "integrator": "rk45"}
         phrase = f"| `{level}`, `rk45` | # | # | # | # | # | # | #"
         yield Quote("docs/study.md", phrase, ((STUDY, row, columns.replace(" ", " h_s~ ", 1)),))
-    cheap = "10 µs, in # of real time, err by # and # %"
-    yield Quote("docs/study.md", cheap, ((STUDY, pair("fast", "1e-05"), "realtime_factor te_error% force_error%"),))
+    cheap = "10 µs give # and # % in # of real time"
+    yield Quote("docs/study.md", cheap, ((STUDY, pair("fast", "1e-05"), "te_error% force_error% realtime_factor"),))
     light = [pair(level, "6.66667e-06", "pair_light") for level in ("fast", "standard", "full", "rigid")]
     phrase = (
-        "transmission error # / # / # % and mesh force # / # / # % at `fast` / `standard` / `full`, `rigid` # and # %"
+        "# / # / # % of transmission error and # / # / # % of mesh force at `fast` / `standard` / `full`, "
+        "`rigid` # and # %"
     )
     cells = [(STUDY, row, column) for column in ("te_error%", "force_error%") for row in light[:3]]
     yield Quote("docs/study.md", phrase, (*cells, (STUDY, light[3], "te_error% force_error%")))
@@ -102,16 +103,16 @@ def of_sets() -> Iterator[Quote]:
     cells = [(SETS, planets(count=count), "te_error% force_error% realtime_factor") for count in ("3", "5")]
     yield Quote("docs/study.md", few, tuple(cells))
     modes = [(SETS, planets(level), "n_dyn") for level in ("fast", "full", "standard")]
-    yield Quote("docs/study.md", "`fast` takes # of the # oscillators, `standard` #:", tuple(modes))
+    yield Quote("docs/study.md", "`fast` takes # of the # oscillators, `standard` #;", tuple(modes))
     own, both = {"against": "fast, 5 µs, 5 slices"}, "te_error% force_error%"
     slices = "*One slice* moves the ripple by # and # %, the mean transmission error by # times the ripple"
     yield Quote("docs/study.md", slices, ((SETS, planets(slices="1", **own), f"{both} te_mean_error"),))
-    yield Quote("docs/study.md", "instead of five: # and # %", ((SETS, planets(slices="10", **own), both),))
+    yield Quote("docs/study.md", "*Ten slices*: # and # %", ((SETS, planets(slices="10", **own), both),))
     effects = {"tip edges": "tip_contact", "tip relief": "tip_relief", "elastic bodies": "elastic"}
     effects |= {"Hertz's law": "hertz", "contact damping": "contact_damping"}
     for shown, effect in effects.items():
         yield Quote("docs/study.md", f"{shown} # and # %", ((SETS, planets(off=effect, **own), both),))
-    for shown, effect in {"centrifugal load": "centrifugal", "Coriolis forces": "coriolis"}.items():
+    for shown, effect in {"Centrifugal load": "centrifugal", "Coriolis forces": "coriolis"}.items():
         cells = [(SETS, planets(off=effect, speed=speed, **own), both) for speed in ("85", "300")]
         yield Quote("docs/study.md", f"{shown} # and # % (300 rad/s: # and # %)", tuple(cells))
     for scene in sorted((ROOT / "gearfmu" / "scenes").glob("planetary_*.toml")):

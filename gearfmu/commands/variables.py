@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from importlib.resources import files
 from typing import NamedTuple
@@ -71,8 +72,13 @@ def variables_page() -> str:
             f"\n## {causality.capitalize()}s\n\n| name | number | unit | "
             f"{'start' if causality != 'OUTPUT' else 'type'} | exists | meaning |\n|---|---|---|---|---|---|\n"
         )
-        parts += [_line(row) for row in chosen]
+        parts += [_line(*alike) for _, alike in itertools.groupby(chosen, key=_numbered)]
     return "".join(parts)
+
+
+def _numbered(row: Row) -> str:
+    """The name without its number: slices make one line of the page."""
+    return re.sub(r"(?<=slice_)\d+", "", row.name)
 
 
 def _row(text: str) -> Row:
@@ -82,9 +88,14 @@ def _row(text: str) -> Row:
     return Row(int(number), identifier, name, kind, causality, exists, unit, start, items, description)
 
 
-def _line(row: Row) -> str:
+def _line(row: Row, *others: Row) -> str:
+    """A row of the page; others: rows that differ in their number alone."""
     third = row.type.removeprefix("GK_").lower()
     if row.causality != "GK_OUTPUT":
         third = row.items.split("|")[int(row.start)] if row.items else row.start
     meaning = row.description + (f" ({row.items.replace('|', ', ')})" if row.items else "")
-    return f"| `{row.name}` | {row.number} | {row.unit} | {third} | {WHEN[row.exists]} | {meaning} |\n"
+    name, number = f"`{row.name}`", str(row.number)
+    for last in others[-1:]:
+        name, number = f"{name} … `{last.name}`", f"{number} … {last.number}"
+        meaning = meaning.replace("slice 1 ", "a slice ")
+    return f"| {name} | {number} | {row.unit} | {third} | {WHEN[row.exists]} | {meaning} |\n"

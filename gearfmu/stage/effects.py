@@ -68,7 +68,7 @@ class Cost:
         return self.off / self.without - 1.0
 
 
-DISSIPATION = "it dissipates: what grows slowly without it no short window shows"
+DISSIPATION = "it dissipates: no short window shows slow growth without it"
 
 
 def _switched(name: str, test: str = "", carried: bool = False, of_data: bool = False, **words: str) -> Effect:
@@ -94,12 +94,12 @@ EFFECTS: tuple[Effect, ...] = (
         formula="m ẍ = F, J φ̈ = M and q̈ + 2ζω q̇ + ω² q = Σ Nλ; C_static",
         equation="1 (eqs. 1, 2)",
         matters=(
-            "always, but for first estimates of rigid-body motion: with axes held, rigid gears yield a tenth of "
-            "it (fzg_c, 302 N·m)"
+            "always, except for estimates of rigid-body motion: with held axes rigid gears deflect by a tenth (fzg_c, "
+            "302 N·m)"
         ),
-        off="rigid gears; a contact yields by its local law alone, bearings and ports as before",
+        off="rigid gears; contacts have their local law alone, bearings and ports as before",
         code="gk_choose.c (gk_choose): no modes, no tables of compliance",
-        kept="the bodies are what a stage is made of",
+        kept="a stage consists of its bodies",
     ),
     Effect(
         name="modes",
@@ -112,7 +112,7 @@ EFFECTS: tuple[Effect, ...] = (
         ),
         off="level `rigid`: bodies follow their loads statically, the loaded transmission error is the same",
         code=(
-            "gk_choose.c (modes_below), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
+            "gk_choose.c (gk_choose_modes), gk_setup.c (fill_modal), gk_rows.c, gk_flow.c, gk_step.c (predict_gear, "
             "correct_damped)"
         ),
         switch="parameter `level`; cut frequencies `[levels]` in stage.toml; number stored `gears.X.body.modes`",
@@ -127,9 +127,9 @@ EFFECTS: tuple[Effect, ...] = (
         title="residual",
         formula="C_res = C_static − Σ N Nᵀ/ω² over the dynamic modes",
         equation="1 (eq. 2)",
-        matters="always: behind 400 modes a gear it still is a fifth of the pair's compliance (fzg_c)",
+        matters="always: beside 400 modes a gear it is a fifth of the pair's compliance (fzg_c)",
         off="truncated modes, as in the paper; allowed at level `paper` alone, with a warning",
-        code="gk_side.c (store_residual), gk_compliance.c (between_contacts, joint_rows)",
+        code="gk_residual.c (gk_residual_store), gk_compliance.c (between_contacts, joint_residual)",
         switch="level `paper`; `effect.residual` = false is refused at every other level",
         off_setting={"level": 4.0, "integrator": 2.0},
         on_setting={"level": 3.0, "integrator": 2.0},
@@ -143,8 +143,8 @@ EFFECTS: tuple[Effect, ...] = (
         formula="δ(λ) = λ(c − ½ a ln βλ)",
         equation="2.4 (eqs. 7, 8)",
         matters=(
-            "when the load changes much: light load, rattle, engagement; a pair of fzg_c yields 8 % more per "
-            "newton at 80 than at 600 N·m, 17 % more at 8"
+            "when the load changes much: light load, rattle, engagement; the compliance of fzg_c is 8 % higher at 80 "
+            "than at 600 N·m, 17 % at 8"
         ),
         off="its secant at `torque_max`: a linear law",
         code="gk_law.c; the balance of closed steps in gk_balance.c",
@@ -153,7 +153,7 @@ EFFECTS: tuple[Effect, ...] = (
         name="slices",
         title="slices across the face width",
         formula="tₐ = (2a + 1) × mean of P_a over the slice; one force a slice (mirrored slices: one row)",
-        equation="1 (load strip and slices)",
+        equation="1 (load patch and slices)",
         matters=(
             "distribution of the load over the width (ends of fzg_c: 5 % less than the mean); its transmission "
             "error moves by 0.02 %"
@@ -169,8 +169,8 @@ EFFECTS: tuple[Effect, ...] = (
     _switched(
         "coast_flank",
         title="coast flank",
-        formula="g of the other side, sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt; of a mesh through "
-        "which a torque in +z on the first port drives with sg = −1, that of sg = +1",
+        formula="g of sg = −1, with the allowance (j_wt − j_wt,nominal) cos α_wt; of sg = +1 in meshes that a torque "
+        "in +z on the first port drives by sg = −1",
         equation="2.1 (eq. 4)",
         matters="rattle, load reversal, engagement and every start; not where the drive flanks stay closed",
         off="teeth pass through the backlash",
@@ -182,7 +182,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="contact damping",
         formula="F = max(0, F_c + min(F_c, F_d)), F_d = c b × rate of the deflection of the contact's own path",
         equation="2.5, 3.4",
-        matters="level of the mesh resonance and its side bands; dissipation: never leave it out to save time",
+        matters="level of the mesh resonance and its side bands; never leave it out to save time",
         off="the mesh mode is damped by modal damping, bearings and ports alone",
         code="gk_compliance.c (take_paths), gk_solve.c (limit_dashpots), gk_tangent.c",
         kept=DISSIPATION,
@@ -192,7 +192,7 @@ EFFECTS: tuple[Effect, ...] = (
         title="tip relief",
         formula="g → g + δ_A(s_A) + δ_B(s_B), δ(s) = c (s − s₀)²₊, slope in the gradient",
         equation="2.2 (eq. 5)",
-        matters="wherever the stage has it: it is the size of the transmission error",
+        matters="wherever the stage has it: it is as large as the transmission error",
         off="unmodified involutes",
         code="gk_flank.c (relief)",
         kept="it is the shape of the teeth",
@@ -205,7 +205,7 @@ EFFECTS: tuple[Effect, ...] = (
         matters="whenever a loaded pair reaches the end of a flank: without relief always",
         off=(
             "flanks end at their tip roll. Exact while no loaded pair gets there (fzg_c_relief: up to about 100 N·m); "
-            "else a loaded pair vanishes, the energy balance loses percents, and status bit 16 says so"
+            "else a loaded pair vanishes, the energy balance loses percents, and status bit 16 is set"
         ),
         code="gk_flank.c (corner_contact)",
     ),
@@ -215,7 +215,7 @@ EFFECTS: tuple[Effect, ...] = (
         formula="λ/k at the bore node in x and y, c = 2D √(k m)",
         equation="3.9",
         matters="bearing forces, and the mesh mode itself: on fzg_c more than half of the static compliance",
-        off="bores held on their axes; bearing forces are the reactions there",
+        off="bores held on their axes; bearing forces are reactions",
         code="gk_setup.c (fill_base), gk_step.c (damp_supports)",
         kept="without it bearing forces are reactions, another output",
     ),
@@ -234,10 +234,8 @@ EFFECTS: tuple[Effect, ...] = (
         title="motion of the contact along the flanks",
         formula="places, rows, stiffness, normals and curvatures at the rolls of the moment",
         equation="3.3",
-        matters=(
-            "always; a switch for conservation tests: what moves with the roll is work of the mesh, not of the scheme"
-        ),
-        off="all of it stays that of the start, gaps are linear in the coordinates",
+        matters="always; a switch for conservation tests, because a moving mesh does work of its own",
+        off="all of it stays as at the start, gaps are linear in the coordinates",
         code="gk_engage.c",
         kept="a switch for conservation tests",
     ),
@@ -261,8 +259,8 @@ EFFECTS: tuple[Effect, ...] = (
         formula="g → g + d_A(tooth, z, s_A) + d_B(tooth, z, s_B): cubics through tables, slope in the gradient",
         equation="2.2 (eqs. 5a to 5f)",
         matters=(
-            "wherever flanks are corrected or measured: slopes and crownings of a few micrometres are the size of the "
-            "transmission error; deviations that differ from tooth to tooth give shaft orders and side bands"
+            "wherever flanks are corrected or measured: slopes and crownings of a few micrometres are as large as the "
+            "transmission error; different teeth give shaft orders and side bands"
         ),
         off="involutes with parabolic tip relief; leads too are left out",
         code="gk_deviation.c (gk_deviation_at), gk_flank.c (depth_of), gk_strips.c (fill_deviations)",
@@ -275,10 +273,10 @@ EFFECTS: tuple[Effect, ...] = (
         formula="axis of the toothing at C + e (cos, sin)(φ + ψ), tilted by θ about (−sin, cos)(φ + χ)",
         equation="2.1 (eqs. 4c, 4d)",
         matters=(
-            "shaft orders: transmission error of the amplitude e once a turn; side bands of the mesh; with wobble the "
-            "load runs from one end of the face width to the other"
+            "shaft orders: transmission error of amplitude e once a turn; side bands of the mesh; wobble moves the "
+            "load across the face width"
         ),
-        off="toothings run true",
+        off="teeth run true",
         code="gk_deviation.c (gk_runout_move, gk_runout_turn)",
         test="tests/stage/test_flanks.py::test_an_eccentric_gear_moves_te_by_its_eccentricity_once_a_turn",
         of_data=True,
@@ -289,10 +287,10 @@ EFFECTS: tuple[Effect, ...] = (
         formula="v̇ = −2Ω Pᵀ J P v on the rigid masses that a carrier carries, and its own",
         equation="3.10 (eq. 17f)",
         matters=(
-            "in fast sets: without it the ripple of transmission error and mesh forces is off by 0.2 and 0.2 % at 85 "
+            "in fast sets: without it the ripple of transmission error and mesh forces errs by 0.1 and 0.3 % at 85 "
             "rad/s of the carrier, by 0.4 and 3.2 % at 300 (planetary54, `gearfmu study planetary_paper`)"
         ),
-        off="masses in turning axes move as in standing ones",
+        off="masses move as in fixed axes",
         code="gk_frame.c (gk_frame_turn)",
         test="tests/stage/test_planetary_theory.py::test_a_sun_in_free_flight_moves_straight_on",
         carried=True,
@@ -304,8 +302,8 @@ EFFECTS: tuple[Effect, ...] = (
         formula="F = Ω² Σ m a on the places of the planets",
         equation="3.10 (eq. 17g)",
         matters=(
-            "forces of pins, and meshes whose planets it moves: 60 N a planet at 85 rad/s, 750 N at 300; without it "
-            "the ripple of transmission error and mesh forces is off by 3 and 12 %, by 12 and 51 % (2.5 % of the mean)"
+            "pin forces and meshes: 60 N a planet at 85 rad/s, 750 N at 300; without it the ripple of transmission "
+            "error and mesh forces errs by 1.1 and 2.6 %, by 14 and 26 %"
         ),
         off="pins carry mesh forces alone",
         code="gk_frame.c (gk_frame_press, gk_frame_load)",
@@ -319,9 +317,9 @@ EFFECTS: tuple[Effect, ...] = (
         formula="v̇ = −2 (Ω H + Ω_f Q) v; of tilts H = −½ J_p J: moment J_p Ω θ̇",
         equation="3.11 (eqs. 17j to 17l)",
         matters=(
-            "where something that tilts or bends turns fast: Δω/ω of the size of Ω J_p/(2 J_t ω). Helical pairs and "
-            "trains with their shafts, planets on their pins: at speed_max frequencies below 15 kHz move by 2 % "
-            "(helical_demo), 5 % (two_stage), 4 % (planetary54); elastic patterns alone by Ωg/ω, 0.4 % on fzg_c"
+            "fast bodies that tilt or bend: Δω/ω of the size of Ω J_p/(2 J_t ω). At speed_max frequencies below 15 kHz "
+            "move by 2 % (helical_demo), 5 % (two_stage), 4 % (planetary54); elastic patterns alone by Ωg/ω, 0.4 % on "
+            "fzg_c"
         ),
         off="bodies tilt and vibrate as at rest",
         code="gk_frame.c (gk_frame_turn, gk_frame_turn_gear)",
@@ -338,7 +336,7 @@ EFFECTS: tuple[Effect, ...] = (
             "Off unless the stage says `[contact] friction = {…}`"
         ),
         off="flanks slide without resistance",
-        code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_side.c (store_along)",
+        code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_residual.c (gk_residual_store_along)",
         test="tests/stage/test_friction.py::test_force_across_the_line_of_action_jumps_at_the_pitch_point",
         kept=DISSIPATION,
     ),
