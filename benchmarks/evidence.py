@@ -33,9 +33,11 @@ from typing import Any
 from gearfmu.body.layout import ALGORITHM_VERSION
 from gearfmu.files import write_text
 from gearfmu.kernel.build import BEHAVIOUR, library_path
+from gearfmu.stage.blob import rounded_hash
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = "tests/reference/golden_runs.json"
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 Entry = dict[str, Any]
 
 
@@ -46,13 +48,13 @@ def short(content: bytes) -> str:
 
 @cache
 def stage_hash(name: str) -> str:
-    """Hash of the assembled model of a shipped stage."""
+    """Hash of the assembled model of a shipped stage, the same on every machine."""
     from gearfmu.body import load_bodies
     from gearfmu.spec.stage import load_stage
     from gearfmu.stage import assemble
 
     spec = load_stage(name)
-    return assemble(spec, load_bodies(spec)).hash[:12]
+    return rounded_hash(assemble(spec, load_bodies(spec)).blob)
 
 
 def content(path: Path) -> bytes:
@@ -127,7 +129,8 @@ class Ledger:
         entry, started = self.read()[name], time.monotonic()
         needs = {need: self.digest(need) for need in entry["needs"]}
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        code, last = run(entry["command"], self.root, os.environ | {"PATH": path, BEHAVIOUR: self.digest("kernel")})
+        fixed = {"PATH": path, BEHAVIOUR: self.digest("kernel")}
+        code, last = run(entry["command"], self.root, ONE_THREAD | os.environ | fixed)
         ended = f"exit {code}: {last}" if code else last
         minutes = round((time.monotonic() - started) / 60, 1)
         self.record(name, {} if code else needs, made=f"{datetime.date.today()}", minutes=minutes, ended=ended)

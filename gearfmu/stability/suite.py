@@ -27,6 +27,7 @@ from gearfmu.stability.record import Stopped
 from gearfmu.stability.scenes import SCENES
 from gearfmu.stability.sets import BACKFIRE, planetary
 from gearfmu.stability.trains import CLOSING, train
+from gearfmu.stage.blob import rounded_hash
 
 COLUMNS = ("scene", "level", "h_s", "outcome", "energy_residual", "penetration_m", "realtime_factor")
 GIVEN = "given"  # the step of a case whose h was named
@@ -132,7 +133,7 @@ def key_of(scene: str) -> str:
             left += re.findall(r"^from gearfmu\.stability\.(\w+) import", _source(name), flags=re.MULTILINE)
     for name in sorted(used):
         digest.update(_source(name).encode())
-        digest.update(_made_from(name))
+        digest.update(_made_from(name, (PLAIN, RELIEVED)).encode())
     return digest.hexdigest()[:12]
 
 
@@ -142,17 +143,18 @@ def _source(name: str) -> str:
     return (Path(__file__).parent / f"{name}.py").read_text(encoding="utf-8")
 
 
-def _made_from(name: str) -> bytes:
-    """Models and scene files that a file of this package uses."""
+@cache
+def _made_from(name: str, pairs: tuple[str, ...]) -> str:
+    """Models and scene files that a file of this package uses; pairs: the stages of the bench."""
     if name == "clutches":
-        return scene_path(DUMP).read_bytes()
+        return scene_path(DUMP).read_text(encoding="utf-8")
     if name == "bench":
-        return b"".join(model(Variant(stage)).blob for stage in (PLAIN, RELIEVED))
+        return "".join(rounded_hash(model(Variant(stage)).blob) for stage in pairs)
     if name == "trains":
-        return train().blob + scene_path(CLOSING).read_bytes()
+        return rounded_hash(train().blob) + scene_path(CLOSING).read_text(encoding="utf-8")
     if name in ("sets", "set_bench"):
-        return planetary().blob + scene_path(BACKFIRE).read_bytes()
-    return b""
+        return rounded_hash(planetary().blob) + scene_path(BACKFIRE).read_text(encoding="utf-8")
+    return ""
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -37,6 +37,12 @@ def test_the_table_is_whole() -> None:
     assert set(tasks(tuple(SCENES), LEVELS, tuple(STEPS))) == set(seen), REMEDY
 
 
+def test_validation_counts_the_cases() -> None:
+    of_sets = [name for name in SCENES if name.startswith(("set_", "planetary_"))]
+    said = f"| {len(SCENES)} hard cases, {len(of_sets)} of them on planetary sets,"
+    assert said in (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+
+
 def test_table_facts_and_page_are_of_one_run() -> None:
     rows = read(TABLE)
     assert TABLE.read_text(encoding="utf-8") == table(rows), REMEDY

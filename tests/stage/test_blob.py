@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
 from gearfmu.errors import ModelError
-from gearfmu.stage.blob import ENTRY, HEADER, blob_hash, read_blob, seal, write_blob
+from gearfmu.stage.blob import ENTRY, HEADER, blob_hash, read_blob, rounded_hash, seal, write_blob
 
 SAMPLE = {
     "name": "fzg_c µm",
@@ -112,3 +112,17 @@ def test_another_version_names_the_remedy() -> None:
     blob = write_blob(SAMPLE)
     with pytest.raises(ModelError, match="version 9, this package reads version 2: assemble the stage again"):
         read_blob(seal(blob[:4] + b"\x09\0\0\0" + blob[8:]))
+
+
+def test_a_rounded_hash_sees_what_a_stage_changes_and_no_rounding() -> None:
+    """Noise of the last digits and a rotation of modes of equal frequency are the same model."""
+    large = np.random.default_rng(1).normal(size=(2, 500))
+    sample = SAMPLE | {"rows": large}
+    turned = np.array([[0.6, -0.8], [0.8, 0.6]]) @ large
+
+    def hashed(**changed: object) -> str:
+        return rounded_hash(write_blob(sample | changed))
+
+    assert hashed() == hashed(rows=turned) == hashed(roll=SAMPLE["roll"] * (1 + 1e-12))
+    others = {"rows": 1.001 * large, "roll": SAMPLE["roll"] * 1.001, "teeth": np.array([16, 25]), "name": "fzg_b"}
+    assert len({hashed(), *(hashed(**{name: value}) for name, value in others.items())}) == 5
