@@ -15,6 +15,7 @@ from gearfmu.stability.record import run
 
 MU = 0.1
 FRICTION = {"effect.friction": 1.0, "friction_coefficient": MU}
+UNSOLVED = 1e-4  # of all steps: which of them have no root of the step's energy depends on the last bits of the stage
 FILM = {"effect.film": 1.0, "oil_viscosity": 0.01}
 
 
@@ -38,8 +39,8 @@ def rubbing_standstill(case: Case) -> Finding:
 
 def rubbing_light_load(case: Case) -> Finding:
     """Friction in idle rattle: the driver swings at 53 Hz, a drag of 4.4 N·m on a loose wheel. The impulse of the mesh
-    is that of the drag to 2 %, and some contact is lost."""
-    return light_load(case, FRICTION)
+    is that of the drag to 2 %, and some contact is lost. One step in ten thousand may stay unsolved."""
+    return light_load(case, FRICTION, UNSOLVED)
 
 
 def rubbing_turns_for_long(case: Case) -> Finding:
@@ -79,8 +80,8 @@ def reversal(case: Case, effects: Mapping[str, float]) -> Finding:
     return finding(made, pair, said, {"coast_torque_Nm": coast, "drive_torque_Nm": drive})
 
 
-def light_load(case: Case, effects: Mapping[str, float]) -> Finding:
-    """A driver that swings, a drag on a loose wheel."""
+def light_load(case: Case, effects: Mapping[str, float], unsolved: float = 0.0) -> Finding:
+    """A driver that swings, a drag on a loose wheel. unsolved: share of steps that may be."""
     variant, frequency, periods = Variant(ports=(DRIVEN, LOOSE)), 53.0, 20
     pair = geometry(variant)
     inputs, start = swinging(1500 * RPM, frequency, SWING, DRAG)
@@ -91,4 +92,4 @@ def light_load(case: Case, effects: Mapping[str, float]) -> Finding:
     torque = mean_torque(steady, pair) * pair.gears[1].r_b / pair.gears[0].r_b
     said = near("mean torque of the mesh on the wheel, its impulse,", torque, DRAG, 0.02)
     said += at_least("share without contact", float(np.mean(steady["mesh.contact"] == 0)), 0.1)
-    return finding(made, pair, said, {"drag_Nm": torque})
+    return finding(made, pair, said, {"drag_Nm": torque}, unsolved=unsolved)
