@@ -10,7 +10,7 @@ import pytest
 from probes import build
 from small_model import BASE, INERTIA, LENGTH, PSI, TEETH, WORKING, pair_blob
 
-from gearfmu.errors import SimulationError
+from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.stage.blob import read_blob, write_blob
 
@@ -144,3 +144,16 @@ def test_energy_guard_stops_a_run_that_gains_or_loses_half_of_all_energy(factor:
             other.step(5 * STEP, STEP)
         other.restore(own)
         assert other.try_step(0.0, STEP) == 0
+
+
+def test_the_state_of_a_pair_is_as_long_as_its_counts() -> None:
+    """Not as those of the largest stage: that was 53 kB."""
+    assert len(spinning(200.0).save()) <= 8 * 1024
+
+
+def test_a_state_whose_arrays_lie_elsewhere_is_refused() -> None:
+    kernel = spinning(200.0)
+    state = bytearray(kernel.save())
+    state[16 + 4] ^= 1  # behind magic, phase and status: where the second array begins
+    with pytest.raises(ModelError):
+        kernel.restore(bytes(state))

@@ -226,53 +226,28 @@ fmi2Status fmi2Reset(fmi2Component c)
 }
 
 /* ---- variables --------------------------------------------------------------------------------------------------- */
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
-{
-    ENTER(Get);
-    if (nvr) NEED(f, vr && value);
-    return face_get(f, ROLE_REAL, vr, nvr, value, NULL);
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
-{
-    ENTER(Get);
-    if (nvr) NEED(f, vr && value);
-    return face_get(f, ROLE_INTEGER, vr, nvr, NULL, value);
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
-{
-    ENTER(Get);
-    if (nvr) NEED(f, vr && value);
-    return face_get(f, ROLE_BOOLEAN, vr, nvr, NULL, value);
-}
+#define CONST_get
+#define CONST_set const
+#define VALUES(VERB, verb, TYPE, ROLE, reals, integers)                                                                \
+    fmi2Status fmi2##VERB##TYPE(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,                            \
+                                CONST_##verb fmi2##TYPE value[])                                                       \
+    {                                                                                                                  \
+        ENTER(VERB);                                                                                                   \
+        if (nvr) NEED(f, vr && value);                                                                                 \
+        return face_##verb(f, ROLE_##ROLE, vr, nvr, reals, integers);                                                  \
+    }
+VALUES(Get, get, Real, REAL, value, NULL);
+VALUES(Get, get, Integer, INTEGER, NULL, value);
+VALUES(Get, get, Boolean, BOOLEAN, NULL, value);
+VALUES(Set, set, Real, REAL, value, NULL);
+VALUES(Set, set, Integer, INTEGER, NULL, value);
+VALUES(Set, set, Boolean, BOOLEAN, NULL, value);
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
 {
     ENTER(Get);
     (void)vr, (void)value;
     return nvr ? REFUSE(f, "get String: this model has no String variables") : fmi2OK;
-}
-
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
-{
-    ENTER(Set);
-    if (nvr) NEED(f, vr && value);
-    return face_set(f, ROLE_REAL, vr, nvr, value, NULL);
-}
-
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
-{
-    ENTER(Set);
-    if (nvr) NEED(f, vr && value);
-    return face_set(f, ROLE_INTEGER, vr, nvr, NULL, value);
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
-{
-    ENTER(Set);
-    if (nvr) NEED(f, vr && value);
-    return face_set(f, ROLE_BOOLEAN, vr, nvr, NULL, value);
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
@@ -384,47 +359,25 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     return fmi2Discard;
 }
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
-{
-    ENTER(GetStatus);
-    NEED(f, value);
-    if (s != fmi2DoStepStatus) return fmi2Discard;
-    *value = f->step_status;
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
-{
-    ENTER(GetStatus);
-    NEED(f, value);
-    if (s != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = f->last_good;
-    return fmi2OK;
-}
+#define STATUS(NAME, TYPE, KIND, told)                                                                                 \
+    fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2StatusKind s, fmi2##TYPE *value)                               \
+    {                                                                                                                  \
+        ENTER(GetStatus);                                                                                              \
+        NEED(f, value);                                                                                                \
+        if (s != fmi2##KIND) return fmi2Discard;                                                                       \
+        *value = told;                                                                                                 \
+        return fmi2OK;                                                                                                 \
+    }
+STATUS(Status, Status, DoStepStatus, f->step_status);
+STATUS(RealStatus, Real, LastSuccessfulTime, f->last_good);
+STATUS(BooleanStatus, Boolean, Terminated, fmi2False); /* a discarded step may be tried again from a saved state */
+STATUS(StringStatus, String, PendingStatus, "");
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
 {
     ENTER(GetStatus);
     (void)s, (void)value;
     return fmi2Discard; /* the standard knows no integer status */
-}
-
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
-{
-    ENTER(GetStatus);
-    NEED(f, value);
-    if (s != fmi2Terminated) return fmi2Discard;
-    *value = fmi2False; /* a discarded step may be tried again from a saved state */
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
-{
-    ENTER(GetStatus);
-    NEED(f, value);
-    if (s != fmi2PendingStatus) return fmi2Discard;
-    *value = "";
-    return fmi2OK;
 }
 
 /* ---- what modelDescription.xml does not declare (fmi2_absent.c) -------------------------------------------------- */

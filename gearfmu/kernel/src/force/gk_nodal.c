@@ -433,7 +433,7 @@ static void press_engagement(const gk_model *model, const gk_setup *setup, gk_wo
     const int frozen = !GK_ON(setup, roll_motion);
     nodal_pair p = {.model = model, .setup = setup, .e = &model->engagement[e], .mesh = &setup->mesh[e]};
     p.ground = work->ground_trial;
-    p.pose = frozen ? data->meshing[e].frozen : engaged->pose;
+    p.pose = frozen ? GK_OF(data, meshing)[e].frozen : engaged->pose;
     for (int d = 0; d < POSE && frozen; d++) p.moved[d] = p.e->kind == MESH_FLAT ? 0.0 : engaged->pose[d] - p.pose[d];
     gk_rows_pose(model, setup, e, work->speed, work->ground_trial + setup->base.n, p.rate);
     take_runout(&p);

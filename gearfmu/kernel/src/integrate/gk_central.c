@@ -21,8 +21,8 @@ static void approach(const gk_model *model, const gk_setup *setup, gk_work *work
     const int width = setup->base.n;
     const double *x = gk_ground_seen(data);
     for (int d = 0; d < setup->spins; d++) {
-        work->trial_spin[d] = data->x[d] + h * (data->v[d] + 0.5 * h * data->f[d]);
-        work->trial_spin[MAX_SPINS + d] = data->v[d] + h * data->f[d]; /* the speed that dampers see */
+        work->trial_spin[d] = GK_OF(data, x)[d] + h * (GK_OF(data, v)[d] + 0.5 * h * GK_OF(data, f)[d]);
+        work->trial_spin[MAX_SPINS + d] = GK_OF(data, v)[d] + h * GK_OF(data, f)[d]; /* the speed that dampers see */
     }
     for (int i = 0; i < width; i++) {
         work->ground_trial[i] = x[i] + h * (x[width + i] + 0.5 * h * x[2 * width + i]);
@@ -46,9 +46,9 @@ static void arrive(const gk_model *model, const gk_setup *setup, const gk_work *
     double *x = gk_ground_of(data);
     for (int d = 0; d < setup->spins; d++) {
         const double a = work->stage_spin[0][MAX_SPINS + d];
-        data->v[d] += 0.5 * h * (data->f[d] + a);
-        data->x[d] = work->trial_spin[d];
-        data->f[d] = a;
+        GK_OF(data, v)[d] += 0.5 * h * (GK_OF(data, f)[d] + a);
+        GK_OF(data, x)[d] = work->trial_spin[d];
+        GK_OF(data, f)[d] = a;
     }
     for (int i = 0; i < width; i++) {
         const double a = work->ground_stage[0][width + i];
@@ -72,7 +72,7 @@ static void arrive(const gk_model *model, const gk_setup *setup, const gk_work *
 static int torque_jumps(const gk_model *model, const gk_setup *setup, const gk_work *work, const gk_data *data)
 {
     for (int p = 0; p < model->ports; p++)
-        if (setup->given_torque[p] && work->torque[p] != data->joint[p][JOINT_PORT].force) return 1;
+        if (setup->given_torque[p] && work->torque[p] != GK_OF(data, joint)[p][JOINT_PORT].force) return 1;
     return 0;
 }
 
@@ -120,7 +120,7 @@ double gk_central_energy(const gk_model *model, const gk_setup *setup, const gk_
     GK_ASSERT(h > 0.0);
     const double *ground = gk_ground_seen(data) + 2 * setup->base.n;
     double sum = 0.0;
-    for (int d = 0; d < setup->spins; d++) sum += 2.0 * gk_kinetic(setup, d, data->f[d]);
+    for (int d = 0; d < setup->spins; d++) sum += 2.0 * gk_kinetic(setup, d, GK_OF(data, f)[d]);
     for (int i = 0; i < setup->base.n; i++) sum += ground[i] * ground[i];
     for (int g = 0; g < model->gears; g++) {
         const int n = setup->modal[g].n;

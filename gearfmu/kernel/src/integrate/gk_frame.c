@@ -32,7 +32,7 @@ void gk_frame_turn(const gk_setup *setup, const gk_coefficients *k, const gk_dat
     const gk_base *base = &setup->base;
     for (int j = 0; j < base->turns; j++) {
         const int i = back ? base->turns - 1 - j : j;
-        const double speed = data->v[base->turn_rotor[i]];
+        const double speed = GK_OF(data, v)[base->turn_rotor[i]];
         if (speed != 0.0) turn_pair(setup, &k->ground, 0.5 * k->h * speed, i, v);
     }
 }
@@ -74,7 +74,7 @@ double gk_frame_press(const gk_model *model, const gk_setup *setup, const gk_coe
     const gk_ground_flow *f = &k->ground;
     double work = 0.0;
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++) {
-        const double *outward = base->outward + r * base->n, speed2 = data->v[r] * data->v[r];
+        const double *outward = base->outward + r * base->n, speed2 = GK_OF(data, v)[r] * GK_OF(data, v)[r];
         for (int i = 0; i < base->n && carries(model, r); i++) {
             if (outward[i] == 0.0 || !(f->a12[i] != 0.0)) continue;
             const double kick = -f->d11[i] / (f->a12[i] * base->omega2[i]) * speed2 * outward[i];
@@ -91,7 +91,8 @@ void gk_frame_load(const gk_model *model, const gk_setup *setup, const gk_data *
     GK_ASSERT(force);
     const gk_base *base = &setup->base;
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
-        if (carries(model, r)) gk_axpy(data->v[r] * data->v[r], base->outward + r * base->n, force, 0, base->n / 4);
+        if (carries(model, r))
+            gk_axpy(GK_OF(data, v)[r] * GK_OF(data, v)[r], base->outward + r * base->n, force, 0, base->n / 4);
 }
 
 /* the accelerations of both, for explicit integrators: speeds of the spins and v of the ground group */

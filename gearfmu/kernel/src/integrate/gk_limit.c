@@ -137,9 +137,9 @@ static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work,
     const double position = (double)i / LIMIT_POSITIONS;
     const gk_system *s = &work->engaged[e].system;
     const gk_engagement *engagement = &model->engagement[e];
-    double C[MAX_ROWS * MAX_ROWS], K[MAX_ROWS * MAX_ROWS];
     const double *Q = kept_at(work, e, i);
     if (!gk_limit_place(model, setup, work, data, k, e, position)) return INFINITY;
+    double *const C = s->J, *const K = s->L;
     gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
     kappa_part(s, Q, K);
     return gk_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;

@@ -163,8 +163,8 @@ static void combine(const gk_model *model, const gk_setup *setup, gk_work *work,
         double x = 0.0, v = 0.0;
         for (int i = 0; i < count; i++)
             x += weight[i] * work->stage_spin[i][d], v += weight[i] * work->stage_spin[i][MAX_SPINS + d];
-        work->trial_spin[d] = data->x[d] + h * x;
-        work->trial_spin[MAX_SPINS + d] = data->v[d] + h * v;
+        work->trial_spin[d] = GK_OF(data, x)[d] + h * x;
+        work->trial_spin[MAX_SPINS + d] = GK_OF(data, v)[d] + h * v;
     }
     for (int j = 0; j < 2 * setup->base.n; j++) {
         double sum = 0.0;
@@ -218,8 +218,8 @@ static double error_ratio(const gk_model *model, const gk_setup *setup, const gk
 static void keep(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
 {
     for (int d = 0; d < setup->spins; d++) {
-        data->x[d] = work->trial_spin[d];
-        data->v[d] = work->trial_spin[MAX_SPINS + d];
+        GK_OF(data, x)[d] = work->trial_spin[d];
+        GK_OF(data, v)[d] = work->trial_spin[MAX_SPINS + d];
     }
     memcpy(gk_ground_of(data), work->ground_trial, 2 * (size_t)setup->base.n * sizeof(double));
     for (int g = 0; g < model->gears; g++)
@@ -231,7 +231,7 @@ void gk_rk45_squeeze(const gk_model *model, const gk_setup *setup, const gk_work
 {
     GK_ASSERT(step > 0.0);
     for (int e = 0; e < model->engagements && GK_ON(setup, film); e++)
-        data->meshing[e].squeezed += gk_film_power(&work->engaged[e].system) * step;
+        GK_OF(data, meshing)[e].squeezed += gk_film_power(&work->engaged[e].system) * step;
 }
 
 /* angles of the bores with a given torque, quasi-static part included */
@@ -242,7 +242,7 @@ void gk_rk45_angles(const gk_model *model, const gk_work *work, gk_data *data)
         const gk_system *s = &work->engaged[e].system;
         for (int i = s->contacts; i < s->n; i++)
             if (s->kind[i] == ROW_TORQUE)
-                data->angle[s->port_of[i]] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
+                GK_OF(data, angle)[s->port_of[i]] = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
     }
 }
 

@@ -156,15 +156,17 @@ static void begin(rest *r)
     for (int g = 0; g < m->gears; g++)
         if (r->soft[g]) memset(r->work->rest_modes[g], 0, (size_t)r->setup.modal[g].n * sizeof(gk_real));
     for (int e = 0; e < m->engagements; e++)
-        if (searched(r, e)) data->meshing[e].pairs = 0;
+        if (searched(r, e)) GK_OF(data, meshing)[e].pairs = 0;
     for (int d = 0; d < r->setup.spins; d++) {
         if (!moves(r, d)) continue;
-        data->x[d] = 0.0;
+        GK_OF(data, x)[d] = 0.0;
         for (int t = 0; t < r->motion.count; t++)
-            if (r->leader[t] >= 0 && r->motion.turn[t][d] != 0.0) data->x[d] += begins_at(r, t) * r->motion.turn[t][d];
+            if (r->leader[t] >= 0 && r->motion.turn[t][d] != 0.0)
+                GK_OF(data, x)[d] += begins_at(r, t) * r->motion.turn[t][d];
     }
     for (int p = 0; p < m->ports; p++)
-        if (r->setup.chained[p] && moves(r, gk_inertia_of(m, p))) data->x[gk_inertia_of(m, p)] = r->boundary[p].phi;
+        if (r->setup.chained[p] && moves(r, gk_inertia_of(m, p)))
+            GK_OF(data, x)[gk_inertia_of(m, p)] = r->boundary[p].phi;
 }
 
 /* torque on every spin by given torques and, after a first solution, by all rows */
@@ -206,10 +208,11 @@ static void unroll(rest *r)
         double momentum = 0.0;
         if (!r->floats[t] || !any_moves(r, t)) continue;
         for (int d = 0; d < r->setup.spins; d++)
-            if (turn[d] != 0.0) momentum += turn[d] * (r->data->x[d] - r->before[d]) / r->setup.inverse_inertia[d];
+            if (turn[d] != 0.0)
+                momentum += turn[d] * (GK_OF(r->data, x)[d] - r->before[d]) / r->setup.inverse_inertia[d];
         const double inertia = inertia_of(r, t, t);
         for (int d = 0; d < r->setup.spins; d++)
-            if (turn[d] != 0.0) r->data->x[d] -= turn[d] * momentum / inertia;
+            if (turn[d] != 0.0) GK_OF(r->data, x)[d] -= turn[d] * momentum / inertia;
     }
 }
 
@@ -219,14 +222,14 @@ static int press(rest *r)
 {
     gk_work *work = r->work;
     for (int d = 0; d < r->setup.spins; d++) {
-        work->spin[d] = r->data->x[d] + MOBILITY * r->setup.inverse_inertia[d] * r->given[d];
+        work->spin[d] = GK_OF(r->data, x)[d] + MOBILITY * r->setup.inverse_inertia[d] * r->given[d];
         work->speed[d] = 2.0 * work->spin[d]; /* a sticking clutch keeps its angle: velocity row with h = 1 */
     }
     for (int g = 0; g < r->model->gears; g++) work->y[g] = r->soft[g] ? work->rest_modes[g] : work->zero;
     work->ground_y = work->rest_ground;
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e)) { /* given torques move the pose, not the place */
-            const gk_search how = {.k = &r->k, .spin = r->data->x, .reach = SEE};
+            const gk_search how = {.k = &r->k, .spin = GK_OF(r->data, x), .reach = SEE};
             if (!gk_engage(r->model, &r->setup, work, r->data, &how, e)) return 0;
             gk_memory_recall(&r->setup, work, r->data, e, &work->engaged[e].system);
         }
@@ -263,10 +266,10 @@ static void find_forces(rest *r)
         }
 }
 
-/* rows of an engagement on the soft modes of its gears, (side, row, mode) */
-typedef double soft_rows[2][MAX_ROWS][MAX_SOFT];
+/* row of an engagement on the soft modes of a side's gear */
+static double *soft_row(const rest *r, int w, int row) { return r->work->soft_rows + (w * MAX_ROWS + row) * MAX_SOFT; }
 
-static void find_soft_rows(rest *r, int e, soft_rows rows)
+static void find_soft_rows(rest *r, int e)
 {
     const gk_system *s = &r->work->engaged[e].system;
     for (int w = 0; w < 2; w++) {
@@ -277,7 +280,7 @@ static void find_soft_rows(rest *r, int e, soft_rows rows)
             memset(out, 0, 2 * (size_t)n * sizeof *out);
             unit[row] = 1.0;
             gk_rows_push_modes(&r->setup, r->work, e, w, unit, unit, out, out + n);
-            for (int i = 0; i < r->soft[g]; i++) rows[w][row][i] = (double)out[r->lane[g][i]];
+            for (int i = 0; i < r->soft[g]; i++) soft_row(r, w, row)[i] = (double)out[r->lane[g][i]];
         }
     }
 }
@@ -291,7 +294,7 @@ static int own_unknowns(const rest *r, int e)
 }
 
 /* Column of one of them, 0 in rows that are not active. Returns its number among all. */
-static int own_unknown(const rest *r, int e, int local, soft_rows soft, double *column)
+static int own_unknown(const rest *r, int e, int local, double *column)
 {
     const gk_mesh *mesh = &r->setup.mesh[e];
     const gk_engaged *engaged = &r->work->engaged[e];
@@ -306,7 +309,7 @@ static int own_unknown(const rest *r, int e, int local, soft_rows soft, double *
         else if (mode < 0)
             column[i] = engaged->ground[(size_t)i * mesh->local + lane];
         else if (i < s->contacts)
-            column[i] = soft[w][i][mode - w * first];
+            column[i] = soft_row(r, w, i)[mode - w * first];
     }
     if (lane < 0) return mesh->spin[local];
     if (mode >= 0) return r->soft_at[mesh->side[w].gear] + mode - w * first;
@@ -319,15 +322,14 @@ static void add_tangent(rest *r, int e)
     gk_system *s = &r->work->engaged[e].system;
     const int own = own_unknowns(r, e);
     double column[MAX_STRIDE], other[MAX_STRIDE];
-    soft_rows soft;
     if (!s->n) return;
     gk_tangent_factorise(s);
-    find_soft_rows(r, e, soft);
+    find_soft_rows(r, e);
     for (int a = 0; a < own; a++) {
-        const int i = own_unknown(r, e, a, soft, column);
+        const int i = own_unknown(r, e, a, column);
         gk_tangent_solve(s, column);
         for (int b = 0; b <= a; b++) {
-            const int j = own_unknown(r, e, b, soft, other);
+            const int j = own_unknown(r, e, b, other);
             const double k = gk_dot_quads(column, other, s->stride / 4);
             r->tangent[(size_t)i * r->unknowns + j] += k;
             if (a != b) r->tangent[(size_t)j * r->unknowns + i] += k;
@@ -386,7 +388,7 @@ static double length_of(const rest *r, const double *move)
 static void go(rest *r, double share)
 {
     const int spins = r->setup.spins;
-    for (int d = 0; d < spins; d++) r->data->x[d] += share * r->move[d];
+    for (int d = 0; d < spins; d++) GK_OF(r->data, x)[d] += share * r->move[d];
     for (int i = 0; i < r->setup.base.n; i++) r->work->rest_ground[i] += share * r->move[spins + i];
     for (int g = 0; g < r->model->gears; g++)
         for (int i = 0; i < r->soft[g]; i++)
@@ -439,7 +441,7 @@ static int go_along(rest *r)
 /* One move, the problem solved before and after it. Returns how long it would have been, NAN where there is none. */
 static double relax(rest *r)
 {
-    memcpy(r->before, r->data->x, sizeof r->before);
+    memcpy(r->before, GK_OF(r->data, x), (size_t)r->setup.spins * sizeof *r->before);
     find_forces(r);
     find_tangent(r);
     memcpy(r->move, r->force, (size_t)r->unknowns * sizeof *r->move);
@@ -489,15 +491,15 @@ static void spread(rest *r)
             q[2 * m->n + i] = work->force[g][i];
         }
     }
-    memset(data->f, 0, sizeof data->f);
-    memset(data->f_rate, 0, sizeof data->f_rate);
+    memset(GK_OF(data, f), 0, (size_t)setup->spins * sizeof(double));
+    memset(GK_OF(data, f_rate), 0, (size_t)setup->spins * sizeof(double));
     for (int e = 0; e < r->model->engagements; e++) {
         const gk_mesh *mesh = &setup->mesh[e];
         const gk_system *s = &work->engaged[e].system;
         for (int l = 0; l < mesh->spins; l++)
             for (int i = 0; i < s->n; i++)
-                if (s->kind[i] != ROW_CLUTCH) data->f[mesh->spin[l]] += s->rigid[l][i] * s->force[i];
-        gk_rows_pose(r->model, setup, e, data->x, work->rest_ground, data->meshing[e].frozen);
+                if (s->kind[i] != ROW_CLUTCH) GK_OF(data, f)[mesh->spin[l]] += s->rigid[l][i] * s->force[i];
+        gk_rows_pose(r->model, setup, e, GK_OF(data, x), work->rest_ground, GK_OF(data, meshing)[e].frozen);
     }
 }
 
@@ -551,18 +553,15 @@ static void set_joints(rest *r)
         r->setup.joint[p][JOINT_PORT].compliance = b->kind == PORT_SPRING ? 1.0 / b->k : 0.0;
         r->work->outer[p] = b->phi;
         r->work->torque[p] = b->torque;
-        if (!r->setup.chained[p] || r->data->locked[p]) continue;
+        if (!r->setup.chained[p] || GK_OF(r->data, locked)[p]) continue;
         const int inertia = gk_inertia_of(r->model, p), disc = gk_disc_of(r->model, p);
-        const double slip = r->data->v[inertia] - r->data->v[disc];
-        const double friction = r->data->shaft[p][V_CAPACITY] * (slip > 0.0 ? 1.0 : slip < 0.0 ? -1.0 : 0.0);
+        const double slip = GK_OF(r->data, v)[inertia] - GK_OF(r->data, v)[disc];
+        const double friction = GK_OF(r->data, shaft)[p][V_CAPACITY] * (slip > 0.0 ? 1.0 : slip < 0.0 ? -1.0 : 0.0);
         r->setup.joint[p][JOINT_CLUTCH].live = 0;
         r->given[inertia] = -friction;
         r->given[disc] = friction;
     }
 }
-
-/* do any engagements share rotors? */
-static int shares(const rest *r) { return r->setup.islands < r->model->engagements; }
 
 static int close_to_rest(const rest *r, double length)
 {
@@ -571,6 +570,7 @@ static int close_to_rest(const rest *r, double length)
 
 static int search(rest *r)
 {
+    const int shared = r->setup.islands < r->model->engagements; /* rotors */
     double length = INFINITY;
     r->trust = TRUST, r->loose = LOOSE;
     balance_rotation(r, 0);
@@ -582,7 +582,7 @@ static int search(rest *r)
         if (!gk_finite(length)) return 0;
         if (length <= AT_REST + EXACT * deepest_of(r)) break;
         if (i >= ORDINARY && length > SLOW * last) r->loose = gk_min(10.0 * r->loose, MOST_LOOSE);
-        if (shares(r) && close_to_rest(r, length) && length > 0.5 * last) break; /* rounding of the rows is left */
+        if (shared && close_to_rest(r, length) && length > 0.5 * last) break; /* rounding of the rows is left */
     }
     for (int e = 0; e < r->model->engagements; e++)
         if (searched(r, e)) gk_memory_keep(&r->setup, &r->work->engaged[e], r->data, e);
@@ -611,7 +611,7 @@ gk_outcome gk_static_solve(const gk_model *model, const gk_setup *setup, gk_work
     set_compliance(&r);
     find_motions(&r);
     for (int e = 0; e < model->engagements; e++) gk_memory_forget(&work->engaged[e]);
-    if (!keep) memset(data->x, 0, sizeof data->x);
+    if (!keep) memset(GK_OF(data, x), 0, (size_t)setup->spins * sizeof(double));
     int found = 1;
     for (r.island = 0; r.island < r.setup.islands && found; r.island++) {
         if (!keep) begin(&r);

@@ -33,7 +33,7 @@ static double dynamic_energy(const gk_model *model, const gk_setup *setup, const
     const gk_base *base = &setup->base;
     const double *x = gk_ground_seen(data), *v = x + base->n;
     double sum = ENERGY_SMALL;
-    for (int d = 0; d < setup->spins; d++) sum += gk_kinetic(setup, d, data->v[d]);
+    for (int d = 0; d < setup->spins; d++) sum += gk_kinetic(setup, d, GK_OF(data, v)[d]);
     for (int i = 0; i < base->n; i++)
         sum += 0.5 * k->ground.inverse_s2[i] * (v[i] * v[i] + base->omega2[i] * x[i] * x[i]);
     for (int g = 0; g < model->gears; g++) sum += modal_energy(setup, data, k, g);
@@ -58,9 +58,10 @@ static void express(const gk_model *model, const gk_setup *setup, gk_work *work,
     }
     const double lead = data->state_h > 0.0 ? speed_lead(k->h, k->gamma) - speed_lead(data->state_h, data->state_gamma)
                                             : 0.0;
-    for (int d = 0; d < setup->spins; d++) data->v[d] += lead * setup->inverse_inertia[d] * data->f_rate[d];
     for (int d = 0; d < setup->spins; d++)
-        data->x[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_inertia[d] * data->f[d];
+        GK_OF(data, v)[d] += lead * setup->inverse_inertia[d] * GK_OF(data, f_rate)[d];
+    for (int d = 0; d < setup->spins; d++)
+        GK_OF(data, x)[d] += (k->rigid_kappa - old->rigid_kappa) * setup->inverse_inertia[d] * GK_OF(data, f)[d];
     data->energy.baseline += dynamic_energy(model, setup, data, k) - before;
     data->state_h = k->h;
     data->state_gamma = k->gamma;
@@ -95,7 +96,7 @@ static void predict_gear(const gk_model *model, const gk_setup *setup, gk_work *
     const int n = GK_LANES(setup, g), halves = 2 * n / LANES;
     const gk_half *q = SEEN_HALVES(gk_modal_seen(setup, data, g)), *v = q + halves, *f = v + halves;
     if (GK_HAS(gyroscopic) && setup->modal[g].turns) {
-        gk_frame_turn_gear(&setup->modal[g], k->h * data->v[model->gear[g].rotor], (const gk_real *)v,
+        gk_frame_turn_gear(&setup->modal[g], k->h * GK_OF(data, v)[model->gear[g].rotor], (const gk_real *)v,
                            work->turned_speed[g]);
         v = SEEN_HALVES(work->turned_speed[g]);
     }
@@ -146,9 +147,9 @@ static double predict(const gk_model *model, const gk_setup *setup, gk_work *wor
 {
     for (int g = 0; g < model->gears; g++) predict_gear(model, setup, work, data, k, g);
     for (int d = 0; d < setup->spins; d++) {
-        const double acceleration = data->f[d] * setup->inverse_inertia[d];
-        work->spin[d] = data->x[d] + k->h * data->v[d] + k->rigid_b0 * acceleration;
-        work->speed[d] = data->v[d] + 0.5 * k->h * acceleration;
+        const double acceleration = GK_OF(data, f)[d] * setup->inverse_inertia[d];
+        work->spin[d] = GK_OF(data, x)[d] + k->h * GK_OF(data, v)[d] + k->rigid_b0 * acceleration;
+        work->speed[d] = GK_OF(data, v)[d] + 0.5 * k->h * acceleration;
     }
     return predict_ground(model, setup, work, data, k);
 }
@@ -160,8 +161,8 @@ static int passable(const gk_model *model, const gk_work *work, const gk_data *d
         for (int w = 0; w < 2 && model->engagement[e].kind != MESH_FLAT; w++) {
             const gk_gear *gear = &model->gear[model->engagement[e].gear[w]];
             const int frame = model->frame[gear->rotor];
-            const double turned = frame < 0 ? 0.0 : work->spin[frame] - data->x[frame];
-            if (!(fabs(work->spin[gear->rotor] - data->x[gear->rotor] - turned) * gear->z < FARTHEST)) return 0;
+            const double turned = frame < 0 ? 0.0 : work->spin[frame] - GK_OF(data, x)[frame];
+            if (!(fabs(work->spin[gear->rotor] - GK_OF(data, x)[gear->rotor] - turned) * gear->z < FARTHEST)) return 0;
         }
     return 1;
 }
@@ -211,7 +212,7 @@ static const gk_real *finish_speeds(const gk_model *model, const gk_setup *setup
     if (!GK_HAS(gyroscopic) || !m->turns) return k->flow[g].bv;
     gk_real *v = work->vp[g];
     for (int i = 0; i < m->n; i++) v[i] += k->flow[g].bv[i] * work->force[g][i];
-    gk_frame_turn_gear(m, k->h * data->v[model->gear[g].rotor], v, v);
+    gk_frame_turn_gear(m, k->h * GK_OF(data, v)[model->gear[g].rotor], v, v);
     return work->zero;
 }
 
@@ -314,12 +315,12 @@ static void correct_spins(const gk_model *model, const gk_setup *setup, gk_work 
         }
     }
     for (int d = 0; d < setup->spins; d++) {
-        const double before = data->x[d];
-        data->x[d] = work->spin[d] + k->rigid_bq * setup->inverse_inertia[d] * z[d];
-        data->v[d] = work->speed[d] + 0.5 * k->h * setup->inverse_inertia[d] * z[d];
-        data->f_rate[d] = (force[d] - data->f[d]) / k->h;
-        data->f[d] = force[d];
-        work->moved[d] = data->x[d] - before;
+        const double before = GK_OF(data, x)[d];
+        GK_OF(data, x)[d] = work->spin[d] + k->rigid_bq * setup->inverse_inertia[d] * z[d];
+        GK_OF(data, v)[d] = work->speed[d] + 0.5 * k->h * setup->inverse_inertia[d] * z[d];
+        GK_OF(data, f_rate)[d] = (force[d] - GK_OF(data, f)[d]) / k->h;
+        GK_OF(data, f)[d] = force[d];
+        work->moved[d] = GK_OF(data, x)[d] - before;
     }
 }
 
@@ -365,7 +366,7 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
         const double mean = gk_solve_mean(s, i);
         if (s->kind[i] == ROW_CLUTCH) {
             taken -= mean * (work->moved[gk_inertia_of(model, port)] - work->moved[gk_disc_of(model, port)]);
-            data->locked[port] = s->active[i];
+            GK_OF(data, locked)[port] = s->active[i];
             continue;
         }
         taken += mean * (s->lag[i] - s->lag0[i]) - 0.5 * s->damper[i] * (gk_solve_end_gap(s, i) - s->g0[i]);
@@ -373,8 +374,8 @@ static double account(const gk_model *model, const gk_work *work, gk_data *data,
         if (s->kind[i] == ROW_TORQUE) {
             const double angle = gk_solve_end_gap(s, i) + gk_solve_quasi_static(s, i);
             const double yielded = gk_solve_quasi_static(s, i) + s->g0[i];
-            feed(&data->energy, mean * (angle - data->angle[port]) - 0.5 * s->jump[i] * yielded);
-            data->angle[port] = angle;
+            feed(&data->energy, mean * (angle - GK_OF(data, angle)[port]) - 0.5 * s->jump[i] * yielded);
+            GK_OF(data, angle)[port] = angle;
         } else if (s->joint_of[i] == JOINT_PORT) {
             feed(&data->energy, mean * (work->outer[port] - work->outer_before[port]));
         }
@@ -403,7 +404,7 @@ static gk_outcome solve_all(const gk_model *model, const gk_setup *setup, gk_wor
         gk_system *s = &work->engaged[e].system;
         if (!all_finite(s)) return GK_DIVERGED;
         if (GK_HAS(tip_contact) && !setup->on.tip_contact &&
-            flank_ended(&data->meshing[e], &work->engaged[e], s->strips))
+            flank_ended(&GK_OF(data, meshing)[e], &work->engaged[e], s->strips))
             data->status |= STATUS_TIP_ENDED;
     }
     return GK_OK;
@@ -414,7 +415,7 @@ static double account_friction(const gk_work *work, gk_data *data, int e)
 {
     const gk_glide *glide = work->engaged[e].glide;
     data->energy.dissipated += glide->taken;
-    data->meshing[e].rubbed += glide->taken;
+    GK_OF(data, meshing)[e].rubbed += glide->taken;
     if (work->another) data->energy.baseline += glide->held0;
     return gk_friction_held(glide, &work->engaged[e].system);
 }
@@ -424,7 +425,7 @@ static void account_film(const gk_work *work, gk_data *data, int e)
 {
     const double lost = gk_film_on(&work->engaged[e].system) ? gk_film_lost(&work->engaged[e].system) : 0.0;
     data->energy.dissipated += lost;
-    data->meshing[e].squeezed += lost;
+    GK_OF(data, meshing)[e].squeezed += lost;
 }
 
 static void settle_accounts(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data)
@@ -480,8 +481,7 @@ gk_outcome gk_step_once(const gk_model *model, const gk_setup *setup, gk_work *w
         gk_memory_keep(setup, &work->engaged[e], data, e);
         if (GK_ON(setup, friction)) gk_friction_watch(setup, data, h, e);
     }
-    data->expressed_h = h, data->expressed_gamma = gamma;
-    data->steps++;
+    data->expressed_h = h, data->expressed_gamma = gamma, data->steps++;
     GK_LAP(work, PHASE_REMEMBER);
     return GK_OK;
 }

@@ -46,7 +46,7 @@ gk_outcome gk_te(const gk_model *model, const gk_setup *setup, gk_work *work, gk
     for (int p = 2; p < model->ports; p++) b[p] = further(model, p);
     gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 1, keep);
     if (outcome) return outcome;
-    for (int r = 0; r < model->rotors; r++) angle[r] = data->x[r];
+    for (int r = 0; r < model->rotors; r++) angle[r] = GK_OF(data, x)[r];
     angle[model->port[0].rotor] = driven_angle(model, work, 0);
     angle[model->port[1].rotor] = phi_out;
     const gk_engagement *mesh = &model->engagement[e];

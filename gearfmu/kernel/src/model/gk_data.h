@@ -75,21 +75,54 @@ typedef struct gk_energy {
     double through;      /* that passed the ports, in whichever direction */
 } gk_energy;
 
+typedef double gk_shaft_values[SHAFT_VARS], gk_rotor_values[ROTOR_VARS], gk_mesh_values[MESH_VARS],
+    gk_support_values[SUPPORT_VARS];
+typedef gk_joint_state gk_joint_states[JOINTS];
+
+/* Arrays behind the head of gk_data: GK_ARRAY(name, type of an element, how many). What `mesh` and those before it hold
+ * are variables.
+ * x, v, f: angle, speed and torque of the moment of spins; f_rate: change of f in the last step over h
+ * locked: clutches; input: outer ends at the start of the communication step; hold: angle a port is referred to
+ * v_bore: speed of the bore nodes before the last internal step
+ * angle: bore angle at a torque port, quasi-static part included
+ * oscillator: ground group: q (n), v (n), f (n), double; then of every gear group q, v, f, gk_real; then the amplitudes
+ * of observed gears */
+#define GK_ARRAYS                                                                                                      \
+    GK_ARRAY(shaft, gk_shaft_values, model->ports)                                                                     \
+    GK_ARRAY(rotor, gk_rotor_values, model->rotors)                                                                    \
+    GK_ARRAY(support, gk_support_values, model->supports)                                                              \
+    GK_ARRAY(mesh, gk_mesh_values, model->engagements)                                                                 \
+    GK_ARRAY(x, double, spins)                                                                                         \
+    GK_ARRAY(v, double, spins)                                                                                         \
+    GK_ARRAY(f, double, spins)                                                                                         \
+    GK_ARRAY(f_rate, double, spins)                                                                                    \
+    GK_ARRAY(joint, gk_joint_states, model->ports)                                                                     \
+    GK_ARRAY(input, gk_motion, model->ports)                                                                           \
+    GK_ARRAY(hold, double, model->ports)                                                                               \
+    GK_ARRAY(v_bore, double, model->ports)                                                                             \
+    GK_ARRAY(angle, double, model->ports)                                                                              \
+    GK_ARRAY(locked, int32_t, model->ports)                                                                            \
+    GK_ARRAY(meshing, gk_meshing, model->engagements)                                                                  \
+    GK_ARRAY(oscillator, double, 0)
+#define GK_ARRAY(name, type, count) typedef type gk_of_##name;
+GK_ARRAYS
+#undef GK_ARRAY
+enum {
+#define GK_ARRAY(name, type, count) OF_##name,
+    GK_ARRAYS
+#undef GK_ARRAY
+        ARRAYS
+};
+/* an array of some data */
+#define GK_OF(data, name) ((gk_of_##name *)(uintptr_t)((data)->tail + (data)->at[OF_##name]))
+
 struct gk_data {
     uint64_t magic;
     int32_t phase, status;
-    double stage[STAGE_VARS], shaft[MAX_PORTS][SHAFT_VARS], rotor[MAX_ROTORS][ROTOR_VARS],
-        mesh[MAX_ENGAGEMENTS][MESH_VARS], support[MAX_SUPPORTS][SUPPORT_VARS];
-    double x[MAX_SPINS], v[MAX_SPINS], f[MAX_SPINS]; /* spins: angle, speed, torque of the moment */
-    double f_rate[MAX_SPINS];                        /* change of f in the last step over h */
-    gk_joint_state joint[MAX_PORTS][JOINTS];
-    int32_t locked[MAX_PORTS]; /* clutches */
-    double time_base, step_H;  /* time = time_base + count·H */
+    uint32_t at[ARRAYS]; /* where they begin, in doubles from `tail` on */
+    double stage[STAGE_VARS];
+    double time_base, step_H; /* time = time_base + count·H */
     int64_t count;
-    gk_motion input[MAX_PORTS]; /* outer ends at the start of the communication step */
-    double hold[MAX_PORTS];     /* angle a port is referred to */
-    double v_bore[MAX_PORTS];   /* speed of the bore nodes before the last internal step */
-    double angle[MAX_PORTS];    /* bore angle at a torque port, quasi-static part included */
     double rk_h;
     double state_h, state_gamma;         /* the step for which x and q are expressed; 0: physical */
     double expressed_h, expressed_gamma; /* the last step that was made */
@@ -98,11 +131,12 @@ struct gk_data {
     gk_energy energy;
     int64_t steps, iterations, retried;
     int64_t amplitudes; /* where those of observed gears stand, in doubles from `oscillator` on */
-    gk_meshing meshing[MAX_ENGAGEMENTS];
-    double oscillator[]; /* ground group: q (n), v (n), f (n), double; then of every gear group q, v, f, gk_real; then
-                            the amplitudes of observed gears */
+    double tail[];
 };
 
 #define GK_DATA_MAGIC 0x32415441444b47ULL
 enum { PHASE_NEW = 1, PHASE_RUNNING, PHASE_FAILED };
+
+/* where the arrays of a model's data begin */
+void gk_data_plan(const gk_model *model, uint32_t at[ARRAYS]);
 #endif

@@ -19,11 +19,8 @@ static const field TABLE[GK_FIELDS] = {
 #undef GK_FIELD
 };
 
-static const char *const WORDS[SYMBOLS] = {"rotors",  "gears",       "engagements",  "ports",       "supports",
-                                           "dampers", "functions",   "rolls",        "z",           "modes",
-                                           "reads",   "ground",      "carried",      "whirls",      "own",
-                                           "starts",  "flank_teeth", "flank_places", "flank_rolls", "points",
-                                           "low",     "flanks",      "places",       "half",        "across"};
+#define WORD(name) #name,
+static const char *const WORDS[SYMBOLS] = {GK_SYMBOLS(WORD)};
 
 static void section_name(const field *f, const gk_shape *shape, char out[32])
 {

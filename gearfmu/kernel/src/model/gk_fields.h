@@ -11,34 +11,20 @@ enum {
 };
 
 /* what a word in the dimensions of a field means; 0 until it is known */
-typedef enum gk_symbol {
-    SYMBOL_rotors,
-    SYMBOL_gears,
-    SYMBOL_engagements,
-    SYMBOL_ports,
-    SYMBOL_supports,
-    SYMBOL_dampers,
-    SYMBOL_functions,
-    SYMBOL_rolls,
-    SYMBOL_z,
-    SYMBOL_modes,
-    SYMBOL_reads,
-    SYMBOL_ground,
-    SYMBOL_carried,
-    SYMBOL_whirls,
-    SYMBOL_own,
-    SYMBOL_starts,
-    SYMBOL_flank_teeth,
-    SYMBOL_flank_places,
-    SYMBOL_flank_rolls,
-    SYMBOL_points, /* of a flank where rows are stored */
-    SYMBOL_low,    /* modes of nodal diameter 0 and 1 */
-    SYMBOL_flanks, /* with tables of their own */
-    SYMBOL_places, /* points times width functions */
-    SYMBOL_half,   /* pairs of places, each once */
-    SYMBOL_across, /* numbers of a table between both flanks */
-    SYMBOLS
-} gk_symbol;
+/* clang-format off */
+#define GK_SYMBOLS(S)                                                                                                  \
+    S(rotors) S(gears) S(engagements) S(ports) S(supports) S(dampers) S(functions) S(rolls) S(z) S(modes) S(reads)     \
+    S(ground) S(carried) S(whirls) S(own) S(starts) S(flank_teeth) S(flank_places) S(flank_rolls)                      \
+    S(points) /* of a flank where rows are stored */                                                                   \
+    S(low)    /* modes of nodal diameter 0 and 1 */                                                                    \
+    S(flanks) /* with tables of their own */                                                                           \
+    S(places) /* points times width functions */                                                                       \
+    S(half)   /* pairs of places, each once */                                                                         \
+    S(across) /* numbers of a table between both flanks */
+/* clang-format on */
+#define GK_SYMBOL(name) SYMBOL_##name,
+typedef enum gk_symbol { GK_SYMBOLS(GK_SYMBOL) SYMBOLS } gk_symbol;
+#undef GK_SYMBOL
 
 typedef struct gk_shape {
     uint64_t size[SYMBOLS];

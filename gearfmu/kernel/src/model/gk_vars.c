@@ -2,7 +2,7 @@
  * model. A reference is 256 × the variable's number + its instance, so that it stays when variables or gears are
  * added; those of amplitudes, which may be many, begin at 2²⁴. */
 #include "model/gk_data.h"
-#include "setup/gk_setup.h"
+#include <stdio.h>
 
 typedef enum {
     ALWAYS,
@@ -42,8 +42,10 @@ typedef struct gk_row {
 static const gk_row TABLE[] = {
 #define GK_VAR(SCOPE, NUMBER, ID, NAME, TYPE, CAUSALITY, EXISTS, UNIT, START, MIN, MAX, ITEMS, TEXT)                   \
     {(gk_scope)SCOPE, NUMBER, V_##ID, NAME, TYPE, CAUSALITY, EXISTS, UNIT, START, MIN, MAX, ITEMS, TEXT},
+#define GK_VARS_END(SCOPE)
 #include "model/gk_variables.inc"
 #undef GK_VAR
+#undef GK_VARS_END
 };
 enum { ROWS = sizeof TABLE / sizeof *TABLE, INSTANCES = 256, MODES_FROM = 1 << 24 };
 
@@ -98,11 +100,11 @@ static const gk_row *row_of(const gk_model *model, uint32_t reference, int *inst
 static double *value_of(gk_data *data, const gk_row *row, int instance)
 {
     switch (row->scope) {
-    case SCOPE_SHAFT: return &data->shaft[instance][row->place];
-    case SCOPE_ROTOR: return &data->rotor[instance][row->place];
-    case SCOPE_MESH: return &data->mesh[instance][row->place];
-    case SCOPE_SUPPORT: return &data->support[instance][row->place];
-    case SCOPE_MODE: return data->oscillator + data->amplitudes + instance;
+    case SCOPE_SHAFT: return &GK_OF(data, shaft)[instance][row->place];
+    case SCOPE_ROTOR: return &GK_OF(data, rotor)[instance][row->place];
+    case SCOPE_MESH: return &GK_OF(data, mesh)[instance][row->place];
+    case SCOPE_SUPPORT: return &GK_OF(data, support)[instance][row->place];
+    case SCOPE_MODE: return GK_OF(data, oscillator) + data->amplitudes + instance;
     default: return &data->stage[row->place];
     }
 }
@@ -125,12 +127,6 @@ static double start_of(const gk_model *model, const gk_row *row, int instance)
 }
 
 /* ---- names ------------------------------------------------------------------------------------------------------- */
-static size_t append(char *out, size_t size, size_t n, const char *text)
-{
-    for (; *text && n + 1 < size; text++) out[n++] = *text;
-    return n;
-}
-
 static const char *instance_name(const gk_model *model, const gk_row *row, int instance)
 {
     switch (row->scope) {
@@ -159,40 +155,28 @@ static int number_of(const gk_model *model, int instance)
 }
 
 /* ring.motion.x, ring.mode_12 */
-static size_t append_mode(char *out, size_t size, const gk_model *model, int instance)
+static void name_mode(char *out, size_t size, const gk_model *model, int instance)
 {
     static const char *const motions[] = {"x", "y", "z", "rx", "ry", "rz"};
+    const char *gear = observed_of(model, instance)->observed.name;
     const int number = number_of(model, instance);
-    size_t n = append(out, size, 0, observed_of(model, instance)->observed.name);
-    if (number < 0) return append(out, size, append(out, size, n, ".motion."), motions[-number - 1]);
-    char digits[8] = {0};
-    int at = (int)sizeof digits - 1;
-    for (int rest = number; rest; rest /= 10) digits[--at] = (char)('0' + rest % 10);
-    return append(out, size, append(out, size, n, ".mode_"), digits + at);
+    if (number < 0)
+        snprintf(out, size, "%s.motion.%s", gear, motions[-number - 1]);
+    else
+        snprintf(out, size, "%s.mode_%d", gear, number);
 }
 
 static void expand(char *out, size_t size, const gk_model *model, const gk_row *row, int instance)
 {
+    if (row->scope == SCOPE_MODE) return name_mode(out, size, model, instance);
+    const char *name = instance_name(model, row, instance);
     size_t n = 0;
-    if (row->scope == SCOPE_MODE) {
-        out[append_mode(out, size, model, instance)] = 0;
-        return;
-    }
-    for (const char *c = row->name; *c; c++) {
-        const char one[2] = {*c, 0}, *name = instance_name(model, row, instance);
-        if (*c == '%')
-            n = append(out, size, n, name);
-        else if (*c == '&')
-            n = append(out, size, n, model->displacement_name[instance]);
-        else if (*c != '@')
-            n = append(out, size, n, one);
-        else if (model->engagements > 1)
-            n = append(out, size, append(out, size, n, name), ".");
-    }
-    out[n] = 0;
+    for (const char *c = row->name; *c && n < size; c++)
+        n += (size_t)(*c == '%'   ? snprintf(out + n, size - n, "%s", name)
+                      : *c == '&' ? snprintf(out + n, size - n, "%s", model->displacement_name[instance])
+                      : *c != '@' ? snprintf(out + n, size - n, "%c", *c)
+                                  : snprintf(out + n, size - n, model->engagements > 1 ? "%s." : "", name));
 }
-
-static void copy(char *out, size_t size, const char *text) { out[append(out, size, 0, text)] = 0; }
 
 /* ---- interface --------------------------------------------------------------------------------------------------- */
 int gk_variable_count(const gk_model *model)
@@ -238,9 +222,9 @@ gk_outcome gk_variable(const gk_model *model, int index, gk_variable_info *info)
     info->type = row->type;
     info->causality = row->causality;
     expand(info->name, sizeof info->name, model, row, instance);
-    copy(info->unit, sizeof info->unit, unit_of(model, row, instance));
-    copy(info->items, sizeof info->items, row->items);
-    copy(info->description, sizeof info->description, row->description);
+    snprintf(info->unit, sizeof info->unit, "%s", unit_of(model, row, instance));
+    snprintf(info->items, sizeof info->items, "%s", row->items);
+    snprintf(info->description, sizeof info->description, "%s", row->description);
     info->start = start_of(model, row, instance);
     info->minimum = row->minimum;
     info->maximum = row->maximum;
@@ -252,7 +236,8 @@ gk_outcome gk_defaults(const gk_model *model, gk_data *data)
     GK_ASSERT(model && data);
     const size_t size = gk_data_size(model);
     memset(data, 0, size);
-    data->amplitudes = (int64_t)((size - sizeof *data) / sizeof(double)) -
+    gk_data_plan(model, data->at);
+    data->amplitudes = (int64_t)((size - sizeof *data) / sizeof(double)) - data->at[OF_oscillator] -
                        model->amplitudes; /* until they have their place */
     data->magic = GK_DATA_MAGIC;
     data->phase = PHASE_NEW;

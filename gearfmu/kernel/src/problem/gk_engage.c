@@ -25,7 +25,7 @@ int gk_engage(const gk_model *model, const gk_setup *setup, gk_work *work, const
               int e)
 {
     GK_ASSERT(gk_is_mesh(setup, e) && how && how->k);
-    const gk_meshing *meshing = &data->meshing[e];
+    const gk_meshing *meshing = &GK_OF(data, meshing)[e];
     const double *const ground = how->ground ? how->ground : work->ground_y;
     gk_engaged *engaged = &work->engaged[e];
     const int frozen = !how->anew && !setup->on.roll_motion;
@@ -77,7 +77,7 @@ static void recall_forces(const gk_data *data, gk_system *s, int linear)
     else
         gk_clear(s->begin, quads);
     for (int i = s->n - s->clutches; i < s->n; i++) {
-        s->active[i] = (unsigned char)data->locked[s->port_of[i]];
+        s->active[i] = (unsigned char)GK_OF(data, locked)[s->port_of[i]];
         s->slip[i - s->n + s->clutches] = s->g[i] > 0.0 ? -s->bound[i] : s->bound[i];
     }
     gk_law_apply(s);
@@ -110,8 +110,8 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
         const int memory = engaged->place[s->place_of[i]].memory;
         s->recalled[i] = memory >= 0;
         s->g0[i] = memory < 0 ? gk_max(s->g[i], s->g0[i])
-                              : (data->meshing[e].adopted ? 0.0 : s->g0[i]) +
-                                    data->meshing[e].memory[memory].gap[i % GK_STRIPS(s)];
+                              : (GK_OF(data, meshing)[e].adopted ? 0.0 : s->g0[i]) +
+                                    GK_OF(data, meshing)[e].memory[memory].gap[i % GK_STRIPS(s)];
         s->active[i] = s->force0[i] > 0.0 || s->g[i] < 0.0;
         s->clip[i] = s->force0[i] > 0.0 && s->damping[i] > 0.0 ? 0 : 2;
     }
@@ -129,7 +129,7 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
         gk_solve_settle(s);
     else
         gk_solve_begin_dashpots(s);
-    s->energy_error = data->meshing[e].energy_error;
+    s->energy_error = GK_OF(data, meshing)[e].energy_error;
     s->energy_correction = gk_clamp(s->energy_error, -PAYABLE * s->stored0, PAYABLE * s->stored0);
 }
 
@@ -138,7 +138,7 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
     GK_ASSERT(engaged && engaged->index == e);
     GK_ASSERT(engaged->places >= 0 && engaged->places <= MAX_PAIRS);
     const gk_system *s = &engaged->system;
-    gk_meshing *meshing = &data->meshing[e];
+    gk_meshing *meshing = &GK_OF(data, meshing)[e];
     double deepest = 0.0;
     const int most = meshing->pairs > engaged->places ? meshing->pairs : engaged->places;
     memset(meshing->memory, 0, (size_t)most * sizeof *meshing->memory);
@@ -157,9 +157,9 @@ void gk_memory_keep(const gk_setup *setup, const gk_engaged *engaged, gk_data *d
                 data->status |= STATUS_LAW;
         }
     }
-    for (int i = s->contacts; i < s->n; i++)
-        data->joint[s->port_of[i]][s->joint_of[i]] = (gk_joint_state){
-            s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i], s->damper[i], s->end[i]};
+    for (int i = s->contacts; i < s->n; i++) GK_OF(data, joint)
+    [s->port_of[i]][s->joint_of[i]] = (gk_joint_state){s->kind[i] == ROW_CLUTCH ? 0.5 * s->z[i] : s->force[i],
+                                                       s->damper[i], s->end[i]};
     meshing->search_distance = 20e-6 + 0.5 * deepest; /* neighbours of a loaded tooth follow its deflection in part */
     meshing->energy_error = meshing->adopted ? 0.0
                                              : s->energy_error; /* what the change of setup took or gave is no debt */

@@ -9,7 +9,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
                           int e)
 {
     const gk_mesh *mesh = &setup->mesh[e];
-    const gk_meshing *meshing = &data->meshing[e];
+    const gk_meshing *meshing = &GK_OF(data, meshing)[e];
     gk_engaged *engaged = &work->engaged[e];
     gk_system *s = &engaged->system;
     static const gk_memory fresh;
@@ -42,7 +42,7 @@ static void list_contacts(const gk_model *model, const gk_setup *setup, const gk
 
 static void list_joint(const gk_setup *setup, const gk_data *data, double h, gk_system *s, int port, int joint)
 {
-    const gk_joint_state *state = &data->joint[port][joint];
+    const gk_joint_state *state = &GK_OF(data, joint)[port][joint];
     const int clutch = joint == JOINT_CLUTCH, torque = joint == JOINT_PORT && setup->given_torque[port];
     s->kind[s->n] = clutch ? ROW_CLUTCH : torque ? ROW_TORQUE : ROW_SPRING;
     s->port_of[s->n] = port, s->joint_of[s->n] = joint;
@@ -51,7 +51,7 @@ static void list_joint(const gk_setup *setup, const gk_data *data, double h, gk_
     s->end0[s->n] = state->end;
     s->damper0[s->n] = state->damper;
     s->damping[s->n] = 2.0 * setup->joint[port][joint].damping / h;
-    s->bound[s->n] = clutch ? 2.0 * data->shaft[port][V_CAPACITY] : 0.0;
+    s->bound[s->n] = clutch ? 2.0 * GK_OF(data, shaft)[port][V_CAPACITY] : 0.0;
     s->width[s->n] = s->per_width[s->n] = 0.0;
     s->clutches += clutch;
     s->n++;

@@ -48,10 +48,10 @@ static void slide_freely(const gk_setup *setup, const gk_data *data, gk_work *wo
         gk_rows_read_modes_along(setup, work, e, w, q + n, glide->begin);
     }
     for (int l = 0; l < mesh->spins; l++) {
-        const double turned = work->spin[mesh->spin[l]] - data->x[mesh->spin[l]];
+        const double turned = work->spin[mesh->spin[l]] - GK_OF(data, x)[mesh->spin[l]];
         for (int i = 0; i < contacts; i++) {
             glide->free[i] += turned * glide->rigid[l][i];
-            glide->begin[i] += data->v[mesh->spin[l]] * glide->rigid[l][i];
+            glide->begin[i] += GK_OF(data, v)[mesh->spin[l]] * glide->rigid[l][i];
         }
     }
     for (int i = 0; i < contacts; i++) glide->begin[i] *= h;
@@ -79,9 +79,9 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
     const gk_mesh *mesh = &setup->mesh[e];
     const gk_system *s = &engaged->system;
     gk_glide *glide = engaged->glide;
-    const double frame = mesh->frame < 0 ? 0.0 : data->v[mesh->frame];
-    const double speed[2] = {data->v[mesh->spin[0]] - frame, data->v[mesh->spin[1]] - frame};
-    const gk_meshing *meshing = &data->meshing[e];
+    const double frame = mesh->frame < 0 ? 0.0 : GK_OF(data, v)[mesh->frame];
+    const double speed[2] = {GK_OF(data, v)[mesh->spin[0]] - frame, GK_OF(data, v)[mesh->spin[1]] - frame};
+    const gk_meshing *meshing = &GK_OF(data, meshing)[e];
     gk_sliding at = {.turns = speed[0]};
     glide->rolls = fabs(meshing->rolling) > STEADY * meshing->unsteady; /* a gear that rings about rest sticks */
     for (int i = 0; i < s->contacts; i++) at.total += s->force0[i];
@@ -213,7 +213,7 @@ void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_dat
     memset(glide->matrix, 0, 4 * size * sizeof(double));
     for (size_t i = 0; i < 6; i++) *matrix[i] = glide->matrix + i * size;
     memcpy(glide->D, s->D, (size_t)(s->n * s->stride) * sizeof *s->D);
-    recall_friction(engaged, &data->meshing[e], glide);
+    recall_friction(engaged, &GK_OF(data, meshing)[e], glide);
     gk_rows_form_along(setup, work, e);
     slide_freely(setup, data, work, k->h, e);
     find_coefficients(model, setup, data, k->h, e, engaged);
@@ -257,20 +257,20 @@ static void find_sliding(gk_glide *glide, const gk_system *s)
     }
 }
 
-/* x ← a⁻¹ x for `columns` right-hand sides, a (n, n) by rows, close to symmetric positive definite: no pivoting */
-static void solve_small(double a[][MAX_CONTACTS], double x[][MAX_STRIDE], int n, int columns)
+/* x ← a⁻¹ x, both (n, width) by rows, a close to symmetric positive definite: no pivoting */
+static void solve_small(double *a, double *x, int width, int n)
 {
     for (int k = 0; k < n; k++)
         for (int i = k + 1; i < n; i++) {
-            const double f = a[i][k] / a[k][k];
+            const double f = a[i * width + k] / a[k * width + k];
             if (f == 0.0) continue;
-            for (int j = k; j < n; j++) a[i][j] -= f * a[k][j];
-            for (int c = 0; c < columns; c++) x[i][c] -= f * x[k][c];
+            for (int j = k; j < n; j++) a[i * width + j] -= f * a[k * width + j];
+            for (int c = 0; c < width; c++) x[i * width + c] -= f * x[k * width + c];
         }
     for (int k = n - 1; k >= 0; k--)
-        for (int c = 0; c < columns; c++) {
-            for (int j = k + 1; j < n; j++) x[k][c] -= a[k][j] * x[j][c];
-            x[k][c] /= a[k][k];
+        for (int c = 0; c < width; c++) {
+            for (int j = k + 1; j < n; j++) x[k * width + c] -= a[k * width + j] * x[j * width + c];
+            x[k * width + c] /= a[k * width + k];
         }
 }
 
@@ -308,36 +308,36 @@ static void express_limits(gk_glide *glide, const gk_system *s)
 
 static void express_friction(gk_glide *glide, const gk_system *s)
 {
-    double a[MAX_CONTACTS][MAX_CONTACTS], x[MAX_CONTACTS][MAX_STRIDE];
+    const int width = s->n + 1;
+    double *const all_a = glide->small, *const all_x = all_a + s->contacts * width;
     int held[MAX_CONTACTS], n = 0;
     express_limits(glide, s);
-    for (int j = 0; j < s->contacts; j++)
-        if (glide->held[j]) held[n++] = j;
+    for (int j = 0; j < s->contacts; j++) held[n] = j, n += glide->held[j] != 0;
     for (int k = 0; k < n; k++) { /* Δs without the forces in the step and without friction that follows them */
         const int i = held[k];
         const double *moved = glide->gap_moves + i * s->stride, *yielded = glide->gap_yields + i * s->stride;
-        double rest = glide->slid[i];
+        double rest = glide->slid[i], *a = all_a + k * width, *x = all_x + k * width;
         for (int r = 0; r < s->n; r++) {
             const double each = moved[r] + yielded[r];
-            rest -= each * s->z[r], x[k][r] = -each;
+            rest -= each * s->z[r], x[r] = -each;
         }
         for (int j = 0; j < s->contacts; j++) {
             const int at = j * s->stride + i;
             const double moves = 2.0 * glide->moves[at], yields = glide->yields[at];
             rest += moves * (glide->fixed[j] - glide->mean[j]) + yields * (glide->end_fixed[j] - glide->end[j]);
-            x[k][j] -= moves * glide->by_z[j * s->stride + j] + yields * glide->end_by_z[j];
+            x[j] -= moves * glide->by_z[j * s->stride + j] + yields * glide->end_by_z[j];
         }
-        x[k][s->n] = -rest;
+        x[s->n] = -rest;
         for (int j = 0; j < n; j++) {
             const int at = held[j] * s->stride + i;
-            a[k][j] = 2.0 * glide->moves[at] + glide->end_by_mean[held[j]] * glide->yields[at];
+            a[j] = 2.0 * glide->moves[at] + glide->end_by_mean[held[j]] * glide->yields[at];
         }
-        a[k][k] += glide->creep[i] / glide->most_force[i];
+        a[k] += glide->creep[i] / glide->most_force[i];
     }
-    solve_small(a, x, n, s->n + 1);
+    solve_small(all_a, all_x, width, n);
     for (int k = 0; k < n; k++) {
-        glide->fixed[held[k]] = x[k][s->n];
-        memcpy(glide->by_z + held[k] * s->stride, x[k], (size_t)s->n * sizeof(double));
+        glide->fixed[held[k]] = all_x[k * width + s->n];
+        memcpy(glide->by_z + held[k] * s->stride, all_x + k * width, (size_t)s->n * sizeof(double));
     }
 }
 
@@ -424,26 +424,6 @@ static void apply(const gk_glide *glide, gk_system *s)
     }
 }
 
-/* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
- * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
-double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
-{
-    GK_ASSERT(glide && round >= 0);
-    GK_ASSERT(gk_system_is_sound(s));
-    find_limits(glide, s);
-    if (!round) guess_end(glide, s);
-    find_sliding(glide, s);
-    const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
-    express_friction(glide, s);
-    apply(glide, s);
-    gk_solve_settle(s);
-    gk_solve_contacts(s);
-    const double moved = follow(glide, s);
-    s->rubbing = gk_friction_defect(glide, s);
-    if (changed || (!stands && !round)) return 1.0;
-    return moved / find_limits(glide, s);
-}
-
 /* What a mean of friction that is not that of both ends leaves of the energy it holds along the profile: taken where it
  * is less than nothing */
 static double faded(const gk_glide *glide, const gk_system *s)
@@ -459,7 +439,7 @@ static double faded(const gk_glide *glide, const gk_system *s)
 
 /* What the forces of the step leave of the energy that friction holds in what is quasi-static, because they are no
  * means of those at its ends: the step's one scalar balances it (docs/theory.md, eq. 12) */
-double gk_friction_defect(const gk_glide *glide, const gk_system *s)
+static double friction_defect(const gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide && s);
     double sum = gk_friction_held(glide, s) - glide->held0 - faded(glide, s);
@@ -474,14 +454,34 @@ double gk_friction_defect(const gk_glide *glide, const gk_system *s)
     return sum;
 }
 
+/* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
+ * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
+double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
+{
+    GK_ASSERT(glide && round >= 0);
+    GK_ASSERT(gk_system_is_sound(s));
+    find_limits(glide, s);
+    if (!round) guess_end(glide, s);
+    find_sliding(glide, s);
+    const int changed = stands || !round ? 0 : change_status(glide, s, round < PATIENT);
+    express_friction(glide, s);
+    apply(glide, s);
+    gk_solve_settle(s);
+    gk_solve_contacts(s);
+    const double moved = follow(glide, s);
+    s->rubbing = friction_defect(glide, s);
+    if (changed || (!stands && !round)) return 1.0;
+    return moved / find_limits(glide, s);
+}
+
 /* the speed of gear A as a mean over the last millisecond */
 void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e)
 {
     GK_ASSERT(gk_is_mesh(setup, e));
     GK_ASSERT(h > 0.0);
     const gk_mesh *mesh = &setup->mesh[e];
-    gk_meshing *meshing = &data->meshing[e];
-    const double speed = data->v[mesh->spin[0]] - (mesh->frame < 0 ? 0.0 : data->v[mesh->frame]);
+    gk_meshing *meshing = &GK_OF(data, meshing)[e];
+    const double speed = GK_OF(data, v)[mesh->spin[0]] - (mesh->frame < 0 ? 0.0 : GK_OF(data, v)[mesh->frame]);
     const double part = data->steps ? h / (RECENT + h) : 1.0;
     meshing->rolling += part * (speed - meshing->rolling);
     meshing->unsteady += part * (fabs(speed - meshing->rolling) - meshing->unsteady);

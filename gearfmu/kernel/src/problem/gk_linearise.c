@@ -62,7 +62,7 @@ static void place_ground(const gk_setup *setup, const double *lanes, int first, 
 /* ---- the problem at rest ----------------------------------------------------------------------------------------- */
 static int form_all(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data)
 {
-    memcpy(work->spin, data->x, sizeof work->spin);
+    memcpy(work->spin, GK_OF(data, x), (size_t)setup->spins * sizeof *work->spin);
     memset(work->speed, 0, sizeof work->speed);
     for (int g = 0; g < model->gears; g++) work->y[g] = work->zero;
     work->ground_y = work->ground_zero;

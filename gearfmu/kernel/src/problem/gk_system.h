@@ -17,7 +17,6 @@ enum {
     MAX_JOINTS = 2 * JOINTS, /* of one engagement */
     MAX_ROWS = MAX_CONTACTS + MAX_JOINTS,
     MAX_STRIDE = (MAX_ROWS + 3) / 4 * 4,
-    KINDS = 3,    /* of compliance: D, −K, Q */
     MAX_LOCAL = 7 /* spins that an engagement's rows read */
 };
 /* λ ≥ 0; any λ; given torque; velocity-level friction */

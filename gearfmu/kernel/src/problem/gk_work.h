@@ -5,9 +5,8 @@
 #include "problem/gk_system.h"
 #include "setup/gk_spread.h"
 
-/* phases of a step, for the profile */
 enum { LIMIT_POSITIONS = 8 }; /* of an engagement, where the limit of the step is looked for */
-enum { COMMON = 8 };          /* motions of a gear and the angle of its bore, padded to quads */
+/* phases of a step, for the profile */
 enum { PHASE_PREDICT, PHASE_FIND, PHASE_ROWS, PHASE_SYSTEM, PHASE_SOLVE, PHASE_CORRECT, PHASE_REMEMBER, PHASES };
 typedef struct gk_point { /* of a strip */
     double gap, gradient[POSE];
@@ -47,9 +46,6 @@ typedef struct gk_position {
     double part;       /* 0 … 1 of the way to the next node */
 } gk_position;
 
-/* of them that a model knows */
-static inline int gk_common(const gk_setup *setup) { return setup->spatial ? COMMON : COMMON / 2; }
-
 typedef struct gk_step_side { /* D and A of one step h: squares of nodes and products of neighbours */
     gk_real *moves; /* (nodes + 1, points, 4, columns): D at the node, D mixed with the next, the same of A = C − K */
     double *pulls;  /* (nodes + 1, points, 2, common): what the ground oscillators' rows have in common with the rigid
@@ -67,7 +63,7 @@ typedef struct gk_bores { /* at once: moments on ports, and what contacts turn t
 typedef struct gk_glide {
     gk_real *basis[2]; /* (contacts, n), (contacts, local part) rows of the sliding, as those of the gaps */
     double *ground, rigid[MAX_LOCAL][MAX_STRIDE];
-    double *matrix;
+    double *matrix, *small;                     /* small: two of (contacts, rows + 1) */
     double *gap_moves, *gap_yields;             /* (contacts, stride) to the gaps of all rows: in the step; at once */
     double *moves, *yields;                     /* to the sliding of all contacts */
     double gap[MAX_STRIDE];                     /* gaps without friction */
@@ -159,12 +155,16 @@ struct gk_work {
     gk_engaged *engaged;         /* (engagements) */
     gk_shared *shared;           /* (shareds) */
     int shareds;
+    double *tally;    /* (6, ground oscillators) sums of a communication step and their scratch (gk_tally.c) */
+    double *pushed;   /* forces on all oscillators of the ground group, then of a gear group */
+    double *mode_row; /* (modes) scratch */
     /* statics (gk_static.c): every oscillator is compliance */
     double *rest_ground;            /* displacement of the ground group */
     gk_real *rest_modes[MAX_GEARS]; /* displacement of those modes of gears with several engagements that are soft */
-    double *rest;    /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
-    double *columns; /* room for a node's rows and their products; A of the explicit rows at all LIMIT_POSITIONS */
-    double *spread;  /* room of gk_spread.c, and the compliances that it makes of one gear */
+    double *rest;      /* forces, moves and their tangent: (2 + n, n), n spins and dynamic ground oscillators */
+    double *soft_rows; /* (2, MAX_ROWS, MAX_SOFT) rows of an engagement on the soft modes of its gears */
+    double *columns;   /* room for a node's rows and their products; A of the explicit rows at all LIMIT_POSITIONS */
+    double *spread;    /* room of gk_spread.c, and the compliances that it makes of one gear */
     gk_real *blocks;
     gk_compliance compliance;
     double *sum_ground, sum_spin[2][MAX_SPINS]; /* what all engagements of an island give */
@@ -192,7 +192,8 @@ typedef struct gk_strip_load { /* outward forces on the strips of one tooth */
     double force[MAX_SLICES], roll[MAX_SLICES];
     gk_strip_weights width;
 } gk_strip_load;
-void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum);
+void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *row,
+                  double *sum);
 void gk_node_push_ground(const gk_model *model, const gk_setup *setup, int e, int which, const gk_strip_load *load,
                          double *sum);
 /* gk_moves.c */
@@ -249,7 +250,6 @@ GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const
                              const gk_coefficients *k, gk_work *work, int e);
 GK_HOT double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands);
 GK_HOT double gk_friction_held(const gk_glide *glide, const gk_system *s);
-GK_HOT double gk_friction_defect(const gk_glide *glide, const gk_system *s);
 GK_HOT void gk_friction_watch(const gk_setup *setup, gk_data *data, double h, int e);
 GK_HOT double gk_friction_settle(gk_glide *glide, const gk_system *s);
 /* gk_couple.c */

@@ -27,7 +27,7 @@ static int allowed(const gk_setup *old, const gk_data *from, const gk_setup *set
 static void take_contacts(const passage *c, int e)
 {
     const gk_system *s = &c->work->engaged[e].system;
-    gk_meshing *meshing = &c->data->meshing[e];
+    gk_meshing *meshing = &GK_OF(c->data, meshing)[e];
     meshing->energy_error = 0.0;
     meshing->adopted = 1;
     if (c->old->strips != c->setup->strips) meshing->pairs = 0;
@@ -40,8 +40,9 @@ static void take_contacts(const passage *c, int e)
 static void take_head(const passage *c)
 {
     gk_vars_take(c->model, c->data, c->from);
-    const size_t start = offsetof(gk_data, x);
+    const size_t start = offsetof(gk_data, time_base), from = c->data->at[OF_x];
     memcpy((char *)c->data + start, (const char *)c->from + start, sizeof(gk_data) - start);
+    memcpy(c->data->tail + from, c->from->tail + from, (c->data->at[OF_oscillator] - from) * sizeof(double));
     c->data->phase = PHASE_RUNNING;
     c->data->status = c->from->status;
     c->data->amplitudes = (int64_t)c->setup->amplitudes;
@@ -56,7 +57,7 @@ static void take_head(const passage *c)
 static void take_spins(const passage *c)
 {
     for (int d = 0; d < c->old->spins; d++)
-        c->data->x[d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * c->from->f[d];
+        GK_OF(c->data, x)[d] -= c->k->rigid_kappa * c->old->inverse_inertia[d] * GK_OF(c->from, f)[d];
 }
 
 /* displacement, speed and force of the ground oscillators; pushed: modal forces on those that were compliance */
@@ -109,7 +110,9 @@ gk_outcome gk_adopt(const gk_model *model, const gk_setup *from_setup, const gk_
     if (!allowed(from_setup, from, setup, data)) return GK_BAD_CALL;
     const gk_coefficients *k = gk_flow_known(from_work, from->state_h, from->state_gamma);
     const passage c = {model, from_setup, setup, from_work, from, data, k};
-    double ground[MAX_GROUND] = {0}, modes[MAX_MODES];
+    const size_t oscillators = (size_t)model->ground[from_setup->base.set].n;
+    double *const ground = from_work->pushed, *const modes = ground + oscillators;
+    memset(ground, 0, oscillators * sizeof *ground);
     take_head(&c);
     take_spins(&c);
     for (int g = 0; g < model->gears; g++) {

@@ -32,7 +32,7 @@ void gk_amplitudes_of_contacts(const gk_model *model, const gk_setup *setup, con
     gk_strips_rows(model, setup, &model->engagement[e], g, load.width);
     for (int p = 0; p < engaged->places; p++)
         if (strip_load(setup, engaged, p, which, &load) > 0.0) {
-            gk_node_push(model, setup, &load, setup->modal[g].count, modes);
+            gk_node_push(model, setup, &load, setup->modal[g].count, work->mode_row, modes);
             gk_node_push_ground(model, setup, e, which, &load, ground);
         }
 }
@@ -82,7 +82,7 @@ static void own_motion(const gk_model *model, const gk_setup *setup, const gk_da
         for (int k = 0; k < reads; k++) out[i] += row[k] * moved[list[k]];
     }
     double sine, cosine;
-    gk_sincos(gear->phase + data->x[gear->rotor] - (frame < 0 ? 0.0 : data->x[frame]), &sine, &cosine);
+    gk_sincos(gear->phase + GK_OF(data, x)[gear->rotor] - (frame < 0 ? 0.0 : GK_OF(data, x)[frame]), &sine, &cosine);
     for (int i = 0; i < o->own; i++)
         if (o->member[i] == 1) {
             const double a = out[i], b = out[i + 1];
@@ -121,9 +121,11 @@ void gk_amplitudes(const gk_model *model, const gk_setup *setup, const gk_work *
     for (int g = 0; g < model->gears; g++) {
         const gk_gear *gear = &model->gear[g];
         const gk_observed *o = &gear->observed;
-        double moved[MAX_GROUND] = {0};
+        const size_t oscillators = (size_t)model->ground[setup->base.set].n;
+        double *const moved = work->pushed;
         if (!o->name) continue;
-        double *own = data->oscillator + data->amplitudes + o->from, *modes = own + o->own;
+        memset(moved, 0, oscillators * sizeof *moved);
+        double *own = GK_OF(data, oscillator) + data->amplitudes + o->from, *modes = own + o->own;
         memset(modes, 0, (size_t)gear->modes * sizeof *modes);
         push_static(model, setup, work, g, modes, moved);
         for (int i = setup->modal[g].count; i < gear->modes; i++)

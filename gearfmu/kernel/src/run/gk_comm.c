@@ -15,8 +15,8 @@ double gk_time(const gk_data *data)
 
 static gk_motion motion_in(const gk_data *data, int p)
 {
-    const double *v = data->shaft[p];
-    return (gk_motion){v[V_PHI_IN] - data->hold[p], v[V_W_IN], v[V_A_IN]};
+    const double *v = GK_OF(data, shaft)[p];
+    return (gk_motion){v[V_PHI_IN] - GK_OF(data, hold)[p], v[V_W_IN], v[V_A_IN]};
 }
 
 /* outer end of a port at τ after the start of the communication step: φ + wτ + ½aτ² plus the jump of the inputs,
@@ -43,7 +43,7 @@ int gk_profile(const gk_work *work, int phase, const char **name, uint64_t *cycl
 /* ---- start ------------------------------------------------------------------------------------------------------- */
 static double start_speed(const gk_model *model, const gk_data *data, int p)
 {
-    const double *v = data->shaft[p];
+    const double *v = GK_OF(data, shaft)[p];
     return model->port[p].kind == PORT_TORQUE ? v[V_W_START] : model->port[p].kind == PORT_SPRING ? v[V_W_IN] : 0.0;
 }
 
@@ -51,19 +51,20 @@ static void start_speeds(const gk_model *model, gk_data *data)
 {
     int known[MAX_ROTORS];
     for (int r = 0; r < model->rotors; r++) known[r] = model->inertia[r] == 0.0;
-    memset(data->v, 0, sizeof data->v);
+    memset(GK_OF(data, v), 0, (size_t)(model->rotors + 2 * model->chains) * sizeof(double));
     for (int p = 0; p < model->ports; p++) {
         const gk_port *port = &model->port[p];
         double w = start_speed(model, data, p);
         if (port->chain) {
-            data->v[gk_inertia_of(model, p)] = w;
-            data->v[gk_disc_of(model, p)] = w = data->shaft[p][V_DISC_W_START];
-            data->locked[p] = data->v[gk_inertia_of(model, p)] == w && data->shaft[p][V_CAPACITY] > 0.0;
+            GK_OF(data, v)[gk_inertia_of(model, p)] = w;
+            GK_OF(data, v)[gk_disc_of(model, p)] = w = GK_OF(data, shaft)[p][V_DISC_W_START];
+            GK_OF(data, locked)
+            [p] = GK_OF(data, v)[gk_inertia_of(model, p)] == w && GK_OF(data, shaft)[p][V_CAPACITY] > 0.0;
         }
-        data->v[port->rotor] = w;
+        GK_OF(data, v)[port->rotor] = w;
         known[port->rotor] = 1;
     }
-    gk_kinematics_follow(model, known, data->v); /* rotors without a port */
+    gk_kinematics_follow(model, known, GK_OF(data, v)); /* rotors without a port */
 }
 
 static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data)
@@ -72,12 +73,12 @@ static gk_outcome start(const gk_model *model, const gk_setup *setup, gk_work *w
     start_speeds(model, data);
     for (int p = 0; p < model->ports; p++) {
         const gk_port *port = &model->port[p];
-        const double *v = data->shaft[p];
-        data->hold[p] = data->stage[V_REFERENCE] != 0.0 && port->kind == PORT_SPRING ? v[V_PHI_IN] : 0.0;
-        data->input[p] = motion_in(data, p);
+        const double *v = GK_OF(data, shaft)[p];
+        GK_OF(data, hold)[p] = data->stage[V_REFERENCE] != 0.0 && port->kind == PORT_SPRING ? v[V_PHI_IN] : 0.0;
+        GK_OF(data, input)[p] = motion_in(data, p);
         b[p].kind = port->kind == PORT_FIXED ? PORT_SPRING : port->kind;
         b[p].torque = port->kind == PORT_TORQUE ? v[V_TAU_IN] : 0.0;
-        b[p].phi = port->kind == PORT_SPRING ? data->input[p].phi : 0.0;
+        b[p].phi = port->kind == PORT_SPRING ? GK_OF(data, input)[p].phi : 0.0;
         b[p].k = port->k;
     }
     const gk_outcome outcome = gk_static_solve(model, setup, work, data, b, 0, 0);
@@ -138,11 +139,12 @@ typedef struct span {
 static void set_ports(const gk_model *model, gk_work *work, gk_data *data, const span *c, double tau, double h)
 {
     for (int p = 0; p < model->ports; p++) {
-        double *v = data->shaft[p];
+        double *v = GK_OF(data, shaft)[p];
         if (model->port[p].chain) v[V_CAPACITY] = gk_max(0.0, c->capacity[p] + v[V_CAPACITY_RATE] * (tau + 0.5 * h));
         work->outer_before[p] = work->outer[p];
-        work->outer[p] = model->port[p].kind == PORT_SPRING ? carried(data->input[p], c->jump[p], tau + h, c->H).phi
-                                                            : 0.0;
+        work->outer[p] = model->port[p].kind == PORT_SPRING
+                             ? carried(GK_OF(data, input)[p], c->jump[p], tau + h, c->H).phi
+                             : 0.0;
         work->torque[p] = model->port[p].kind == PORT_TORQUE ? v[V_TAU_IN] : 0.0;
     }
 }
@@ -188,7 +190,7 @@ static gk_outcome accept_step(gk_data *data, double time, double H)
 static int starts_late(const gk_model *model, const gk_data *data)
 {
     for (int p = 0; p < model->ports; p++) {
-        const gk_motion was = data->input[p], next = motion_in(data, p);
+        const gk_motion was = GK_OF(data, input)[p], next = motion_in(data, p);
         const double gained = fabs(next.w) - 2.0 * fabs(next.a) * data->step_H;
         if (model->port[p].kind == PORT_SPRING && was.w == 0.0 && gained > JUMP) return 1;
     }
@@ -200,11 +202,11 @@ static span begin(const gk_model *model, gk_work *work, gk_data *data)
 {
     span c = {.start = gk_time(data), .H = data->step_H};
     for (int p = 0; p < model->ports; p++) {
-        const gk_motion next = motion_in(data, p), was = data->input[p];
+        const gk_motion next = motion_in(data, p), was = GK_OF(data, input)[p];
         c.jump[p] = (gk_motion){was.phi - next.phi, was.w - next.w, 0.0};
-        c.capacity[p] = data->shaft[p][V_CAPACITY];
+        c.capacity[p] = GK_OF(data, shaft)[p][V_CAPACITY];
         work->outer[p] = was.phi;
-        data->input[p] = next;
+        GK_OF(data, input)[p] = next;
     }
     return c;
 }
@@ -237,7 +239,7 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
     for (int64_t i = 0; i < steps; i++) {
         if (i + 1 == steps) gk_outputs_bores(model, setup, data);
         outcome = advance(model, setup, work, data, &c, (double)i * h, h, 0);
-        for (int p = 0; p < model->ports; p++) data->shaft[p][V_CAPACITY] = c.capacity[p];
+        for (int p = 0; p < model->ports; p++) GK_OF(data, shaft)[p][V_CAPACITY] = c.capacity[p];
         if (outcome) {
             stand_at(data, c.start + (double)i * h);
             return outcome;
@@ -247,7 +249,8 @@ gk_outcome gk_step(const gk_model *model, const gk_setup *setup, gk_work *work, 
         first = 0;
     }
     data->count++;
-    for (int p = 0; p < model->ports; p++) data->input[p] = carried(data->input[p], (gk_motion){0, 0, 0}, c.H, c.H);
+    for (int p = 0; p < model->ports; p++)
+        GK_OF(data, input)[p] = carried(GK_OF(data, input)[p], (gk_motion){0, 0, 0}, c.H, c.H);
     gk_outputs_end(model, setup, work, data, c.H, h, &tally);
     if (gk_outputs_balance(model, setup, work, data, h, 0)) return GK_OK;
     data->phase = PHASE_FAILED; /* no state to go on from: only a restored one */
@@ -274,24 +277,16 @@ static int good_meshing(const gk_meshing *m)
     return good;
 }
 
-static int good_ports(const gk_data *d)
+static int good_head(const gk_model *model, const gk_data *d)
 {
-    int good = 1;
-    for (int p = 0; good && p < MAX_PORTS; p++) {
-        good = (d->locked[p] == 0 || d->locked[p] == 1) && all_small(&d->input[p].phi, 3);
-        for (int j = 0; j < JOINTS; j++) good &= all_small(&d->joint[p][j].force, 3);
-    }
-    return good && all_small(d->hold, MAX_PORTS) && all_small(d->v_bore, MAX_PORTS) && all_small(d->angle, MAX_PORTS);
-}
-
-static int good_head(const gk_data *d)
-{
-    int good = d->magic == GK_DATA_MAGIC && d->phase >= PHASE_NEW && d->phase <= PHASE_FAILED && d->count >= 0 &&
-               all_small(d->stage, STAGE_VARS) && all_small(d->shaft[0], MAX_PORTS * SHAFT_VARS) &&
-               all_small(d->rotor[0], MAX_ROTORS * ROTOR_VARS) && all_small(d->mesh[0], MAX_ENGAGEMENTS * MESH_VARS) &&
-               all_small(d->support[0], MAX_SUPPORTS * SUPPORT_VARS) && all_small(d->x, 4 * MAX_SPINS) &&
-               gk_finite(d->time_base) && gk_finite(d->step_H) && gk_finite(d->table_h) && good_ports(d);
-    for (int e = 0; good && e < MAX_ENGAGEMENTS; e++) good = good_meshing(&d->meshing[e]);
+    uint32_t at[ARRAYS];
+    gk_data_plan(model, at);
+    int good = d->magic == GK_DATA_MAGIC && !memcmp(d->at, at, sizeof at) && d->phase >= PHASE_NEW &&
+               d->phase <= PHASE_FAILED && d->count >= 0 && all_small(d->stage, STAGE_VARS) &&
+               gk_finite(d->time_base) && gk_finite(d->step_H) && gk_finite(d->table_h) &&
+               all_small(d->tail, at[OF_locked]);
+    for (int p = 0; good && p < model->ports; p++) good = GK_OF(d, locked)[p] == 0 || GK_OF(d, locked)[p] == 1;
+    for (int e = 0; good && e < model->engagements; e++) good = good_meshing(&GK_OF(d, meshing)[e]);
     return good;
 }
 
@@ -304,5 +299,5 @@ gk_outcome gk_state_check(const gk_model *model, const gk_setup *setup, const vo
         size < sizeof(gk_data) || (uintptr_t)bytes % 8)
         return GK_BAD_VALUE;
     const gk_data *data = bytes;
-    return good_head(data) && data->amplitudes == (int64_t)setup->amplitudes ? GK_OK : GK_BAD_VALUE;
+    return good_head(model, data) && data->amplitudes == (int64_t)setup->amplitudes ? GK_OK : GK_BAD_VALUE;
 }

@@ -9,7 +9,7 @@ static const double LEAK = 0.01;  /* … beside this of what passed the ports: w
 static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
 {
     const gk_system *s = &engaged->system;
-    double side[2] = {0, 0}, *v = data->mesh[e];
+    double side[2] = {0, 0}, *v = GK_OF(data, mesh)[e];
     int pairs = 0, touched[2] = {0, 0};
     for (int i = 0; i < MAX_SLICES; i++) v[V_SLICE_1 + i] = 0.0;
     for (int p = 0; p < engaged->places; p++) {
@@ -29,16 +29,16 @@ static void mesh_outputs(const gk_engaged *engaged, gk_data *data, int e)
     v[V_PAIRS] = pairs;
     v[V_CONTACT] = side[0] > 0.0 ? (side[1] > 0.0 ? 2 : 1) : side[1] > 0.0 ? -1 : 0;
     if (gk_film_on(s)) v[V_CONTACT] = touched[0] ? (touched[1] ? 2 : 1) : touched[1] ? -1 : 0;
-    v[V_FILM_LOSS] = data->meshing[e].squeezed;
-    v[V_IMPACTS] = (double)data->meshing[e].impacts;
-    v[V_OPEN_TIME] = data->meshing[e].open_time;
+    v[V_FILM_LOSS] = GK_OF(data, meshing)[e].squeezed;
+    v[V_IMPACTS] = (double)GK_OF(data, meshing)[e].impacts;
+    v[V_OPEN_TIME] = GK_OF(data, meshing)[e].open_time;
 }
 
 /* friction on the flanks of gear A, and over the normal force of all contacts */
 static void friction_outputs(const gk_engaged *engaged, gk_data *data, int e)
 {
     const gk_system *s = &engaged->system;
-    double force = 0.0, normal = 0.0, most = 0.0, *v = data->mesh[e];
+    double force = 0.0, normal = 0.0, most = 0.0, *v = GK_OF(data, mesh)[e];
     for (int i = 0; i < s->contacts; i++) {
         force += engaged->glide->end[i];
         normal += gk_reported(s, i);
@@ -46,7 +46,7 @@ static void friction_outputs(const gk_engaged *engaged, gk_data *data, int e)
     }
     v[V_FRICTION_FORCE] = force;
     v[V_FRICTION_RATIO] = normal > 0.0 ? most / normal : 0.0;
-    v[V_FRICTION_LOSS] = data->meshing[e].rubbed;
+    v[V_FRICTION_LOSS] = GK_OF(data, meshing)[e].rubbed;
 }
 
 static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data,
@@ -56,11 +56,11 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
         const int port = s->port_of[i], rotor = model->port[port].rotor;
         const double force = gk_reported(s, i),
                      deflection = s->force[i] * setup->joint[port][s->joint_of[i]].compliance;
-        double *v = data->shaft[port], *angle = &data->rotor[rotor][V_GEAR_PHI];
+        double *v = GK_OF(data, shaft)[port], *angle = &GK_OF(data, rotor)[rotor][V_GEAR_PHI];
         switch (s->joint_of[i]) {
         case JOINT_PORT:
             if (s->kind[i] == ROW_TORQUE) {
-                *angle = data->angle[port];
+                *angle = GK_OF(data, angle)[port];
             } else {
                 v[V_TAU] = -force;
                 if (!model->port[port].chain) *angle = work->outer[port] - deflection;
@@ -68,7 +68,7 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
             break;
         case JOINT_SHAFT:
             v[V_SHAFT_TAU] = force;
-            *angle = data->x[gk_disc_of(model, port)] - deflection;
+            *angle = GK_OF(data, x)[gk_disc_of(model, port)] - deflection;
             break;
         default: v[V_CLUTCH_TAU] = -0.5 * s->z[i];
         }
@@ -78,8 +78,8 @@ static void joint_outputs(const gk_model *model, const gk_setup *setup, const gk
 static void support_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, const double *force)
 {
     for (int s = 0; s < model->supports; s++) {
-        data->support[s][V_FORCE] = force[s];
-        data->support[s][V_MOVED] = force[s] * model->ground[setup->base.set].support_compliance[s];
+        GK_OF(data, support)[s][V_FORCE] = force[s];
+        GK_OF(data, support)[s][V_MOVED] = force[s] * model->ground[setup->base.set].support_compliance[s];
     }
 }
 
@@ -89,26 +89,26 @@ static double bore_speed(const gk_model *model, const gk_setup *setup, const gk_
 {
     const int n = setup->base.n;
     const double *v = gk_ground_seen(data) + n;
-    return data->v[model->port[p].rotor] + (n ? gk_dot_quads(v, setup->base.port_rows + p * n, n / 4) : 0.0);
+    return GK_OF(data, v)[model->port[p].rotor] + (n ? gk_dot_quads(v, setup->base.port_rows + p * n, n / 4) : 0.0);
 }
 
 void gk_outputs_bores(const gk_model *model, const gk_setup *setup, gk_data *data)
 {
     GK_ASSERT(model->ports <= MAX_PORTS);
-    for (int p = 0; p < model->ports; p++) data->v_bore[p] = bore_speed(model, setup, data, p);
+    for (int p = 0; p < model->ports; p++) GK_OF(data, v_bore)[p] = bore_speed(model, setup, data, p);
 }
 
 static void port_outputs(const gk_model *model, const gk_setup *setup, gk_data *data, int p, double h)
 {
-    double *v = data->shaft[p];
+    double *v = GK_OF(data, shaft)[p];
     if (setup->given_torque[p]) {
-        v[V_PHI] = data->angle[p];
+        v[V_PHI] = GK_OF(data, angle)[p];
         v[V_W] = bore_speed(model, setup, data, p);
-        v[V_A] = h > 0.0 ? (v[V_W] - data->v_bore[p]) / h : 0.0;
+        v[V_A] = h > 0.0 ? (v[V_W] - GK_OF(data, v_bore)[p]) / h : 0.0;
     }
     if (!model->port[p].chain) return;
-    const double inertia = data->v[gk_inertia_of(model, p)], disc = data->v[gk_disc_of(model, p)];
-    v[V_CLUTCH_LOCKED] = data->locked[p];
+    const double inertia = GK_OF(data, v)[gk_inertia_of(model, p)], disc = GK_OF(data, v)[gk_disc_of(model, p)];
+    v[V_CLUTCH_LOCKED] = GK_OF(data, locked)[p];
     v[V_INERTIA_W] = inertia;
     v[V_DISC_W] = disc;
     v[V_CLUTCH_SLIP] = inertia - disc;
@@ -121,9 +121,9 @@ static double transmission_error(const gk_model *model, const gk_data *data, int
     const gk_gear *A = &model->gear[engagement->gear[0]], *B = &model->gear[engagement->gear[1]];
     const double sense = engagement->kind == MESH_INTERNAL ? -1.0 : 1.0;
     const int f = gk_frame_of(model, engagement);
-    const double frame = f < 0 ? 0.0 : data->x[f];
-    return A->r_b * (data->rotor[A->rotor][V_GEAR_PHI] - frame) +
-           sense * B->r_b * (data->rotor[B->rotor][V_GEAR_PHI] - frame);
+    const double frame = f < 0 ? 0.0 : GK_OF(data, x)[f];
+    return A->r_b * (GK_OF(data, rotor)[A->rotor][V_GEAR_PHI] - frame) +
+           sense * B->r_b * (GK_OF(data, rotor)[B->rotor][V_GEAR_PHI] - frame);
 }
 
 static void outputs(const gk_model *model, const gk_setup *setup, const gk_work *work, gk_data *data, double h)
@@ -131,7 +131,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     double *v = data->stage, force[MAX_SUPPORTS];
     int dynamic = setup->base.count;
     for (int r = 0; r < model->rotors; r++)
-        data->rotor[r][V_GEAR_W] = data->v[r], data->rotor[r][V_GEAR_PHI] = data->x[r];
+        GK_OF(data, rotor)[r][V_GEAR_W] = GK_OF(data, v)[r], GK_OF(data, rotor)[r][V_GEAR_PHI] = GK_OF(data, x)[r];
     for (int e = 0; e < model->engagements; e++) {
         mesh_outputs(&work->engaged[e], data, e);
         if (GK_ON(setup, friction)) friction_outputs(&work->engaged[e], data, e);
@@ -141,7 +141,7 @@ static void outputs(const gk_model *model, const gk_setup *setup, const gk_work 
     gk_supports_forces(model, setup, work, data, force);
     gk_supports_turn(model, data, 1.0, force);
     support_outputs(model, setup, data, force);
-    for (int e = 0; e < model->engagements; e++) data->mesh[e][V_TE] = transmission_error(model, data, e);
+    for (int e = 0; e < model->engagements; e++) GK_OF(data, mesh)[e][V_TE] = transmission_error(model, data, e);
     gk_amplitudes(model, setup, work, data);
     for (int g = 0; g < model->gears; g++) dynamic += setup->modal[g].count;
     v[V_WORK] = data->energy.work;
@@ -191,20 +191,20 @@ static double carried_angle(const gk_model *model, const gk_data *data, int e)
 {
     const gk_engagement *engagement = &model->engagement[e];
     const int f = gk_frame_of(model, engagement);
-    return data->x[model->gear[engagement->gear[0]].rotor] - (f < 0 ? 0.0 : data->x[f]);
+    return GK_OF(data, x)[model->gear[engagement->gear[0]].rotor] - (f < 0 ? 0.0 : GK_OF(data, x)[f]);
 }
 
 static void begin_pitch(const gk_model *model, gk_data *data, int e)
 {
-    data->meshing[e].pitch_angle = carried_angle(model, data, e);
-    data->meshing[e].pitch_time = data->meshing[e].pitch_impulse = 0.0;
+    GK_OF(data, meshing)[e].pitch_angle = carried_angle(model, data, e);
+    GK_OF(data, meshing)[e].pitch_time = GK_OF(data, meshing)[e].pitch_impulse = 0.0;
 }
 
 /* Over every tooth pitch that passes: is the mean force beyond that of torque_max, the speed beyond speed_max? */
 static void watch_limits(const gk_model *model, gk_data *data, int e, double H, double impulse)
 {
     const gk_engagement *engagement = &model->engagement[e];
-    gk_meshing *meshing = &data->meshing[e];
+    gk_meshing *meshing = &GK_OF(data, meshing)[e];
     const double turned = fabs(carried_angle(model, data, e) - meshing->pitch_angle),
                  pitches = turned * model->gear[engagement->gear[0]].z / (2.0 * GK_PI);
     meshing->pitch_time += H;
@@ -221,19 +221,19 @@ void gk_outputs_start(const gk_model *model, const gk_setup *setup, const gk_wor
     GK_ASSERT(data->phase == PHASE_RUNNING);
     outputs(model, setup, work, data, 0.0);
     for (int p = 0; p < model->ports; p++) {
-        double *v = data->shaft[p];
+        double *v = GK_OF(data, shaft)[p];
         v[V_TAU_MEAN] = v[V_TAU_NEXT] = v[V_TAU];
     }
-    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = data->support[s][V_FORCE];
+    for (int s = 0; s < model->supports; s++) GK_OF(data, support)[s][V_FORCE_MEAN] = GK_OF(data, support)[s][V_FORCE];
     for (int e = 0; e < model->engagements; e++) {
-        double *v = data->mesh[e];
+        double *v = GK_OF(data, mesh)[e];
         v[V_MESH_FORCE_MEAN] = v[V_MESH_FORCE];
         v[V_FORCE_MAX] = gk_max(v[V_FORCE_DRIVE], v[V_FORCE_COAST]);
-        data->meshing[e].apart = v[V_CONTACT] == 0.0;
+        GK_OF(data, meshing)[e].apart = v[V_CONTACT] == 0.0;
         begin_pitch(model, data, e);
     }
     data->stage[V_ENERGY] = stored(model, work); /* elastic: at rest C′ holds all of it */
-    for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, data->v[d]);
+    for (int d = 0; d < setup->spins; d++) data->stage[V_ENERGY] += gk_kinetic(setup, d, GK_OF(data, v)[d]);
 }
 
 void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work, gk_data *data, double H, double h,
@@ -241,12 +241,12 @@ void gk_outputs_end(const gk_model *model, const gk_setup *setup, gk_work *work,
 {
     GK_ASSERT(H > 0.0 && h > 0.0 && tally);
     gk_tally_means(model, setup, data, H, tally);
-    for (int e = 0; e < model->engagements && GK_ON(setup, friction); e++)
-        data->mesh[e][V_FRICTION_POWER] = (data->meshing[e].rubbed - data->mesh[e][V_FRICTION_LOSS]) / H;
+    for (int e = 0; e < model->engagements && GK_ON(setup, friction); e++) GK_OF(data, mesh)
+    [e][V_FRICTION_POWER] = (GK_OF(data, meshing)[e].rubbed - GK_OF(data, mesh)[e][V_FRICTION_LOSS]) / H;
     for (int e = 0; e < model->engagements; e++) watch_limits(model, data, e, H, tally->mesh[e]);
     outputs(model, setup, work, data, h);
     for (int p = 0; p < model->ports; p++) {
-        double *v = data->shaft[p];
+        double *v = GK_OF(data, shaft)[p];
         v[V_TAU_NEXT] = 2.0 * v[V_TAU] - v[V_TAU_MEAN];
     }
 }

@@ -9,9 +9,9 @@ struct gk_tally { /* integrals over a communication step */
     double mesh[MAX_ENGAGEMENTS], highest[MAX_ENGAGEMENTS], port[MAX_PORTS];
     double support[MAX_SUPPORTS], last[MAX_SUPPORTS]; /* forces that contacts and joints put on the supports directly;
                                                          last: at the end of the step before */
-    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS]; /* what moves springs and dashpots of
-                                                                                      the supports */
-    double last_moved[MAX_GROUND + 4 * MAX_ROTORS], last_speed[MAX_GROUND + 4 * MAX_ROTORS];
+    double *moved, *speed, *last_moved, *last_speed;  /* (ground oscillators) what moves springs and dashpots of the
+                                                        supports */
+    double *now[2];                                   /* scratch of the same size */
 };
 
 /* Force of a row at the end of the step: λ, and what its damper does there. Second order in h; a contact never

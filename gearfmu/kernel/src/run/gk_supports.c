@@ -83,7 +83,7 @@ void gk_supports_add_direct(const gk_model *model, const gk_setup *setup, const 
     }
     for (int r = 0; r < model->rotors && model->carried && GK_ON(setup, centrifugal); r++)
         for (int i = 0; i < model->supports; i++)
-            out[i] += data->v[r] * data->v[r] * setup->base.outward_support[r * model->supports + i];
+            out[i] += GK_OF(data, v)[r] * GK_OF(data, v)[r] * setup->base.outward_support[r * model->supports + i];
 }
 
 /* forces on the supports at the end of the step */
@@ -91,7 +91,7 @@ void gk_supports_forces(const gk_model *model, const gk_setup *setup, const gk_w
                         double *out)
 {
     GK_ASSERT(out);
-    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS];
+    double *const moved = work->tally + 4 * setup->base.n, *const speed = moved + setup->base.n;
     gk_supports_motion(setup, work, data, moved, speed);
     gk_supports_by_motion(model, setup, moved, speed, out);
     gk_supports_add_direct(model, setup, work, data, out);
@@ -106,7 +106,7 @@ void gk_supports_turn(const gk_model *model, const gk_data *data, double sense, 
         const int turn = model->support_turn[s];
         double sine, cosine;
         if (turn < 0 || turn % 2) continue;
-        gk_sincos(sense * data->x[turn / 2], &sine, &cosine);
+        gk_sincos(sense * GK_OF(data, x)[turn / 2], &sine, &cosine);
         const double x = force[s], y = force[s + 1];
         force[s] = cosine * x - sine * y, force[s + 1] = sine * x + cosine * y;
     }

@@ -4,15 +4,17 @@
 void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, gk_tally *tally)
 {
     GK_ASSERT(tally && setup->base.n % 4 == 0);
-    const size_t size = (size_t)setup->base.n * sizeof(double);
-    memset(tally, 0, offsetof(gk_tally, moved));
-    memset(tally->moved, 0, size);
-    memset(tally->speed, 0, size);
+    const size_t n = (size_t)setup->base.n;
+    double **array[] = {&tally->moved,      &tally->speed,  &tally->last_moved,
+                        &tally->last_speed, &tally->now[0], &tally->now[1]};
+    memset(tally, 0, sizeof *tally);
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = work->tally + i * n;
+    memset(tally->moved, 0, 2 * n * sizeof *tally->moved);
     if (data->state_h > 0.0) gk_flow_for(model, setup, work, data->state_h, data->state_gamma); /* a restored state */
     gk_supports_motion(setup, work, data, tally->last_moved, tally->last_speed);
     gk_supports_by_motion(model, setup, tally->last_moved, tally->last_speed, tally->last);
     double now[MAX_SUPPORTS];
-    for (int s = 0; s < model->supports; s++) now[s] = data->support[s][V_FORCE];
+    for (int s = 0; s < model->supports; s++) now[s] = GK_OF(data, support)[s][V_FORCE];
     gk_supports_turn(model, data, -1.0, now);
     for (int s = 0; s < model->supports; s++) tally->last[s] = now[s] - tally->last[s];
 }
@@ -20,7 +22,7 @@ void gk_tally_begin(const gk_model *model, const gk_setup *setup, gk_work *work,
 static void count_mesh(const gk_engaged *engaged, gk_data *data, int e, double h, gk_tally *tally)
 {
     const gk_system *s = &engaged->system;
-    gk_meshing *meshing = &data->meshing[e];
+    gk_meshing *meshing = &GK_OF(data, meshing)[e];
     double side[2] = {0, 0};
     int touches = 0;
     for (int i = 0; i < s->contacts; i++) {
@@ -56,7 +58,7 @@ void gk_tally_count(const gk_model *model, const gk_setup *setup, const gk_work 
                     gk_tally *tally)
 {
     GK_ASSERT(tally && h > 0.0);
-    double moved[MAX_GROUND + 4 * MAX_ROTORS], speed[MAX_GROUND + 4 * MAX_ROTORS], direct[MAX_SUPPORTS];
+    double *const moved = tally->now[0], *const speed = tally->now[1], direct[MAX_SUPPORTS];
     for (int e = 0; e < model->engagements; e++) count_mesh(&work->engaged[e], data, e, h, tally);
     gk_supports_motion(setup, work, data, moved, speed);
     integrate(tally->moved, tally->last_moved, moved, setup->base.n, h);
@@ -74,14 +76,14 @@ void gk_tally_means(const gk_model *model, const gk_setup *setup, gk_data *data,
 {
     GK_ASSERT(tally && H > 0.0);
     for (int p = 0; p < model->ports; p++)
-        if (!setup->given_torque[p]) data->shaft[p][V_TAU_MEAN] = tally->port[p] / H;
+        if (!setup->given_torque[p]) GK_OF(data, shaft)[p][V_TAU_MEAN] = tally->port[p] / H;
     double force[MAX_SUPPORTS];
     gk_supports_by_motion(model, setup, tally->moved, tally->speed, force);
     for (int s = 0; s < model->supports; s++) force[s] = (force[s] + tally->support[s]) / H;
     gk_supports_turn(model, data, 1.0, force);
-    for (int s = 0; s < model->supports; s++) data->support[s][V_FORCE_MEAN] = force[s];
+    for (int s = 0; s < model->supports; s++) GK_OF(data, support)[s][V_FORCE_MEAN] = force[s];
     for (int e = 0; e < model->engagements; e++) {
-        data->mesh[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
-        data->mesh[e][V_FORCE_MAX] = tally->highest[e];
+        GK_OF(data, mesh)[e][V_MESH_FORCE_MEAN] = tally->mesh[e] / H;
+        GK_OF(data, mesh)[e][V_FORCE_MAX] = tally->highest[e];
     }
 }

@@ -9,7 +9,7 @@ static int has_nodes(const gk_model *model, const gk_data *data)
 {
     int all = model->engagements > 0;
     for (int e = 0; e < model->engagements; e++) {
-        all &= data->mesh[e][V_PENALTY] > 0.0;
+        all &= GK_OF(data, mesh)[e][V_PENALTY] > 0.0;
         for (int w = 0; w < 2; w++) all &= model->gear[model->engagement[e].gear[w]].nodes[0] > 0;
     }
     return all;
@@ -95,7 +95,7 @@ gk_outcome gk_choose(const gk_model *model, const gk_data *data, gk_setup *setup
     setup->slices = (int)data->stage[V_SLICES];
     setup->spatial = model->spatial;
     setup->strips = gk_strips_count(model, setup->slices);
-    for (int e = 0; e < model->engagements; e++) damping = gk_max(damping, data->mesh[e][V_DAMPING]);
+    for (int e = 0; e < model->engagements; e++) damping = gk_max(damping, GK_OF(data, mesh)[e][V_DAMPING]);
     if (damping == 0.0) setup->on.contact_damping = 0;
     setup->base.set = model->sets > 1 && !setup->on.bearings;
     if (setup->level == LEVEL_EXPLICIT && setup->integrator == DG4) setup->integrator = CENTRAL;

@@ -32,13 +32,6 @@ static void find_islands(const gk_model *model, gk_setup *setup)
     }
 }
 
-static void count_engagements(const gk_model *model, gk_setup *setup)
-{
-    for (int g = 0; g < model->gears; g++) setup->engagements_of[g] = 0;
-    for (int e = 0; e < model->engagements; e++)
-        for (int w = 0; w < 2; w++) setup->engagements_of[model->engagement[e].gear[w]]++;
-}
-
 /* ---- the plan ---------------------------------------------------------------------------------------------------- */
 /* what sizes depend on once level and effects are chosen: islands, engagements of a gear, candidates of a side */
 void gk_layout_plan(const gk_model *model, gk_setup *setup)
@@ -46,11 +39,13 @@ void gk_layout_plan(const gk_model *model, gk_setup *setup)
     GK_ASSERT(model->engagements >= 0 && model->engagements <= MAX_ENGAGEMENTS);
     GK_ASSERT(setup->strips >= 1 && setup->strips <= MAX_SLICES);
     find_islands(model, setup);
-    count_engagements(model, setup);
+    for (int g = 0; g < model->gears; g++) setup->engagements_of[g] = 0;
     for (int e = 0; e < model->engagements; e++) {
         setup->mesh[e].index = e;
-        for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
+        for (int w = 0; w < 2; w++) setup->engagements_of[model->engagement[e].gear[w]]++;
     }
+    for (int e = 0; e < model->engagements; e++)
+        for (int w = 0; w < 2; w++) gk_side_plan(model, setup, e, &setup->mesh[e].side[w], w);
 }
 
 /* ---- arrays ------------------------------------------------------------------------------------------------------ */
@@ -201,21 +196,26 @@ static size_t lay_out_setup(const gk_model *model, gk_setup *setup, char *base, 
         setup->point_rows[g].ground = reals(&b, 3 * cells * (size_t)setup->base.n);
     }
     setup->amplitudes = 3 * (size_t)setup->base.n + (at * sizeof(gk_real) + sizeof(double) - 1) / sizeof(double);
-    setup->state_size = sizeof(gk_data) + (setup->amplitudes + (size_t)model->amplitudes) * sizeof(double);
+    uint32_t arrays[ARRAYS];
+    gk_data_plan(model, arrays);
+    setup->state_size = sizeof(gk_data) +
+                        (arrays[OF_oscillator] + setup->amplitudes + (size_t)model->amplitudes) * sizeof(double);
     return b.used;
 }
+
+#define FLOW_ARRAYS(f)                                                                                                 \
+    {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,                                  \
+     &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2}
 
 static void lay_out_flow(bump *b, const gk_model *model, const gk_setup *setup, gk_coefficients *k)
 {
     for (int g = 0; g < model->gears; g++) {
         gk_flow *f = &k->flow[g];
-        gk_real **array[] = {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,
-                             &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+        gk_real **array[] = FLOW_ARRAYS(f);
         for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = reals(b, (size_t)setup->modal[g].n);
     }
     gk_ground_flow *f = &k->ground;
-    double **array[] = {&f->d11, &f->a12,      &f->a21,    &f->d22,    &f->b0q,   &f->b0v,       &f->bq,
-                        &f->bv,  &f->mobility, &f->read_q, &f->read_v, &f->kappa, &f->inverse_s2};
+    double **array[] = FLOW_ARRAYS(f);
     for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = doubles(b, (size_t)setup->base.n);
     f->pulls = doubles(b, (size_t)model->dampers * (size_t)setup->base.n);
     const size_t turning = 2 * (size_t)(model->carried + model->whirls) * (size_t)setup->base.n;
@@ -229,18 +229,14 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     const size_t contacts = MAX_PAIRS * (size_t)setup->strips, rows = contacts + MAX_JOINTS + 4;
     for (int w = 0; w < 2; w++) {
         const gk_side *side = &setup->mesh[e].side[w];
-        const size_t points = (size_t)(side->candidates * setup->strips);
-        engaged->basis[w] = reals(b, contacts * (size_t)setup->modal[side->gear].n);
-        const int shared = setup->engagements_of[side->gear] > 1 && GK_ON(setup, friction);
-        engaged->given_modes[w] = reals(b, shared ? (size_t)setup->modal[side->gear].n : 0);
+        const size_t points = (size_t)(side->candidates * setup->strips), n = (size_t)setup->modal[side->gear].n;
+        const int shared = setup->engagements_of[side->gear] > 1;
+        engaged->basis[w] = reals(b, contacts * n);
+        engaged->given_modes[w] = reals(b, shared && GK_ON(setup, friction) ? n : 0);
         engaged->table[w].moves = reals(b, ((size_t)side->nodes + 1) * points * 4 * (size_t)side->columns);
         engaged->table[w].pulls = doubles(b, ((size_t)side->nodes + 1) * points * 2 * (size_t)gk_common(setup));
-    }
-    for (int w = 0; w < 2; w++) {
-        const int far = gk_far_known(model, setup, setup->mesh[e].side[w].gear);
-        engaged->far[w] = doubles(b, far ? contacts * FAR : 0);
-        const int g = setup->mesh[e].side[w].gear;
-        engaged->turned[w] = reals(b, setup->engagements_of[g] > 1 ? (size_t)setup->modal[g].n * contacts : 0);
+        engaged->far[w] = doubles(b, gk_far_known(model, setup, side->gear) ? contacts * FAR : 0);
+        engaged->turned[w] = reals(b, shared ? n * contacts : 0);
     }
     engaged->ground = doubles(b, rows * (size_t)setup->base.n);
     engaged->index = e;
@@ -253,6 +249,7 @@ static void lay_out_engaged(bump *b, const gk_model *model, const gk_setup *setu
     for (int w = 0; w < 2; w++) of->basis[w] = reals(b, contacts * (size_t)setup->modal[setup->mesh[e].side[w].gear].n);
     of->ground = doubles(b, rows * (size_t)setup->base.n);
     of->matrix = doubles(b, 6 * rows * rows);
+    of->small = doubles(b, 2 * rows * rows);
 }
 
 /* Pairs of engagements with a gear in common; list NULL: counts them */
@@ -287,7 +284,7 @@ static void lay_out_shared(bump *b, const gk_model *model, const gk_setup *setup
 static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work *work, char *base)
 {
     bump b = {base, 0};
-    size_t widest = 0;
+    size_t widest = 0, most = 0;
     const size_t ground = (size_t)setup->base.n;
     for (int g = 0; g < model->gears; g++) {
         const size_t n = (size_t)setup->modal[g].n;
@@ -297,6 +294,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         for (int i = 0; i < 7; i++) work->stage[g][i] = reals(&b, 2 * n);
         work->trial[g] = reals(&b, 2 * n);
         widest = n > widest ? n : widest;
+        most = (size_t)model->gear[g].modes > most ? (size_t)model->gear[g].modes : most;
     }
     work->turned = reals(&b, widest), work->turned_next = reals(&b, widest), work->zero = reals(&b, widest);
     work->scaled = reals(&b, 2 * widest);
@@ -314,6 +312,9 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         lay_out_engaged(&b, model, setup, work->engaged ? &work->engaged[e] : &counted, e);
     }
     lay_out_shared(&b, model, setup, work);
+    work->tally = doubles(&b, 6 * ground);
+    work->pushed = doubles(&b, (size_t)model->ground[setup->base.set].n + most);
+    work->mode_row = doubles(&b, most);
     work->rest_ground = doubles(&b, ground);
     size_t unknowns = (size_t)(model->rotors + 2 * model->chains) + ground;
     for (int g = 0; g < model->gears; g++) {
@@ -322,6 +323,7 @@ static size_t lay_out_work(const gk_model *model, const gk_setup *setup, gk_work
         unknowns += shared ? MAX_SOFT : 0;
     }
     work->rest = doubles(&b, (2 + unknowns) * unknowns);
+    work->soft_rows = doubles(&b, work->shareds ? 2 * MAX_ROWS * MAX_SOFT : 0);
     work->columns = doubles(&b, gk_side_scratch(model) +
                                     (size_t)(model->engagements * LIMIT_POSITIONS) * MAX_STRIDE * MAX_STRIDE);
     size_t blocks;

@@ -38,7 +38,7 @@ void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *me
     GK_ASSERT(gk_is_engagement(model, mesh->index));
     const gk_engagement *e = &model->engagement[mesh->index];
     const gk_gear *a = &model->gear[e->gear[0]], *b = &model->gear[e->gear[1]];
-    const double *v = data->mesh[mesh->index];
+    const double *v = GK_OF(data, mesh)[mesh->index];
     gk_friction *f = &mesh->friction;
     *f = (gk_friction){.law = (gk_friction_law)(int)v[V_FRICTION_LAW],
                        .coefficient = v[V_FRICTION_COEFFICIENT],

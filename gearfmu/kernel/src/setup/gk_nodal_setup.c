@@ -208,7 +208,7 @@ void gk_nodal_fill(const gk_model *model, const gk_setup *setup, const gk_data *
 {
     GK_ASSERT(gk_is_engagement(model, mesh->index) && setup->nodal);
     const gk_engagement *e = &model->engagement[mesh->index];
-    const double penalty = data->mesh[mesh->index][V_PENALTY];
+    const double penalty = GK_OF(data, mesh)[mesh->index][V_PENALTY];
     for (int w = 0; w < 2; w++) {
         const gk_gear *gear = &model->gear[e->gear[w]];
         fill_along(gear, &mesh->nodes[w]);

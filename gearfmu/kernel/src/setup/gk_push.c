@@ -32,14 +32,16 @@ static void add_turned(const gk_gear *gear, int tooth, int first, const double *
 }
 
 /* Adds the modal forces of a gear group, modes from `first` on, by outward forces on the strips of a tooth at these
- * lengths of roll. Strips in one cell of the grid of rolls, as those of a spur gear, are one row. */
-void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *sum)
+ * lengths of roll; row: scratch of all modes. Strips in one cell of the grid of rolls, as those of a spur gear, are one
+ * row. */
+void gk_node_push(const gk_model *model, const gk_setup *setup, const gk_strip_load *load, int first, double *row,
+                  double *sum)
 {
     GK_ASSERT(gk_is_gear(model, load->gear) && load->strips <= MAX_SLICES);
     GK_ASSERT(first >= 0 && first <= model->gear[load->gear].modes);
     const gk_gear *gear = &model->gear[load->gear];
     const gk_node n = {.model = model, .gear = gear, .flank = &setup->flank[load->gear]};
-    double row[MAX_MODES], weight[4][MAX_FUNCTIONS] = {{0}};
+    double weight[4][MAX_FUNCTIONS] = {{0}};
     gk_spot p = {.flank = load->flank, .grid.index = -1}, next = p;
     memset(row + first, 0, (size_t)(gear->modes - first) * sizeof *row);
     for (int strip = 0; strip < load->strips; strip++) {

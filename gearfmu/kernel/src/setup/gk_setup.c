@@ -275,9 +275,9 @@ static void fill_mesh(const gk_model *model, gk_setup *setup, const gk_data *dat
     const double distance = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
     fill_spins(model, mesh);
     fill_parts(model, &setup->base, mesh);
-    mesh->damping = data->mesh[e][V_DAMPING];
+    mesh->damping = GK_OF(data, mesh)[e][V_DAMPING];
     if (engagement->kind != MESH_FLAT)
-        mesh->allowance = (data->mesh[e][V_BACKLASH] - engagement->nominal_backlash) *
+        mesh->allowance = (GK_OF(data, mesh)[e][V_BACKLASH] - engagement->nominal_backlash) *
                           gk_base_reach(model, engagement) / distance;
     gk_strips_fill(model, setup, mesh);
     gk_law_bounds(model, mesh);

@@ -258,17 +258,17 @@ static inline int gk_is_mesh(const gk_setup *setup, int e)
 static inline int gk_span_is_whole(gk_span span) { return span.from >= 0 && span.from % 4 == 0 && span.width % 4 == 0; }
 
 /* states in gk_data */
-static inline double *gk_ground_of(gk_data *data) { return data->oscillator; }
+static inline double *gk_ground_of(gk_data *data) { return GK_OF(data, oscillator); }
 static inline gk_real *gk_modal_of(const gk_setup *setup, gk_data *data, int g)
 {
     GK_ASSERT(g >= 0 && g < MAX_GEARS);
-    return (gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
+    return (gk_real *)(GK_OF(data, oscillator) + 3 * setup->base.n) + setup->modal[g].at;
 }
-static inline const double *gk_ground_seen(const gk_data *data) { return data->oscillator; }
+static inline const double *gk_ground_seen(const gk_data *data) { return GK_OF(data, oscillator); }
 static inline const gk_real *gk_modal_seen(const gk_setup *setup, const gk_data *data, int g)
 {
     GK_ASSERT(g >= 0 && g < MAX_GEARS);
-    return (const gk_real *)(data->oscillator + 3 * setup->base.n) + setup->modal[g].at;
+    return (const gk_real *)(GK_OF(data, oscillator) + 3 * setup->base.n) + setup->modal[g].at;
 }
 /* kinetic energy of a spin */
 static inline double gk_kinetic(const gk_setup *setup, int d, double speed)
@@ -329,6 +329,9 @@ static inline int gk_padded(int n)
     return (n + 3) / 4 * 4;
 }
 static inline int gk_directions(const gk_setup *setup) { return setup->spatial ? SPACE : PLANE; }
+/* motions of a gear and the angle of its bore, padded to quads; those of them that a model knows */
+enum { COMMON = 8 };
+static inline int gk_common(const gk_setup *setup) { return setup->spatial ? COMMON : COMMON / 2; }
 /* Σ of a row over its span, and its multiple added there */
 static inline double gk_dot_span(gk_span span, const double *row, const double *x)
 {
@@ -340,24 +343,7 @@ static inline void gk_axpy_span(gk_span span, double f, const double *row, doubl
     GK_ASSERT(gk_span_is_whole(span));
     gk_axpy(f, row, y, span.from / 4, (span.from + span.width) / 4);
 }
-/* a row over the parts of an engagement, and a whole vector x or y of the ground group */
-static inline double gk_local_dot(const gk_mesh *mesh, const double *row, const double *x)
-{
-    GK_ASSERT(gk_span_is_whole(mesh->part[0]) && gk_span_is_whole(mesh->part[1]));
-    const gk_quad *a = (const gk_quad *)row;
-    gk_quad sum = {0};
-    for (int w = 0; w < 2; w++) {
-        const gk_quad *b = (const gk_quad *)(x + mesh->part[w].from);
-        for (int q = 0; q < mesh->part[w].width / 4; q++) sum += *a++ * b[q];
-    }
-    return (sum[0] + sum[2]) + (sum[1] + sum[3]);
-}
-static inline void gk_local_axpy(const gk_mesh *mesh, double f, const double *row, double *y)
-{
-    GK_ASSERT(gk_span_is_whole(mesh->part[0]) && gk_span_is_whole(mesh->part[1]));
-    gk_axpy(f, row, y + mesh->part[0].from, 0, mesh->part[0].width / 4);
-    gk_axpy(f, row + mesh->part[0].width, y + mesh->part[1].from, 0, mesh->part[1].width / 4);
-}
+/* the parts of a vector of the ground group that an engagement reads */
 static inline void gk_local_gather(const gk_mesh *mesh, const double *x, double *row)
 {
     GK_ASSERT(mesh->part[0].width + mesh->part[1].width == mesh->local);
