@@ -199,7 +199,7 @@ def main() -> int:
     parser.add_argument("verb", choices=("check", "make", "forget"))
     parser.add_argument("targets", nargs="*", metavar="TARGET")
     parser.add_argument("--again", action="store_true", help="current targets too")
-    chosen, ledger = parser.parse_args(), Ledger()
+    chosen, ledger = parser.parse_intermixed_args(), Ledger()
     if chosen.verb == "check":
         return check(ledger)
     if chosen.verb == "forget":
