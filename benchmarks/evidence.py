@@ -9,7 +9,8 @@ evidence.json has one entry a target: `command`; `needs`, input → hash when th
 `makes`, file → hash; `made` (date), `minutes`, `ended` (last line that the command printed). Inputs: `kernel` (the
 golden digests: a rewrite that leaves all bits ages nothing), `stage NAME` (the assembled model, so stage file, bodies
 and assembly), `reduction` (the version of bodies), and files, by patterns. Comments and docstrings of Python files do
-not count. A command that fails leaves its target stale.
+not count. `kernel friction` is the golden runs with friction, which `kernel` leaves out. A command that fails leaves
+its target stale.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from gearfmu.stage.blob import rounded_hash
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = "tests/reference/golden_runs.json"
+KERNEL = ("kernel", "kernel friction")
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 Entry = dict[str, Any]
 
@@ -58,14 +60,22 @@ def stage_hash(name: str) -> str:
 
 
 def content(path: Path) -> bytes:
-    """Bytes of a file; of a Python file those that decide what it does, of the golden digests their values."""
-    if path.name == Path(GOLDEN).name:
-        return json.dumps(json.loads(path.read_bytes()), sort_keys=True).encode()
+    """Bytes of a file; of a Python file those that decide what it does."""
     if path.suffix != ".py":
         return path.read_bytes()
     code = re.sub(r'^\s*""".*?"""\n', "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     lines = [re.sub(r"(^|\s+)# .*", "", line) for line in code.splitlines()]
     return "\n".join(line for line in lines if line.strip()).encode()
+
+
+def golden_runs(path: Path, friction: bool) -> bytes:
+    """The golden digests of the runs with friction, or of all others."""
+    builds = json.loads(path.read_bytes())
+    chosen = {
+        build: {name: bits for name, bits in runs.items() if ("friction" in name) == friction}
+        for build, runs in builds.items()
+    }
+    return json.dumps(chosen, sort_keys=True).encode()
 
 
 @dataclass(frozen=True)
@@ -85,7 +95,9 @@ class Ledger:
             return stage_hash(need.removeprefix("stage "))
         if need == "reduction":
             return f"version {ALGORITHM_VERSION}"
-        paths = sorted(self.root.glob(GOLDEN if need == "kernel" else need))
+        if need in KERNEL:
+            return short(golden_runs(self.root / GOLDEN, need != KERNEL[0]))
+        paths = sorted(self.root.glob(need))
         return short(b"\0".join(content(path) for path in paths)) if paths else "missing"
 
     def stale(self) -> dict[str, list[str]]:
@@ -129,7 +141,7 @@ class Ledger:
         entry, started = self.read()[name], time.monotonic()
         needs = {need: self.digest(need) for need in entry["needs"]}
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        fixed = {"PATH": path, BEHAVIOUR: self.digest("kernel")}
+        fixed = {"PATH": path, BEHAVIOUR: "".join(map(self.digest, KERNEL))}
         code, last = run(entry["command"], self.root, ONE_THREAD | os.environ | fixed)
         ended = f"exit {code}: {last}" if code else last
         minutes = round((time.monotonic() - started) / 60, 1)
@@ -180,7 +192,7 @@ def make(ledger: Ledger, names: list[str], again: bool = False, tell: Callable[[
         sys.exit(f"no target {', '.join(unknown)}; there are {', '.join(entries)}" if unknown else "name the targets")
     stale = ledger.stale()
     due = [name for name in names or entries if again or name in stale]
-    if any("kernel" in entries[name]["needs"] for name in due) and not ledger.golden():
+    if any(need in entries[name]["needs"] for name in due for need in KERNEL) and not ledger.golden():
         sys.exit(f"the kernel's runs are not those of {GOLDEN}: what is made now would be of neither")
     tell(f"{len(due)} to make, last time {cost(entries[name] for name in due)}")
     for count, name in enumerate(due, 1):
