@@ -20,7 +20,6 @@ import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
@@ -81,7 +80,7 @@ def started(path: str, folder: str) -> dict[str, float]:
     }
 
 
-def apart(work: Callable[..., dict[str, Any]], *arguments: str | int) -> dict[str, Any]:
+def apart(work: Callable[..., dict[str, float]], *arguments: str) -> dict[str, float]:
     """The result of `work` in a fresh process."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(work, arguments)
