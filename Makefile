@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV   ?= .venv
 RUN     = $(VENV)/bin/python
+PIP     = $(RUN) -m pip install --quiet
+BUILD_NEEDS = "setuptools>=77" "fmpy>=0.3.20"
 STAMP   = $(VENV)/.installed
 JOBS   ?= 2
 BENCHMARKS ?= phases fmu_overhead harness levels coupling effects_cost
@@ -77,12 +79,15 @@ lint: $(STAMP)
 
 $(VENV)/.base: pyproject.toml setup.py
 	$(PYTHON) -m venv $(VENV)
-	$(RUN) -m pip install --quiet --upgrade pip
-	$(RUN) -m pip install --quiet -e .
+	$(PIP) --no-compile --no-deps $(BUILD_NEEDS)
+	@echo "compiling the kernel beside installing packages"
+	@PYTHONPATH=. $(RUN) gearfmu/kernel/build.py & kernel=$$!; \
+	GEARFMU_PLATFORMS=none $(PIP) --no-compile --no-build-isolation -e . ; packages=$$?; \
+	wait $$kernel && exit $$packages
 	@touch $@
 
 $(STAMP): $(VENV)/.base
-	$(RUN) -m pip install --quiet -e ".[test]"
+	$(PIP) --no-build-isolation -e ".[test]"
 	@touch $@
 
 .PHONY: help demo test test-full bench study study-bodies stability evidence evidence-check wheel models docs site lint

@@ -1,7 +1,7 @@
 """Builds the kernel library into the package; everything else is in pyproject.toml.
 
 A source install builds the host's kernel only. GEARFMU_PLATFORMS="linux64 win64" (make wheel, with ziglang) puts
-several into one wheel."""
+several into one wheel; "none" leaves the library to whoever sets it (make, which compiles beside pip)."""
 
 import importlib.util
 import os
@@ -14,6 +14,8 @@ from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
+NAMED = os.environ.get("GEARFMU_PLATFORMS", "").split()
+RELEASE = [platform for platform in NAMED if platform != "none"]
 WHEEL_TAG = {"linux64": "manylinux2014_x86_64.manylinux_2_17_x86_64", "win64": "win_amd64"}
 
 
@@ -26,14 +28,10 @@ def kernel_build():
     return module
 
 
-def chosen_platforms():
-    return os.environ.get("GEARFMU_PLATFORMS", "").split()
-
-
 class BuildWithKernel(build_py):
     def run(self):
         build = kernel_build()
-        libraries = [build.build_library(platform) for platform in chosen_platforms() or [build.host_platform()]]
+        libraries = [build.build_library(platform) for platform in RELEASE] if NAMED else [build.current_library()]
         super().run()
         if not self.editable_mode:  # an editable install finds both in the checkout
             for library in libraries:
@@ -49,8 +47,7 @@ class BuildWithKernel(build_py):
 
 class PlatformWheel(bdist_wheel):
     def get_tag(self):
-        platforms = chosen_platforms()
-        tag = ".".join(WHEEL_TAG[p] for p in platforms) if platforms else super().get_tag()[2]
+        tag = ".".join(WHEEL_TAG[platform] for platform in RELEASE) if RELEASE else super().get_tag()[2]
         return "py3", "none", tag
 
 
@@ -62,5 +59,5 @@ class BinaryDistribution(Distribution):
 setup(
     distclass=BinaryDistribution,
     cmdclass={"build_py": BuildWithKernel, "bdist_wheel": PlatformWheel},
-    setup_requires=["ziglang==0.16.0"] if chosen_platforms() else [],
+    setup_requires=["ziglang==0.16.0"] if RELEASE else [],
 )

@@ -51,7 +51,7 @@ def te(
     values, model = [_checked("torque", torque, "torque") for torque in wanted], model_of(stage)
     known = parameters(model, settings)
     if isinstance(model.spec, PlanetarySpec):
-        return set_te(model, values, positions, pitches, **known)
+        return set_te(model, values, positions, pitches, None, **known)
     return loaded_te(model, values, positions, rigid_bearings, mesh, pitches, **known)
 
 

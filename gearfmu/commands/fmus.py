@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from gearfmu.commands.shared import progress_bar
+
 PORT_KINDS = ("spring", "torque", "fixed")
 
 
@@ -74,7 +76,9 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
         model = model_of(stage, port_kinds(ports), observe=observe)
     model = model.with_starts(parameters(model, starts, "--start"))
     path, runtime = out or Path(f"{model.spec.name}.fmu"), how["runtime"]
-    fmu.export(model, path, **how)
+    with progress_bar(f"export {model.spec.name}") as progress:
+        progress(None, "writing")
+        fmu.export(model, path, **how)
     click.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {runtime}, model {model.hash[:12]}")
 
 

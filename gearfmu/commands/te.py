@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from gearfmu.commands.models import model_of
-from gearfmu.commands.shared import Quantity
+from gearfmu.commands.shared import Quantity, progress_bar
 
 
 @click.command()
@@ -109,7 +109,8 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     from gearfmu.stage.set_te import set_te
     from gearfmu.stage.trace import write_columns
 
-    result = set_te(model, torques, where["positions"], where["pitches"])
+    with progress_bar(f"te {model.spec.name}") as progress:
+        result = set_te(model, torques, where["positions"], where["pitches"], progress)
     write_columns(out, result.columns())
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)

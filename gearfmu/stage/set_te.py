@@ -8,7 +8,7 @@ later what the others do: its mean share over the period is 1."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -59,14 +59,20 @@ class SetTeResult:
 
 
 def set_te(
-    model: StageModel, torques: Sequence[float], positions: int = 41, periods: int = 1, **parameters: float
+    model: StageModel,
+    torques: Sequence[float],
+    positions: int = 41,
+    periods: int = 1,
+    progress: Callable[[float, str], None] | None = None,
+    **parameters: float,
 ) -> SetTeResult:
     """te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), angles of the bores of sun and carrier, at positions i/N of one mesh period
     or of more (no end point), the output held. Without load it is ± the mean backlash of the two meshes along the line
     of action.
 
-    torques: N·m on the input, the first port; 0 is the limit of a vanishing positive torque. parameters: of the kernel,
-    e.g. slices=10. ModelError where the stage is no planetary set; SimulationError(no_equilibrium) where there is none.
+    torques: N·m on the input, the first port; 0 is the limit of a vanishing positive torque. progress: called with the
+    part done and the torque. parameters: of the kernel, e.g. slices=10. ModelError where the stage is no planetary set;
+    SimulationError(no_equilibrium) where there is none.
     """
     if not isinstance(model.spec, PlanetarySpec):
         raise ModelError(f"{model.name} is no planetary set: its meshes have transmission errors of their own")
@@ -78,6 +84,8 @@ def set_te(
     for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         at = -part * place.pitch
+        if progress:
+            progress((i + j / position.size) / len(torques), f"{torque:g} N·m")
         with limit_named(model, torque):
             error = _error(model, kernel, at, carried)
             force[i, j] = _forces(kernel, at, carried, planets)

@@ -63,6 +63,24 @@ def test_touching_or_changing_line_ends_does_not(package):
     assert library_path().is_file()
 
 
+def test_a_library_of_these_sources_is_not_built_again(package, monkeypatch):
+    monkeypatch.setattr(build, "HERE", package)
+    monkeypatch.setattr(build, "build_library", lambda: "built")
+    assert build.current_library() == "built"
+    library = place_library(package)
+    assert build.current_library() == library
+    (package / "src" / "gk_new.c").write_text("")
+    assert build.current_library() == "built"
+
+
+def test_sources_of_the_avx2_unit_are_compiled_at_less_cost_where_it_is():
+    files = [p for p in build.sources() if p.suffix == ".c"]
+    for target, cheap in (("x86_64-linux-gnu.2.17", 29), ("aarch64-macos.11.0", 0)):
+        lines = build._compilations(["zig", "cc", "-target", target], (), files, Path("out"))
+        assert [path.stem for path in lines][0] == "gk_wide"
+        assert sum(line[4] == "-O1" for line in lines.values()) == cheap, target
+
+
 def test_compiler_errors_are_shown_and_leave_the_old_library(tmp_path, monkeypatch):
     broken = tmp_path / "broken.c"
     broken.write_text("int f(void) { return undeclared_name; }\n")

@@ -158,6 +158,12 @@ def test_the_next_mesh_period_is_the_same(model: StageModel, ideal: SetTeResult)
         assert error == pytest.approx(ideal.te[0, 3], abs=1e-11)
 
 
+def test_progress_is_the_part_done_and_the_torque(model: StageModel) -> None:
+    told: list[tuple[float, str]] = []
+    set_te(model, [60.0, TORQUE], 1, progress=lambda part, text: told.append((part, text)))
+    assert told == [(0.0, "60 N·m"), (0.5, f"{TORQUE:g} N·m")]
+
+
 @pytest.mark.full
 def test_unloaded_error_is_the_backlash_of_both_meshes(model: StageModel, spec: PlanetarySpec) -> None:
     """Its zero lies in the middle: ± j cos α, to what of the mesh is relieved everywhere (0.12 µm); loaded, it grows
