@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from gearfmu.files import written_whole
 from gearfmu.report.metrics import level
 from gearfmu.report.style import panels, styled
 from gearfmu.report.te import write_plot
+from gearfmu.stage.te import mesh_harmonics
 from gearfmu.sweeps.table import SweepTable
 
 TORQUE, SPEED = "torque_Nm", "speed_rad_s"
@@ -64,6 +66,7 @@ def _harris(table: SweepTable, path: Path) -> Path:
         mesh_stiffness=1e6 * np.array(mesh[: len(parts)]) if mesh else None,
         stage_stiffness=1e6 * np.array(stage[: len(parts)]),
     )
+    result.harmonics = partial(mesh_harmonics, result.te, pitches=int(result.position[-1]) + 1)
     write_plot(result, path)
     return path
 
