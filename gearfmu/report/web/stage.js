@@ -4,7 +4,7 @@
 window.gearfmuStage = (stage, array, colour) => {
   const place = document.getElementById("stage"), canvas = place.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
-  if (!gl) { place.querySelector(".note").textContent = "This browser has no WebGL 2: the turning view is left out."; return; }
+  if (!gl) { place.classList.add("none"); place.querySelector("figcaption").textContent = "This browser has no WebGL 2: the turning view is left out."; return; }
   const time = array(stage.time), last = time.length - 1, state = { at: 0, scale: stage.scale, yaw: -0.3, pitch: 0.35, zoom: 1, close: false, running: false };
 
   const VERTEX = `#version 300 es
@@ -135,6 +135,7 @@ window.gearfmuStage = (stage, array, colour) => {
         gl.drawElements(gl.LINES, body.nLines, gl.UNSIGNED_INT, 0);
       }
     }
+    place.classList.add("drawn");
     place.querySelector("output").textContent = `${(1e3 * between(time, k, part)).toFixed(2)} ms`;
     place.querySelector(".factor").textContent = `${state.scale.toPrecision(3).replace(/\.?0+$/, "")}×`;
   }
@@ -143,7 +144,7 @@ window.gearfmuStage = (stage, array, colour) => {
   let before = 0;
   function step(now) {
     if (!state.running) return;
-    state.at = (state.at + Math.min(now - before, 100) / 1e3 / seconds * last) % last;
+    state.at = (state.at + Math.max(0, Math.min(now - before, 100)) / 1e3 / seconds * last) % last;
     before = now;
     slider.value = String(state.at / last);
     draw();
