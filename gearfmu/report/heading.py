@@ -33,7 +33,7 @@ def operating_point(run: Run) -> list[str]:
     if torque is not None and np.any(part[torque]):
         values = np.abs(part[torque])
         steady = float(np.mean(values)) if _steady(values) else None
-        found.append(f"{steady:.4g} N·m" if steady is not None else f"up to {values.max():.4g} N·m")
+        found.append(f"{_round(steady):.5g} N·m" if steady is not None else f"up to {values.max():.4g} N·m")
     speed = f"{name}{GEAR_SPEED}"
     if speed in part and np.any(part[speed]):
         values = np.abs(part[speed]) * RPM
