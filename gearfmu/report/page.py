@@ -83,9 +83,9 @@ def facts(pairs: Mapping[str, str]) -> str:
     return f'<dl class="run">{rows}</dl>'
 
 
-def figure(plot: Plot, folder: str = "data") -> str:
-    """A section with one plot, its caption and the link to its data in `folder`."""
-    at = escape(f"{folder}/{plot.name}.csv", quote=True)
+def figure(plot: Plot, folder: str = "data", file: str = "") -> str:
+    """A section with one plot, its caption and the link to its data: `file`, else a file of its name in `folder`."""
+    at = escape(file or f"{folder}/{plot.name}.csv", quote=True)
     link = f'<a href="{at}">{at}</a>'
     seen = chart_element(plot.name, plot.picture) if isinstance(plot.picture, Chart) else _told(plot)
     return (
