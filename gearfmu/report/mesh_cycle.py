@@ -20,7 +20,7 @@ from gearfmu.stage import assemble
 from gearfmu.stage.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.meshes import EXTERNAL, kind_of, mesh_geometry
 from gearfmu.stage.place import place_of
-from gearfmu.stage.te import mesh_harmonics
+from gearfmu.stage.te import mesh_harmonics, statics_of
 from gearfmu.stage.trace import Trace
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
@@ -36,7 +36,7 @@ def static_loads(
     """Statics of engagements under the mean mesh force that each has over the window, and in words why others are not
     there; those with hardly a load are left out."""
     model, part, found = assemble(spec, bodies), trace.window(window.start, window.end), {}
-    missing = []
+    missing, kernel = [], None
     slices = float(trace.meta.get("slices") or 5)
     positions = POSITIONS if model.stage.frame_of(model.stage.engagements[0]) is None else POSITIONS_OF_SET
     for mesh in meshes:
@@ -45,7 +45,8 @@ def static_loads(
             torque = float(np.mean(part[f"{mesh}.force"])) * place.lever
             torque *= math.cos(mesh_geometry(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
             if abs(torque) >= LEAST_LOAD * place.most:
-                found[mesh] = flank_loads(model, torque, mesh, positions, slices=slices)
+                kernel = kernel or statics_of(model, slices=slices)
+                found[mesh] = flank_loads(model, torque, mesh, positions, kernel)
         except (SimulationError, ModelError) as error:
             missing.append(f"Mesh cycle and contact pattern of {mesh}: {error}")
     return found, missing
