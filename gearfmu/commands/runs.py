@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import click
@@ -191,8 +192,10 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
     from gearfmu.api.runs import run as run_it
     from gearfmu.errors import GearfmuError
 
+    begin = process_time()
     with progress_bar(scene.name) as progress:
         trace = run_it(scene, out, progress=progress, **options)
+    prepared = process_time() - begin - trace.meta["cpu_s"]
     if scene.deformation is not None and scene.deformation.vtu:
         found = recorded_deformation(trace, out)
         assert found is not None
@@ -201,7 +204,7 @@ def run_scene(scene: Any, out: Path, **options: Any) -> int:
                 click.echo(path)
         except GearfmuError as error:
             _tell(f"no .vtu of the deformed gears: {error}")
-    return finish(trace, out, None)
+    return finish(trace, out, None, prepared)
 
 
 def run_plan(path: Path, out: Path | None, unit: Any) -> int:
@@ -218,18 +221,23 @@ def run_plan(path: Path, out: Path | None, unit: Any) -> int:
     return finish(trace, folder, None)
 
 
-def finish(trace: Any, out: Path, stage: str | None) -> int:
+def finish(trace: Any, out: Path, stage: str | None, prepared: float | None = None) -> int:
     """Write trace.h5 and the report into `out` and print the outcome and the price; 0 when the run reached its end,
-    else 1. stage : as of `api.write_report`."""
+    else 1. stage : as of `api.write_report`. prepared : processor time (s) of the work around the simulation, to be
+    shown."""
     from gearfmu.report.results import REACHED_THE_END
 
+    begin = process_time()
     trace.save(out / "trace.h5")
     page = write_report(trace, out, stage)
-    meta = trace.meta
+    meta, reported = trace.meta, process_time() - begin
     click.echo(
         f"{meta['outcome']}: {meta['simulated_s']:.4g} s simulated in {meta['cpu_s']:.3g} s CPU time "
         f"({meta['realtime_factor']:.3g} per simulated second)"
     )
+    if prepared is not None:
+        parts = {"model, FMU and start": prepared, "simulation": meta["cpu_s"], "report": reported}
+        click.echo(f"CPU time: {', '.join(f'{name} {value:.3g} s' for name, value in parts.items())}")
     for text in meta.get("warnings") or ():
         click.echo(f"warning: {text}", err=True)
     click.echo(page)

@@ -1,4 +1,4 @@
-"""The verb sweep: many points into one table, and its pictures."""
+"""The verb sweep: many points into one table, and its pictures and page."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from gearfmu.commands.shared import progress_bar
 def sweep(
     subject: str, over: tuple[str, ...], out: Path | None, jobs: int | None, scheduler: str | None, traces: bool
 ) -> int:
-    """Run SCENE at many points: one table (Parquet with pyarrow, else CSV) and its pictures.
+    """Run SCENE at many points: one table (Parquet with pyarrow, else CSV), its pictures and a page.
 
     SCENE may be a STAGE too: with a speed it is run alone as by 'simulate', without one its loaded transmission error
     is taken as by 'te' (Harris map). Keys: torque, speed; stage.<field of the stage file>; of a scene its fields; of a
@@ -36,6 +36,7 @@ def sweep(
     when it is called again. Exit code: the number of points that failed (at most 99)."""
     from gearfmu.api.sweeps import sweep as run_sweep
     from gearfmu.sweeps.charts import write_charts
+    from gearfmu.sweeps.page import write_page
     from gearfmu.sweeps.values import key_and_values
 
     folder = out or Path("out") / f"sweep_{Path(subject).stem}"
@@ -43,7 +44,7 @@ def sweep(
         table = run_sweep(subject, dict(map(key_and_values, over)), folder, traces, scheduler or jobs, progress)
     for failure in table.failures:
         click.echo(f"gearfmu: {failure}", err=True)
-    for path in [*table.files, *write_charts(table, folder)]:
+    for path in [*table.files, *write_charts(table, folder), write_page(table, subject, folder)]:
         click.echo(path)
     failed = len(table.failures)
     click.echo(f"{len(table)} points" + (f", {failed} failed" if failed else ""))

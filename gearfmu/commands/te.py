@@ -73,13 +73,20 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
         path = out.with_stem(f"{out.stem}_{mesh}") if len(meshes) > 1 else out
         write_columns(path, result.columns())
         picture = path.with_suffix(".png")
-        write_plot(result, picture)
+        write_plot(result, picture, _unloaded(model, torques, mesh=mesh, **where))
         if len(meshes) > 1:
             click.echo(mesh)
         _tell(result, where["rigid_bearings"])
         click.echo(f"{path}, {picture}")
     _draw_flanks(model, out)
     warn_of_limits(model, torques)
+
+
+def _unloaded(model: Any, torques: Sequence[float], **where: Any) -> Any:
+    """The transmission error without load, for the picture; None where it is among those asked for."""
+    from gearfmu.stage import loaded_te
+
+    return None if 0.0 in torques else loaded_te(model, [0.0], **where)
 
 
 def _draw_flanks(model: Any, out: Path) -> None:

@@ -89,7 +89,7 @@ def _of_meshes(run: Run, deformed: Sequence[Maker]) -> list[Maker]:
         makers.append(
             partial(plots.mesh_force_and_error, trace, mesh, detail_window(trace, mesh, run.angles.get(mesh)))
         )
-    makers.append(lambda: plots.bearing_forces(trace))
+    makers += [lambda: plots.bearing_forces(trace), lambda: plots.axial_and_tilting(trace)]
     makers += _statics(run, [[mesh] for mesh in run.shown_meshes])
     if run.stage is not None:
         makers += [partial(picture.deformed_pair, trace, run.stage, mesh, run.bodies or ()) for mesh in names]
@@ -122,6 +122,7 @@ def _of_set(run: Run, own: PlanetSet, deformed: Sequence[Maker]) -> list[Maker]:
         *deformed,
         *_set_pair(run, own),
         lambda: plots.bearing_forces(trace, carried=True),
+        lambda: plots.axial_and_tilting(trace),
         lambda: plots_set.energy(trace),
         *over_frequency,
     ]

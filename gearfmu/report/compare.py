@@ -16,7 +16,7 @@ from gearfmu.report import metrics, page, sections
 from gearfmu.report.chart import TIME, Chart, Curve, Panel, Plot, level_limits
 from gearfmu.report.mesh_cycle import BINS, HARMONICS, folded, position_of
 from gearfmu.report.metrics import MetricsError
-from gearfmu.report.names import shown
+from gearfmu.report.names import plain, shown
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.plots_nvh import SHOWN_TO, averaging, force_channels, octave_table, segment, spectrum_of
 from gearfmu.report.results import dynamic_factors, key_results
@@ -129,8 +129,8 @@ def _plots(compared: Sequence[Compared]) -> list[Plot | None]:
     names = [mesh for mesh in meshes(compared[0].run.trace) if all(mesh in meshes(own.run.trace) for own in compared)]
     found: list[Plot | None] = []
     for mesh in names:
-        found += [_over_time(compared, mesh), _mesh_cycle(compared, mesh)]
-    return [*found, _spectra(compared), *[_orders(compared, mesh) for mesh in names]]
+        found += [_mesh_cycle(compared, mesh), _orders(compared, mesh)]
+    return [*found, _spectra(compared), *[_over_time(compared, mesh) for mesh in names]]
 
 
 def _over_time(compared: Sequence[Compared], mesh: str) -> Plot | None:
@@ -277,7 +277,7 @@ def _octaves(compared: Sequence[Compared]) -> list[str]:
         return []
     rows = []
     for name in _common(compared):
-        rows.append((f"{name}, {compared[0].label}", *(_db(first[name][band]) for band in bands)))
+        rows.append((f"{plain(name) or name}, {compared[0].label}", *(_db(first[name][band]) for band in bands)))
         for own in compared[1:]:
             change = [tables[own.label][name][band] - first[name][band] for band in bands]
             rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))
@@ -297,7 +297,7 @@ def _order_table(compared: Sequence[Compared]) -> list[str]:
         levels = [order_levels(own, mesh) for own in compared]
         rows = []
         for name in (n for n in _common(compared) if all(n in level for level in levels)):
-            rows.append((f"{name}, {compared[0].label}", *(_db(value) for value in levels[0][name])))
+            rows.append((f"{plain(name) or name}, {compared[0].label}", *(_db(value) for value in levels[0][name])))
             for own, level in zip(compared[1:], levels[1:], strict=True):
                 change = level[name] - levels[0][name]
                 rows.append((f"    {own.label}, change", *(_db(value, "+") for value in change)))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.files import write_text, written_whole
-from gearfmu.report import page, sections
+from gearfmu.report import heading, page, sections
 from gearfmu.report.chart import Plot
 from gearfmu.report.choice import chosen_plots, turning
 from gearfmu.report.metrics import MetricsError
@@ -69,15 +69,14 @@ def _sound(run: Run, missing: list[str]) -> Sound | None:
 
 def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sound | None) -> str:
     summary = run.summary
-    about = " · ".join(str(summary[key]) for key in ("description", "started") if summary.get(key))
+    about = [run.title, *(str(summary[key]) for key in ("description", "started") if summary.get(key))]
     over_speed = [plot for plot in made if plot.name in RUN_UP]
     over_frequency = [plot for plot in made if plot.name.startswith(NVH) and plot.name not in RUN_UP]
     others = [plot for plot in made if not plot.name.startswith(NVH)]
     octaves = sections.octaves(run)
     view = turning(run)
-    subtitle = f"{run.stage_name}{' · ' + about if about else ''}"
     body = [
-        page.head(run.title, str(summary.get("outcome", "outcome not given")), subtitle),
+        page.head(heading.title(run), str(summary.get("outcome", "outcome not given")), " · ".join(about)),
         page.tiles(sections.tiles(run)),
         page.facts(sections.facts(summary)),
         *[page.warning(f"{text[:1].upper()}{text[1:]}.") for text in summary.get("warnings") or ()],
@@ -85,7 +84,7 @@ def _document(run: Run, made: Sequence[Plot], missing: Sequence[str], sound: Sou
         *([page.section("Not shown", *[page.note(reason) for reason in missing])] if missing else []),
         *(sections.warned(run.trace) if over_speed else []),
         *[page.figure(plot) for plot in over_speed],
-        *([page.stage_view("The deformed stage, turning", view.caption)] if view is not None else []),
+        *([page.stage_view("The deformed stage, turning", view.caption, view.most)] if view is not None else []),
         *(sections.planets(run) or [page.section("Results", sections.results(run), name="results")]),
         *plan_sections(run.trace.meta.get("plan")),
         *[page.figure(plot) for plot in others],

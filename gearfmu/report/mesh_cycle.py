@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
@@ -19,12 +20,12 @@ from gearfmu.stage import assemble
 from gearfmu.stage.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.meshes import EXTERNAL, kind_of, mesh_geometry
 from gearfmu.stage.place import place_of
-from gearfmu.stage.te import mesh_harmonics
+from gearfmu.stage.te import mesh_harmonics, statics_of
 from gearfmu.stage.trace import Trace
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
 LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of
-ROLLS = 60  # rows of a contact pattern
+ROLLS, WIDTHS = 60, 61  # rows and columns of a contact pattern
 POSITIONS, POSITIONS_OF_SET = 24, 16  # over a pitch: a set solves all its meshes at each
 STATIC, RUN = "quasi-static", "in the run"
 
@@ -35,7 +36,7 @@ def static_loads(
     """Statics of engagements under the mean mesh force that each has over the window, and in words why others are not
     there; those with hardly a load are left out."""
     model, part, found = assemble(spec, bodies), trace.window(window.start, window.end), {}
-    missing = []
+    missing, kernel = [], None
     slices = float(trace.meta.get("slices") or 5)
     positions = POSITIONS if model.stage.frame_of(model.stage.engagements[0]) is None else POSITIONS_OF_SET
     for mesh in meshes:
@@ -44,7 +45,8 @@ def static_loads(
             torque = float(np.mean(part[f"{mesh}.force"])) * place.lever
             torque *= math.cos(mesh_geometry(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
             if abs(torque) >= LEAST_LOAD * place.most:
-                found[mesh] = flank_loads(model, torque, mesh, positions, slices=slices)
+                kernel = kernel or statics_of(model, slices=slices)
+                found[mesh] = flank_loads(model, torque, mesh, positions, kernel)
         except (SimulationError, ModelError) as error:
             missing.append(f"Mesh cycle and contact pattern of {mesh}: {error}")
     return found, missing
@@ -123,7 +125,8 @@ def contact_pattern(trace: Trace, stage: GeneralStage, mesh: str, loads: FlankLo
     pair = mesh_geometry(stage, engagement)
     pressed = loads.roll[loads.force > 0]
     rolls = np.linspace(pressed.min(), pressed.max(), ROLLS)
-    load, z = 1e-3 * loads.line_load(rolls), 1e3 * loads.width
+    z = np.linspace(-500, 500, WIDTHS) * loads.face_width
+    load = over_width(1e-3 * loads.line_load(rolls), 1e3 * loads.width, z)
     sense = 1 if kind_of(pair) == EXTERNAL else -1
     other = sense * (pair.length - rolls) if sense > 0 else rolls + pair.length
     top, half, panels = float(load.max()), 500 * loads.face_width, []
@@ -136,7 +139,8 @@ def contact_pattern(trace: Trace, stage: GeneralStage, mesh: str, loads: FlankLo
     flank = "drive" if loads.side > 0 else "coast"
     caption = (
         f"Force per width on the {flank} flanks over a whole engagement, quasi-static under the mean mesh force of the "
-        f"run; largest {top:.4g} N/mm. Left to right: from −b/2 to +b/2 of the common face width. "
+        f"run, interpolated between {loads.width.size} slices; largest {top:.4g} N/mm. "
+        "Left to right: from −b/2 to +b/2 of the common face width. "
     )
     factor = face_load_factor(trace, mesh)
     if factor is not None:
@@ -149,6 +153,18 @@ def contact_pattern(trace: Trace, stage: GeneralStage, mesh: str, loads: FlankLo
     }
     title = of_mesh(trace, mesh, "Contact pattern")
     return Plot(file, title, caption, Chart(tuple(panels), "place on the face width in mm", across=2), data)
+
+
+def over_width(load: np.ndarray, middles: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Load (R, S) at the middles (S,) of slices at places (W,) of the width as a smooth curve: (R, W), without
+    overshoot and none below 0."""
+    if middles.size < 3:
+        return np.stack([np.interp(places, middles, row) for row in load])
+    ends = [1.5 * load[:, :1] - 0.5 * load[:, 1:2], 1.5 * load[:, -1:] - 0.5 * load[:, -2:-1]]
+    half = 0.5 * (middles[1] - middles[0])
+    at = np.concatenate([[middles[0] - half], middles, [middles[-1] + half]])
+    known = np.maximum(np.concatenate([ends[0], load, ends[1]], axis=1), 0.0)
+    return np.asarray(PchipInterpolator(at, known, axis=1)(np.clip(places, at[0], at[-1])))
 
 
 def slice_forces(trace: Trace, mesh: str) -> np.ndarray | None:

@@ -20,12 +20,14 @@ from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
 from gearfmu.report.picture import SHOWN_FRACTION, contacts_at, mirrored, round_scale
 from gearfmu.report.signals import GEAR_PHI
+from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.spec.general import EngagementSpec, GeneralStage
 from gearfmu.stage.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.trace import Trace
 
 FRAMES, CONTACTS, PITCHES = 160, 4, 8
 STEPS = 127  # of a displacement, in the page
+BOLT_TONE = 1.45  # brighter than the plate behind it
 
 
 Contacts: TypeAlias = np.ndarray
@@ -51,6 +53,7 @@ class Body:
     times: np.ndarray | None = None
     frames: np.ndarray | None = None
     extra: np.ndarray | None = None  # (F,) rad: turn per unit of enlargement that keeps loaded flanks together
+    tone: float = 0.0  # of a shaft or carrier, drawn rigid: brightness; 0 of a gear
 
 
 @dataclass(frozen=True)
@@ -84,9 +87,10 @@ class View:
         )
         if self.recorded:
             text += f"of {', '.join(self.recorded)}: the sum of all recorded modes; "
+        rigid = "; shafts and carrier, dark, are drawn rigid" if any(body.tone for body in self.bodies) else ""
         return text + (
             f"largest {1e6 * self.most:.3g} µm, enlarged {self.scale:g} times to begin with. Loaded flanks are turned "
-            "together again; local flattening, shafts and carriers are left out. Drag to look from another side."
+            f"together again; local flattening is left out{rigid}. Drag to look from another side."
         )
 
 
@@ -115,7 +119,24 @@ def moving_view(
         return None
     module = float(stage.gears[0].normal_module)
     scale = round_scale(SHOWN_FRACTION * module / most)
-    return View(time, list(made.values()), scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
+    drawn = [*made.values(), *_structure(trace, stage, time)]
+    return View(time, drawn, scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
+
+
+def _structure(trace: Trace, stage: GeneralStage, time: np.ndarray) -> list[Body]:
+    """Shafts and carriers whose angle was recorded."""
+    found = []
+    for name, rotor, profile, (x, y), z in parts(stage):
+        recorded = _rotor_angle(trace, stage, rotor)
+        if recorded is None:
+            continue
+        angle, axis = np.interp(time, trace.time, recorded), complex(*stage.rotors[rotor].axis)
+        at = axis + complex(x, y) * np.exp(1j * angle)
+        surface = turned(profile)
+        found.append(
+            Body(name, *surface, AROUND, angle, (at.real, at.imag, z), tone=BOLT_TONE if "bolt" in name else 1.0)
+        )
+    return found
 
 
 def _body(trace: Trace, stage: GeneralStage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Body:
@@ -272,7 +293,8 @@ def _close(stage: GeneralStage, trace: Trace, time: np.ndarray) -> tuple[np.ndar
 
 def _numbers(body: Body, pack: Pack) -> dict[str, Any]:
     size, (x, y, z) = len(body.points) // body.teeth, body.place
-    found: dict[str, Any] = {
+    found: dict[str, Any] = {"tone": body.tone} if body.tone else {}
+    found |= {
         "name": body.name, "teeth": body.teeth, "z": z, "size": size,
         "points": pack.add_raw(body.points[:size].astype(np.float32).ravel()),
         "quads": pack.add_raw(body.quads.astype(np.int32).ravel()),

@@ -43,8 +43,17 @@ WHOLE = {
 DIRECTIONS = {"f": "force", "m": "moment"}
 
 
+def mesh_words(mesh: str) -> str:
+    """ "sun – planet 1" of sun_planet1; other names as they are."""
+    return re.sub(r"^([a-z]+)_planet(\d+)$", r"\1 – planet \2", mesh)
+
+
 def plain(channel: str) -> str:
     """The plain name of a channel; "" for what is none that we know."""
+    return re.sub(r"(?:the )?\bplanet(\d+)", r"planet \1", _plain(channel))
+
+
+def _plain(channel: str) -> str:
     if channel in WHOLE:
         return WHOLE[channel]
     found = re.fullmatch(r"(bearing|pin)\.([^.]+)\.([fm])([xyz])(_mean)?", channel)
@@ -53,9 +62,9 @@ def plain(channel: str) -> str:
         return f"{kind.capitalize()} {DIRECTIONS[what]} {axis}, {part}{', mean over the step' if mean else ''}"
     first, _, last = channel.partition(".")
     if last in MESH:
-        return MESH[last] if first == "mesh" else f"{MESH[last]}, {first}"
+        return MESH[last] if first == "mesh" else f"{MESH[last]}, {mesh_words(first)}"
     if last.startswith("slice_"):
-        return f"Force of slice {last.removeprefix('slice_')}" + ("" if first == "mesh" else f", {first}")
+        return f"Force of slice {last.removeprefix('slice_')}" + ("" if first == "mesh" else f", {mesh_words(first)}")
     for end, words in ENDS.items():
         if channel.endswith(f".{end}"):
             return words.format(channel.removesuffix(f".{end}").removeprefix("drive.").replace(".", " "))

@@ -83,9 +83,9 @@ def facts(pairs: Mapping[str, str]) -> str:
     return f'<dl class="run">{rows}</dl>'
 
 
-def figure(plot: Plot, folder: str = "data") -> str:
-    """A section with one plot, its caption and the link to its data in `folder`."""
-    at = escape(f"{folder}/{plot.name}.csv", quote=True)
+def figure(plot: Plot, folder: str = "data", file: str = "") -> str:
+    """A section with one plot, its caption and the link to its data: `file`, else a file of its name in `folder`."""
+    at = escape(file or f"{folder}/{plot.name}.csv", quote=True)
     link = f'<a href="{at}">{at}</a>'
     seen = chart_element(plot.name, plot.picture) if isinstance(plot.picture, Chart) else _told(plot)
     return (
@@ -94,8 +94,9 @@ def figure(plot: Plot, folder: str = "data") -> str:
     )
 
 
-def stage_view(title: str, caption: str) -> str:
-    """The place of the turning stage with its controls; the script `stage.js` draws it."""
+def stage_view(title: str, caption: str, most: float) -> str:
+    """The place of the turning stage with its controls; the script `stage.js` draws it and then shows them. most:
+    displacement (m) at the end of the scale of colours."""
     label = escape(f"{title}. {caption}", quote=True)
     return (
         f'<section id="stage" class="stage"><h2>{escape(title)}</h2><figure>'
@@ -104,8 +105,10 @@ def stage_view(title: str, caption: str) -> str:
         '<label>time <input class="moment" type="range" min="0" max="1" step="0.001" value="0">'
         "<output></output></label>"
         '<label>enlarged <input class="enlarge" type="range" min="-1" max="0.7" step="0.01" value="0">'
-        '<span class="factor"></span></label><span class="scale" title="elastic displacement: none to largest"></span>'
-        f'</div><figcaption class="note">{escape(caption)}</figcaption></figure></section>'
+        '<span class="factor"></span></label><span class="legend">0<span class="scale"></span>'
+        f"{1e6 * most:.3g} µm</span>"
+        '</div><p class="wait note">The view is drawn when its data are unpacked.</p>'
+        f'<figcaption class="note">{escape(caption)}</figcaption></figure></section>'
     )
 
 

@@ -107,12 +107,13 @@ def contacts_at(pair: MeshShape, angles: Sequence[float], sg: int) -> list[Conta
     """The tooth pairs whose contact point lies on both flanks `sg`, from gear A's root outward. angles (rad) of the
     bodies from the line of their centres, A to B; of a ring, B, from its axis to A's."""
     (a, b), external = pair.gears, isinstance(pair, PairGeometry)
-    t = -sg * pair.alpha_wt
-    found = []
+    t, length = -sg * pair.alpha_wt, pair.length
+    base, first, low, high = a.r_b, angles[0] + sg * a.psi_b - t, a.s_form, a.s_tip
+    found, ends = [], sorted((b.s_form, b.s_tip))
     for k in range(a.z):
-        roll = a.r_b * sg * _wrapped(angles[0] + 2 * math.pi * k / a.z + sg * a.psi_b - t)
-        opposite = pair.length - roll if external else pair.length + roll
-        if a.s_form <= roll <= a.s_tip and min(b.s_form, b.s_tip) <= opposite <= max(b.s_form, b.s_tip):
+        roll = base * sg * _wrapped(first + 2 * math.pi * k / a.z)
+        opposite = length - roll if external else length + roll
+        if low <= roll <= high and ends[0] <= opposite <= ends[1]:
             turn = t + (math.pi if external else 0.0) + sg * (opposite / b.r_b - b.psi_b) - angles[1]
             found.append(Contact((k, round(turn * b.z / (2 * math.pi)) % b.z), (roll, opposite)))
     return sorted(found, key=lambda contact: contact.rolls[0])

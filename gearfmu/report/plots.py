@@ -7,11 +7,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from gearfmu.report.chart import SPANS, Curve, Panel, Plot, Span, over_time
-from gearfmu.report.signals import LOCKED, bearings, lock_time, meshes, spans
+from gearfmu.report.names import mesh_words
+from gearfmu.report.signals import LOCKED, bearings, lock_time, meshes, noise_floor, spans
 from gearfmu.stage.trace import Trace, heading
 
 CLUTCH_TORQUES = ("clutch.capacity", "clutch.tau", ".shaft.tau")
 RPM = 30 / np.pi
+LEVER = 0.01  # m: moments below the noise of forces times this lever are noise
 MOST_SPANS = 300  # shaded in a panel
 
 
@@ -33,7 +35,8 @@ def torque_and_slip(trace: Trace) -> Plot | None:
     ]
     at = lock_time(trace)
     caption = "" if at is None else f"The clutch stays locked from {at:.4f} s on."
-    return Plot("torque", "Torque and slip", caption, over_time(panels), columns(trace, clutch + others + slips))
+    title = "Torques and slip" if slips else "Torques"
+    return Plot("torque", title, caption, over_time(panels), columns(trace, clutch + others + slips))
 
 
 def speeds(trace: Trace) -> Plot | None:
@@ -70,12 +73,15 @@ def mesh_force_and_error(trace: Trace, mesh: str, window: tuple[float, float] | 
 
 def of_mesh(trace: Trace, mesh: str, title: str) -> str:
     """The title of a figure; with the name of the mesh where there are several."""
-    return f"{title}, {mesh}" if len(meshes(trace)) > 1 else title
+    return f"{title}, {mesh_words(mesh)}" if len(meshes(trace)) > 1 else title
 
 
 def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
     """Bearing forces x and y of every bearing over time; None without them. carried: of a planetary set."""
     groups = {b: found for b in bearings(trace) if (found := [n for d in "xy" if (n := f"bearing.{b}.f{d}") in trace])}
+    floor = noise_floor(trace)
+    quiet = [name for name, own in groups.items() if all(np.abs(trace[channel]).max() < floor for channel in own)]
+    groups = {name: own for name, own in groups.items() if name not in quiet}
     if not groups:
         return None
     panels = [Panel(f"{name}: force in kN", channels(trace, found, 1e-3, "kN")) for name, found in groups.items()]
@@ -85,7 +91,29 @@ def bearing_forces(trace: Trace, carried: bool = False) -> Plot | None:
         caption = "Force of the body on its bearing, along the fixed axes x and y."
     elif len(meshes(trace)) == 1:
         caption = "Force of the gear on its bearing; x points from pinion to wheel."
+    caption += f" No net force on {', '.join(quiet)}: below {floor:.2g} N." if quiet else ""
     return Plot("bearing", "Bearing forces", caption, over_time(panels), columns(trace, names))
+
+
+def axial_and_tilting(trace: Trace) -> Plot | None:
+    """Axial forces and tilting moments of bearings and pins over time; None where there are hardly any, as of spur
+    gears."""
+    floor, panels, names = noise_floor(trace), [], []
+    for kind, where in (("bearing", "on bearings"), ("pin", "on the planets' pins")):
+        for ends, scale, label, least in (
+            (("fz",), 1e-3, f"axial force {where} in kN", floor),
+            (("mx", "my"), 1.0, f"tilting moment {where} in N·m", floor * LEVER),
+        ):
+            own = [n for n in trace.channels if n.startswith(f"{kind}.") and n.split(".")[-1] in ends]
+            own = [name for name in own if np.abs(trace[name]).max() > least]
+            if own:
+                panels.append(Panel(label, channels(trace, own, scale, label.rsplit(maxsplit=1)[-1]), height=170))
+                names += own
+    if not panels:
+        return None
+    caption = "Along and about the fixed axes x, y and z; those of pins turn with the carrier."
+    title = "Axial forces and tilting moments"
+    return Plot("axial", title, caption, over_time(panels), columns(trace, names))
 
 
 def channels(trace: Trace, names: Iterable[str], scale: float = 1.0, unit: str | None = None) -> tuple[Curve, ...]:

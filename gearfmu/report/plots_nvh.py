@@ -10,7 +10,7 @@ from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Heat, Mark, Panel, Plot, level_limits, over_time
 from gearfmu.report.names import shown
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import Window, bearings, meshes
+from gearfmu.report.signals import Window, bearings, meshes, noise_floor
 from gearfmu.stage.trace import Trace
 
 RANGE_DB = 90
@@ -24,11 +24,13 @@ SHOWN_TO = 12e3  # Hz; the data go on to half the sampling rate
 
 def force_channels(trace: Trace) -> list[str]:
     """The channels whose sound matters: bearing forces, then mesh forces. Where the mean over the communication step
-    was recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back."""
+    was recorded ("…_mean") it stands for the sample at its end: averaging weakens what would fold back. Forces that
+    cancel are left out (`noise_floor`)."""
     names = [f"bearing.{name}.{direction}" for name in bearings(trace) for direction in ("fx", "fy")]
     names += [f"{mesh}.force" for mesh in meshes(trace)]
     best = [next((n for n in (f"{name}_mean", name) if n in trace), None) for name in names]
-    return [name for name in best if name is not None]
+    floor = noise_floor(trace)
+    return [name for name in best if name is not None and np.abs(trace[name]).max() >= floor]
 
 
 def averaging(trace: Trace, name: str) -> float:

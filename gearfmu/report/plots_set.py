@@ -10,9 +10,10 @@ import numpy as np
 
 from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Mark, Panel, Plot, level_limits, over_time
+from gearfmu.report.names import mesh_words
 from gearfmu.report.plots import channels, columns
 from gearfmu.report.plots_nvh import SHOWN_TO, segment, spectrum_curve
-from gearfmu.report.signals import GEAR_SPEED, Window
+from gearfmu.report.signals import GEAR_SPEED, Window, noise_floor
 from gearfmu.spec.turning import Meshing
 from gearfmu.stage.trace import Trace
 
@@ -85,7 +86,7 @@ def _opened(part: Trace, own: PlanetSet) -> str:
 def shares(trace: Trace, own: PlanetSet, window: Window) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     """Share of every engagement in the force of its central gear, 1 where all planets carry alike: over time (n,), mean
     over one mesh period, NaN where that would reach beyond the run; and mean over `window`."""
-    period = max(1, round(2 * np.pi / _mesh_speed(trace, own) / metrics.sample_step(trace.time)))
+    period = max(1, round(2 * np.pi / mesh_speed(trace, own) / metrics.sample_step(trace.time)))
     inside = (trace.time >= window.start) & (trace.time <= window.end)
     over_time, means = {}, {}
     for meshes in own.meshes.values():
@@ -235,7 +236,7 @@ def spectrum(trace: Trace, own: PlanetSet, window: Window) -> Plot:
         n: metrics.amplitude_spectrum(v, step, size, step if f"{n}_mean" in part else 0.0)
         for n, v in (signals | fixed).items()
     }
-    mesh_frequency = _mesh_speed(part, own) / (2 * np.pi)
+    mesh_frequency = mesh_speed(part, own) / (2 * np.pi)
     speed = np.abs(part[f"{own.carrier}{GEAR_SPEED}"])
     carrier = float(np.median(speed)) / (2 * np.pi)
     steady = np.ptp(np.percentile(speed, [5, 95])) < STEADY * np.median(speed)
@@ -282,20 +283,22 @@ def results(trace: Trace, own: PlanetSet, window: Window) -> tuple[tuple[str, ..
             pin = [part[name] for d in "xy" if (name := f"pin.{planet}.f{d}") in part]
             held = float(np.mean(np.hypot(*pin))) if len(pin) == 2 else np.nan
             numbers = (np.mean(force), np.std(force), means[mesh], np.mean(te), np.std(te), held)
-            rows.append((mesh, *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
+            rows.append((mesh_words(mesh), *("–" if np.isnan(number) else f"{number:.4g}" for number in numbers)))
     head = ("mesh", "force, N", "alternating, N rms", "share", "TE, µm", "TE alternating, µm rms", "pin force, N")
     return head, rows
 
 
 def detail_window(trace: Trace, own: PlanetSet, window: Window, periods: float = 8) -> tuple[float, float]:
     """The last mesh periods (s) of the run, within `window`."""
-    width = periods * 2 * np.pi / _mesh_speed(trace, own)
+    width = periods * 2 * np.pi / mesh_speed(trace, own)
     return max(window.start, window.end - width), window.end
 
 
 def on_mounts(part: Trace) -> dict[str, np.ndarray]:
-    """Force of the ring on its mounts, N, along the fixed axes x and y, by name."""
-    return {name: mean_or_sample(part, name) for name in ("bearing.ring.fx", "bearing.ring.fy") if name in part}
+    """Force of the ring on its mounts, N, along the fixed axes x and y, by name; none where it cancels."""
+    known = {name: mean_or_sample(part, name) for name in ("bearing.ring.fx", "bearing.ring.fy") if name in part}
+    floor = noise_floor(part)
+    return known if any(np.abs(values).max() >= floor for values in known.values()) else {}
 
 
 def _force(trace: Trace, mesh: str) -> np.ndarray:
@@ -307,7 +310,7 @@ def mean_or_sample(trace: Trace, name: str) -> np.ndarray:
     return trace[f"{name}_mean"] if f"{name}_mean" in trace else trace[name]
 
 
-def _mesh_speed(trace: Trace, own: PlanetSet) -> float:
+def mesh_speed(trace: Trace, own: PlanetSet) -> float:
     """Median of the mesh frequency, rad/s."""
     turning: dict[str, Any] = {n: trace[f"{n}{GEAR_SPEED}"] for n in (own.meshing.rotor, own.carrier)}
     return max(float(np.median(np.abs(own.meshing.relative(turning)))) * own.meshing.teeth, 1e-9)

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from gearfmu.report import page, plots_nvh, plots_set
+from gearfmu.report import heading, page, plots_nvh, plots_set
 from gearfmu.report.levels import HEADER, fingerprint, levels_path, read_levels, shown_rows
 from gearfmu.report.metrics import MetricsError
-from gearfmu.report.names import plain
+from gearfmu.report.names import mesh_words, plain
 from gearfmu.report.plots import RPM
 from gearfmu.report.results import dynamic_factors, key_results
 from gearfmu.report.run import Run
-from gearfmu.report.signals import SETTLED, bearings, meshes
+from gearfmu.report.signals import SETTLED, bearings, meshes, noise_floor
 from gearfmu.stage.trace import Trace
 
 WORDS = {  # key of a result: words, channel of the mesh, unit
@@ -47,7 +47,7 @@ def tiles(run: Run) -> list[tuple[str, str, str]]:
         known = {mesh: results[own] for mesh in names if (own := _key(mesh, key, names)) in results}
         if known:
             mesh = max(known, key=lambda name: abs(known[name]))
-            where = f", {mesh} (the largest)" if len(known) > 1 and known[mesh] else ""
+            where = f", {mesh_words(mesh)} (the largest)" if len(known) > 1 and known[mesh] else ""
             found.append((f"{abs(known[mesh]) * scale:.3g}", unit, f"{words}{where}"))
     if run.planets is not None:
         found += _most_loaded(run)
@@ -58,6 +58,7 @@ def tiles(run: Run) -> list[tuple[str, str, str]]:
     }
     if loudest:
         name = max(loudest, key=lambda bearing: loudest[bearing])
+    if loudest and loudest[name] >= noise_floor(run.trace):
         found.append((f"{loudest[name]:.3g}", "N rms", f"alternating bearing force, {name}"))
     if "lock_time_s" in results:
         found.append((f"{results['lock_time_s']:.4g}", "s", "clutch locked from here on"))
@@ -71,7 +72,7 @@ def _most_loaded(run: Run) -> list[tuple[str, str, str]]:
     except MetricsError:
         return []
     mesh = max(means, key=lambda name: means[name])
-    return [(f"{means[mesh]:.3f}", "", f"largest share of a planet, {mesh} (1: all alike)")]
+    return [(f"{means[mesh]:.3f}", "", f"largest share of a planet, {mesh_words(mesh)} (1: all alike)")]
 
 
 def _key(mesh: str, key: str, names: Sequence[str]) -> str:
@@ -82,7 +83,9 @@ def results(run: Run) -> str:
     """The table of key results."""
     names = meshes(run.trace)
     values = {**key_results(run.trace), **dynamic_factors(run.trace)}
-    rows = "".join(_row(key, value, names) for key, value in values.items())
+    floor = noise_floor(run.trace)
+    noise = {key for key, value in values.items() if key.endswith("rms_ac_N") and value < floor}
+    rows = "".join(_row(key, 0.0 if key in noise else value, names) for key, value in values.items())
     if not rows:
         return page.note("The trace holds no mesh or bearing channel.")
     window = run.window
@@ -92,6 +95,7 @@ def results(run: Run) -> str:
     where += FACTOR_WORDS + (
         "Static: the mean." if steady else "Static: the moving average of 10 ms, where it is a tenth of its largest."
     )
+    where += f" Forces below {floor:.2g} N, 1e-4 of the largest mesh force, are shown as 0." if noise else ""
     head = '<tr><th></th><th>channel</th><th class="n">value</th><th>unit</th></tr>'
     return f'<div class="scroll"><table>{head}{rows}</table></div>{page.note(where)}'
 
@@ -110,7 +114,7 @@ def result_words(key: str, names: Sequence[str]) -> tuple[str, str, str]:
     inner = key.removeprefix(f"{mesh}_") if mesh else key
     if inner in WORDS:
         words, channel, unit = WORDS[inner]
-        return f"{words}, {mesh}" if mesh else words, f"{mesh or names[0]}.{channel}", unit
+        return f"{words}, {mesh_words(mesh)}" if mesh else words, f"{mesh or names[0]}.{channel}", unit
     if inner == "lock_time_s":
         return "Clutch locked from", "*.locked", "s"
     bearing = inner.removeprefix("bearing_").removesuffix("_rms_ac_N")
@@ -131,8 +135,9 @@ def planets(run: Run) -> list[str]:
         f"From {window.start:.4g} s to {window.end:.4g} s, {window.reason}. Share: 1 where all planets carry alike. "
     )
     factors = [v for v in dynamic_factors(run.trace).values() if math.isfinite(v)]
-    where += f"{FACTOR_WORDS}Largest of all meshes: {max(factors):.4g}." if factors else ""
-    return [page.section("Planets", table, page.note(where), name="results")]
+    where += FACTOR_WORDS if factors else ""
+    numbers = page.table(("", ""), heading.of_set(run), (0, 1))
+    return [page.section("Key numbers", numbers, name="results"), page.section("Planets", table, page.note(where))]
 
 
 def warned(trace: Trace) -> list[str]:
@@ -155,7 +160,7 @@ def octaves(run: Run) -> str:
     bands = list(dict.fromkeys(band for row in levels.values() for band in row))
     if not bands:
         return ""
-    rows = [(name, *(f"{row[band]:.1f}" for band in bands)) for name, row in levels.items()]
+    rows = [(plain(name) or name, *(f"{row[band]:.1f}" for band in bands)) for name, row in levels.items()]
     return page.note("Level in dB re 1 N (rms) over the window of the results.") + page.table(
         ("Hz", *(f"{band:g}" for band in bands)), rows
     )

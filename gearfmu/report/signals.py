@@ -17,6 +17,7 @@ GEAR_SPEED = ".gear.w"
 GEAR_PHI = ".gear.phi"
 LOCKED = ".locked"
 MESH_CHANNELS = ("force", "force_mean", "te", "contact", "impacts")
+NOISE = 1e-4  # of the largest mesh force: forces that cancel leave less
 SETTLED = "after the scene's settling time"
 
 
@@ -40,6 +41,12 @@ def meshes(trace: Trace) -> list[str]:
     """Names of the engagements, in the trace's order: all X with a channel as X.force; that of a pair is "mesh"."""
     found = (name.split(".") for name in trace.channels)
     return list(dict.fromkeys(parts[0] for parts in found if len(parts) == 2 and parts[1] in MESH_CHANNELS))
+
+
+def noise_floor(trace: Trace) -> float:
+    """N: forces below it are rounding and tolerances of the solver, NOISE times the largest mesh force; 0 without."""
+    forces = [f"{mesh}.force" for mesh in meshes(trace) if f"{mesh}.force" in trace]
+    return NOISE * max((float(np.abs(trace[name]).max()) for name in forces), default=0.0)
 
 
 def known_meshings(trace: Trace, spec: Any = None) -> dict[str, Meshing]:

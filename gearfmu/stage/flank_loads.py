@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearfmu.kernel import Kernel
 from gearfmu.stage.limits import limit_named
 from gearfmu.stage.meshes import direction_of, mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.model import StageModel
@@ -42,10 +43,13 @@ class FlankLoads:
         return found * self.width.size / self.face_width
 
 
-def flank_loads(model: StageModel, torque: float, mesh: str, positions: int = 24, **parameters: float) -> FlankLoads:
+def flank_loads(
+    model: StageModel, torque: float, mesh: str, positions: int = 24, kernel: Kernel | None = None
+) -> FlankLoads:
     """Statics of `loaded_te` under `torque` (N·m on the input), with the forces that its sums are made of. positions:
-    over one pitch, end point left out. SimulationError where there is no equilibrium."""
-    kernel, place = statics_of(model, **parameters), place_of(model, mesh)
+    over one pitch, end point left out. kernel: of `statics_of`, one for several meshes; a new one when None.
+    SimulationError where there is no equilibrium."""
+    kernel, place = kernel or statics_of(model), place_of(model, mesh)
     stage = model.stage
     engagement = stage.engagements[place.number]
     pair = mesh_geometry(stage, engagement)

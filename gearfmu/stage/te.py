@@ -27,7 +27,8 @@ class TeResult:
     mesh alone, tangent dF/dte with F along the line of action and the bores held on their axes · stage_stiffness (T, P)
     N/m, the same tangent with shafts and bearings; with rigid bearings it is the mesh stiffness
     · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come
-    into mesh: a pair keeps its column through the pitch, sorted by tooth number.
+    into mesh: a pair keeps its column through the pitch, sorted by tooth number
+    · over_width (T, S): force of each slice over the mean of all slices, mean over the positions.
     """
 
     torque: np.ndarray
@@ -36,6 +37,7 @@ class TeResult:
     mesh_stiffness: np.ndarray
     stage_stiffness: np.ndarray
     shares: np.ndarray
+    over_width: np.ndarray
 
     def harmonics(self, count: int = 5) -> np.ndarray:
         """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
@@ -96,6 +98,7 @@ def loaded_te(
     position, least = np.arange(pitches * positions) / positions, LEAST * place.most
     te, alone, whole = np.empty((3, len(torques), position.size))
     shares = np.zeros((len(torques), position.size, SHARES))
+    carried_by = np.zeros((len(torques), int(kernel.get("slices"))))
     for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
         carried = torque if abs(torque) >= least else math.copysign(least, torque)
         at = -part * place.pitch
@@ -106,7 +109,9 @@ def loaded_te(
         te[i, j] = state.te + (torque - carried) / tangent
         alone[i, j], whole[i, j] = firm / place.lever, tangent / place.lever
         shares[i, j] = _shares(state, int(part))
-    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares)
+        carried_by[i] += np.sum(list(state.forces.values()), axis=0)
+    mean = np.maximum(np.abs(carried_by).mean(axis=1, keepdims=True), 1e-300)
+    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares, np.abs(carried_by) / mean)
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:

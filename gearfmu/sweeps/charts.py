@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from gearfmu.files import written_whole
 from gearfmu.report.metrics import level
 from gearfmu.report.style import panels, styled
 from gearfmu.report.te import write_plot
+from gearfmu.stage.te import mesh_harmonics
 from gearfmu.sweeps.table import SweepTable
 
 TORQUE, SPEED = "torque_Nm", "speed_rad_s"
@@ -28,14 +30,14 @@ def write_charts(table: SweepTable, out: Path) -> list[Path]:
     over torque. levels : of mesh force and bearing forces, their alternating part in dB re 1 N rms, as a map over two
     swept keys or curves over one. Further swept keys are held at the values of the first point; titles name them.
     """
-    axes = [name for name in table.axes if _numeric(table, name)]
+    axes = numeric_axes(table)
     found: list[Path] = []
     if not np.any(table["outcome"] == "ok"):
         return []
     if TORQUE in axes and table.curves:
         found += [_harris(table, out / "harris.png"), _orders(table, out / "te_orders.png")]
     if axes and any(name.endswith("_rms_ac_N") for name in table.columns):
-        found.append(_levels(table, _by_torque(axes), out / "levels.png"))
+        found.append(_levels(table, axes, out / "levels.png"))
     return found
 
 
@@ -64,6 +66,7 @@ def _harris(table: SweepTable, path: Path) -> Path:
         mesh_stiffness=1e6 * np.array(mesh[: len(parts)]) if mesh else None,
         stage_stiffness=1e6 * np.array(stage[: len(parts)]),
     )
+    result.harmonics = partial(mesh_harmonics, result.te, pitches=int(result.position[-1]) + 1)
     write_plot(result, path)
     return path
 
@@ -101,49 +104,48 @@ def _levels(table: SweepTable, axes: list[str], path: Path) -> Path:
                 _map(figure, axis, table, rows, axes, name)
         else:
             for name in names:
-                x = _ticks(table, axes[0])[rows]
+                x = ticks_of(table, axes[0])[rows]
                 panes[0].plot(x, level(table[name][rows]), marker=".", label=_plain(name))
             panes[0].set_ylabel("level in dB re 1 N")
             panes[0].legend()
         panes[0].set_title(title)
-        panes[-1].set_xlabel(_label(axes[0]))
+        panes[-1].set_xlabel(label_of(axes[0]))
         _save(figure, path)
     return path
 
 
 def _map(figure: Any, axis: Any, table: SweepTable, rows: np.ndarray, axes: list[str], name: str) -> None:
     """One colour map: the first key to the right, the second upwards."""
-    x, y = (_ticks(table, key)[rows] for key in axes[:2])
+    x, y = (ticks_of(table, key)[rows] for key in axes[:2])
     right, up = np.unique(x), np.unique(y)
     grid = np.full((up.size, right.size), np.nan)
     grid[np.searchsorted(up, y), np.searchsorted(right, x)] = level(table[name][rows])
     image = axis.pcolormesh(right, up, grid, shading="nearest")
     axis.grid(False)
-    axis.set_ylabel(_label(axes[1]))
+    axis.set_ylabel(label_of(axes[1]))
     figure.colorbar(image, ax=axis, label=f"{_plain(name)}\ndB re 1 N")
 
 
-def _by_torque(axes: list[str]) -> list[str]:
-    """Speed to the right and torque upwards where both are swept."""
+def numeric_axes(table: SweepTable) -> list[str]:
+    """The swept keys that are numbers; speed to the right and torque upwards where both are swept."""
+    axes = [name for name in table.axes if table[name].dtype.kind in "if"]
     order = {SPEED: -1, TORQUE: 1}
     return sorted(axes, key=lambda name: order.get(name, 0)) if {SPEED, TORQUE} <= set(axes) else axes
 
 
-def _ticks(table: SweepTable, name: str) -> np.ndarray:
+def ticks_of(table: SweepTable, name: str) -> np.ndarray:
+    """(n,) values of a swept key in the unit that is shown."""
     return table[name] * RPM if name == SPEED else table[name]
 
 
-def _label(name: str) -> str:
+def label_of(name: str) -> str:
+    """A swept key with its unit, for an axis."""
     return LABELS.get(name, name)
 
 
 def _plain(name: str) -> str:
     """ "bearing pinion" of "bearing_pinion_rms_ac_N"."""
     return name.removesuffix("_rms_ac_N").replace("_", " ")
-
-
-def _numeric(table: SweepTable, name: str) -> bool:
-    return table[name].dtype.kind in "if"
 
 
 def _save(figure: Any, path: Path) -> None:

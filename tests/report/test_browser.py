@@ -89,6 +89,14 @@ def test_the_turning_view_moves_by_the_displacement_of_the_picture(opened: Brows
     assert max(apart) < 0.02
 
 
+def test_the_turning_view_is_shown_with_its_time_and_scale_once_it_is_drawn(opened: Browser) -> None:
+    assert opened.value("document.querySelector('#stage').classList.contains('drawn')")
+    assert opened.value("getComputedStyle(document.querySelector('#stage .wait')).visibility") == "hidden"
+    assert "µm" in opened.value("document.querySelector('.legend').textContent")
+    time = opened.value("document.querySelector('#stage output').textContent")
+    assert time.removesuffix(" ms").replace(".", "").isdigit(), time
+
+
 def test_it_turns(opened: Browser) -> None:
     opened.value("gearfmuPage.stage.state.at = 0, gearfmuPage.stage.run(true), 1")
     opened.value("new Promise(done => setTimeout(done, 700)).then(() => 1)")

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from gearfmu.body import load_bodies
-from gearfmu.report.mesh_cycle import BINS, contact_pattern, face_load_factor, folded, static_loads, transmission_error
+from gearfmu.report.mesh_cycle import (
+    BINS,
+    contact_pattern,
+    face_load_factor,
+    folded,
+    over_width,
+    static_loads,
+    transmission_error,
+)
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.signals import Window, window_of_interest
 from gearfmu.spec.expand import as_general
@@ -130,3 +138,11 @@ def test_no_statics_without_a_load() -> None:
     spec = load_stage("fzg_c")
     trace = steady(np.full(100, 0.1), np.arange(100.0))
     assert static_loads(trace, Window(0, 99, "here"), ["mesh"], spec, load_bodies(spec)) == ({}, [])
+
+
+def test_load_over_the_width_is_smooth_and_goes_through_the_slices() -> None:
+    """Linear loads come out exactly up to both ends; a step makes neither overshoot nor pull."""
+    middles, places = np.linspace(-0.4, 0.4, 5), np.linspace(-0.5, 0.5, 41)
+    found = over_width(np.stack([3 + 2 * middles, np.array([0.0, 0.0, 5.0, 5.0, 5.0])]), middles, places)
+    assert found[0] == pytest.approx(3 + 2 * places) and found[1].min() >= 0 and found[1].max() <= 5 + 1e-12
+    assert found[1, [4, 12, 20, 28, 36]] == pytest.approx([0, 0, 5, 5, 5])

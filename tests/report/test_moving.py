@@ -13,6 +13,7 @@ from gearfmu.geometry import PairGeometry
 from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack, unpacked
 from gearfmu.report.picture import contacts_at, meshing_angles
+from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.meshes import mesh_geometry
@@ -124,3 +125,25 @@ def test_planets_stand_between_sun_and_ring() -> None:
                 x, y, _ = body.place
                 spots.append(complex(x[frame], y[frame]) + (geometry.r_b + 1j * sg * roll) * np.exp(1j * t))
             assert abs(spots[0] - spots[1]) < 5e-6, mesh.name
+
+
+def test_shafts_and_carriers_of_the_stage_are_drawn_with_its_measures() -> None:
+    """A shaft of its cylinders' radii; a carrier's bolts on the axes of its planets, all round its own axis."""
+    train = as_general(load_stage("two_stage"))
+    shafts = {name: (rotor, profile) for name, rotor, profile, _, _ in parts(train)}
+    assert set(shafts) == {"input_shaft", "intermediate_shaft", "output_shaft"}
+    rotor, profile = shafts["input_shaft"]
+    body = train.bodies["input_shaft"]
+    assert rotor == "input" and max(z for _, z in profile) == pytest.approx(body.length)
+    assert max(radius for radius, _ in profile) == max(0.5 * s.outer_diameter for s in body.sections)
+    planets = as_general(load_stage("planetary54"))
+    found = {name: axis for name, rotor, _, axis, _ in parts(planets) if rotor == "carrier"}
+    bolts = [axis for name, axis in found.items() if "bolt" in name]
+    assert len(found) == 5 and [math.hypot(*axis) for axis in bolts] == pytest.approx([0.045] * 4)
+    points, quads, ahead = turned(profile)
+    assert len(points) == AROUND * len(profile) and len(quads) == len(ahead) == len(profile) - 1
+
+
+def test_a_pair_without_shafts_has_its_gears_alone(view: View) -> None:
+    assert [body.name for body in view.bodies] == ["pinion", "wheel"]
+    assert "shafts" not in view.caption

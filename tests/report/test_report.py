@@ -18,6 +18,7 @@ from gearfmu.report.signals import lock_time, spans, window_of_interest
 from gearfmu.stage.trace import Channel, Trace
 
 STEP, SAMPLES = 1e-4, 3000
+AXIAL = {"fz": "N", "mx": "N.m", "my": "N.m"}
 ALL = ("torque", "speed", "mesh", "mesh_detail", "bearing", "spectrum", "orders", "spectrogram")
 
 
@@ -193,6 +194,31 @@ def test_uneven_sampling_is_said_and_the_rest_is_shown(tmp_path: Path) -> None:
         and (tmp_path / "data" / "mesh.csv").is_file()
         and not (tmp_path / "data" / "spectrum.csv").exists()
     )
+
+
+def test_heading_names_stage_and_operating_point_of_the_window(folder: Path) -> None:
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<h1>pair, 1910 rpm<" in text and "<p>closure</p>" in text
+
+
+def test_without_a_clutch_there_is_no_chapter_of_its_slip(folder: Path, tmp_path: Path) -> None:
+    whole = coupled_run()
+    kept = {n: c for n, c in whole.channels.items() if "clutch" not in n}
+    alone = Trace(whole.time, {**kept, "pinion.tau": Channel(np.full(SAMPLES, 120.0), "N.m")}, whole.meta)
+    page = report.write(alone, SUMMARY, tmp_path).read_text(encoding="utf-8")
+    assert "<h2>Torques</h2>" in page and "slip" not in page[: page.index("<h2>Accuracy")]
+    assert "<h2>Torques and slip</h2>" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "<h1>pair, 120 N·m, " in page
+
+
+def test_axial_forces_and_tilting_moments_have_a_figure_where_there_are_any(folder: Path, tmp_path: Path) -> None:
+    whole = coupled_run()
+    loads = {f"bearing.pinion.{end}": Channel(0.3 * whole["mesh.force"], unit) for end, unit in AXIAL.items()}
+    trace = Trace(whole.time, {**whole.channels, **loads}, whole.meta)
+    page = report.write(trace, SUMMARY, tmp_path).read_text(encoding="utf-8")
+    assert "<h2>Axial forces and tilting moments</h2>" in page
+    assert "tilting moment on bearings in N·m" in page and (tmp_path / "data" / "axial.csv").is_file()
+    assert not (folder / "data" / "axial.csv").exists()
 
 
 def test_named_failure_is_shown_as_such(tmp_path: Path) -> None:

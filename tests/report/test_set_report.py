@@ -58,13 +58,40 @@ def test_a_set_shows_its_planets_side_by_side(tmp_path: Path) -> None:
     assert sorted(p.stem for p in (tmp_path / "data").glob("*.csv")) == sorted(FIGURES)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     table = text[text.index("<h2>Planets") :]
-    cells = dict(re.findall(r"<tr><td>(\w+)</td>(.*?)</tr>", table))
-    rows = {mesh: re.findall(r">([^<]+)</td>", numbers) for mesh, numbers in cells.items() if "_planet" in mesh}
+    cells = dict(re.findall(r"<tr><td>([\w –]+)</td>(.*?)</tr>", table))
+    rows = {mesh: re.findall(r">([^<]+)</td>", numbers) for mesh, numbers in cells.items() if " – planet" in mesh}
     assert len(rows) == 8
-    for mesh, share in (("ring_planet3", 1.05), ("sun_planet2", -0.9)):
+    for mesh, share in (("ring – planet 3", 1.05), ("sun – planet 2", -0.9)):
         wanted = [1e3 * share, 35.355, abs(share), 10 * share, 0.35355, 1e3 * abs(share)]
         assert [float(cell) for cell in rows[mesh]] == pytest.approx(wanted, rel=1e-3), mesh
     assert "Deformed" not in text and "planet4.gear.w" in text
+
+
+def test_a_set_begins_with_its_operating_point_and_key_numbers(tmp_path: Path) -> None:
+    trace = set_run()
+    report.write(trace, trace.meta, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert re.search(r"<h1>set, 600 N·m, 812 rpm<", text), "stage, torque and speed of the input"
+    table = text[text.index("<h2>Key numbers") : text.index("<h2>Planets")]
+    found = dict(re.findall(r"<tr><td>([^<]+)</td><td>([^<]+)</td></tr>", table))
+    assert found["Torques, mean"] == "sun −150 N·m, carrier 600 N·m"
+    assert found["Speeds, mean"] == "sun 3247 rpm, carrier 811.7 rpm"
+    assert found["Ratio, speed of the sun over that of the carrier"] == "4"
+    assert float(found["Mesh frequency"].split()[0]) == pytest.approx(MESH, rel=1e-3)
+    assert found["K_γ at the sun, largest mean share"] == "1.100 (sun – planet 1)"
+    assert float(found["Dynamic factor, largest"].split()[0]) == pytest.approx(1 + 0.05 / 0.9, rel=1e-2)
+
+
+def test_forces_that_cancel_are_no_result(tmp_path: Path) -> None:
+    """A ring whose forces cancel to 1e-6 of the mesh force has no chart, no level and no tile."""
+    trace = set_run()
+    quiet = {name: Channel(1e-5 * trace[name], "N") for name in ("bearing.ring.fx", "bearing.ring.fy")}
+    trace = Trace(trace.time, {**trace.channels, **quiet}, trace.meta)
+    report.write(trace, trace.meta, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "alternating bearing force" not in text and not (tmp_path / "data" / "bearing.csv").exists()
+    header = (tmp_path / "data" / "spectrum.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "bearing.ring" not in header and "sun_planet1" in header
 
 
 def test_shares_are_means_over_a_mesh_period_and_of_the_window() -> None:

@@ -4,7 +4,7 @@
 window.gearfmuStage = (stage, array, colour) => {
   const place = document.getElementById("stage"), canvas = place.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
-  if (!gl) { place.querySelector(".note").textContent = "This browser has no WebGL 2: the turning view is left out."; return; }
+  if (!gl) { place.classList.add("none"); place.querySelector("figcaption").textContent = "This browser has no WebGL 2: the turning view is left out."; return; }
   const time = array(stage.time), last = time.length - 1, state = { at: 0, scale: stage.scale, yaw: -0.3, pitch: 0.35, zoom: 1, close: false, running: false };
 
   const VERTEX = `#version 300 es
@@ -13,12 +13,12 @@ window.gearfmuStage = (stage, array, colour) => {
     void main() { vec3 p = base + enlarge * moved; p = vec3(turn.x * p.x - turn.y * p.y, turn.y * p.x + turn.x * p.y, p.z) + origin;
       seen = view * p; value = length(moved) / most; gl_Position = vec4(seen.xy * frame.xy, -seen.z * frame.z - line * 4e-3, 1.0); }`;
   const FRAGMENT = `#version 300 es
-    precision highp float; in vec3 seen; in float value; uniform highp float line; out vec4 colour;
+    precision highp float; in vec3 seen; in float value; uniform highp float line, tone; out vec4 colour;
     vec3 ramp(float v) { vec3 c[5] = vec3[5](vec3(.839,.863,.89), vec3(.64,.749,.847), vec3(.31,.533,.722), vec3(.886,.651,.243), vec3(.733,.227,.149));
       float k = clamp(v, 0., 1.) * 4.; int i = int(min(floor(k), 3.)); return mix(c[i], c[i + 1], k - float(i)); }
     void main() { vec3 n = normalize(cross(dFdx(seen), dFdy(seen))); if (n.z < 0.) n = -n;
       float light = .7 + .4 * max(dot(n, normalize(vec3(-.4, .6, .7))), 0.);
-      vec3 c = ramp(value); colour = line > .5 ? vec4(vec3(.1, .15, .2) * .22, .22) : vec4(c * light, 1.); }`;
+      vec3 c = tone > 0. ? tone * vec3(.42, .46, .52) : ramp(value); colour = line > .5 ? vec4(vec3(.1, .15, .2) * .22, .22) : vec4(c * light, 1.); }`;
 
   function shader(kind, text) {
     const found = gl.createShader(kind);
@@ -117,6 +117,7 @@ window.gearfmuStage = (stage, array, colour) => {
       gl.uniform2f(at("turn"), Math.cos(angle), Math.sin(angle));
       gl.uniform3f(at("origin"), between(array(body.own.x), k, part) - centre[0], between(array(body.own.y), k, part) - centre[1], body.own.z - middle);
       gl.uniform1f(at("enlarge"), state.scale);
+      gl.uniform1f(at("tone"), body.own.tone || 0);
       gl.bindBuffer(gl.ARRAY_BUFFER, body.bases);
       gl.enableVertexAttribArray(BASE);
       gl.vertexAttribPointer(BASE, 3, gl.FLOAT, false, 0, 0);
@@ -129,12 +130,13 @@ window.gearfmuStage = (stage, array, colour) => {
       gl.uniform1f(at("line"), 0);
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, body.faces);
       gl.drawElements(gl.TRIANGLES, body.nFaces, gl.UNSIGNED_INT, 0);
-      if (state.close || bodies.length < 3) {
+      if (!body.own.tone && (state.close || bodies.length < 3)) {
         gl.uniform1f(at("line"), 1);
         gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, body.lines);
         gl.drawElements(gl.LINES, body.nLines, gl.UNSIGNED_INT, 0);
       }
     }
+    place.classList.add("drawn");
     place.querySelector("output").textContent = `${(1e3 * between(time, k, part)).toFixed(2)} ms`;
     place.querySelector(".factor").textContent = `${state.scale.toPrecision(3).replace(/\.?0+$/, "")}×`;
   }
@@ -143,7 +145,7 @@ window.gearfmuStage = (stage, array, colour) => {
   let before = 0;
   function step(now) {
     if (!state.running) return;
-    state.at = (state.at + Math.min(now - before, 100) / 1e3 / seconds * last) % last;
+    state.at = (state.at + Math.max(0, Math.min(now - before, 100)) / 1e3 / seconds * last) % last;
     before = now;
     slider.value = String(state.at / last);
     draw();

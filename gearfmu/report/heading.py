@@ -1,0 +1,120 @@
+"""What a report begins with: the stage and its operating point, and the key numbers of a planetary set."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gearfmu.report import plots_set
+from gearfmu.report.metrics import MetricsError
+from gearfmu.report.names import mesh_words
+from gearfmu.report.plots import RPM
+from gearfmu.report.results import dynamic_factors
+from gearfmu.report.run import Run
+from gearfmu.report.signals import GEAR_SPEED
+from gearfmu.stage.trace import Trace
+
+STEADY = 0.1  # nine tenths of the samples lie as close together, over their median
+
+
+def title(run: Run) -> str:
+    """ "fzg_c/stage_relief, 302 N·m, 2000 rpm": stage and operating point."""
+    return ", ".join([run.stage_name, *operating_point(run)])
+
+
+def operating_point(run: Run) -> list[str]:
+    """Torque and speed of the input within the window of the results, as far as they were recorded: one number where
+    they are steady, else the largest torque and the range of the speed."""
+    part = run.trace.window(run.window.start, run.window.end)
+    found = []
+    name = _input(part)
+    torque = next((n for n in (f"{name}.tau_mean", f"{name}.tau", f"drive.{name}.tau") if n in part), None)
+    if torque is not None and np.any(part[torque]):
+        values = np.abs(part[torque])
+        steady = float(np.mean(values)) if _steady(values) else None
+        found.append(f"{_round(steady):.5g} N·m" if steady is not None else f"up to {values.max():.4g} N·m")
+    speed = f"{name}{GEAR_SPEED}"
+    if speed in part and np.any(part[speed]):
+        values = np.abs(part[speed]) * RPM
+        low, high = (f"{_round(float(v)):.5g}" for v in (values.min(), values.max()))
+        found.append(f"{_round(float(np.mean(values))):.5g} rpm" if _steady(values) else f"{low} … {high} rpm")
+    return found
+
+
+def _round(value: float) -> float:
+    """Three digits, of four digits before the point four."""
+    return float(f"{value:.4g}") if value >= 1000 else float(f"{value:.3g}")
+
+
+def _steady(values: np.ndarray) -> bool:
+    low, high = np.percentile(values, [5, 95])
+    return bool(high - low < STEADY * np.median(values))
+
+
+def _input(trace: Trace) -> str:
+    """The first shaft with a torque and a speed, else the first gear with a speed."""
+    torques = [name.removesuffix(".tau").removeprefix("drive.") for name in trace.channels if name.endswith(".tau")]
+    known = [name for name in torques if f"{name}{GEAR_SPEED}" in trace]
+    speeds = [name.removesuffix(GEAR_SPEED) for name in trace.channels if name.endswith(GEAR_SPEED)]
+    return next(iter(known or speeds), "")
+
+
+def of_set(run: Run) -> list[tuple[str, str]]:
+    """Key numbers of a planetary set over the window: torques, speeds, ratio, mesh frequency, K_γ, dynamic factor;
+    those that were not recorded are left out."""
+    own = run.planets
+    assert own is not None
+    part, found = run.trace.window(run.window.start, run.window.end), []
+    bodies = ["sun", own.carrier, "ring"]
+    means = {
+        name: float(np.mean(part[n]))
+        for name in bodies
+        if (n := next((n for n in _torques(name) if n in part), "")) and np.any(part[n])
+    }
+    if means:
+        found.append(("Torques, mean", ", ".join(f"{name} {_minus(f'{v:.4g}')} N·m" for name, v in means.items())))
+    speeds = {n: float(np.mean(part[f"{n}{GEAR_SPEED}"])) for n in bodies if f"{n}{GEAR_SPEED}" in part}
+    if speeds:
+        words = ", ".join(f"{name} {_minus(f'{_round_to_rpm(v):.4g}')} rpm" for name, v in speeds.items())
+        found.append(("Speeds, mean", words))
+    if speeds.get("sun") and abs(speeds.get(own.carrier, 0.0)) > 1e-9:
+        found.append(("Ratio, speed of the sun over that of the carrier", f"{speeds['sun'] / speeds[own.carrier]:.4g}"))
+    frequency = plots_set.mesh_speed(part, own) / (2 * math.pi)
+    if frequency > 1e-3:
+        found.append(("Mesh frequency", f"{frequency:.4g} Hz"))
+    return found + _factors(run)
+
+
+def _torques(name: str) -> tuple[str, ...]:
+    """Channels with the torque on a shaft, or of the ring on its mounts."""
+    return f"{name}.tau_mean", f"{name}.tau", f"drive.{name}.tau", f"bearing.{name}.mz_mean", f"bearing.{name}.mz"
+
+
+def _round_to_rpm(speed: float) -> float:
+    """rpm; speeds of the elastic motion of a gear that is held are none."""
+    return speed * RPM if abs(speed * RPM) >= 0.05 else 0.0
+
+
+def _factors(run: Run) -> list[tuple[str, str]]:
+    assert run.planets is not None
+    found = []
+    try:
+        means = plots_set.shares(run.trace, run.planets, run.window)[1]
+    except MetricsError:
+        means = {}
+    for central, meshes in run.planets.meshes.items():
+        known = {mesh: means[mesh] for mesh in meshes.values() if mesh in means}
+        if known:
+            most = max(known, key=lambda mesh: known[mesh])
+            found.append((f"K_γ at the {central}, largest mean share", f"{known[most]:.3f} ({mesh_words(most)})"))
+    factors = {mesh: value for mesh, value in dynamic_factors(run.trace).items() if math.isfinite(value)}
+    if factors:
+        most = max(factors, key=lambda mesh: factors[mesh])
+        where = mesh_words(most.removesuffix("dynamic_factor").rstrip("_"))
+        found.append(("Dynamic factor, largest", f"{factors[most]:.3f}" + (f" ({where})" if where else "")))
+    return found
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "−")

@@ -1,0 +1,47 @@
+"""The picture of a loaded transmission error says what each torque does about its mean, the unloaded pair beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearfmu as gf
+from gearfmu.report.te import write_plot, write_set_plot
+from gearfmu.stage import loaded_te
+from gearfmu.stage.set_te import SetTeResult
+from gearfmu.stage.te import TeResult
+
+POSITION = np.arange(16) / 16
+TORQUE = np.array([50.0, 200.0])
+
+
+def made(torque: np.ndarray, te: np.ndarray) -> TeResult:
+    alike = np.ones((torque.size, POSITION.size))
+    return TeResult(torque, POSITION, te, alike, alike, np.ones((torque.size, 16, 4)), np.ones((torque.size, 5)))
+
+
+def test_every_torque_is_named_with_its_peak_to_peak_and_the_unloaded_one_beside(tmp_path: Path) -> None:
+    swing = np.cos(2 * np.pi * POSITION)
+    result = made(TORQUE, np.stack([30e-6 + 1.5e-6 * swing, 110e-6 + 0.25e-6 * swing]))
+    write_plot(result, tmp_path / "te.svg", made(np.zeros(1), 2e-7 * swing[None]))
+    seen = (tmp_path / "te.svg").read_text(encoding="utf-8")
+    assert "50 N·m: 3 µm peak to peak, mean 30 µm" in seen
+    assert "200 N·m: 0.5 µm peak to peak, mean 110 µm" in seen
+    assert "without load: 0.4 µm peak to peak" in seen
+    assert "harmonic of the mesh" in seen and "load per width over its mean" in seen
+
+
+def test_a_set_has_its_load_factor_over_the_torque(tmp_path: Path) -> None:
+    te, sharing = np.zeros((2, 16)), np.ones((2, 16, 2, 3))
+    sharing[1, 4, 0] = (1.2, 0.9, 0.9)
+    write_set_plot(SetTeResult(TORQUE, POSITION, te, te, sharing, np.ones((2, 16, 2))), tmp_path / "te.svg")
+    seen = (tmp_path / "te.svg").read_text(encoding="utf-8")
+    assert "mesh load factor K_γ" in seen and "planet 3" in seen
+
+
+def test_load_over_the_width_of_a_spur_pair_is_even_about_its_middle() -> None:
+    found = loaded_te(gf.assemble("fzg_c"), [302.0], positions=4).over_width
+    assert found.shape == (1, 5) and found.mean() == pytest.approx(1.0)
+    assert found[0] == pytest.approx(found[0, ::-1], rel=1e-6) and np.ptp(found) > 0
