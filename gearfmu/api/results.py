@@ -8,8 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import Unpack
+
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, Stage, load, model_of
+from gearfmu.api.settings import Settings
 from gearfmu.body import load_bodies
 from gearfmu.errors import GearfmuError
 from gearfmu.fmu.opened import read_fmu
@@ -27,7 +30,7 @@ def export(
     runtime: str = "native",
     platforms: Sequence[str] = ("host",),
     terminals: bool = True,
-    **starts: Any,
+    **starts: Unpack[Settings],
 ) -> Path:
     """Export a stage as an FMI 2.0 co-simulation FMU; returns its path.
 

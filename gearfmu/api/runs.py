@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
+
+from typing_extensions import Unpack
 
 from gearfmu import cosim
 from gearfmu.api.models import AnyStage, PathLike, Progress, Stage, load, load_scene, model_of, reduce
+from gearfmu.api.settings import RunSettings, Settings
 from gearfmu.cosim.scene_run import Staged
 from gearfmu.ranges import in_range, range_of
 from gearfmu.spec.expand import as_general
@@ -32,7 +35,7 @@ def te(
     rigid_bearings: bool = False,
     mesh: str | None = None,
     pitches: int = 1,
-    **settings: Any,
+    **settings: Unpack[Settings],
 ) -> TeResult | SetTeResult:
     """Quasi-static loaded transmission error over one pitch or more, output held, torque on the input (the first port).
 
@@ -62,7 +65,7 @@ def simulate(
     duration: Quantity | None = None,
     step: Quantity = 20e-6,
     settle: Quantity = 0.02,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> Trace:
     """Run a stage alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque.
@@ -97,7 +100,9 @@ def simulate(
     return steady_run(model, driven, parameters(model, settings))
 
 
-def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 20e-6, **settings: Any) -> Trace:
+def drive(
+    stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 20e-6, **settings: Unpack[Settings]
+) -> Trace:
     """Run a stage alone under inputs of one's own.
 
     inputs : time (s) → values by input name, SI ({"pinion.phi": …, "pinion.w": …}); asked at the start of each step.

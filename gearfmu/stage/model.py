@@ -16,15 +16,42 @@ from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.turning import Shafts, shafts_of
 from gearfmu.stage.blob import blob_hash, read_blob, write_blob
+from gearfmu.stage.shown import Card, grouped
+from gearfmu.units import quantity_text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StageModel:
     """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""
 
     spec: StageSpec | GeneralStage | PlanetarySpec
     blob: bytes
     body_hashes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return self._card.text
+
+    def _repr_html_(self) -> str:
+        return self._card.html
+
+    @property
+    def _card(self) -> Card:
+        known = self.kernel_variables()
+        meshes = [f"{mesh.name}: {' with '.join(mesh.gears)}" for mesh in self.stage.engagements]
+        ports = [f"{name}: {port.kind}" for name, port in self.stage.ports.items()]
+        names = {sort: [v.name for v in known if v.causality == sort] for sort in ("input", "parameter", "output")}
+        spec = self.spec
+        limits = () if isinstance(spec, GeneralStage) else ((spec.torque_max, "N*m"), (spec.speed_max, "rad/s"))
+        most = " and ".join(quantity_text(value, unit) for value, unit in limits if value is not None)
+        rows = [
+            ("ports", ", ".join(ports) + "; input first, then output"),
+            ("meshes", ", ".join(meshes)),
+            ("bodies", ", ".join(f"{name} {body[:8]}" for name, body in self.bodies.items())),
+            *((f"{sort}s", " ".join(f"{group}.({last})" if group else last for group, last in grouped(own)))
+              for sort, own in names.items()),
+            ("size", f"{len(self.blob) / 1e6:.2f} MB, model {self.hash[:12]}"),
+        ]  # fmt: skip
+        return Card(f"Stage {self.name} ({spec.kind}{', up to ' * bool(most)}{most}): {spec.description}", rows, 3)
 
     @property
     def name(self) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gearfmu.errors import ModelError, Problem, SpecError
+from gearfmu.errors import ModelError, Problem, SpecError, near_or_all
 from gearfmu.kernel import Variable
 from gearfmu.ranges import Range, range_of, range_problems
 from gearfmu.spec.profile import Profile
@@ -107,7 +108,7 @@ def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, floa
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     unknown = [name for name in settings if name not in known]
     if unknown:
-        raise ModelError(f"'{unknown[0]}' is no parameter; there are {', '.join(known)}")
+        raise ModelError(f"'{unknown[0]}' is no parameter: {near_or_all(unknown[0], known, 'there are', cutoff=0.6)}")
     found = {name: _number(known[name], value) for name, value in settings.items()}
     if problems := range_problems({name: (value, _range(known[name])) for name, value in found.items()}):
         raise SpecError(problems)
@@ -173,5 +174,7 @@ def _number(variable: Variable, value: Any) -> float:
     try:
         return float(value)
     except (TypeError, ValueError):
+        near = difflib.get_close_matches(str(value), words, n=1)
         expected = " | ".join(words) or f"a number in {variable.unit or 'plain form'}"
-        raise ModelError(f"{variable.name} = {value}: expected {expected}") from None
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise ModelError(f"{variable.name} = {value}: expected {expected}{hint}") from None

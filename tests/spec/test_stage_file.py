@@ -123,7 +123,7 @@ FIELD_PROBLEMS = [
     ({"pair.centre_distance": "91.5 mm"}, "pair.centre_distance", 'did you mean "center_distance"'),
     ({"zzz": 1}, "zzz", "unknown key: known are"),
     ({"source": "x"}, "source", "unknown key"),
-    ({"gears.wheel.face_width": 14}, "gears.wheel.face_width", 'write "14 m"'),
+    ({"gears.wheel.face_width": 14}, "gears.wheel.face_width", 'write "14 mm"'),
     ({"gears.wheel.face_width": "14 kg"}, "gears.wheel.face_width", "another kind"),
     ({"gears.wheel.face_width": "0 mm"}, "gears.wheel.face_width", "must be from 1 µm to 10000 mm"),
     ({"pair.backlash": "-0.01 mm"}, "pair.backlash", "must be from 0 mm to 10 mm"),
