@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias, TypedDict
 
 from gearfmu.api.models import PathLike
+from gearfmu.api.quantities import Quantity
 from gearfmu.spec.profile import Profile
 
 Level: TypeAlias = Literal["rigid", "fast", "standard", "full", "paper", "explicit"]
@@ -60,10 +61,10 @@ class RunSettings(Settings, total=False):
 
 
 class Starts(Settings, total=False):
-    """Start values of an FMU. torque, speed : of the input: port values that carry them at the start."""
+    """Start values of an FMU. torque, speed : of the input, which it carries at the start."""
 
-    torque: str | float
-    speed: str | float
+    torque: Quantity
+    speed: Quantity
 
 
 class PlanOptions(TypedDict, total=False):

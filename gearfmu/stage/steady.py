@@ -122,9 +122,10 @@ def steady_run(
     progress: Callable[[float], None] | None = None,
 ) -> Trace:
     """Trace of the model under this drive (`Steady`, with a profile `Profiled`). settings: kernel parameters, as
-    numbers (`parameters`); progress is called with the part done, 0 … 1. SpecError where a port that would have to turn
-    is no spring port without a chain."""
-    _require_springs(model)
+    numbers (`parameters`); progress is called with the part done, 0 … 1. Torque ports are driven through springs
+    (`StageModel.driven_by_springs`); SpecError where that cannot be."""
+    require_driven(model.stage, (model.shafts.input, model.shafts.output), "simulate")
+    model = model.driven_by_springs()
     torque, speed = drive.lines()
     inputs = _inputs(model, drive, torque, speed)
     most, fastest = (float(max(line.values, key=abs)) for line in (torque, speed))
@@ -145,16 +146,6 @@ def _inputs(model: StageModel, drive: Drive, torque: Line, speed: Line) -> Input
     if drive.profile is not None:
         return Profiled(model, torque, speed)
     return Steady(model, float(speed.values[0]), float(torque.values[0]), speed.at(0.0)[1])
-
-
-def _require_springs(model: StageModel) -> None:
-    two = (model.shafts.input, model.shafts.output)
-    require_driven(model.stage, two, "simulate")
-    driven = {name: model.stage.ports[name] for name in two}
-    soft = [name for name, port in driven.items() if port.kind != "spring" or port.chain is not None]
-    if soft:
-        remedy = f"'simulate' turns spring ports without a chain; {', '.join(soft)} is another: use 'run' with a scene"
-        raise SpecError([Problem(str(model.spec.source), "ports", "", remedy)])
 
 
 def _range(variable: Variable) -> Range:
