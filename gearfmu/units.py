@@ -17,7 +17,7 @@ _UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
 _SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ": "µ"})
 _PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
 _NEWTON_METRE = re.compile(r"\b([kM]?)Nm\b")
-_IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi)}
+_IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi), "m^3": ("cm^3", 1e6)}
 _USUAL_UNIT = {"rad": "deg", "rad/s": "rpm", "m": "mm"}  # in which people write a quantity
 _USUAL = {  # what stage files say most: without pint, which takes a second to load
     ("mm", "m"): 1e-3,

@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from gearfmu.geometry.iso6336 import mesh_stiffness
 from gearfmu.kernel import Kernel, TeState
+from gearfmu.spec.general import GearBody, RingBody
 from gearfmu.stage.limits import limit_named
+from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
 from gearfmu.stage.shown import Card, plot_over
@@ -20,6 +23,8 @@ from gearfmu.stage.shown import Card, plot_over
 TANGENT = 1e-4
 LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
 SHARES = 4
+SOFTER = 0.9  # of the mesh stiffness of ISO: below it the reason is given
+WHY_SOFTER = ": teeth on discs that do not yield; here bodies twist and bend, and averaging bores lose their shape"
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,7 +33,8 @@ class TeResult:
     mesh alone, tangent dF/dte with F along the line of action and the bores held on their axes · stage_stiffness (T, P)
     N/m, the same tangent with shafts and bearings; with rigid bearings it is the mesh stiffness
     · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come
-    into mesh: a pair keeps its column through the pitch, sorted by tooth number.
+    into mesh: a pair keeps its column through the pitch, sorted by tooth number · iso_stiffness N/m: c_γα of ISO 6336-1
+    times the common face width.
     """
 
     torque: np.ndarray
@@ -37,6 +43,7 @@ class TeResult:
     mesh_stiffness: np.ndarray
     stage_stiffness: np.ndarray
     shares: np.ndarray
+    iso_stiffness: float = math.nan
 
     def __repr__(self) -> str:
         return self._card.text
@@ -59,6 +66,9 @@ class TeResult:
             if not np.array_equal(mesh, stage):
                 text += f", stage stiffness {1e-6 * stage.mean():.1f} N/µm (with shafts and bearings)"
             rows.append((f"{torque:.1f} N·m", text))
+        if math.isfinite(self.iso_stiffness):
+            why = WHY_SOFTER if self.mesh_stiffness.mean() < SOFTER * self.iso_stiffness else ""
+            rows.append(("ISO 6336-1", f"c_gamma times face width {1e-6 * self.iso_stiffness:.1f} N/µm{why}"))
         return rows
 
     def plot(self, figure: Any = None) -> np.ndarray:
@@ -160,7 +170,17 @@ def loaded_te(
         te[i, j] = state.te + (torque - carried) / tangent
         alone[i, j], whole[i, j] = firm / place.lever, tangent / place.lever
         shares[i, j] = _shares(state, int(part))
-    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares)
+    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares, _by_iso(model, mesh))
+
+
+def _by_iso(model: StageModel, name: str | None) -> float:
+    """`TeResult.iso_stiffness` of an engagement."""
+    mesh = model.stage.engagements[place_of(model, name).number]
+    a, b = (model.stage.bodies[gear] for gear in mesh.gears)
+    assert isinstance(a, (GearBody, RingBody)) and isinstance(b, (GearBody, RingBody))
+    e_a, e_b = a.material.youngs_modulus, b.material.youngs_modulus
+    shape, dedendum = mesh_geometry(model.stage, mesh), a.rack.dedendum if isinstance(a, GearBody) else 1.25
+    return min(a.face_width, b.face_width) * mesh_stiffness(shape, dedendum, 2 * e_a * e_b / (e_a + e_b))
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.base import read_toml
-from gearfmu.spec.checks import largest_half_width
+from gearfmu.spec.checks import at_most, largest_half_width
 from gearfmu.spec.gear import Bearing
 from gearfmu.spec.library import find_stage, model_folder, shipped_stages
 from gearfmu.spec.new import stage_text
@@ -213,6 +213,11 @@ GEOMETRY_PROBLEMS = [
 def test_impossible_geometry_is_named_with_its_remedy(write: Write, changes, field: str, remedy: str) -> None:
     found = problems(write(changes))
     assert remedy in found[field].remedy
+
+
+def test_a_largest_length_below_zero_is_none() -> None:
+    assert at_most(0.0123456) == "at most 12.34 mm"
+    assert at_most(-1.423e-3).startswith("no value fits")
 
 
 def test_interference_below_the_form_circle(write: Write) -> None:
