@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from gearfmu.api.plans import plan, run_plan
     from gearfmu.api.results import compare, convert, export, write_report
     from gearfmu.api.runs import assemble_in_scene, drive, run, simulate, te, wound_up
+    from gearfmu.api.settings import Settings
     from gearfmu.api.sweeps import sweep
     from gearfmu.errors import GearfmuError
     from gearfmu.stage.model import StageModel
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Channel",
     "GearfmuError",
+    "Settings",
     "StageModel",
     "SweepTable",
     "TeResult",
@@ -65,6 +67,7 @@ _HOMES = {
     "api.plans": ("plan", "run_plan"),
     "api.results": ("compare", "convert", "export", "write_report"),
     "api.runs": ("assemble_in_scene", "drive", "run", "simulate", "te", "wound_up"),
+    "api.settings": ("Settings",),
     "api.sweeps": ("sweep",),
     "errors": ("GearfmuError",),
     "stage.model": ("StageModel",),

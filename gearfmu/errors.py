@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -23,6 +24,10 @@ class Problem:
 
 class GearfmuError(Exception):
     """Base of all errors that are the input's or the surroundings' fault, not ours."""
+
+
+class OutputError(GearfmuError, OSError):
+    """A file that cannot be written where it was asked for."""
 
 
 class UnitError(GearfmuError):
@@ -65,3 +70,10 @@ class SimulationError(GearfmuError):
         super().__init__(message)
         self.outcome = outcome
         self.time = time
+
+
+def near_or_all(word: str, known: Iterable[str], all_of_them: str, mark: str = '"', cutoff: float = 0.5) -> str:
+    """'did you mean "force"?' for a word that is not known, where one is near; else `all_of_them` and the list."""
+    names = list(known)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=cutoff)
+    return f"did you mean {mark}{near[0]}{mark}?" if near else f"{all_of_them} {', '.join(names)}"

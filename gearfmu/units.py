@@ -17,7 +17,8 @@ _UNIT_TEXT = re.compile(r"[A-Za-zµμ°%][A-Za-z0-9µμ°%*/^ ()_-]{0,39}$")
 _SPELLINGS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3", "μ": "µ"})
 _PRODUCT_DOT = re.compile(r"(?<=[A-Za-z0-9])\.(?=[A-Za-z])")  # "N.m", as FMI writes it
 _NEWTON_METRE = re.compile(r"\b([kM]?)Nm\b")
-_IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi)}
+_IN = {"rad": ("deg", 180 / math.pi), "rad/s": ("rpm", 30 / math.pi), "m^3": ("cm^3", 1e6)}
+_USUAL_UNIT = {"rad": "deg", "rad/s": "rpm", "m": "mm"}  # in which people write a quantity
 _USUAL = {  # what stage files say most: without pint, which takes a second to load
     ("mm", "m"): 1e-3,
     ("µm", "m"): 1e-6,
@@ -29,6 +30,7 @@ _USUAL = {  # what stage files say most: without pint, which takes a second to l
     ("kHz", "Hz"): 1e3,
     ("GPa", "Pa"): 1e9,
 }
+_REVOLUTIONS = ("U/min", "1/min", "min^-1")  # as name plates have them; the unit library takes them for others
 _SCALES = {"m": ((1e-4, "mm", 1e3), (0.0, "µm", 1e6)), "s": ((1.0, "s", 1.0), (1e-3, "ms", 1e3), (0.0, "µs", 1e6))}
 
 
@@ -40,21 +42,30 @@ def to_si(text: object, unit: str) -> float:
     number. Raises UnitError with the remedy.
     """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
-        raise UnitError(f'expected a quantity such as "1 {unit}"')
+        raise UnitError(f'expected a quantity such as "1 {usual_unit(unit)}"')
     if not isinstance(text, str):
         if not math.isfinite(text):
-            raise UnitError(f'not a finite number: write it like "1.5 {unit}"')
-        raise UnitError(f'the unit is missing: write "{text:g} {unit}" or another unit of the same kind')
+            raise UnitError(f'not a finite number: write it like "1.5 {usual_unit(unit)}"')
+        raise UnitError(f'the unit is missing: write "{text:g} {usual_unit(unit)}" or another unit of the same kind')
     match = _NUMBER.match(text)
     if not match:
-        raise UnitError(f'not a number with a unit: write it like "1.5 {unit}"')
+        raise UnitError(f'not a number with a unit: write it like "1.5 {usual_unit(unit)}"')
     number, unit_text = float(match[1]), _plain_unit(match[2])
     if not unit_text and unit:
-        raise UnitError(f'the unit is missing: write "{match[1]} {unit}" or another unit of the same kind')
+        raise UnitError(f'the unit is missing: write "{match[1]} {usual_unit(unit)}" or another unit of the same kind')
     value = number * _factor(unit_text, unit)
     if not math.isfinite(value):
         raise UnitError("the value is not finite")
     return float(f"{value:.15g}")
+
+
+def usual_unit(unit: str) -> str:
+    """The unit in which people write a quantity of this SI unit: mm, deg, rpm; else the SI unit itself."""
+    return _USUAL_UNIT.get(unit, unit)
+
+
+def _examples(unit: str) -> str:
+    return " or ".join(dict.fromkeys((f'"{usual_unit(unit)}"', f'"{unit}"')))
 
 
 def quantity_text(value: float, unit: str) -> str:
@@ -71,6 +82,8 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def _plain_unit(text: str) -> str:
+    if text in _REVOLUTIONS:
+        return "rpm"
     return _NEWTON_METRE.sub(r"\1N*m", _PRODUCT_DOT.sub("*", text.translate(_SPELLINGS)))
 
 
@@ -86,15 +99,15 @@ def _factor(unit_text: str, unit: str) -> float:
 
 def _factor_by_pint(unit_text: str, unit: str) -> float:
     if not _UNIT_TEXT.match(unit_text):
-        raise UnitError(f'"{unit_text}" is no unit: use one like "{unit}"')
+        raise UnitError(f'"{unit_text}" is no unit: use one like {_examples(unit)}')
     registry = _registry()
     try:
         given = registry.Quantity(1.0, registry.parse_units(unit_text)).to_root_units()
     except Exception as error:  # pint raises its own, tokenize's and arithmetic errors for odd text
-        raise UnitError(f'unknown unit "{unit_text}": use one like "{unit}"') from error
+        raise UnitError(f'unknown unit "{unit_text}": use one like {_examples(unit)}') from error
     wanted = registry.Quantity(1.0, registry.parse_units(unit)).to_root_units()
     if given.units != wanted.units:
-        raise UnitError(f'"{unit_text}" is a unit of another kind: use one like "{unit}"')
+        raise UnitError(f'"{unit_text}" is a unit of another kind: use one like {_examples(unit)}')
     return float(given.magnitude / wanted.magnitude)
 
 

@@ -129,7 +129,7 @@ def test_ports_and_bores_of_a_model() -> None:
         gf.assemble("fzg_c", bore="loose")
     with pytest.raises(gf.GearfmuError, match="keep averaging bores"):
         gf.assemble("planetary54", bore="rigid")
-    with pytest.raises(gf.GearfmuError, match="'levl' is no parameter; there are"):
+    with pytest.raises(gf.GearfmuError, match="'levl' is no parameter: did you mean \"level\""):
         gf.simulate("fzg_c", 1, 1, levl="fast")
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import Unpack
+
 from gearfmu.api.models import PathLike, Progress, load_scene
+from gearfmu.api.settings import PlanOptions
 from gearfmu.cosim.scene_run import stage_model
 from gearfmu.planning import cache
 from gearfmu.planning.book import Plan
@@ -25,7 +28,7 @@ def plan(
     budget: str | None = None,
     waveform: str | None = None,
     on: Any = None,
-    **how: Any,
+    **how: Unpack[PlanOptions],
 ) -> Plan:
     """Plan a scene for an error budget: which effects, level, step and slices it needs.
 
@@ -44,7 +47,7 @@ def plan(
     spec = scene if isinstance(scene, SceneSpec) else load_scene(scene)
     model = stage_model(spec)
     asked = request(spec, model, outputs, band, budget, waveform)
-    tell: Callable[[str], None] = how.get("tell") or (lambda text: None)
+    tell = how.get("tell") or (lambda text: None)
     job = Job(spec, model, asked, _runner(on), force=tuple(how.get("may_drop", ())), tell=tell)
     name = str(how.get("name") or (spec.name if isinstance(scene, SceneSpec) else scene))
     known = None if how.get("fresh") else cache.find(job.identity)

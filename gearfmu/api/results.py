@@ -8,17 +8,22 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import Unpack
+
 from gearfmu import fmu
 from gearfmu.api.models import AnyStage, PathLike, Stage, load, model_of
+from gearfmu.api.quantities import Quantity, checked
+from gearfmu.api.settings import Starts
 from gearfmu.body import load_bodies
-from gearfmu.errors import GearfmuError
+from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.report import write
 from gearfmu.report.run import Run
-from gearfmu.stage import Trace
+from gearfmu.stage import StageModel, Trace
 from gearfmu.stage.deformation import Deformation
 from gearfmu.stage.exchange import convert as convert_trace
 from gearfmu.stage.steady import parameters
+from gearfmu.stage.windup import wound_starts, write_starts
 
 
 def export(
@@ -27,7 +32,7 @@ def export(
     runtime: str = "native",
     platforms: Sequence[str] = ("host",),
     terminals: bool = True,
-    **starts: Any,
+    **starts: Unpack[Starts],
 ) -> Path:
     """Export a stage as an FMI 2.0 co-simulation FMU; returns its path.
 
@@ -36,13 +41,38 @@ def export(
     runtime : "native", which needs nothing where it is imported, or "python" for hosts that are Python.
     platforms : "host", "linux64", "win64"; others than the host's need gearfmu[cross].
     terminals : with terminalsAndIcons.xml, which some importers cannot read (docs/howto-fmu.md).
-    starts : start values of parameters (docs/variables.md): level="fast", slices=10.
+    starts : start values of parameters (docs/variables.md): level="fast", slices=10. torque and speed, of the input:
+        <path>_windup.csv beside the FMU lists the inputs with which it starts under that torque.
 
     Raises FmuError and BuildError.
     """
-    model = model_of(stage)
+    model, wound = with_windup(model_of(stage), starts.pop("torque", None), starts.pop("speed", None))
     model = model.with_starts(parameters(model, starts))
-    return fmu.export(model, Path(f"{model.name}.fmu") if path is None else Path(path), runtime, platforms, terminals)
+    target = Path(f"{model.name}.fmu") if path is None else Path(path)
+    written = fmu.export(model, target, runtime, platforms, terminals)
+    if wound:
+        write_starts(windup_file(target), model, wound)
+    return written
+
+
+def with_windup(
+    model: StageModel, torque: Quantity | None, speed: Quantity | None
+) -> tuple[StageModel, dict[str, float]]:
+    """The model with its initial speeds, and the inputs with which it starts under torque and speed of its input.
+    Without a torque the model as it is. SpecError for a speed without a torque."""
+    if torque is None:
+        if speed is not None:
+            raise SpecError([Problem("", "speed", str(speed), "give the torque of the start too")])
+        return model, {}
+    values = wound_starts(model, checked("torque", torque, "torque"), checked("speed", speed or 0.0, "speed"))
+    known = model.kernel().variables
+    own = {name: value for name, value in values.items() if known[name].causality == "parameter"}
+    return model.with_starts(own), {name: value for name, value in values.items() if name not in own}
+
+
+def windup_file(path: Path) -> Path:
+    """Beside an FMU the table of inputs with which it starts under torque."""
+    return path.with_name(f"{path.stem}_windup.csv")
 
 
 def write_report(

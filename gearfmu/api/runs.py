@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+
+from typing_extensions import Unpack
 
 from gearfmu import cosim
 from gearfmu.api.models import AnyStage, PathLike, Progress, Stage, load, load_scene, model_of, reduce
+from gearfmu.api.quantities import Quantity, checked, in_si
+from gearfmu.api.settings import RunSettings, Settings
 from gearfmu.cosim.scene_run import Staged
-from gearfmu.ranges import in_range, range_of
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.profile import Profile, read_profile
@@ -20,9 +22,6 @@ from gearfmu.stage import simulate as simulate_model
 from gearfmu.stage.set_te import SetTeResult, set_te
 from gearfmu.stage.simulate import Inputs
 from gearfmu.stage.steady import Drive, parameters, steady_run
-from gearfmu.units import to_si
-
-Quantity: TypeAlias = str | float  # "302 N*m", or the SI number
 
 
 def te(
@@ -32,7 +31,7 @@ def te(
     rigid_bearings: bool = False,
     mesh: str | None = None,
     pitches: int = 1,
-    **settings: Any,
+    **settings: Unpack[Settings],
 ) -> TeResult | SetTeResult:
     """Quasi-static loaded transmission error over one pitch or more, output held, torque on the input (the first port).
 
@@ -48,7 +47,7 @@ def te(
     and load sharing. Raises SimulationError where there is no equilibrium.
     """
     wanted = [torques] if isinstance(torques, (str, float, int)) else list(torques)
-    values, model = [_checked("torque", torque, "torque") for torque in wanted], model_of(stage)
+    values, model = [checked("torque", torque, "torque") for torque in wanted], model_of(stage)
     known = parameters(model, settings)
     if isinstance(model.spec, PlanetarySpec):
         return set_te(model, values, positions, pitches, None, **known)
@@ -62,7 +61,7 @@ def simulate(
     duration: Quantity | None = None,
     step: Quantity = 20e-6,
     settle: Quantity = 0.02,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> Trace:
     """Run a stage alone: the outer ends of input and output turn at constant speed, from one to another or along a
     profile, wound up by the torque.
@@ -82,14 +81,14 @@ def simulate(
     given = settings.pop("profile", None)
     profile = given if given is None or isinstance(given, Profile) else read_profile(Path(given))
     start, *end = (
-        None if value is None else _si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,))
+        None if value is None else in_si(value, "rad/s") for value in (speed if isinstance(speed, tuple) else (speed,))
     )
     driven = Drive(
-        torque=None if torque is None else _si(torque, "N*m"),
+        torque=None if torque is None else in_si(torque, "N*m"),
         speed=start,
-        duration=None if duration is None else _si(duration, "s"),
-        step=_si(step, "s"),
-        settle=_si(settle, "s"),
+        duration=None if duration is None else in_si(duration, "s"),
+        step=in_si(step, "s"),
+        settle=in_si(settle, "s"),
         end_speed=end[0] if end else None,
         profile=profile,
     )
@@ -97,7 +96,9 @@ def simulate(
     return steady_run(model, driven, parameters(model, settings))
 
 
-def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 20e-6, **settings: Any) -> Trace:
+def drive(
+    stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 20e-6, **settings: Unpack[Settings]
+) -> Trace:
     """Run a stage alone under inputs of one's own.
 
     inputs : time (s) → values by input name, SI ({"pinion.phi": …, "pinion.w": …}); asked at the start of each step.
@@ -108,8 +109,8 @@ def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 
     return simulate_model(
         model,
         inputs,
-        _checked("duration", duration, "duration"),
-        _checked("step", step, "step"),
+        checked("duration", duration, "duration"),
+        checked("step", step, "step"),
         parameters(model, settings),
     )
 
@@ -117,7 +118,7 @@ def drive(stage: AnyStage, inputs: Inputs, duration: Quantity, step: Quantity = 
 def wound_up(stage: AnyStage, torque: Quantity, speed: Quantity) -> Steady:
     """Inputs over time with which input and output of a stage turn at constant speed, wound up by the torque: a
     function of time (s) that gives values by input name."""
-    return Steady(model_of(stage), _checked("speed", speed, "speed"), _checked("torque", torque, "torque"))
+    return Steady(model_of(stage), checked("speed", speed, "speed"), checked("torque", torque, "torque"))
 
 
 def run(
@@ -182,13 +183,3 @@ def _staged(scene: SceneSpec, own: Stage | None, observe: Sequence[str], progres
     own = load(scene.stage.name) if own is None else own
     as_general(own)
     return Staged.of(scene, own, reduce(own, progress=progress), observe)
-
-
-def _checked(field: str, value: Quantity, name: str) -> float:
-    """`_si` of a number in the range of that name; SpecError where it is not."""
-    return in_range(field, _si(value, range_of(name).unit), name)
-
-
-def _si(value: Quantity, unit: str) -> float:
-    """A quantity with its unit, or the SI number, as SI number."""
-    return to_si(value, unit) if isinstance(value, str) else float(value)

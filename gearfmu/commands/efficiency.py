@@ -1,4 +1,4 @@
-"""The verb efficiency: what the mesh of a pair loses to friction, by a run and by the closed form."""
+"""The verb efficiency: what the meshes of a stage lose to friction, by a run and by the closed form."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from gearfmu.commands.shared import Quantity, echo_pairs
 @click.argument("stage")
 @click.option("--torque", required=True, type=Quantity("torque"), help='Torque on the input, "302 N*m".')
 @click.option("--speed", required=True, type=Quantity("speed"), help='Speed of the input, "2000 rpm".')
-@click.option("--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches.")
+@click.option(
+    "--pitches", type=click.IntRange(1, 10_000), default=8, show_default=True, help="Whole pitches of the slowest mesh."
+)
 def efficiency(stage: str, torque: float, speed: float, pitches: int) -> None:
-    """Efficiency of the mesh of the pair STAGE at constant load: mean friction power of a run over whole pitches, and
-    P mu H_V with the tooth loss factor of Ohlendorf (ISO/TR 14179-2) and the run's mean coefficient of friction.
+    """Efficiency of the meshes of STAGE at constant load: mean friction power of a run over whole pitches, and
+    P mu H_V with the tooth loss factor of Ohlendorf (ISO/TR 14179-2) and the run's mean coefficient of friction. Power
+    is that which rolls through a mesh: in a planetary set less than the input's.
 
     The coefficient follows what the stage says ([contact] friction), else it is 0.05. Losses of bearings, seals and
     churned oil are in neither number."""

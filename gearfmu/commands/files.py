@@ -14,7 +14,7 @@ from gearfmu.commands.shared import echo_pairs
 UNITS = {
     "r_b": "m", "r_f": "m", "r_a": "m", "base_pitch": "m", "ring_least_tip_radius": "m", "gap_between_planets": "m",
     "sun_torque_in_one_mesh": "N*m", "largest_hertz_half_width_planet_ring": "m", "carrier_mass": "kg",
-    "youngs_modulus": "Pa", "density": "kg/m3", "volume": "m3", "flank_element_length": "m",
+    "youngs_modulus": "Pa", "density": "kg/m3", "volume": "m^3", "flank_element_length": "m",
 }  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import click
 
 from gearfmu.commands.shared import progress_bar
 
+OF_INPUT = ("torque", "speed")  # starts that are no parameters
 PORT_KINDS = ("spring", "torque", "fixed")
 
 
@@ -49,8 +50,9 @@ PORT_KINDS = ("spring", "torque", "fixed")
     "starts",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Start value of a parameter: level=fast, slices=10; for importers that set none, or no enumeration; may "
-    "repeat.",
+    help="Start value of a parameter: level=fast, slices=10; for importers that set none, or no enumeration. "
+    'torque="200 N*m" and speed="2000 rpm" of the input: <out>_windup.csv lists the inputs with which it starts under '
+    "that torque. May repeat.",
 )
 @click.option(
     "--terminals/--no-terminals",
@@ -62,8 +64,10 @@ PORT_KINDS = ("spring", "torque", "fixed")
 def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: tuple[str, ...], **how: Any) -> None:
     """Export STAGE as an FMI 2.0 co-simulation FMU."""
     from gearfmu import fmu
+    from gearfmu.api.results import windup_file, with_windup
     from gearfmu.commands.models import model_in_scene, model_of
     from gearfmu.commands.settings import parameters
+    from gearfmu.stage.windup import write_starts
 
     scene, observe = how.pop("scene"), how.pop("observe")
     if scene is not None:
@@ -74,12 +78,27 @@ def export(stage: str | None, out: Path | None, ports: tuple[str, ...], starts: 
         raise click.UsageError("name a STAGE, or a scene with --scene")
     else:
         model = model_of(stage, port_kinds(ports), observe=observe)
-    model = model.with_starts(parameters(model, starts, "--start"))
+    wound = {name: value for name, sign, value in (text.partition("=") for text in starts) if name in OF_INPUT and sign}
+    model, inputs = with_windup(model, wound.get("torque"), wound.get("speed"))
+    model = model.with_starts(parameters(model, tuple(s for s in starts if s.split("=")[0] not in OF_INPUT), "--start"))
     path, runtime = out or Path(f"{model.spec.name}.fmu"), how["runtime"]
     with progress_bar(f"export {model.spec.name}") as progress:
         progress(None, "writing")
         fmu.export(model, path, **how)
     click.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, {runtime}, model {model.hash[:12]}")
+    if inputs:
+        click.echo(f"{write_starts(windup_file(path), model, inputs)}: set these inputs before the initialisation ends")
+    click.echo(how_to_load(path, model))
+
+
+def how_to_load(path: Path, model: Any) -> str:
+    """What an importer connects, and how Python loads the FMU."""
+    names = [variable.name for variable in model.kernel_variables() if variable.causality == "input"]
+    connect = f"connect {', '.join(names[:6])}{' …' if len(names) > 6 else ''}" if names else "it has no inputs"
+    return (
+        f"Load it as an FMI 2.0 co-simulation FMU at a fixed step of 100 µs; {connect}. In Python:\n"
+        f'  fmpy.simulate_fmu("{path}", stop_time=0.01, output_interval=1e-4)'
+    )
 
 
 @click.command()

@@ -21,10 +21,11 @@ class Quantity(click.ParamType):
 
     def __init__(self, name: str) -> None:
         from gearfmu.ranges import range_of
+        from gearfmu.units import usual_unit
 
         self.range = range_of(name)
-        self.unit = unit = self.range.unit
-        self.name = f'"<number> {unit}"'
+        self.unit = self.range.unit
+        self.name = f'"<number> {usual_unit(self.unit)}"'
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """As the option takes it: click would write the unit in capitals."""

@@ -22,6 +22,7 @@ from gearfmu.commands.shared import echo_pairs
 @click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the files.")
 def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out: Path) -> None:
     """Mesh the bodies of STAGE, print size and quality, write <body>.vtu."""
+    from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
     from gearfmu.spec.stage import load_stage
@@ -35,7 +36,7 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
         if deck:
             write_deck(written, path.with_suffix(".inp"), _body(spec, name).material.model_dump())
         click.echo(name)
-        echo_pairs({**mesh_report(sector, *facts), "written": str(path)}, "  ")
+        echo_pairs({**in_units(mesh_report(sector, *facts)), "written": str(path)}, "  ")
 
 
 @click.command()

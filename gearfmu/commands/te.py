@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from gearfmu.commands.models import model_of
 from gearfmu.commands.shared import Quantity, progress_bar
@@ -76,7 +75,7 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
         write_plot(result, picture, _unloaded(model, torques, mesh=mesh, **where))
         if len(meshes) > 1:
             click.echo(mesh)
-        _tell(result, where["rigid_bearings"])
+        _tell(result)
         click.echo(f"{path}, {picture}")
     _draw_flanks(model, out)
     warn_of_limits(model, torques)
@@ -121,37 +120,27 @@ def _of_set(model: Any, torques: list[float], out: Path, **where: Any) -> None:
     write_columns(out, result.columns())
     picture = out.with_suffix(".png")
     write_set_plot(result, picture)
-    for line in set_te_lines(result, model.spec.set.load_sharing):
-        click.echo(line)
+    _tell(result)
+    for text in above_sharing(result, model.spec.set.load_sharing):
+        click.echo(f"warning: {text}", err=True)
     click.echo(f"{out}, {picture}")
     _draw_flanks(model, out)
     warn_of_limits(model, torques)
 
 
-def set_te_lines(result: Any, load_sharing: float) -> list[str]:
-    """Of a set: for every torque the error, K_γ at sun and ring, and the mean share of each planet."""
-    lines = []
-    for torque, row, stiffness, factor, sharing in zip(
-        result.torque, result.te, result.stage_stiffness, result.load_factor, result.sharing, strict=True
-    ):
-        lines.append(
-            f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
-            f"stage stiffness at the sun's base circle {1e-6 * stiffness.mean():.1f} N/µm"
-        )
-        for gear, most, shares in zip(("sun", "ring"), factor, sharing.mean(axis=0), strict=True):
-            means = " ".join(f"{share:.3f}" for share in shares)
-            above = f", above load_sharing = {load_sharing:g} of the stage file" if most > load_sharing else ""
-            lines.append(f"{'':14}{gear}: K_gamma {most:.3f}{above}; means of planets 1 … {len(shares)}: {means}")
-    return lines
+def above_sharing(result: Any, load_sharing: float) -> list[str]:
+    """Where a planet of a set carries more than the stage file's `load_sharing` says."""
+    from gearfmu.stage.set_te import GEARS
+
+    return [
+        f"{torque:g} N·m: K_gamma {most:.3f} at the {gear}, above load_sharing = {load_sharing:g} of the stage file"
+        for torque, factors in zip(result.torque, result.load_factor, strict=True)
+        for gear, most in zip(GEARS, factors, strict=True)
+        if most > load_sharing
+    ]
 
 
-def _tell(result: Any, rigid_bearings: bool) -> None:
-    """One line a torque; with rigid bearings the stage has the stiffness of its mesh."""
-    for torque, row, mesh, stage in zip(
-        result.torque, result.te, result.mesh_stiffness, result.stage_stiffness, strict=True
-    ):
-        with_bearings = f", stage stiffness {1e-6 * stage.mean():.1f} N/µm (with shafts and bearings)"
-        click.echo(
-            f"{torque:8.1f} N·m: mean {1e6 * row.mean():.3f} µm, peak to peak {1e6 * np.ptp(row):.3f} µm, "
-            f"mesh stiffness {1e-6 * mesh.mean():.1f} N/µm{'' if rigid_bearings else with_bearings}"
-        )
+def _tell(result: Any) -> None:
+    """One line a torque, of a set two more."""
+    for torque, text in result.rows:
+        click.echo(f"{torque:>12}: {text}" if torque else f"{'':14}{text}")

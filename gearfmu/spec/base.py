@@ -6,7 +6,6 @@ it may also be the SI number.
 
 from __future__ import annotations
 
-import difflib
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
-from gearfmu.errors import Problem, SpecError, UnitError
+from gearfmu.errors import Problem, SpecError, UnitError, near_or_all
 from gearfmu.ranges import Range, range_of
 from gearfmu.units import to_si
 
@@ -224,8 +223,7 @@ def _remedy(kind: type[Spec], entry: Any) -> str:
 
 
 def _unknown_key(key: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-    return f'unknown key: did you mean "{near[0]}"?' if near else f"unknown key: known are {', '.join(sorted(known))}"
+    return f"unknown key: {near_or_all(key, sorted(known), 'known are')}"
 
 
 def fields_at(kind: type[BaseModel], loc: tuple[str | int, ...]) -> dict[Any, Any]:

@@ -103,7 +103,7 @@ def _rim_problems(gear: GearSpec, shape: GearGeometry) -> Found:
         yield (
             "bore_diameter",
             gear.bore_diameter,
-            f"leaves a rim thinner than half the tooth height: at most {millimetres(rounded_down(largest))}",
+            f"leaves a rim thinner than half the tooth height: {at_most(largest)}",
         )
 
 
@@ -187,7 +187,7 @@ def _interference(gears: Sequence[GearSpec], geometry: PairGeometry, index: int)
         yield (
             field,
             value,
-            f"interference: the tip meets {other} below its form circle: at most {millimetres(rounded_down(largest))}",
+            f"interference: the tip meets {other} below its form circle: {at_most(largest)}",
         )
 
 
@@ -205,7 +205,7 @@ def _strips(gears: Sequence[GearSpec], geometry: PairGeometry, torque_max: float
                 f"{millimetres(rounded_up(least, 3))}",
             )
         elif 2 * width > flank:
-            yield field, width, f"the strip is longer than the flank: at most {millimetres(flank / 2)}"
+            yield field, width, f"the strip is longer than the flank: {at_most(flank / 2)}"
 
 
 def largest_half_width(gears: Sequence[GearSpec], geometry: PairGeometry, torque: float) -> float:
@@ -239,6 +239,13 @@ def rounded_down(value: float, digits: int = 4) -> float:
 def rounded_up(value: float, digits: int = 4) -> float:
     """The smallest number of so many significant digits that is not below `value`."""
     return -rounded_down(-value, digits)
+
+
+def at_most(limit: float, digits: int = 4) -> str:
+    """The largest length (m) that is allowed, or that there is none."""
+    if limit <= 0:
+        return "no value fits: another number of this gear is wrong, teeth, module, profile shift or a diameter"
+    return f"at most {millimetres(rounded_down(limit, digits))}"
 
 
 def millimetres(value: float) -> str:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from pathlib import Path
 from typing import Any
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import Problem, SpecError, near_or_all
 from gearfmu.spec.base import read_toml
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -42,8 +41,7 @@ def find_stage(name: str | os.PathLike[str]) -> Path:
     if own.parent == Path(".") and (named := _shipped_of_name(str(name))) is not None:
         return named
     shipped = shipped_stages()
-    near = difflib.get_close_matches(str(name), shipped, n=1)
-    hint = f'did you mean "{near[0]}"?' if near else f"give the path of a stage.toml, or one of: {', '.join(shipped)}"
+    hint = near_or_all(str(name), shipped, "give the path of a stage.toml, or one of:", cutoff=0.6)
     raise SpecError([Problem(str(name), "", "", f"there is no such stage: {hint}")])
 
 

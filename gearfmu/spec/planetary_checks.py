@@ -22,6 +22,7 @@ from gearfmu.ranges import range_of
 from gearfmu.spec.checks import (
     STRIP_PER_HERTZ,
     Found,
+    at_most,
     gear_problems,
     geometry_problems,
     import_problems,
@@ -152,8 +153,8 @@ def _ring_mesh(spec: PlanetarySpec | RingPair, mesh: RingMesh) -> Found:
         largest = millimetres(rounded_down(2 * (mesh.ring.r_f - mesh.a), 5))
         yield "planet.tip_diameter", spec.planet.tip_diameter, f"touches the ring's root: less than {largest}"
     elif mesh.planet.r_a > mesh.largest_planet_tip_radius:
-        largest = millimetres(rounded_down(2 * mesh.largest_planet_tip_radius, 5))
-        remedy = f"interference: the tip meets the ring in its root fillet; at most {largest}"
+        largest = at_most(2 * mesh.largest_planet_tip_radius, 5)
+        remedy = f"interference: the tip meets the ring in its root fillet; {largest}"
         yield "planet.tip_diameter", spec.planet.tip_diameter, remedy
     if mesh.tip_clearance_angle < 0:
         remedy = "planet and ring collide with their tips outside the line of action: make it larger, or more teeth"
@@ -180,7 +181,7 @@ def _ring_strips(spec: PlanetarySpec | RingPair, mesh: RingMesh, half_width: flo
             remedy = f"too narrow for the ring's contact at torque_max: at least {millimetres(rounded_up(least, 3))}"
             yield field, width, remedy
         elif gear is spec.ring and 2 * width > flank:
-            yield field, width, f"the strip is longer than the flank: at most {millimetres(flank / 2)}"
+            yield field, width, f"the strip is longer than the flank: {at_most(flank / 2)}"
 
 
 def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
@@ -260,6 +261,10 @@ def _carrier(spec: PlanetarySpec) -> Iterator[tuple[str, float | str, str]]:
         named = ", ".join(carrier.imported.bolts) or "none"
         yield "carrier.import.bolts", named, f"one node set for each of the {g.planets} bolts, each its own"
     known = ["bore", *(f"bolt{k}" for k in range(g.planets))]
+    bolts = [name for name in known[1:] if name in carrier.coupling]
+    if bolts and len(bolts) < g.planets:
+        left = ", ".join(name for name in known[1:] if name not in carrier.coupling)
+        yield "carrier.coupling", ", ".join(bolts), f"{left} would be rigid unsaid: name it too, rigid or averaging"
     for name in carrier.coupling:
         if name not in known:
             yield f"carrier.coupling.{name}", carrier.coupling[name], f"no such interface: known are {', '.join(known)}"

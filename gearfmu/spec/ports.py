@@ -94,6 +94,15 @@ class PortSpec(Spec):
     c: Damping | None = Field(default=None, description="damping of the port spring")
     chain: ChainSpec | None = Field(default=None, description="inertia, clutch and shaft inside the FMU")
 
+    @property
+    def no_spring(self) -> str:
+        """Why the port cannot be a spring that is turned from outside, and the remedy; empty where it can."""
+        if self.chain is not None:
+            return "a port with a clutch is driven in a scene: use 'gearfmu run'"
+        if self.kind == "fixed":
+            return "a fixed port does not turn: make it a spring or torque port with k and c"
+        return "" if self.k is not None and self.c is not None else "write k and c of its shaft into this table"
+
     @model_validator(mode="after")
     def _complete(self) -> PortSpec:
         if self.kind == "spring" and (self.k is None or self.c is None):

@@ -5,26 +5,56 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from gearfmu.errors import ModelError
+from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Kernel, Variable
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
-from gearfmu.spec.turning import Shafts, shafts_of
+from gearfmu.spec.turning import Shafts, shafts_of, with_ports
 from gearfmu.stage.blob import blob_hash, read_blob, write_blob
+from gearfmu.stage.shown import Card, grouped
+from gearfmu.units import quantity_text
+
+SPRING = 0  # kind of a port in the blob
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StageModel:
     """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""
 
     spec: StageSpec | GeneralStage | PlanetarySpec
     blob: bytes
     body_hashes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return self._card.text
+
+    def _repr_html_(self) -> str:
+        return self._card.html
+
+    @property
+    def _card(self) -> Card:
+        known = self.kernel_variables()
+        meshes = [f"{mesh.name}: {' with '.join(mesh.gears)}" for mesh in self.stage.engagements]
+        ports = [f"{name}: {port.kind}" for name, port in self.stage.ports.items()]
+        names = {sort: [v.name for v in known if v.causality == sort] for sort in ("input", "parameter", "output")}
+        spec = self.spec
+        limits = () if isinstance(spec, GeneralStage) else ((spec.torque_max, "N*m"), (spec.speed_max, "rad/s"))
+        most = " and ".join(quantity_text(value, unit) for value, unit in limits if value is not None)
+        rows = [
+            ("ports", ", ".join(ports) + "; input first, then output"),
+            ("meshes", ", ".join(meshes)),
+            ("bodies", ", ".join(f"{name} {body[:8]}" for name, body in self.bodies.items())),
+            *((f"{sort}s", " ".join(f"{group}.({last})" if group else last for group, last in grouped(own)))
+              for sort, own in names.items()),
+            ("size", f"{len(self.blob) / 1e6:.2f} MB, model {self.hash[:12]}"),
+        ]  # fmt: skip
+        return Card(f"Stage {self.name} ({spec.kind}{', up to ' * bool(most)}{most}): {spec.description}", rows, 3)
 
     @property
     def name(self) -> str:
@@ -61,6 +91,26 @@ class StageModel:
     def kernel(self, **parameters: float) -> Kernel:
         """A fresh instance; dots in parameter names are written as they are: kernel(**{"effect.hertz": 0})."""
         return Kernel(self.blob, parameters)
+
+    def driven_by_springs(self) -> StageModel:
+        """The same model whose input and output are spring ports, with the k and c that the stage keeps for them.
+        SpecError for a torque port that has none, and where one has a chain or is fixed."""
+        two = (self.shafts.input, self.shafts.output)
+        ports = {name: self.stage.ports[name] for name in two}
+        if all(port.kind == "spring" and port.chain is None for port in ports.values()):
+            return self
+        refused = [
+            Problem(str(self.spec.source), f"ports.{name}", port.kind, remedy)
+            for name, port in ports.items()
+            if (remedy := port.no_spring)
+        ]
+        if refused:
+            raise SpecError(refused)
+        sections = read_blob(self.blob)
+        kinds = np.array(sections["port_kinds"], np.int32).reshape(-1, 3)
+        kinds[[list(self.stage.ports).index(name) for name in two], 1] = SPRING
+        changed: dict[str, Any] = {name: port.model_copy(update={"kind": "spring"}) for name, port in ports.items()}
+        return replace(self, spec=with_ports(self.spec, changed), blob=write_blob(sections | {"port_kinds": kinds}))
 
     def with_starts(self, starts: Mapping[str, float]) -> StageModel:
         """The same model whose parameters start with other values, SI, an enumeration by its number: what an importer

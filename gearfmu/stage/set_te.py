@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -21,12 +22,21 @@ from gearfmu.stage.limits import limit_named
 from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
-from gearfmu.stage.te import LEAST, TANGENT, common_columns, mesh_harmonics, statics_of
+from gearfmu.stage.te import (
+    LEAST,
+    TANGENT,
+    common_columns,
+    error_text,
+    mesh_harmonics,
+    plot_te,
+    statics_of,
+    te_card,
+)
 
 GEARS = ("sun", "ring")  # whose meshes with the planets share the load
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SetTeResult:
     """torque (T,) N·m · position (P,) in mesh periods · te (T, P) m · stage_stiffness (T, P) N/m, tangent
     d(T_s/r_bs)/dte of all meshes with carrier and bearings · sharing (T, P, 2, N): normal force of each planet over the
@@ -38,6 +48,36 @@ class SetTeResult:
     stage_stiffness: np.ndarray
     sharing: np.ndarray
     force: np.ndarray
+
+    def __repr__(self) -> str:
+        return te_card(self).text
+
+    def _repr_html_(self) -> str:
+        return te_card(self).html
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """For every torque the error, then K_γ at sun and ring with the mean share of each planet."""
+        rows = []
+        for torque, row, stiffness, factor, sharing in zip(
+            self.torque, self.te, self.stage_stiffness, self.load_factor, self.sharing, strict=True
+        ):
+            mean = f"stage stiffness at the sun's base circle {1e-6 * stiffness.mean():.1f} N/µm"
+            rows.append((f"{torque:.1f} N·m", f"{error_text(row)}, {mean}"))
+            for gear, most, shares in zip(GEARS, factor, sharing.mean(axis=0), strict=True):
+                means = " ".join(f"{share:.3f}" for share in shares)
+                rows.append(("", f"{gear}: K_gamma {most:.3f}; means of planets 1 … {len(shares)}: {means}"))
+        return rows
+
+    def plot(self, figure: Any = None) -> np.ndarray:
+        """Draw transmission error about its mean and shares of the planets at the largest torque over the mesh period
+        with matplotlib; returns the axes. figure : of matplotlib, a new one when None."""
+        most = int(np.argmax(np.abs(self.torque)))
+        shares = {
+            f"{gear}: force over the mean": {f"planet {k + 1}": row for k, row in enumerate(self.sharing[most, :, g].T)}
+            for g, gear in enumerate(GEARS)
+        }
+        return plot_te(self, shares, figure)
 
     @property
     def load_factor(self) -> np.ndarray:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gearfmu.errors import ModelError, Problem, SpecError
+from gearfmu.errors import ModelError, Problem, SpecError, near_or_all
 from gearfmu.kernel import Variable
 from gearfmu.ranges import Range, range_of, range_problems
 from gearfmu.spec.profile import Profile
@@ -107,7 +108,7 @@ def parameters(model: StageModel, settings: Mapping[str, Any]) -> dict[str, floa
     known = {v.name: v for v in model.kernel_variables() if v.causality == "parameter"}
     unknown = [name for name in settings if name not in known]
     if unknown:
-        raise ModelError(f"'{unknown[0]}' is no parameter; there are {', '.join(known)}")
+        raise ModelError(f"'{unknown[0]}' is no parameter: {near_or_all(unknown[0], known, 'there are', cutoff=0.6)}")
     found = {name: _number(known[name], value) for name, value in settings.items()}
     if problems := range_problems({name: (value, _range(known[name])) for name, value in found.items()}):
         raise SpecError(problems)
@@ -121,9 +122,10 @@ def steady_run(
     progress: Callable[[float], None] | None = None,
 ) -> Trace:
     """Trace of the model under this drive (`Steady`, with a profile `Profiled`). settings: kernel parameters, as
-    numbers (`parameters`); progress is called with the part done, 0 … 1. SpecError where a port that would have to turn
-    is no spring port without a chain."""
-    _require_springs(model)
+    numbers (`parameters`); progress is called with the part done, 0 … 1. Torque ports are driven through springs
+    (`StageModel.driven_by_springs`); SpecError where that cannot be."""
+    require_driven(model.stage, (model.shafts.input, model.shafts.output), "simulate")
+    model = model.driven_by_springs()
     torque, speed = drive.lines()
     inputs = _inputs(model, drive, torque, speed)
     most, fastest = (float(max(line.values, key=abs)) for line in (torque, speed))
@@ -146,16 +148,6 @@ def _inputs(model: StageModel, drive: Drive, torque: Line, speed: Line) -> Input
     return Steady(model, float(speed.values[0]), float(torque.values[0]), speed.at(0.0)[1])
 
 
-def _require_springs(model: StageModel) -> None:
-    two = (model.shafts.input, model.shafts.output)
-    require_driven(model.stage, two, "simulate")
-    driven = {name: model.stage.ports[name] for name in two}
-    soft = [name for name, port in driven.items() if port.kind != "spring" or port.chain is not None]
-    if soft:
-        remedy = f"'simulate' turns spring ports without a chain; {', '.join(soft)} is another: use 'run' with a scene"
-        raise SpecError([Problem(str(model.spec.source), "ports", "", remedy)])
-
-
 def _range(variable: Variable) -> Range:
     """The range of a parameter, with the remedy of the stage file's field where it is the same number."""
     last = variable.name.rpartition(".")[2]
@@ -173,5 +165,7 @@ def _number(variable: Variable, value: Any) -> float:
     try:
         return float(value)
     except (TypeError, ValueError):
+        near = difflib.get_close_matches(str(value), words, n=1)
         expected = " | ".join(words) or f"a number in {variable.unit or 'plain form'}"
-        raise ModelError(f"{variable.name} = {value}: expected {expected}") from None
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        raise ModelError(f"{variable.name} = {value}: expected {expected}{hint}") from None

@@ -4,31 +4,38 @@ contact routine of the step."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from gearfmu.geometry.iso6336 import mesh_stiffness
 from gearfmu.kernel import Kernel, TeState
+from gearfmu.spec.general import GearBody, RingBody
 from gearfmu.stage.limits import limit_named
+from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
+from gearfmu.stage.shown import Card, plot_over
 
 TANGENT = 1e-4
 LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
 SHARES = 4
+SOFTER = 0.9  # of the mesh stiffness of ISO: below it the reason is given
+WHY_SOFTER = ": teeth on discs that do not yield; here bodies twist and bend, and averaging bores lose their shape"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TeResult:
     """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · mesh_stiffness (T, P) N/m of the
     mesh alone, tangent dF/dte with F along the line of action and the bores held on their axes · stage_stiffness (T, P)
     N/m, the same tangent with shafts and bearings; with rigid bearings it is the mesh stiffness
     · shares (T, P, K): part of the mesh force that each tooth pair carries, pairs in the order in which they come
     into mesh: a pair keeps its column through the pitch, sorted by tooth number
-    · over_width (T, S): force of each slice over the mean of all slices, mean over the positions.
+    · over_width (T, S): force of each slice over the mean of all slices, mean over the positions · iso_stiffness N/m:
+    c_γα of ISO 6336-1 times the common face width.
     """
 
     torque: np.ndarray
@@ -38,6 +45,42 @@ class TeResult:
     stage_stiffness: np.ndarray
     shares: np.ndarray
     over_width: np.ndarray
+    iso_stiffness: float = math.nan
+
+    def __repr__(self) -> str:
+        return self._card.text
+
+    def _repr_html_(self) -> str:
+        return self._card.html
+
+    @property
+    def _card(self) -> Card:
+        return te_card(self)
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """For every torque its error and stiffness in words; with rigid bearings the stage has that of its mesh."""
+        rows = []
+        for torque, row, mesh, stage in zip(
+            self.torque, self.te, self.mesh_stiffness, self.stage_stiffness, strict=True
+        ):
+            text = f"{error_text(row)}, mesh stiffness {1e-6 * mesh.mean():.1f} N/µm"
+            if not np.array_equal(mesh, stage):
+                text += f", stage stiffness {1e-6 * stage.mean():.1f} N/µm (with shafts and bearings)"
+            rows.append((f"{torque:.1f} N·m", text))
+        if math.isfinite(self.iso_stiffness):
+            why = WHY_SOFTER if self.mesh_stiffness.mean() < SOFTER * self.iso_stiffness else ""
+            rows.append(("ISO 6336-1", f"c_gamma times face width {1e-6 * self.iso_stiffness:.1f} N/µm{why}"))
+        return rows
+
+    def plot(self, figure: Any = None) -> np.ndarray:
+        """Draw transmission error about its mean and mesh stiffness over the pitch with matplotlib; returns the axes.
+        figure : of matplotlib, a new one when None."""
+        stiffness = {name: 1e-6 * values for name, values in self._by_torque(self.mesh_stiffness).items()}
+        return plot_te(self, {"mesh stiffness in N/µm": stiffness}, figure)
+
+    def _by_torque(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        return {f"{torque:g} N·m": row for torque, row in zip(self.torque, values, strict=True)}
 
     def harmonics(self, count: int = 5) -> np.ndarray:
         """(T, K) m, rms: harmonics 1 … `count` of the mesh in the transmission error (`mesh_harmonics`)."""
@@ -63,6 +106,27 @@ def mesh_harmonics(te: np.ndarray, count: int, pitches: int = 1) -> np.ndarray:
     lines = np.abs(np.fft.rfft(te, axis=1))[:, pitches : pitches * count + 1 : pitches] * math.sqrt(2) / te.shape[1]
     lines[:, (te.shape[1] // pitches + 1) // 2 - 1 :] = np.nan
     return np.pad(lines, ((0, 0), (0, count - lines.shape[1])), constant_values=np.nan)
+
+
+def error_text(te: np.ndarray) -> str:
+    """Mean and peak to peak of a transmission error (m)."""
+    return f"mean {1e6 * te.mean():.3f} µm, peak to peak {1e6 * np.ptp(te):.3f} µm"
+
+
+def te_card(result: Any) -> Card:
+    """How a result of te is shown: its size and its `rows`."""
+    positions = f"Loaded transmission error, {len(result.torque)} torques at {result.position.size} positions"
+    return Card(positions, result.rows, 2)
+
+
+def plot_te(result: Any, others: Mapping[str, Mapping[str, np.ndarray]], figure: Any = None) -> np.ndarray:
+    """`plot_over` of the transmission error about its mean, peak to peak in its name, and of other panels."""
+    about = {
+        f"{torque:g} N·m: {1e6 * row.mean():.2f} µm, peak to peak {1e6 * np.ptp(row):.2f} µm": 1e6 * (row - row.mean())
+        for torque, row in zip(result.torque, result.te, strict=True)
+    }
+    panels = {"error less its mean in µm": about, **others}
+    return plot_over(("position in pitches", result.position), panels, figure)
 
 
 def common_columns(result: Any) -> dict[str, np.ndarray]:
@@ -111,7 +175,18 @@ def loaded_te(
         shares[i, j] = _shares(state, int(part))
         carried_by[i] += np.sum(list(state.forces.values()), axis=0)
     mean = np.maximum(np.abs(carried_by).mean(axis=1, keepdims=True), 1e-300)
-    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares, np.abs(carried_by) / mean)
+    over_width = np.abs(carried_by) / mean
+    return TeResult(np.asarray(torques, float), position, te, alone, whole, shares, over_width, _by_iso(model, mesh))
+
+
+def _by_iso(model: StageModel, name: str | None) -> float:
+    """`TeResult.iso_stiffness` of an engagement."""
+    mesh = model.stage.engagements[place_of(model, name).number]
+    a, b = (model.stage.bodies[gear] for gear in mesh.gears)
+    assert isinstance(a, (GearBody, RingBody)) and isinstance(b, (GearBody, RingBody))
+    e_a, e_b = a.material.youngs_modulus, b.material.youngs_modulus
+    shape, dedendum = mesh_geometry(model.stage, mesh), a.rack.dedendum if isinstance(a, GearBody) else 1.25
+    return min(a.face_width, b.face_width) * mesh_stiffness(shape, dedendum, 2 * e_a * e_b / (e_a + e_b))
 
 
 def statics_of(model: StageModel, **parameters: float) -> Kernel:

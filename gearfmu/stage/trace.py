@@ -7,15 +7,18 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
-from gearfmu.errors import GearfmuError
+from gearfmu.errors import GearfmuError, near_or_all
 from gearfmu.extras import required
 from gearfmu.files import written_whole
 from gearfmu.hdf5 import Format, reading, writing
+from gearfmu.stage.shown import Card, grouped, plot_over
+from gearfmu.units import quantity_text
 
 if TYPE_CHECKING:
     import xarray
@@ -25,6 +28,7 @@ class TraceError(GearfmuError):
     """A trace, or a file that should hold one, is not valid."""
 
 
+OWN_PANELS = 4  # channels of a plot that have one each
 FILE = Format("gearfmu-trace", 2, "trace", TraceError, "make it again with 'gearfmu run' or 'gearfmu simulate'")
 
 
@@ -37,7 +41,7 @@ class Channel:
     description: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace:
     """Signals over one time base.
 
@@ -62,8 +66,57 @@ class Trace:
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of channel `name`; raises TraceError with the names there are."""
         if name not in self.channels:
-            raise TraceError(f"the trace has no channel '{name}'; it has: {', '.join(sorted(self.channels))}")
+            hint = near_or_all(str(name), sorted(self.channels), "it has:", "'", cutoff=0.6)
+            raise TraceError(f"the trace has no channel '{name}': {hint}")
         return self.channels[name].values
+
+    def __repr__(self) -> str:
+        return self._card.text
+
+    def _repr_html_(self) -> str:
+        return self._card.html
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Names that IPython offers after trace["."""
+        return list(self.channels)
+
+    @property
+    def _card(self) -> Card:
+        run = [str(self.meta[key]) for key in ("stage", "scene", "level", "outcome") if self.meta.get(key)]
+        span = f"{quantity_text(self.time[0], 's')} to {quantity_text(self.time[-1], 's')}"
+        size = ("samples", f"{self.time.size}, {span}; {len(self.channels)} channels:")
+        return Card("Trace: " + ", ".join(run), [size, *grouped(self.channels)])
+
+    def plot(self, *names: str, start: float | None = None, end: float = np.inf, figure: Any = None) -> np.ndarray:
+        """Draw channels over time with matplotlib, up to four in panels of their own, more by unit; returns the axes.
+
+        names : of channels, or patterns as "bearing.*.fx"; force and transmission error of the meshes when none.
+        start, end : of the part that is drawn, s; from the run's settling time when start is None. figure : of
+        matplotlib, a new one when None. TraceError for a name that there is not."""
+        chosen = self.matching(names or self._of_meshes)
+        first = float(self.meta.get("settle") or 0.0) if start is None else start
+        part = self if first >= self.time[-1] else self.window(first, end)
+        panels: dict[str, dict[str, np.ndarray]] = {}
+        for name in chosen:
+            unit = self.channels[name].unit or "1"
+            label = f"{name} in {unit}" if len(chosen) <= OWN_PANELS else unit
+            panels.setdefault(label, {})[name] = part[name]
+        return plot_over(("time in s", part.time), panels, figure)
+
+    @property
+    def _of_meshes(self) -> list[str]:
+        meshes = [name.removesuffix("te") for name in self.channels if name.endswith(".te")]
+        own = (f"{mesh}{channel}" for channel in ("force", "te") for mesh in meshes)
+        return [name for name in own if name in self.channels] or ["*"]
+
+    def matching(self, patterns: Iterable[str]) -> list[str]:
+        """Names of the channels that these names and patterns ("bearing.*.fx") mean; TraceError where one means
+        none."""
+        found: dict[str, None] = {}
+        for pattern in patterns:
+            own = [name for name in self.channels if fnmatchcase(name, pattern)]
+            found |= dict.fromkeys(own or self.chosen([pattern]))
+        return list(found)
 
     def __contains__(self, name: object) -> bool:
         return name in self.channels

@@ -11,7 +11,15 @@ from gearfmu.spec.scene import SHIPPED, load_scene, shipped_scenes
 
 
 def test_shipped_scenes():
-    pairs = ["clutch_closure", "clutch_closure_train", "clutch_dump", "pair_light", "pair_loaded", "train_runup"]
+    pairs = [
+        "clutch_closure",
+        "clutch_closure_train",
+        "clutch_dump",
+        "pair_light",
+        "pair_loaded",
+        "pair_runup",
+        "train_runup",
+    ]
     sets = {name: "planetary54" for name in ("planetary_backfire", "planetary_paper", "planetary_closure")}
     sets |= {"planetary_runup": "planetary54/stage_pin_error", "planetary_shift": "planetary54/stage_ring_port"}
     assert shipped_scenes() == sorted([*pairs, *sets])
@@ -22,7 +30,8 @@ def test_shipped_scenes():
         scene, train = load_scene(name), "train" in name
         assert scene.name == name
         assert scene.stage.name == ("two_stage" if train else "fzg_c/stage_relief")
-        assert (scene.stage.level, scene.stage.slices) == (("fast", 7) if train else ("standard", 5))
+        level = "fast" if "runup" in name or train else "standard"
+        assert (scene.stage.level, scene.stage.slices) == (level, 7 if train else 5)
 
 
 def test_clutch_closure_is_the_demo():

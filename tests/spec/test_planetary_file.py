@@ -67,6 +67,7 @@ def test_the_shipped_set_is_read():
         (('bore_diameter = "40 mm"', 'bore_diameter = "80 mm"'), "carrier.bore_diameter", "less than 74 mm"),
         (('outer_diameter = "120 mm"', 'outer_diameter = "100 mm"'), "carrier.outer_diameter", "more than 106 mm"),
         (('bolt3 = "rigid"', 'bolt4 = "rigid"'), "carrier.coupling.bolt4", "bolt0, bolt1, bolt2, bolt3"),
+        (('bolt3 = "rigid"', ""), "carrier.coupling", "bolt3 would be rigid unsaid"),
         (('bolt3 = "rigid"', 'bolt3 = "stiff"'), "carrier.coupling.bolt3", "'rigid' or 'averaging'"),
         (('strip_half_width = "0.45 mm"', 'strip_half_width = "0.2 mm"'), "ring.body.strip_half_width", "0.273 mm"),
         (('kind = "planetary_set"', 'kind = "epicyclic"'), "kind", "external_pair"),

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gearfmu.errors import SpecError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.base import read_toml
-from gearfmu.spec.checks import largest_half_width
+from gearfmu.spec.checks import at_most, largest_half_width
 from gearfmu.spec.gear import Bearing
 from gearfmu.spec.library import find_stage, model_folder, shipped_stages
 from gearfmu.spec.new import stage_text
@@ -123,7 +123,7 @@ FIELD_PROBLEMS = [
     ({"pair.centre_distance": "91.5 mm"}, "pair.centre_distance", 'did you mean "center_distance"'),
     ({"zzz": 1}, "zzz", "unknown key: known are"),
     ({"source": "x"}, "source", "unknown key"),
-    ({"gears.wheel.face_width": 14}, "gears.wheel.face_width", 'write "14 m"'),
+    ({"gears.wheel.face_width": 14}, "gears.wheel.face_width", 'write "14 mm"'),
     ({"gears.wheel.face_width": "14 kg"}, "gears.wheel.face_width", "another kind"),
     ({"gears.wheel.face_width": "0 mm"}, "gears.wheel.face_width", "must be from 1 µm to 10000 mm"),
     ({"pair.backlash": "-0.01 mm"}, "pair.backlash", "must be from 0 mm to 10 mm"),
@@ -213,6 +213,11 @@ GEOMETRY_PROBLEMS = [
 def test_impossible_geometry_is_named_with_its_remedy(write: Write, changes, field: str, remedy: str) -> None:
     found = problems(write(changes))
     assert remedy in found[field].remedy
+
+
+def test_a_largest_length_below_zero_is_none() -> None:
+    assert at_most(0.0123456) == "at most 12.34 mm"
+    assert at_most(-1.423e-3).startswith("no value fits")
 
 
 def test_interference_below_the_form_circle(write: Write) -> None:

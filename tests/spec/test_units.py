@@ -20,6 +20,9 @@ READ = [
     ("0.6 kNm", "N*m", 600),
     ("600 N.m", "N*m", 600),
     ("6000 rpm", "rad/s", 6000 * math.pi / 30),
+    ("6000 U/min", "rad/s", 6000 * math.pi / 30),
+    ("6000 1/min", "rad/s", 6000 * math.pi / 30),
+    ("6000 min^-1", "rad/s", 6000 * math.pi / 30),
     ("20 deg", "rad", math.pi / 9),
     ("20°", "rad", math.pi / 9),
     ("0.1 mm", "m", 1e-4),
@@ -47,6 +50,8 @@ def test_reads(text: str, unit: str, value: float) -> None:
 REFUSED = [
     ("600", "N*m", "unit is missing"),
     (600, "N*m", 'write "600 N*m"'),
+    (2000, "rad/s", 'write "2000 rpm"'),
+    ("2000 rpmm", "rad/s", 'use one like "rpm" or "rad/s"'),
     (0.1, "m", "unit is missing"),
     ("600 N", "N*m", "another kind"),
     ("50 Hz", "rad/s", "another kind"),

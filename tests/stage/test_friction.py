@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import gearfmu as gf
 from gearfmu.body import ReducedBody, load_stage_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
@@ -320,9 +321,20 @@ def test_efficiency_of_a_run_stands_beside_the_closed_form(spec: StageSpec, bodi
     run loses less, but not by a tenth."""
     found = mesh_efficiency(assemble(spec, bodies), 302.0, 200.0, {"level": 0.0, "friction_coefficient": 0.05})
     print(found.columns())
-    assert found.coefficient == pytest.approx(0.05, rel=0.02) and found.retried_steps == 0
+    assert found.meshes["mesh"].coefficient == pytest.approx(0.05, rel=0.02) and found.retried_steps == 0
     assert found.lost == pytest.approx(found.closed, rel=0.1)
     assert 0.98 < found.efficiency < 1.0
+
+
+def test_efficiency_of_a_set_counts_the_power_that_rolls() -> None:
+    """Of a held ring the sun rolls under ω_s − ω_c: (z_r/(z_s + z_r)) P through all sun meshes, and as much through
+    those of the ring. The torque ports of the set are driven through springs."""
+    found = mesh_efficiency(gf.assemble("planetary54"), 400.0, 50.0, {"level": 0.0}, settles=2e-3, pitches=2)
+    rolling = [sum(m.power for name, m in found.meshes.items() if name.startswith(g)) for g in ("sun", "ring")]
+    assert rolling == pytest.approx([0.75 * found.power] * 2)
+    assert 0.8 * found.closed < found.lost < found.closed and 0.98 < found.efficiency < 1.0
+    ring = found.meshes["ring_planet1"].loss_factor
+    assert 0 < ring < 0.4 * found.meshes["sun_planet1"].loss_factor, "flanks of a ring slide less"
 
 
 def test_a_helical_pair_loses_what_its_ports_do_not_give_on(helical: StageModel) -> None:

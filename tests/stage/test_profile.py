@@ -11,7 +11,9 @@ import pytest
 import gearfmu as gf
 from gearfmu import cli
 from gearfmu.errors import SpecError
+from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.profile import Profile, read_profile
+from gearfmu.spec.turning import with_ports
 from gearfmu.stage.profiled import Line, Profiled, winding_torques
 from gearfmu.stage.simulate import Steady
 
@@ -157,3 +159,16 @@ def test_the_largest_torque_of_a_profile_is_held_against_the_limit(model) -> Non
     torque = Profile(np.array([0.0, 1e-3, 2e-3]), torque=np.array([100.0, -700.0, 100.0]))
     trace = gf.simulate(model, speed="1000 rpm", profile=torque, level="rigid")
     assert any("700 N·m on the pinion is beyond torque_max" in text for text in trace.meta["warnings"])
+
+
+def test_a_set_on_torque_ports_is_driven_through_the_springs_of_its_file() -> None:
+    """The same model as assembled with spring ports; torques in balance. A shaft without k and c is refused."""
+    model = gf.assemble("planetary54")
+    springs = gf.assemble("planetary54", ports={"carrier": "spring", "sun": "spring"})
+    assert model.driven_by_springs().hash == springs.hash and springs.driven_by_springs() is springs
+    trace = gf.simulate(model, 400.0, 50.0, "2 ms", settle="1 ms", level="rigid").window(1e-3)
+    assert trace["sun.tau"].mean() == pytest.approx(100.0, rel=1e-3)
+    assert trace["sun.gear.w"].mean() == pytest.approx(200.0, rel=1e-3)
+    bare = replace(model, spec=with_ports(model.spec, {"sun": PortSpec(kind="torque")}))
+    with pytest.raises(gf.GearfmuError, match=r"ports.sun = torque: write k and c of its shaft"):
+        gf.simulate(bare, 400.0, 50.0, "1 ms")
