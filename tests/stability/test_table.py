@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "benchmarks" / "stability.csv"
 REMEDY = "run `make stability`"
 
+
 def test_every_scene_ran_through_at_level_fast() -> None:
     rows = read(TABLE)
     seen = {row.scene for row in rows if (row.case.level, row.case.step) == ("fast", "default")}
