@@ -64,7 +64,7 @@ TAIL = """
 Rows of sets at level `fast` and the default step are of the present model. Their other rows are older: ring teeth had \
 no tip edges then, and the balance closed less well.
 
-The failures under friction are a resonance of the step with one mode: see [decisions](decisions/hard-cases.md).
+Rows of pairs with friction or oil are of the present kernel, but for the two scenes of ten seconds.
 
 ## The table
 

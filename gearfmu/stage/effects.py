@@ -336,7 +336,7 @@ EFFECTS: tuple[Effect, ...] = (
             "Off unless the stage says `[contact] friction = {…}`"
         ),
         off="flanks slide without resistance",
-        code="gk_friction.c, gk_lubrication.c, gk_flank.c (glide), gk_residual.c (gk_residual_store_along)",
+        code="gk_friction.c, gk_glide.c, gk_lubrication.c, gk_flank.c (glide), gk_residual.c (gk_residual_store_along)",
         test="tests/stage/test_friction.py::test_force_across_the_line_of_action_jumps_at_the_pitch_point",
         kept=DISSIPATION,
     ),

@@ -146,7 +146,7 @@ RUNS: dict[str, tuple[str, Parameters]] = {
 }
 ADOPTIONS: dict[str, tuple[str, Parameters, Parameters]] = {
     "adopt/pair": ("pair", {"level": FAST}, {"level": FULL, "slices": 2.0, "integrator": EM}),
-    "adopt/helical": ("helical", {"level": RIGID}, {"level": STANDARD, "slices": 4.0} | FRICTION),
+    "adopt/helical_friction": ("helical", {"level": RIGID}, {"level": STANDARD, "slices": 4.0} | FRICTION),
     "adopt/train": ("train", {"level": FAST, "slices": 1.0}, {"level": RIGID, "slices": 1.0}),
 }
 STATICS: dict[str, tuple[str, Parameters]] = {

@@ -134,4 +134,49 @@ static inline double gk_dot(const gk_real *a, const gk_real *b, int n)
     low += high;
     return ((low[0] + low[4]) + (low[2] + low[6])) + ((low[1] + low[5]) + (low[3] + low[7]));
 }
+
+/* ---- rows ---- */
+/* adds row·x to what each row reads: `each` rows side by side, whose sums do not wait for each other */
+GK_INLINE void gk_times_some(const double *rows, int width, const double *x, double *read, const int each)
+{
+    const gk_quad *b = (const gk_quad *)x;
+    gk_quad sum[4] = {{0}};
+    for (int q = 0; q < width / 4; q++)
+        for (int i = 0; i < each; i++) sum[i] += ((const gk_quad *)(rows + (size_t)i * (size_t)width))[q] * b[q];
+    for (int i = 0; i < each; i++) read[i] += (sum[i][0] + sum[i][2]) + (sum[i][1] + sum[i][3]);
+}
+
+static inline void gk_times_rows(const double *rows, int n, int width, const double *x, double *read)
+{
+    GK_ASSERT(n >= 0 && width % 4 == 0);
+    int i = 0;
+    for (; i + 4 <= n; i += 4) gk_times_some(rows + (size_t)i * (size_t)width, width, x, read + i, 4);
+    for (; i < n; i++) gk_times_some(rows + (size_t)i * (size_t)width, width, x, read + i, 1);
+}
+
+static inline double gk_across(const gk_half *sum)
+{
+    const gk_four *half = (const gk_four *)sum, s = half[0] + half[1];
+    return (s[0] + s[2]) + (s[1] + s[3]);
+}
+
+/* to[i] += row·rows[i], four rows side by side; rows are `width` halves apart, of which the product takes `halves` */
+static inline void gk_multiply_rows(const gk_half *row, const gk_half *rows, int count, int width, int halves,
+                                    double *to)
+{
+    GK_ASSERT(count >= 0 && halves <= width);
+    int i = 0;
+    for (; i + 4 <= count; i += 4, rows += 4 * width) {
+        gk_half sum[4] = {{0}};
+        for (int k = 0; k < halves; k++)
+            for (int l = 0; l < 4; l++) sum[l] += row[k] * rows[l * width + k];
+        for (int l = 0; l < 4; l++) to[i + l] += gk_across(&sum[l]);
+    }
+    for (; i < count; i++, rows += width) {
+        gk_half sum = {0};
+        for (int k = 0; k < halves; k++) sum += row[k] * rows[k];
+        to[i] += gk_across(&sum);
+    }
+}
+
 #endif

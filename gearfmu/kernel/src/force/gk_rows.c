@@ -210,23 +210,6 @@ void gk_rows_turn_forth(const gk_modal *m, int tooth, const gk_real *f[2], gk_re
         }
 }
 
-/* adds row·x to what each row reads: `each` rows side by side, whose sums do not wait for each other */
-GK_INLINE void read_some(const double *rows, int width, const double *x, double *read, const int each)
-{
-    const gk_quad *b = (const gk_quad *)x;
-    gk_quad sum[4] = {{0}};
-    for (int q = 0; q < width / 4; q++)
-        for (int i = 0; i < each; i++) sum[i] += ((const gk_quad *)(rows + (size_t)i * (size_t)width))[q] * b[q];
-    for (int i = 0; i < each; i++) read[i] += (sum[i][0] + sum[i][2]) + (sum[i][1] + sum[i][3]);
-}
-
-static void read_rows(const double *rows, int n, int width, const double *x, double *read)
-{
-    int i = 0;
-    for (; i + 4 <= n; i += 4) read_some(rows + (size_t)i * (size_t)width, width, x, read + i, 4);
-    for (; i < n; i++) read_some(rows + (size_t)i * (size_t)width, width, x, read + i, 1);
-}
-
 /* what the rows of an engagement read of displacements (or speeds) of its own part of the ground group */
 void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const double *local, double *read)
 {
@@ -234,7 +217,7 @@ void gk_rows_read_local(const gk_mesh *mesh, const gk_engaged *engaged, const do
     GK_ASSERT(local && read);
     const gk_system *s = &engaged->system;
     for (int i = 0; i < s->stride; i++) read[i] = 0.0;
-    read_rows(engaged->ground, s->n, mesh->local, local, read);
+    gk_times_rows(engaged->ground, s->n, mesh->local, local, read);
 }
 
 /* the same of the sliding of the contacts */
@@ -244,7 +227,7 @@ void gk_rows_read_local_along(const gk_mesh *mesh, const gk_engaged *engaged, co
     GK_ASSERT(engaged->glide && local && read);
     const gk_system *s = &engaged->system;
     for (int i = 0; i < s->stride; i++) read[i] = 0.0;
-    read_rows(engaged->glide->ground, s->contacts, mesh->local, local, read);
+    gk_times_rows(engaged->glide->ground, s->contacts, mesh->local, local, read);
 }
 
 /* what the sliding of the contacts reads of displacements (or speeds) of the ground group */

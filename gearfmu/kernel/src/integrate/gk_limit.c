@@ -2,7 +2,8 @@
  * compliance that a force of alternating sign meets: outside the paths of the dashpots all of it, in them what the
  * dashpots let move, S(1 + Γ′S)⁻¹, Γ′ = 2Γ/(1 − m). A closed contact is stable up to μ′ = 1. Modes above ωh = 1.2
  * have no κ, so μ′ goes up and down with h. Default h: the largest with μ′ ≤ 0.9, at most h_max of the stage and
- * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused. */
+ * 1/40 of the mesh period at speed_max. Any other h lowers γ until μ′ = 0.9; above 1/8 of the period it is refused.
+ * Friction c λ adds c C_nt to C and c K_nt to K, which are no longer symmetric: their symmetric parts decide. */
 #include "base/gk_dense.h"
 #include "integrate/gk_integrate.h"
 #include "setup/gk_tables.h"
@@ -131,18 +132,63 @@ static void keep_all(const gk_model *model, const gk_setup *setup, gk_work *work
         }
 }
 
+/* the share of the normal force that slides every contact, gear A turning forwards */
+static void friction_of(const gk_model *model, const gk_setup *setup, const gk_engaged *engaged, int e, double *share)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    const double most = gk_lubrication_most(&setup->mesh[e].friction);
+    const double ratio = model->gear[engagement->gear[0]].r_b / model->gear[engagement->gear[1]].r_b;
+    for (int i = 0; i < engaged->system.contacts; i++) {
+        const double *slide =
+            gk_point_of(setup, &engaged->place[engaged->system.place_of[i]], i % GK_STRIPS(setup))->slide;
+        const double speed = slide[PHIA] - engagement->kind * ratio * slide[PHIB];
+        share[i] = speed > 0.0 ? -most : most;
+    }
+}
+
+/* M (n, n) += ½ sign (Y c + c Yᵀ), Y (contacts, stride): what friction does to the gaps */
+static void add_symmetric(const gk_system *s, const double *Y, const double *share, double sign, double *M)
+{
+    for (int j = 0; j < s->contacts; j++)
+        for (int i = 0; i < s->n; i++) {
+            const double half = counts(s, i) ? 0.5 * sign * share[j] * Y[j * s->stride + i] : 0.0;
+            M[i * s->n + j] += half, M[j * s->n + i] += half;
+        }
+}
+
+/* μ′ of the problem that is formed, Q without the κ part; `sign` of the direction in which gear A turns, 0: no friction
+ */
+static double mu_of(const gk_model *model, const gk_setup *setup, gk_work *work, const double *Q, int e, double sign)
+{
+    const gk_engagement *engagement = &model->engagement[e];
+    gk_engaged *engaged = &work->engaged[e];
+    const gk_system *s = &engaged->system;
+    double *const C = s->J, *const K = s->L;
+    gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
+    kappa_part(s, Q, K);
+    if (sign != 0.0) {
+        double share[MAX_CONTACTS];
+        const double *yields = engaged->glide->D, *all = engaged->glide->gap_yields;
+        friction_of(model, setup, engaged, e, share);
+        add_symmetric(s, yields, share, sign, C);
+        add_symmetric(s, yields, share, sign, K), add_symmetric(s, all, share, -sign, K);
+    }
+    return gk_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
+}
+
 static double mu_at(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data,
                     const gk_coefficients *k, int e, int i)
 {
     const double position = (double)i / LIMIT_POSITIONS;
-    const gk_system *s = &work->engaged[e].system;
-    const gk_engagement *engagement = &model->engagement[e];
     const double *Q = kept_at(work, e, i);
     if (!gk_limit_place(model, setup, work, data, k, e, position)) return INFINITY;
-    double *const C = s->J, *const K = s->L;
-    gk_limit_compliance(s, Q, engagement->force_max / engagement->width, 1, C);
-    kappa_part(s, Q, K);
-    return gk_cholesky(C, s->n) ? largest(C, K, s->n) : INFINITY;
+    if (!GK_ON(setup, friction)) return mu_of(model, setup, work, Q, e, 0.0);
+    const gk_system *s = &work->engaged[e].system;
+    gk_glide *glide = work->engaged[e].glide;
+    gk_glide_rows(setup, work, e);
+    memcpy(glide->D, glide->gap_yields, (size_t)(s->contacts * s->stride) * sizeof *glide->D); /* C_nt */
+    gk_glide_moves(setup, k, work, e);                                                         /* C_nt − K_nt */
+    return gk_max(mu_of(model, setup, work, Q, e, 1.0), mu_of(model, setup, work, Q, e, -1.0));
 }
 
 static double limit_mu(const gk_model *model, const gk_setup *setup, gk_work *work, const gk_data *data, double h,

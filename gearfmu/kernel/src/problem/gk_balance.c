@@ -252,6 +252,20 @@ static int bursts(const gk_island *island, double defect)
     return 0;
 }
 
+/* A step without a root in which flanks rub: what is left is friction's, whose means are not those of both ends beside
+ * dampers, and counts with what friction takes, as long as that is more. Returns whether it is. */
+static int rubs_away(const gk_island *island, double defect)
+{
+    double taken = 0.0;
+    for (int m = 0; m < island->count; m++) taken += island->member[m]->rubs ? island->member[m]->rubbed : 0.0;
+    if (!(fabs(defect) < taken)) return 0;
+    for (int m = 0; m < island->count; m++) {
+        gk_system *s = island->member[m];
+        if (s->rubs) s->unbalanced = defect * s->rubbed / taken;
+    }
+    return 1;
+}
+
 /* a step that cannot be balanced with films goes without them */
 static int dry(const gk_island *island)
 {
@@ -300,6 +314,10 @@ void gk_balance_solve(const gk_island *island)
     if (own.defect > 0.0 && open_balance(&own, steady) && dry(island)) {
         gk_balance_solve(island);
         return;
+    }
+    if (rubs && open_balance(&own, steady) && rubs_away(island, own.defect)) {
+        b.defect -= own.defect;
+        own.defect = 0.0;
     }
     leave(island, &b);
     if (open_balance(&own, rubs ? RUBBED_BALANCE : steady))

@@ -97,7 +97,7 @@ void gk_memory_recall(const gk_setup *setup, const gk_work *work, const gk_data 
     int given = 0; /* forces that are not those of the last step */
     s->curved = GK_ON(setup, hertz) && s->contacts > 0;
     s->rubs = GK_ON(setup, friction) && s->contacts > 0;
-    s->rubbing = 0.0;
+    s->rubbing = s->rubbed = s->unbalanced = 0.0;
     recall_forces(data, s, gk_scheme_of(setup->integrator)->linear_force);
     for (int i = 0; i < s->n; i++) {
         const int acted = s->damper0[i] != 0.0 && (i >= s->contacts || s->force0[i] > 0.0);

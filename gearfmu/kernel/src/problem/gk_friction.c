@@ -30,33 +30,6 @@ static void recall_friction(const gk_engaged *engaged, const gk_meshing *meshing
     }
 }
 
-/* sliding in the step of length h without its forces */
-static void slide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e)
-{
-    const gk_mesh *mesh = &setup->mesh[e];
-    gk_glide *glide = work->engaged[e].glide;
-    const double *x = gk_ground_seen(data);
-    const int contacts = work->engaged[e].system.contacts;
-    for (int i = 0; i < setup->base.n; i++) work->ground_reading[i] = work->ground_q[i] - x[i];
-    gk_rows_read_ground_along(setup, &work->engaged[e], e, work->ground_reading, glide->free);
-    gk_rows_read_ground_along(setup, &work->engaged[e], e, work->ground_start, glide->begin);
-    for (int w = 0; w < 2; w++) {
-        const int g = mesh->side[w].gear, n = GK_LANES(setup, g);
-        const gk_real *q = gk_modal_seen(setup, data, g);
-        for (int k = 0; k < n; k++) work->reading[g][k] = work->qp[g][k] - q[k];
-        gk_rows_read_modes_along(setup, work, e, w, work->reading[g], glide->free);
-        gk_rows_read_modes_along(setup, work, e, w, q + n, glide->begin);
-    }
-    for (int l = 0; l < mesh->spins; l++) {
-        const double turned = work->spin[mesh->spin[l]] - GK_OF(data, x)[mesh->spin[l]];
-        for (int i = 0; i < contacts; i++) {
-            glide->free[i] += turned * glide->rigid[l][i];
-            glide->begin[i] += GK_OF(data, v)[mesh->spin[l]] * glide->rigid[l][i];
-        }
-    }
-    for (int i = 0; i < contacts; i++) glide->begin[i] *= h;
-}
-
 /* limit at which friction works against a sliding that is more than `creep` */
 static signed char against(double sliding, double creep)
 {
@@ -96,90 +69,6 @@ static void find_coefficients(const gk_model *model, const gk_setup *setup, cons
     }
 }
 
-/* ---- what friction does ------------------------------------------------------------------------------------------ */
-/* adds what is not dynamic, from the tables of a side, linear between nodes */
-static void slide_residual(const gk_engaged *engaged, const gk_side *side, gk_glide *glide)
-{
-    const gk_system *s = &engaged->system;
-    const gk_position *at = &engaged->position[side->which];
-    const int strips = GK_STRIPS(s);
-    const size_t columns = (size_t)side->columns, next = (size_t)(side->candidates * strips) * columns;
-    const size_t node = (size_t)at->node * next;
-    for (int i = 0; i < s->contacts; i++)
-        for (int j = 0; j < s->contacts; j++) {
-            const gk_place *p = &engaged->place[s->place_of[i]], *q = &engaged->place[s->place_of[j]];
-            const size_t row = (size_t)(p->candidate[side->which] * strips + i % strips);
-            const size_t cell = node + row * columns + (size_t)(q->candidate[side->which] * strips + j % strips);
-            const gk_real *normal = side->along.normal + cell, *own = side->along.own + cell;
-            glide->gap_yields[j * s->stride + i] += normal[0] + at->part * ((double)normal[next] - normal[0]);
-            glide->yields[j * s->stride + i] += own[0] + at->part * ((double)own[next] - own[0]);
-        }
-}
-
-/* adds the modes of a gear group */
-static void slide_modes(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e, int which)
-{
-    const int g = setup->mesh[e].side[which].gear, n = GK_LANES(setup, g);
-    const gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    gk_glide *glide = engaged->glide;
-    const gk_flow *flow = &k->flow[g];
-    gk_real *moves = work->scaled, *yields = moves + n;
-    for (int j = 0; j < s->contacts && n; j++) {
-        const gk_real *row = glide->basis[which] + (size_t)j * n;
-        for (int l = 0; l < n; l++) moves[l] = row[l] * flow->mobility[l], yields[l] = row[l] * flow->kappa[l];
-        for (int i = 0; i < s->contacts; i++) {
-            const gk_real *gap = engaged->basis[which] + (size_t)i * n, *slide = glide->basis[which] + (size_t)i * n;
-            const int at = j * s->stride + i;
-            glide->gap_moves[at] += gk_dot(moves, gap, n), glide->gap_yields[at] -= gk_dot(yields, gap, n);
-            glide->moves[at] += gk_dot(moves, slide, n);
-        }
-    }
-}
-
-/* adds the ground group */
-static void slide_ground(const gk_setup *setup, gk_work *work, const gk_coefficients *k, int e)
-{
-    const gk_mesh *mesh = &setup->mesh[e];
-    const gk_engaged *engaged = &work->engaged[e];
-    const gk_system *s = &engaged->system;
-    gk_glide *glide = engaged->glide;
-    const int width = mesh->local;
-    double mobility[MAX_GROUND + 4 * MAX_ROTORS], kappa[MAX_GROUND + 4 * MAX_ROTORS];
-    double *moves = work->ground_scaled, *yields = moves + width;
-    gk_local_gather(mesh, k->ground.mobility, mobility);
-    gk_local_gather(mesh, k->ground.kappa, kappa);
-    for (int j = 0; j < s->contacts && width; j++) {
-        const double *row = glide->ground + (size_t)j * width;
-        for (int l = 0; l < width; l++) moves[l] = row[l] * mobility[l], yields[l] = row[l] * kappa[l];
-        for (int i = 0; i < s->n; i++) {
-            const double *gap = engaged->ground + (size_t)i * width, *slide = glide->ground + (size_t)i * width;
-            const int at = j * s->stride + i;
-            glide->gap_moves[at] += gk_dot_quads(moves, gap, width / 4);
-            glide->gap_yields[at] -= gk_dot_quads(yields, gap, width / 4);
-            if (i < s->contacts) glide->moves[at] += gk_dot_quads(moves, slide, width / 4);
-        }
-    }
-}
-
-/* adds the spins */
-static void slide_spins(const gk_setup *setup, const gk_coefficients *k, const gk_mesh *mesh, const gk_system *s,
-                        gk_glide *glide)
-{
-    for (int l = 0; l < mesh->spins; l++) {
-        const double inverse = setup->inverse_inertia[mesh->spin[l]];
-        for (int j = 0; j < s->contacts; j++) {
-            const double moves = k->rigid_mobility * inverse * glide->rigid[l][j];
-            const double yields = k->rigid_kappa * inverse * glide->rigid[l][j];
-            for (int i = 0; i < s->n && moves != 0.0; i++) {
-                const int at = j * s->stride + i;
-                glide->gap_moves[at] += moves * s->rigid[l][i], glide->gap_yields[at] -= yields * s->rigid[l][i];
-                if (i < s->contacts) glide->moves[at] += moves * glide->rigid[l][i];
-            }
-        }
-    }
-}
-
 /* What a contact yields along the profile by itself: as much as its local law does above its upper bound */
 static double local_yield(const gk_system *s, int i) { return s->law[i / 4].slope_high[i % 4] * s->per_width[i]; }
 
@@ -201,35 +90,22 @@ static double held(const gk_glide *glide, const gk_system *s, const double *forc
 void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data, const gk_coefficients *k,
                       gk_work *work, int e)
 {
-    GK_ASSERT(gk_is_mesh(setup, e));
-    GK_ASSERT(k->h > 0.0 && work->engaged[e].glide);
-    GK_ASSERT(gk_system_is_sound(&work->engaged[e].system));
+    GK_ASSERT(k->h > 0.0);
     gk_engaged *engaged = &work->engaged[e];
     gk_glide *glide = engaged->glide;
     gk_system *s = &engaged->system;
-    const size_t size = (size_t)(s->contacts * s->stride);
-    double **matrix[] = {&glide->gap_moves, &glide->gap_yields, &glide->moves, &glide->yields, &glide->by_z, &glide->D};
     memcpy(glide->gap, s->g, (size_t)s->stride * sizeof *s->g);
-    memset(glide->matrix, 0, 4 * size * sizeof(double));
-    for (size_t i = 0; i < 6; i++) *matrix[i] = glide->matrix + i * size;
+    gk_glide_rows(setup, work, e);
     memcpy(glide->D, s->D, (size_t)(s->n * s->stride) * sizeof *s->D);
     recall_friction(engaged, &GK_OF(data, meshing)[e], glide);
-    gk_rows_form_along(setup, work, e);
-    slide_freely(setup, data, work, k->h, e);
+    gk_glide_freely(setup, data, work, k->h, e);
     find_coefficients(model, setup, data, k->h, e, engaged);
-    for (int w = 0; w < 2; w++) {
-        slide_modes(setup, work, k, e, w);
-        if (GK_ON(setup, residual)) slide_residual(engaged, &setup->mesh[e].side[w], glide);
-    }
+    gk_glide_moves(setup, k, work, e);
     for (int i = 0; i < s->contacts; i++) {
         const double yields = local_yield(s, i);
         glide->yields[i * s->stride + i] += yields;
         glide->damps[i] = gk_min(0.5 * s->damping[i] * yields, 0.5);
     }
-    slide_ground(setup, work, k, e);
-    slide_spins(setup, k, &setup->mesh[e], s, glide);
-    for (int j = 0; j < s->contacts; j++) /* a clutch is a row of speeds, without what yields at once */
-        for (int i = s->n - s->clutches; i < s->n; i++) glide->gap_yields[j * s->stride + i] = 0.0;
     glide->held0 = held(glide, s, s->force0, s->end0, glide->start_end);
 }
 
@@ -454,6 +330,14 @@ static double friction_defect(const gk_glide *glide, const gk_system *s)
     return sum;
 }
 
+/* what friction takes in the step; its sliding is known */
+static double friction_taken(const gk_glide *glide, const gk_system *s)
+{
+    double taken = -faded(glide, s);
+    for (int j = 0; j < s->contacts; j++) taken -= glide->mean[j] * glide->slid[j];
+    return taken;
+}
+
 /* Normal forces and friction of an engagement for each other, once. `stands`: where friction is at its limits is known.
  * Returns how much friction has changed, as part of the largest normal force; 1 where it has another status. */
 double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
@@ -470,6 +354,7 @@ double gk_friction_solve(gk_glide *glide, gk_system *s, int round, int stands)
     gk_solve_contacts(s);
     const double moved = follow(glide, s);
     s->rubbing = friction_defect(glide, s);
+    s->rubbed = friction_taken(glide, s);
     if (changed || (!stands && !round)) return 1.0;
     return moved / find_limits(glide, s);
 }
@@ -492,13 +377,11 @@ double gk_friction_settle(gk_glide *glide, const gk_system *s)
 {
     GK_ASSERT(glide);
     GK_ASSERT(gk_system_is_sound(s));
-    double taken = -faded(glide, s);
     find_sliding(glide, s);
     for (int j = 0; j < s->contacts; j++) {
         const double end = s->force[j] + s->end[j];
         glide->ratio[j] = end > 0.0 ? glide->end[j] / end : 0.0;
         glide->last[j] = glide->ratio[j] * s->force[j];
-        taken -= glide->mean[j] * glide->slid[j];
     }
-    return taken;
+    return friction_taken(glide, s) - s->unbalanced;
 }

@@ -13,29 +13,6 @@ static void turn_rows(const gk_model *model, const gk_setup *setup, gk_work *wor
         gk_rows_turn_back(&setup->modal[g], back, engaged->basis[which] + i, engaged->turned[which] + i);
 }
 
-static double across(const gk_half *sum)
-{
-    const gk_four *half = (const gk_four *)sum, s = half[0] + half[1];
-    return (s[0] + s[2]) + (s[1] + s[3]);
-}
-
-/* to[i] += row·rows[i], four rows side by side; rows are `width` halves apart, of which the product takes `halves` */
-static void multiply(const gk_half *row, const gk_half *rows, int count, int width, int halves, double *to)
-{
-    int i = 0;
-    for (; i + 4 <= count; i += 4, rows += 4 * width) {
-        gk_half sum[4] = {{0}};
-        for (int k = 0; k < halves; k++)
-            for (int l = 0; l < 4; l++) sum[l] += row[k] * rows[l * width + k];
-        for (int l = 0; l < 4; l++) to[i + l] += across(&sum[l]);
-    }
-    for (; i < count; i++, rows += width) {
-        gk_half sum = {0};
-        for (int k = 0; k < halves; k++) sum += row[k] * rows[k];
-        to[i] += across(&sum);
-    }
-}
-
 /* R mobility Rᵀ and −R κ Rᵀ over the modes of the gear */
 static void form_modes(const gk_setup *setup, const gk_flow *flow, gk_work *work, gk_shared *s)
 {
@@ -47,10 +24,10 @@ static void form_modes(const gk_setup *setup, const gk_flow *flow, gk_work *work
     gk_half *scaled = (gk_half *)work->scaled;
     for (int j = 0; j < from->system.contacts; j++, b += width) {
         for (int k = 0; k < width; k++) scaled[k] = b[k] * mobility[k];
-        multiply(scaled, a, rows, width, width, s->moves + j * s->stride);
+        gk_multiply_rows(scaled, a, rows, width, width, s->moves + j * s->stride);
         for (int first = 0; first < width && exact; first += half) {
             for (int k = first; k < first + exact; k++) scaled[k] = -b[k] * kappa[k];
-            multiply(scaled + first, a + first, rows, width, exact, s->yielded + j * s->stride);
+            gk_multiply_rows(scaled + first, a + first, rows, width, exact, s->yielded + j * s->stride);
         }
     }
 }

@@ -66,11 +66,12 @@ typedef struct gk_system {
     double linear[MAX_STRIDE], approach[MAX_STRIDE], approach0[MAX_STRIDE]; /* Pλ; Pλ + δ now and at the start */
     double delta[MAX_STRIDE], yield[MAX_STRIDE], potential[MAX_STRIDE]; /* local law at λ: δ, δ′, ∫ λ dδ; 0 in joints */
     double slope[MAX_STRIDE];                                           /* δ′ in the tangent */
-    double stored0;           /* energy of the quasi-static part at the start of the step */
-    double held0;             /* energy that the dampers' force holds in Q at the start */
-    double energy_error;      /* defect of energy that the steps before left */
-    double energy_correction; /* what of it this step should make good */
-    double rubbing;           /* what friction leaves of that energy in the step (gk_friction_defect) */
+    double stored0;            /* energy of the quasi-static part at the start of the step */
+    double held0;              /* energy that the dampers' force holds in Q at the start */
+    double energy_error;       /* defect of energy that the steps before left */
+    double energy_correction;  /* what of it this step should make good */
+    double rubbing;            /* what friction leaves of that energy in the step (gk_friction_defect) */
+    double rubbed, unbalanced; /* energy that friction takes in the step; of it what no scalar balances */
     int iterations, limit_reached, curved, rubs; /* curved: the local law is; rubs: there is friction */
     int dashpots_stand;                          /* where they are: no search for what limits them */
     int films;                                   /* rows whose gap is open at the start of the step, with oil in it */

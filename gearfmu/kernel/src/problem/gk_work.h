@@ -245,6 +245,10 @@ GK_HOT void gk_far_between(const gk_model *model, const gk_setup *setup, const g
 /* gk_film.c */
 GK_HOT void gk_film_begin(const gk_setup *setup, gk_work *work, int e, double h);
 GK_HOT void gk_film_begin_rates(const gk_setup *setup, gk_work *work, int e, const double *rate);
+/* gk_glide.c */
+GK_HOT void gk_glide_rows(const gk_setup *setup, gk_work *work, int e);
+GK_HOT void gk_glide_moves(const gk_setup *setup, const gk_coefficients *k, gk_work *work, int e);
+GK_HOT void gk_glide_freely(const gk_setup *setup, const gk_data *data, gk_work *work, double h, int e);
 /* gk_friction.c */
 GK_HOT void gk_friction_form(const gk_model *model, const gk_setup *setup, const gk_data *data,
                              const gk_coefficients *k, gk_work *work, int e);

@@ -39,6 +39,7 @@
 #include "problem/gk_tangent.c"
 #include "problem/gk_solve.c"
 #include "problem/gk_balance.c"
+#include "problem/gk_glide.c"
 #include "problem/gk_friction.c"
 #include "problem/gk_far.c"
 #include "problem/gk_shared.c"

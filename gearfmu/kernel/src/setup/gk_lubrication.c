@@ -32,6 +32,9 @@ double gk_lubrication_coefficient(const gk_friction *f, double width, const gk_s
     return gk_clamp(found, 0.0, HIGHEST);
 }
 
+/* bound of the coefficient */
+double gk_lubrication_most(const gk_friction *f) { return f->law == FRICTION_CONSTANT ? f->coefficient : HIGHEST; }
+
 /* what the laws need of an engagement: its parameters, its pitch point and the ends of its path of contact */
 void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *mesh)
 {

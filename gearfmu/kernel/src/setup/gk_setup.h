@@ -352,6 +352,7 @@ static inline void gk_local_gather(const gk_mesh *mesh, const double *x, double 
 }
 /* gk_lubrication.c */
 void gk_lubrication_fill(const gk_model *model, const gk_data *data, gk_mesh *mesh);
+double gk_lubrication_most(const gk_friction *friction);
 double gk_lubrication_coefficient(const gk_friction *friction, double width, const gk_sliding *at);
 void gk_strips_rows(const gk_model *model, const gk_setup *setup, const gk_engagement *e, int g, gk_strip_weights out);
 #endif
