@@ -75,7 +75,8 @@ def test_a_library_of_these_sources_is_not_built_again(package, monkeypatch):
 
 def test_sources_of_the_avx2_unit_are_compiled_at_less_cost_where_it_is():
     files = [p for p in build.sources() if p.suffix == ".c"]
-    for target, cheap in (("x86_64-linux-gnu.2.17", 29), ("aarch64-macos.11.0", 0)):
+    unit = next(p for p in files if p.stem == "gk_wide").read_text()
+    for target, cheap in (("x86_64-linux-gnu.2.17", unit.count('.c"\n')), ("aarch64-macos.11.0", 0)):
         lines = build._compilations(["zig", "cc", "-target", target], (), files, Path("out"))
         assert [path.stem for path in lines][0] == "gk_wide"
         assert sum(line[4] == "-O1" for line in lines.values()) == cheap, target
