@@ -99,7 +99,9 @@ def test_the_turning_view_is_shown_with_its_time_and_scale_once_it_is_drawn(open
 
 def test_it_turns(opened: Browser) -> None:
     opened.value("gearfmuPage.stage.state.at = 0, gearfmuPage.stage.run(true), 1")
-    opened.value("new Promise(done => setTimeout(done, 700)).then(() => 1)")
+    seen = "gearfmuPage.stage.state.at > 1 || performance.now() > end"
+    look = f"const end = performance.now() + 20000, look = () => {seen} ? done() : setTimeout(look, 50)"
+    opened.value(f"new Promise(done => {{ {look}; look(); }}).then(() => 1)")
     assert opened.value("gearfmuPage.stage.state.at") > 1
     opened.value("gearfmuPage.stage.run(false), 1")
 
