@@ -14,6 +14,7 @@ from gearfmu.cosim.source import Source
 from gearfmu.kernel.binding import status_words
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.turning import meshings
+from gearfmu.stage.model import integrator_of
 
 TORQUES = (
     "{}.shaft.tau",
@@ -32,12 +33,13 @@ def summary(scene: SceneSpec, source: Source, result: Result, errors: dict[str, 
 
 
 def _what(scene: SceneSpec, source: Source) -> dict[str, Any]:
+    clutch = any(port.chain is not None for port in source.model.stage.ports.values())
     return {
         "scene": scene.name,
         "description": scene.description,
         "stage": scene.stage.name,
         "level": scene.stage.level,
-        "integrator": scene.stage.integrator,
+        "integrator": integrator_of(scene.stage.level, scene.stage.integrator, clutch),
         "contact": scene.stage.contact,
         "slices": scene.stage.slices,
         "effects_off": list(scene.stage.effects.off),

@@ -23,6 +23,14 @@ from gearfmu.units import quantity_text
 SPRING = 0  # kind of a port in the blob
 
 
+OWN_INTEGRATOR = {"paper": "rk45", "explicit": "central"}  # of levels, where dg4 is asked for (gk_choose.c)
+
+
+def integrator_of(level: str, asked: str, clutch: bool) -> str:
+    """What integrates at a level; a clutch on a port keeps dg4."""
+    return OWN_INTEGRATOR.get(level, asked) if asked == "dg4" and not clutch else asked
+
+
 @dataclass(frozen=True, repr=False)
 class StageModel:
     """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""

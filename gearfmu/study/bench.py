@@ -25,6 +25,7 @@ from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Trace, assemble
+from gearfmu.stage.model import integrator_of
 from gearfmu.stage.tables import ROLLS
 from gearfmu.study.norm import Signals, set_signals, signals_of
 
@@ -164,7 +165,8 @@ def measure(scene: SceneSpec, model: StageModel, point: Point) -> Run:
     changed = scene.model_copy(update={"stage": scene.stage.model_copy(update=choice), "record": ("*",)})
     done = recorded_run(changed, model)
     result, facts, end = done.result, done.result.facts, float(done.result.trace.time[-1])
-    integrator = _integrator(done.kernel, point)
+    clutch = any(name.endswith(".clutch.capacity") for name in done.kernel.variables)
+    integrator = integrator_of(point.level, point.integrator, clutch)
     return Run(
         point,
         integrator,
@@ -184,12 +186,6 @@ def _signals(trace: Trace, model: StageModel, settle: float) -> Signals:
         return set_signals(trace, model.spec, settle)
     pinion, wheel = (gear.name for gear in model.spec.gears)
     return signals_of(trace, (pinion, wheel), settle)
-
-
-def _integrator(kernel: Kernel, point: Point) -> str:
-    """What integrates: level paper is rk45 unless a clutch hangs on a port."""
-    clutch = any(name.endswith(".clutch.capacity") for name in kernel.variables)
-    return "rk45" if point.level == "paper" and not clutch else point.integrator
 
 
 def default_step(scene: SceneSpec, model: StageModel, point: Point) -> float:

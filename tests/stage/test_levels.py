@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gearfmu.spec.ports import LevelSpec
+from gearfmu.stage import StageModel
 from gearfmu.stage.levels import FAST, FELT, FULL, RIGID, SHARED_BELOW, STANDARD, WITHIN, lowest_levels
+from gearfmu.stage.model import integrator_of
 
 CUTS = LevelSpec(fast_cut=60e3, standard_cut=120e3)
 DEGREES = np.array([0, 2])
@@ -46,3 +49,19 @@ def test_what_flanks_do_not_feel_is_static() -> None:
 def test_a_cut_goes_through_the_widest_gap_nearby() -> None:
     frequency, size = np.array([56e3, 59.9e3, 60.1e3, 61e3, 68e3]), np.ones(5)
     assert levels(frequency, np.zeros(5, int), size).tolist() == [FAST] * 4 + [STANDARD]
+
+
+@pytest.mark.parametrize("level", ["paper", "explicit"])
+def test_a_level_with_its_own_integrator_runs_what_is_said(plain: StageModel, level: str) -> None:
+    said = integrator_of(level, "dg4", clutch=False)
+    assert said != "dg4" and integrator_of(level, "dg4", clutch=True) == "dg4"
+    forces = []
+    for asked in ("dg4", said):
+        kernel = plain.kernel()
+        for name, item in {"level": level, "integrator": asked}.items():
+            kernel.set(name, kernel.variables[name].items.index(item))
+        kernel.initialize(0.0)
+        kernel.set("pinion.tau" if kernel.variables["pinion.tau"].causality == "input" else "pinion.phi", 1e-4)
+        kernel.step(0.0, 2e-5)
+        forces.append([kernel.get("mesh.force"), kernel.get("solver.steps")])
+    assert forces[0] == forces[1]
