@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from gearfmu.files import written_whole
 from gearfmu.report.style import COLOURS, MUTED, WIDTH, styled
 
+NOISE = 1e-10  # m
 HARMONICS = 6
 LEGEND = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
 
@@ -62,7 +63,12 @@ def write_set_plot(result: Any, path: Path) -> None:
 
 def peak_to_peak(te: np.ndarray) -> str:
     """ "0.69 µm peak to peak" of one torque's te (P,) m."""
-    return f"{1e6 * np.ptp(te):.3g} µm peak to peak"
+    return f"{_micrometres(np.ptp(te)):.3g} µm peak to peak"
+
+
+def _micrometres(length: float) -> float:
+    """In µm; rounding noise of statics is 0."""
+    return 1e6 * length if abs(length) > NOISE else 0.0
 
 
 def _panes() -> tuple[Figure, Any]:
@@ -92,7 +98,7 @@ def _coloured(result: Any, rows: np.ndarray) -> list[tuple[str, float, np.ndarra
 def _about_mean(axis: Axes, drawn: Sequence[Any], unit: str) -> None:
     for colour, torque, position, te, _ in drawn:
         label = f"{f'{torque:.4g} N·m' if torque else 'without load'}: {peak_to_peak(te)}"
-        label += f", mean {1e6 * te.mean():.4g} µm".replace("-", "−")
+        label += f", mean {_micrometres(te.mean()):.4g} µm".replace("-", "−")
         axis.plot(position, 1e6 * (te - te.mean()), color=colour, ls="-" if torque else ":", label=label)
     axis.set(xlabel=f"position in {unit}", ylabel="transmission error\nabout its mean in µm")
     axis.set_xlim(0, math.ceil(drawn[0][2][-1]))

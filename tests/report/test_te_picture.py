@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gearfmu as gf
-from gearfmu.report.te import write_plot, write_set_plot
+from gearfmu.report.te import peak_to_peak, write_plot, write_set_plot
 from gearfmu.stage import loaded_te
 from gearfmu.stage.set_te import SetTeResult
 from gearfmu.stage.te import TeResult
@@ -45,3 +45,7 @@ def test_load_over_the_width_of_a_spur_pair_is_even_about_its_middle() -> None:
     found = loaded_te(gf.assemble("fzg_c"), [302.0], positions=4).over_width
     assert found.shape == (1, 5) and found.mean() == pytest.approx(1.0)
     assert found[0] == pytest.approx(found[0, ::-1], rel=1e-6) and np.ptp(found) > 0
+
+
+def test_rounding_is_no_error_of_transmission() -> None:
+    assert peak_to_peak(np.array([0.0, 2e-12])) == "0 µm peak to peak"
