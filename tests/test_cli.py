@@ -374,7 +374,6 @@ def wreckage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "inspect stage.toml",
         "validate damaged.fmu",
         "new fzg_c/../x",
-        "simulate planetary54 --torque 1_N*m --speed 1_rpm",
         "mesh planetary54 --gear wheel",
     ],
 )

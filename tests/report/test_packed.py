@@ -103,7 +103,7 @@ def test_a_page_is_light_and_tells_its_figures_to_those_who_do_not_see_them(tmp_
     "channel, words",
     [
         ("mesh.te", "Transmission error"),
-        ("sun_planet1.force", "Mesh force, sun_planet1"),
+        ("sun_planet1.force", "Mesh force, sun – planet 1"),
         ("bearing.pinion.fy_mean", "Bearing force y, pinion, mean over the step"),
         ("pinion.gear.w", "Speed of the pinion"),
         ("drive.tyres.tau", "Torque, tyres"),
