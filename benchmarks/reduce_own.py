@@ -1,4 +1,4 @@
-"""What the reduction of a pair of one's own costs (issue 28's pair z 31/73, default mesh): table and CSV.
+"""What the reduction of a pair of one's own costs (z 31/73, default mesh): table and CSV.
 
     python benchmarks/reduce_own.py [--coarse] [--out reduce_own.csv]
 

@@ -17,7 +17,7 @@ from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.turning import Shafts, shafts_of, with_ports
 from gearfmu.stage.blob import blob_hash, read_blob, write_blob
-from gearfmu.stage.shown import Card, grouped
+from gearfmu.stage.shown import Card, Shown, grouped
 from gearfmu.units import quantity_text
 
 SPRING = 0  # kind of a port in the blob
@@ -32,21 +32,16 @@ def integrator_of(level: str, asked: str, clutch: bool) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class StageModel:
+class StageModel(Shown):
     """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""
 
     spec: StageSpec | GeneralStage | PlanetarySpec
     blob: bytes
     body_hashes: tuple[str, ...]
 
-    def __repr__(self) -> str:
-        return self._card.text
-
-    def _repr_html_(self) -> str:
-        return self._card.html
-
     @property
-    def _card(self) -> Card:
+    def card(self) -> Card:
+        """How a session shows it."""
         known = self.kernel_variables()
         meshes = [f"{mesh.name}: {' with '.join(mesh.gears)}" for mesh in self.stage.engagements]
         ports = [f"{name}: {port.kind}" for name, port in self.stage.ports.items()]

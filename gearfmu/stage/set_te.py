@@ -22,6 +22,7 @@ from gearfmu.stage.limits import limit_named
 from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
+from gearfmu.stage.shown import Card, Shown
 from gearfmu.stage.te import (
     LEAST,
     TANGENT,
@@ -37,7 +38,7 @@ GEARS = ("sun", "ring")  # whose meshes with the planets share the load
 
 
 @dataclass(frozen=True, repr=False)
-class SetTeResult:
+class SetTeResult(Shown):
     """torque (T,) N·m · position (P,) in mesh periods · te (T, P) m · stage_stiffness (T, P) N/m, tangent
     d(T_s/r_bs)/dte of all meshes with carrier and bearings · sharing (T, P, 2, N): normal force of each planet over the
     mean of all, at the sun and at the ring · force (T, P, 2) N, that mean."""
@@ -49,11 +50,10 @@ class SetTeResult:
     sharing: np.ndarray
     force: np.ndarray
 
-    def __repr__(self) -> str:
-        return te_card(self).text
-
-    def _repr_html_(self) -> str:
-        return te_card(self).html
+    @property
+    def card(self) -> Card:
+        """How a session shows it."""
+        return te_card(self)
 
     @property
     def rows(self) -> list[tuple[str, str]]:

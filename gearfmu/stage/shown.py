@@ -51,6 +51,21 @@ class Card:
         return self.rows if more <= 0 else [*self.rows[:LINES], ("…", f"{more} more")]
 
 
+class Shown:
+    """What a session shows as its `card`; a dataclass of this kind has repr=False."""
+
+    @property
+    def card(self) -> Card:
+        """Heading and rows."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return self.card.text
+
+    def _repr_html_(self) -> str:
+        return self.card.html
+
+
 def grouped(names: Iterable[str]) -> list[tuple[str, str]]:
     """Names with dots by all before the last dot: ("mesh", "force te …"); those without a dot by themselves. Meshes
     come first."""

@@ -18,7 +18,7 @@ from gearfmu.stage.limits import limit_named
 from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
-from gearfmu.stage.shown import Card, plot_over
+from gearfmu.stage.shown import Card, Shown, plot_over
 
 TANGENT = 1e-4
 LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
@@ -28,7 +28,7 @@ WHY_SOFTER = ": teeth on discs that do not yield; here bodies twist and bend, an
 
 
 @dataclass(frozen=True, repr=False)
-class TeResult:
+class TeResult(Shown):
     """torque (T,) N·m · position (P,) in pitches · te (T, P) m, positive under load · mesh_stiffness (T, P) N/m of the
     mesh alone, tangent dF/dte with F along the line of action and the bores held on their axes · stage_stiffness (T, P)
     N/m, the same tangent with shafts and bearings; with rigid bearings it is the mesh stiffness
@@ -47,14 +47,9 @@ class TeResult:
     over_width: np.ndarray
     iso_stiffness: float = math.nan
 
-    def __repr__(self) -> str:
-        return self._card.text
-
-    def _repr_html_(self) -> str:
-        return self._card.html
-
     @property
-    def _card(self) -> Card:
+    def card(self) -> Card:
+        """How a session shows it."""
         return te_card(self)
 
     @property

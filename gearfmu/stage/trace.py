@@ -17,7 +17,7 @@ from gearfmu.errors import GearfmuError, near_or_all
 from gearfmu.extras import required
 from gearfmu.files import written_whole
 from gearfmu.hdf5 import Format, reading, writing
-from gearfmu.stage.shown import Card, grouped, plot_over
+from gearfmu.stage.shown import Card, Shown, grouped, plot_over
 from gearfmu.units import quantity_text
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Channel:
 
 
 @dataclass(frozen=True, repr=False)
-class Trace:
+class Trace(Shown):
     """Signals over one time base.
 
     time : (n,) float64, s, strictly increasing.
@@ -70,18 +70,13 @@ class Trace:
             raise TraceError(f"the trace has no channel '{name}': {hint}")
         return self.channels[name].values
 
-    def __repr__(self) -> str:
-        return self._card.text
-
-    def _repr_html_(self) -> str:
-        return self._card.html
-
     def _ipython_key_completions_(self) -> list[str]:
         """Names that IPython offers after trace["."""
         return list(self.channels)
 
     @property
-    def _card(self) -> Card:
+    def card(self) -> Card:
+        """How a session shows it."""
         run = [str(self.meta[key]) for key in ("stage", "scene", "level", "outcome") if self.meta.get(key)]
         span = f"{quantity_text(self.time[0], 's')} to {quantity_text(self.time[-1], 's')}"
         size = ("samples", f"{self.time.size}, {span}; {len(self.channels)} channels:")
