@@ -1,11 +1,15 @@
 """Numbers that pages quote are those of the tables: a phrase with # for every number, and the cells where they stand.
 
 A cell is `column` of the rows of a table that hold the given values; `column%` is in per cent. A number agrees when
-the table rounds to it; a tolerance, where one is given, is a share of the number."""
+the table rounds to it; a tolerance, where one is given, is a share of the number.
+
+    python tests/test_quoted.py    writes the numbers of the tables into the pages
+"""
 
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -175,6 +179,41 @@ def numbers(cells: tuple[tuple[str, dict[str, str], str], ...]) -> Iterator[floa
             yield factor * abs(float(row[column.rstrip("%~")]))
 
 
+def places(text: str, quote: Quote) -> list[tuple[str, ...]]:
+    """The numbers that a page shows, at every place of the phrase."""
+    return [place.groups() for place in found(quote).finditer(text)]
+
+
+def found(quote: Quote) -> re.Pattern[str]:
+    """The phrase, over lines, with a group for every number."""
+    return re.compile(re.escape(quote.phrase).replace(r"\#", NUMBER).replace(r"\ ", r"\s+"))
+
+
+def written(shown: str, value: float) -> str:
+    """A number with as many digits as are shown, and no fewer than its whole part has."""
+    digits = len(shown.partition("e")[0].replace(".", "").lstrip("0"))
+    if "e" in shown:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}"
+
+
+def mended(text: str, quote: Quote) -> str:
+    """A page with the numbers of the tables where it shows others."""
+
+    def rewrite(place: re.Match[str]) -> str:
+        result, shift = place[0], place.start()
+        for group in range(place.re.groups, 0, -1):
+            shown, value = place[group], values[group - 1]
+            if not agrees(shown, value, quote.tolerance):
+                begin, end = place.start(group) - shift, place.end(group) - shift
+                result = result[:begin] + written(shown, value) + result[end:]
+        return result
+
+    values = list(numbers(quote.cells))
+    right = (all(map(agrees, place, values, [quote.tolerance] * len(values))) for place in places(text, quote))
+    return text if any(right) else found(quote).sub(rewrite, text, count=1)
+
+
 def agrees(shown: str, value: float, tolerance: float) -> bool:
     """Whether a number rounds, or comes as near as the tolerance, to what is shown."""
     mantissa, _, exponent = shown.partition("e")
@@ -184,11 +223,9 @@ def agrees(shown: str, value: float, tolerance: float) -> bool:
 
 @pytest.mark.parametrize("page", sorted({quote.page for quote in QUOTES}))
 def test_a_page_says_what_its_tables_say(page: str) -> None:
-    text, wrong = " ".join((ROOT / page).read_text(encoding="utf-8").split()), []
+    text, wrong = (ROOT / page).read_text(encoding="utf-8"), []
     for quote in (quote for quote in QUOTES if quote.page == page):
-        places = re.findall(re.escape(quote.phrase).replace(r"\#", NUMBER), text)
-        values = list(numbers(quote.cells))
-        shown = [[place] if isinstance(place, str) else list(place) for place in places]
+        shown, values = places(text, quote), list(numbers(quote.cells))
         assert shown and len(shown[0]) == len(values), f"{quote.phrase}: found {len(shown)} times"
         if not any(all(agrees(*pair, quote.tolerance) for pair in zip(one, values, strict=True)) for one in shown):
             wrong.append(f"{quote.phrase}: {shown}, the table has {', '.join(f'{value:.4g}' for value in values)}")
@@ -200,3 +237,11 @@ def test_a_page_says_what_its_tables_say(page: str) -> None:
 )
 def test_a_number_agrees_when_it_rounds_to_what_is_shown(shown: str, value: float, good: bool) -> None:
     assert agrees(shown, value, 0.0) is good and agrees(shown, value, 0.5)
+
+
+if __name__ == "__main__":
+    for page in sorted({quote.page for quote in QUOTES}):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        for quote in (quote for quote in QUOTES if quote.page == page):
+            text = mended(text, quote)
+        (ROOT / page).write_text(text, encoding="utf-8")
