@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body import ReducedBody
-from gearfmu.body.reduce import reduce_gear
+from gearfmu.body import ReducedBody, reduce_body
 from gearfmu.files import written_whole
 from gearfmu.spec.gear import MeshSpec
 from gearfmu.spec.stage import StageSpec, load_stage
@@ -71,7 +70,7 @@ def study(spec: StageSpec, torque: float) -> list[dict[str, Any]]:
     rows, own = [], None
     for name, mesh in meshes(spec.gears[0].body.mesh):
         changed, start = with_mesh(spec, mesh), time.process_time()
-        bodies = [reduce_gear(changed, index) for index in range(2)]
+        bodies = [reduce_body(changed, gear.name) for gear in changed.gears]
         cost = {
             "cpu_s": round(time.process_time() - start, 1),
             "peak_memory_so_far_GB": bodies[-1].provenance["peak_memory_GB"],

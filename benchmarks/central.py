@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
@@ -201,7 +201,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec = load_stage("fzg_c/stage_relief")
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     models = assemble(spec, bodies), free_pair(spec, bodies)
     lines = [line for level in chosen.levels for line in rows(models, level, chosen.starts, chosen.duration)]
     write_columns(chosen.out, {column: np.array([line[column] for line in lines]) for column in COLUMNS})

@@ -24,7 +24,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from gearfmu.body import load_bodies, load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.files import write_text
 from gearfmu.kernel.build import build_library, source_hash, sources
 from gearfmu.spec.flanks import Eccentricity, ProfileSpec
@@ -71,7 +71,7 @@ class Bench:
             check=True,
         )
         spec = load_stage(STAGE)
-        bodies = load_stage_bodies(spec)
+        bodies = load_bodies(spec)
         self.plain = assemble(spec, bodies)
         self.own = {
             name: assemble(

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from kernel_variants import LOOSE_SOLVER, WITHOUT_ETA, WRONG_MATRIX, double_states, variant  # noqa: E402
 
-from gearfmu.body import load_stage_bodies  # noqa: E402
+from gearfmu.body import load_bodies  # noqa: E402
 from gearfmu.errors import SimulationError  # noqa: E402
 from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
@@ -187,7 +187,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec = load_stage("fzg_c/stage_relief")
-    pair, bad = free_pair(spec, load_stage_bodies(spec)), 0
+    pair, bad = free_pair(spec, load_bodies(spec)), 0
     lines = kept(chosen.out, chosen.cases) if chosen.cases else []
     with tempfile.TemporaryDirectory() as folder:
         run = {

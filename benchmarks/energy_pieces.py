@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from kernel_variants import double_states, variant  # noqa: E402
 
-from gearfmu.body import load_stage_bodies  # noqa: E402
+from gearfmu.body import load_bodies  # noqa: E402
 from gearfmu.kernel import Kernel  # noqa: E402
 from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started  # noqa: E402
 from gearfmu.spec.stage import load_stage  # noqa: E402
@@ -98,7 +98,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec, plain = load_stage("fzg_c/stage_relief"), load_stage("fzg_c")
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     relieved, bare = assemble(spec, bodies), assemble(plain, bodies)
     lines = []
     with tempfile.TemporaryDirectory() as name:

@@ -18,7 +18,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.kernel.build import library_path
 from gearfmu.spec.expand import expand_pair
 from gearfmu.spec.general import GeneralStage, RotorSpec
@@ -110,7 +110,7 @@ def instructions(model: StageModel, drive: Mapping[int, Mapping[str, float]], fo
 def main() -> None:
     """Measure and print."""
     spec = load_stage(STAGE)
-    bodies, pair, first = load_stage_bodies(spec), expand_pair(spec), None
+    bodies, pair, first = load_bodies(spec), expand_pair(spec), None
     alone = assemble(spec, bodies)
     print("pairs   µs a step   instructions   of a pair alone: time, instructions, for each pair")
     with tempfile.TemporaryDirectory() as folder:

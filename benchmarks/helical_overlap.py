@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.parts import kept_offsets, tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.files import written_whole
@@ -81,7 +81,7 @@ def _gear(gear: GearSpec, scale: float) -> GearSpec:
 
 def bodies_of(spec: StageSpec) -> list[ReducedBody]:
     """Bodies of both gears with static tables and a dozen modes of their own, without pictures and gyroscopic terms."""
-    stored = load_stage_bodies(load_stage("helical_demo"))
+    stored = load_bodies(load_stage("helical_demo"))
     return [_body(*entry) for entry in zip(stored, spec.gears, PairGeometry.of(spec).gears, strict=True)]
 
 

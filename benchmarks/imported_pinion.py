@@ -16,8 +16,7 @@ import meshio
 import numpy as np
 import scipy.sparse as sp
 
-from gearfmu.body import ReducedBody, load_stage_bodies
-from gearfmu.body.reduce import reduce_gear
+from gearfmu.body import ReducedBody, load_bodies, reduce_body
 from gearfmu.fem import solids
 from gearfmu.femesh import FeMesh, gear_sector, write_vtu
 from gearfmu.femesh.deck import write_deck
@@ -137,7 +136,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=HERE / "imported_pinion.csv")
     out = parser.parse_args().out
-    wheel = load_stage_bodies(load_stage("fzg_c"))[1]
+    wheel = load_bodies(load_stage("fzg_c"))[1]
     rows: list[dict] = []
     native: ReducedBody | None = None
     with tempfile.TemporaryDirectory() as scratch:
@@ -151,7 +150,7 @@ def main() -> None:
             folder = Path(tempfile.mkdtemp(dir=scratch))
             section = make(folder)
             spec = stage(folder, section)
-            body = reduce_gear(spec, 0)
+            body = reduce_body(spec, "pinion")
             native = native or body
             rows.append(row(name, spec, body, native, wheel))
             print("  ".join(f"{key} {value}" for key, value in rows[-1].items() if value != ""), flush=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.scenes.light_rattle import STEP, LightRattle, run, statistics
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
@@ -87,7 +87,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec = load_stage("fzg_c/stage_relief")
-    lines = table(assemble(spec, load_stage_bodies(spec)), chosen.duration, LEVELS[chosen.level])
+    lines = table(assemble(spec, load_bodies(spec)), chosen.duration, LEVELS[chosen.level])
     write_columns(chosen.out, {column: np.array([made[column] for made in lines]) for column in COLUMNS})
     bad = [(made["scene"], made["h_s"], name) for made in lines if made["start"] == -1 for name in missed(made)]
     for scene, h, name in bad:

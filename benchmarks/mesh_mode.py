@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.optimize import brentq
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble, loaded_te
@@ -27,7 +27,7 @@ def mesh_mode(stage: str, torque: float) -> dict[str, float]:
     """Frequency (Hz), mesh stiffness (N/m), compliance of a contact's own path (m/N) and the dashpot (N·s/m²) for
     RATIO."""
     spec = load_stage(stage)
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     model = assemble(spec, bodies)
     result = loaded_te(model, [torque], positions=64, rigid_bearings=True)
     stiffness, pairs = result.mesh_stiffness.mean(), (result.shares > 1e-3).sum(axis=2).mean()

@@ -25,7 +25,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
 from gearfmu.report.style import panels, styled
 from gearfmu.spec.expand import expand_pair
@@ -67,7 +67,7 @@ class Pair:
 
     def __init__(self) -> None:
         self.spec = load_stage(STAGE)
-        self.bodies = load_stage_bodies(self.spec)
+        self.bodies = load_bodies(self.spec)
         stage = expand_pair(self.spec)
         self.hertz = mesh_penalty(stage, stage.engagements[0])
         self.reference: dict[str, np.ndarray] = {}

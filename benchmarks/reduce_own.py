@@ -20,9 +20,11 @@ from coarse import PAIR
 from sizes import apart, peak_mb
 
 from gearfmu.api.models import load
-from gearfmu.body.reduce import gear_geometry, gear_work, reduce_gear
+from gearfmu.body import reduce_body
+from gearfmu.body.toothed import gear_work
 from gearfmu.files import written_whole
 from gearfmu.spec.coarse import coarse_stage
+from gearfmu.spec.members import member_of
 from gearfmu.spec.proposal import new_from_numbers
 
 
@@ -30,10 +32,10 @@ def reduced(stage: str, index: int) -> dict[str, Any]:
     """One gear, reduced and not stored."""
     spec = load(stage)
     gear = spec.gears[index]
-    work = gear_work(gear, gear_geometry(spec, index))
+    work = gear_work(member_of(spec, gear.name))
     assert work
     clock, processor = time.monotonic(), time.process_time()
-    body = reduce_gear(spec, index)
+    body = reduce_body(spec, gear.name)
     return {
         "body": gear.name,
         "teeth": body.teeth,

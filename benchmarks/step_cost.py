@@ -29,7 +29,7 @@ H, STEP, WARM, PERIOD, TIMED = 50e-6, 5e-6, 10, 38, 100  # communication steps, 
 
 def write(folder: Path, level: float) -> None:
     """Blob, library and arguments of the host program, by the package that this process imports."""
-    from gearfmu.body import load_stage_bodies
+    from gearfmu.body import load_bodies
     from gearfmu.kernel.build import build_library
     from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
@@ -37,7 +37,7 @@ def write(folder: Path, level: float) -> None:
     build_library()  # where this package looks for it
     build_library(out=folder / "kernel.so")
     spec = load_stage(STAGE)
-    model = assemble(spec, load_stage_bodies(spec))
+    model = assemble(spec, load_bodies(spec))
     (folder / "blob").write_bytes(model.blob)
     known, drive = model.kernel().variables, Steady(model, SPEED, TORQUE)
     start, next_one = drive(0.0), drive(H)
@@ -48,13 +48,13 @@ def write(folder: Path, level: float) -> None:
 
 def least(folder: Path, level: float) -> float:
     """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package of this process."""
-    from gearfmu.body import load_stage_bodies
+    from gearfmu.body import load_bodies
     from gearfmu.kernel import Kernel
     from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
 
     spec = load_stage(STAGE)
-    model = assemble(spec, load_stage_bodies(spec))
+    model = assemble(spec, load_bodies(spec))
     drive = Steady(model, SPEED, TORQUE)
     kernel = Kernel(model.blob, {"level": level, "h": STEP, "slices": 5.0}, folder / "kernel.so")
     best, inputs = float("inf"), [drive(k * H) for k in range(PERIOD * TIMED)]

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.files import written_whole
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import assemble, loaded_te
@@ -65,7 +65,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".csv"))
     chosen = parser.parse_args()
     spec = load_stage(chosen.stage)
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     table = [row for torque in chosen.torque or (302.0, 80.0) for row in rows(spec, bodies, torque)]
     with written_whole(chosen.out) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(table[0]), lineterminator="\n")

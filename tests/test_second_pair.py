@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 
-from gearfmu.body import reduce_stage
+from gearfmu.body import reduce_bodies
 from gearfmu.fmu import export, validate
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.new import new_stage
@@ -53,7 +53,7 @@ def edited(path: Path) -> Path:
 def test_a_second_pair_from_its_numbers_to_a_running_fmu(tmp_path: Path) -> None:
     started = time.process_time()
     spec = load_stage(edited(new_stage("second", like="fzg_c", folder=tmp_path)))
-    model = assemble(spec, reduce_stage(spec))
+    model = assemble(spec, reduce_bodies(spec))
     made = time.process_time() - started
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     print(f"both bodies: {made:.0f} s of processor time, {memory:.2f} GB")

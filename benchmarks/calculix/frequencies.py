@@ -23,11 +23,11 @@ import numpy as np
 from ccx import require_ccx, run
 from positions import read
 
+from gearfmu.body.sector import body_sector
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
 from gearfmu.geometry import GearGeometry
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.modes.planetary import set_sector
 from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
 
@@ -67,7 +67,7 @@ def body_of(case: Case) -> tuple[Material, FeMesh]:
     """The body's material and the finite elements of one of its sectors."""
     spec = load_stage(case.stage)
     if spec.kind == "planetary_set":
-        return getattr(spec, case.body).material, set_sector(spec, case.body, case.scale)
+        return getattr(spec, case.body).material, body_sector(spec, case.body, case.scale)
     (gear,) = (gear for gear in spec.gears if gear.name == case.body)
     counts = gear.body.mesh.model_copy(update={"scale": gear.body.mesh.scale * case.scale})
     return gear.material, gear_sector(GearGeometry.of(gear, spec.pair), gear.face_width, counts)

@@ -26,7 +26,7 @@ from ring_section import ring_plane
 from section import Fineness, gear_plane
 from solid import extruded
 
-from gearfmu.body import reduce_stage
+from gearfmu.body import reduce_bodies
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
 from gearfmu.spec.general import GeneralStage
@@ -59,7 +59,7 @@ class Pair:
 def pair_of(work: Path) -> Pair:
     """Stage, geometry and the kernel's transmission error; reduces the bodies where the work folder has none."""
     spec = load_stage(STAGE)
-    bodies, mesh = reduce_stage(spec, work / "internal"), mesh_shape(spec, spec.engagements[0])
+    bodies, mesh = reduce_bodies(spec, work / "internal"), mesh_shape(spec, spec.engagements[0])
     assert isinstance(mesh, RingMesh)
     return Pair(spec, mesh, loaded_te(assemble(spec, bodies), TORQUES, POSITIONS, rigid_bearings=True, **FLANKS))
 

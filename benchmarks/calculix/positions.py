@@ -29,7 +29,7 @@ from ccx import first_solved, require_ccx
 from rigid_bores import rigid_bore_bodies
 from section import Fineness
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.files import written_whole
 from gearfmu.geometry import PairGeometry, hertz
 from gearfmu.spec.stage import StageSpec, load_stage
@@ -56,7 +56,7 @@ class Place:
 
 def te_of_gearfmu(spec: StageSpec, bores: str) -> TeResult:
     """Transmission error and tangent stiffness at all torques and positions."""
-    bodies = load_stage_bodies(spec) if bores == "averaged" else rigid_bore_bodies(spec)
+    bodies = load_bodies(spec) if bores == "averaged" else rigid_bore_bodies(spec)
     model = assemble(spec, bodies)
     return loaded_te(model, TORQUES, POSITIONS, rigid_bearings=True)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.parts import tooth_flank
 from gearfmu.femesh import gear_sector
 from gearfmu.geometry import GearGeometry
@@ -19,7 +19,7 @@ from gearfmu.spec.stage import StageSpec
 def rigid_bore_bodies(spec: StageSpec) -> list[ReducedBody]:
     """The stored bodies of a pair with the static tables of gears whose bores are rigid. Their modes stay as they were:
     of use at level rigid only."""
-    return [_with_rigid_bore(spec, index, body) for index, body in enumerate(load_stage_bodies(spec))]
+    return [_with_rigid_bore(spec, index, body) for index, body in enumerate(load_bodies(spec))]
 
 
 def _with_rigid_bore(spec: StageSpec, index: int, stored: ReducedBody) -> ReducedBody:

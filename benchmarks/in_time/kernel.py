@@ -20,7 +20,7 @@ from contact_points import contact_points
 from scenes import GRID, Solid, gear, joint_rows, nominal_play, placed_gear, touching
 from tables import write_columns, write_rows
 
-from gearfmu.body import reduce_stage
+from gearfmu.body import reduce_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.reduction.basis import Size
 from gearfmu.reduction.methods import METHODS
@@ -86,7 +86,7 @@ def kernel_force(spec: StageSpec, bodies: list, parameters: dict[str, float]) ->
 def runs() -> dict[str, np.ndarray]:
     """Force over time of every model; the first is the reference."""
     spec = load_stage(HERE / "pair" / "stage.toml")
-    bodies = reduce_stage(spec, Path("out/in_time/pair"))
+    bodies = reduce_bodies(spec, Path("out/in_time/pair"))
     solids, whole, side = finite_elements(spec)
     found = {"finite elements": force_of(whole, side)}
     for name, residual in (("finite elements, 400 modes", False), ("finite elements, 400 modes + residual", True)):

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from gearfmu.body.bodies import body_hashes, body_needs, current_bodies, load_bodies, reduce_apart, reduce_bodies
+from gearfmu.body.bodies import (
+    body_hashes,
+    body_needs,
+    body_path,
+    current_bodies,
+    load_bodies,
+    reduce_apart,
+    reduce_bodies,
+    reduce_body,
+)
 from gearfmu.body.inspect import inspect_file
 from gearfmu.body.interface_body import InterfaceBody, load_interface_body
 from gearfmu.body.mounted import MountedRing, mounted
-from gearfmu.body.planetary import load_set_bodies, reduce_set
-from gearfmu.body.reduce import body_path, load_stage_bodies, reduce_stage
 from gearfmu.body.reduced import ReducedBody
 from gearfmu.body.store import load_body
 
@@ -23,11 +30,8 @@ __all__ = [
     "load_bodies",
     "load_body",
     "load_interface_body",
-    "load_set_bodies",
-    "load_stage_bodies",
     "mounted",
     "reduce_apart",
     "reduce_bodies",
-    "reduce_set",
-    "reduce_stage",
+    "reduce_body",
 ]

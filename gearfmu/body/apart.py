@@ -23,7 +23,7 @@ from gearfmu.errors import BodyError
 from gearfmu.reduction.memory import Need, available_memory
 
 Progress = Callable[[str, float], None]
-Job = tuple[Any, "int | str", Path]  # a stage, the number of the gear (of a set its name), the file of the body
+Job = tuple[Any, str, Path]  # a stage, the name of the gear, the file of its body
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SERVE = "from gearfmu.body.apart import serve; serve()"
@@ -82,18 +82,15 @@ def reduce_apart_together(jobs: Sequence[Job], progress: Progress | None = None)
 
 def serve() -> None:
     """What the process does: a job from standard input, progress and failure to standard output, a line each."""
-    from gearfmu.body.planetary import reduce_set_body
-    from gearfmu.body.reduce import reduce_gear
-    from gearfmu.body.store import save_body
+    from gearfmu.body.bodies import make_body
 
     def tell(what: str, value: float | str) -> None:
         print(json.dumps([what, value]), flush=True)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started it ends it
-    spec, which, path = pickle.load(sys.stdin.buffer)
-    reduce: Callable[..., Any] = reduce_set_body if isinstance(which, str) else reduce_gear
+    job: Job = pickle.load(sys.stdin.buffer)
     try:
-        save_body(reduce(spec, which, tell), path)
+        make_body(*job, tell)
     except Exception as error:
         tell(_FAILED, pickle.dumps(error).hex())
 

@@ -20,9 +20,7 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
-from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import set_geometry
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
 from gearfmu.reduction.frf import FrfCase, frf_error
@@ -42,63 +40,57 @@ from gearfmu.reduction.imported_whole import Held, imported_gear_order
 from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.modal import Progress, elastic_modes
 from gearfmu.reduction.statics import Statics, static_tables
+from gearfmu.spec.general import RingBody
+from gearfmu.spec.imported import ImportSpec, RingImportSpec
+from gearfmu.spec.members import Member
 
 
-def check_gear(gear: Any, geometry: Any) -> CheckedGear:
-    """The imported finite elements of a GearSpec, read, checked and placed. Raises MeshError."""
-    if geometry.beta:
-        raise MeshError(f"{gear.imported.file}: finite elements made elsewhere are read for spur gears only")
-    return checked_gear(gear.imported, _wanted(gear, geometry))
+def check_gear(member: Member) -> CheckedGear:
+    """The imported finite elements of a gear, read, checked and placed. Raises MeshError."""
+    files = _files(member)
+    if member.gear.helix_angle:
+        raise MeshError(f"{files.file}: finite elements made elsewhere are read for spur gears only")
+    return checked_gear(files, _wanted(member))
 
 
-def _wanted(gear: Any, geometry: Any) -> Wanted:
+def _files(member: Member) -> ImportSpec | RingImportSpec:
+    assert member.gear.imported is not None
+    return member.gear.imported
+
+
+def _wanted(member: Member) -> Wanted:
+    gear, geometry = member.gear, member.geometry
     internal = isinstance(geometry, InternalGearGeometry)
     flank, points = tooth_flank(geometry, gear, internal)
-    held = gear.rim_diameter if internal else gear.bore_diameter
+    held = gear.rim_diameter if isinstance(gear, RingBody) else gear.bore_diameter
     return Wanted(geometry.z, flank, points, 0.5 * held, gear.material, gear.body.modes)
 
 
-def imported_full_order(gear: Any, geometry: Any) -> FullOrder:
+def imported_full_order(member: Member) -> FullOrder:
     """The whole imported gear or ring before reduction, for every method: interfaces tooth0 … and bore, or on its
     mounts. Raises MeshError."""
-    found, wanted = check_gear(gear, geometry), _wanted(gear, geometry)
-    held = Held(gear.name, geometry.r, gear.imported.bore_coupling, getattr(gear, "mounts", None))
+    found, wanted, files = check_gear(member), _wanted(member), _files(member)
+    held = Held(member.name, member.geometry.r, files.bore_coupling, member.mounts)
     try:
         return imported_gear_order(found, wanted, held)
     except MeshError as error:
-        raise MeshError(f"{gear.imported.file}: {error}") from error
+        raise MeshError(f"{files.file}: {error}") from error
 
 
-def imported_sector_mesh(gear: Any, geometry: Any) -> FeMesh:
+def imported_sector_mesh(member: Member) -> FeMesh:
     """The sector mesh of an imported gear, as of one meshed here, for pictures. BodyError where there is none: mean
     tooth, tetrahedra, ready-made matrices."""
-    found = check_gear(gear, geometry)
+    found = check_gear(member)
     cut = found.cut
     if cut is None or set(cut.elements) != {"hexahedron20"} or found.matrices is not None:
         raise BodyError(
-            f"{gear.imported.file}: this needs hexahedra, our own matrices and a mesh that repeats itself "
+            f"{_files(member).file}: this needs hexahedra, our own matrices and a mesh that repeats itself "
             "from tooth to tooth; "
             "use the pictures of your own finite-element program"
         )
     bore = np.flatnonzero(np.isin(cut.of_mesh, found.mesh.sets[BORE]))
-    sets = {"rim" if isinstance(geometry, InternalGearGeometry) else BORE: bore}
-    return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, geometry.z, cut.cut_minus, cut.cut_plus)
-
-
-def imported_set_sector(spec: Any, name: str) -> FeMesh:
-    """`imported_sector_mesh` of a body of a PlanetarySpec. BodyError for the carrier, which has no sectors."""
-    part = getattr(spec, name)
-    if name != "carrier":
-        return imported_sector_mesh(part, set_geometry(spec, name))
-    raise BodyError(
-        f"{part.imported.file}: an imported carrier is taken as a whole and has no sector: use the pictures of your "
-        "own finite-element program"
-    )
-
-
-def pair_geometry(spec: Any, name: str) -> GearGeometry:
-    """The geometry of a gear of a StageSpec by its name."""
-    return next(g for gear, g in zip(spec.gears, PairGeometry.of(spec).gears, strict=True) if gear.name == name)
+    sets = {"rim" if isinstance(member.gear, RingBody) else BORE: bore}
+    return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, member.geometry.z, cut.cut_minus, cut.cut_plus)
 
 
 def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
@@ -114,32 +106,33 @@ def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
     return found.full, found.facts
 
 
-def imported_parts(gear: Any, geometry: Any, cut: float, report: Progress) -> Parts:
+def imported_parts(member: Member, cut: float, report: Progress) -> Parts:
     """Modes, static tables, error and pictures of an imported gear. cut : Hz, of the stored error. Raises MeshError."""
-    found = imported_gear(gear.imported, _wanted(gear, geometry))
+    gear, geometry, files = member.gear, member.geometry, _files(member)
+    found = imported_gear(files, _wanted(member))
     case = FrfCase(gear.modal_damping, cut, geometry.r)
     drawn = sector_mesh(geometry, gear.face_width, DRAWN)
     try:
         if isinstance(found.body, ImportedSector):
-            return _by_sector(found, gear, case, (drawn, report))
+            return _by_sector(found, member, case, (drawn, report))
         return _by_mean_tooth(found, gear.body.modes, case, (drawn, report))
     except (FactorError, ModesError) as error:
         raise MeshError(
-            f"{gear.imported.file}: the stiffness matrix cannot be factorised ({error}): it is singular "
+            f"{files.file}: the stiffness matrix cannot be factorised ({error}): it is singular "
             "beyond the six rigid "
             "motions (a hinge, a loose part), or not of a free body"
         ) from error
 
 
-def _by_sector(found: ImportedGear, gear: Any, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
+def _by_sector(found: ImportedGear, member: Member, case: FrfCase, drawing: tuple[Any, Progress]) -> Parts:
     body, (drawn, report) = found.body, drawing
     assert isinstance(body, ImportedSector)
     surface = outline(drawn, body.mesh.nodes)
-    modes = elastic_modes(body, gear.body.modes, report, surface.sample)
+    modes = elastic_modes(body, member.gear.body.modes, report, surface.sample)
     statics = static_tables(body, pictured_loads(body.points), report)
     report("frequency response", 0.0)
     frf = frf_error(body, modes, statics, case)
-    rim = rim_of(body, modes, statics, getattr(gear, "mounts", None))
+    rim = rim_of(body, modes, statics, member.mounts)
     display, shapes = sector_display(surface, body, statics), sector_shapes(surface, modes)
     return Parts(modes, statics, frf, found.facts, display, body.inertia, rim, shapes)
 

@@ -86,42 +86,29 @@ def frf(stage: str, body: str, **options: Any) -> None:
 
 def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrder:
     """The FullOrder of a body of STAGE: gear, ring or carrier; a usage error for a body it does not have."""
+    from gearfmu.spec.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
     factor: dict[str, Any] = {} if scale is None else {"scale": scale}
-    names = ["sun", "planet", "ring", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
+    toothed, names = members(spec), body_names(spec)
     if body not in names:
         raise click.BadParameter(f"no body '{body}'; the stage has {', '.join(names)}", param_hint="BODY")
+    from gearfmu.body.imported import imported_full_order
     from gearfmu.reduction.carrier import carrier_full_order
     from gearfmu.reduction.toothed import gear_full_order, ring_full_order
 
-    if body == "carrier" and spec.kind == "planetary_set":
-        _keep_scale(spec.carrier, body, scale)
+    imported = toothed[body].gear.imported if body in toothed else spec.carrier.imported
+    if imported is not None and scale is not None:
+        remedy = f"the finite elements of '{body}' are yours: coarsen your mesh, or leave --scale away"
+        raise click.BadParameter(remedy, param_hint="--scale")
+    if body not in toothed:
         return carrier_full_order(spec, **factor)
-    gear = next(gear for gear in spec.gears if gear.name == body)
-    _keep_scale(gear, body, scale)
-    if gear.imported is not None:
-        return _imported(spec, gear)
+    if imported is not None:
+        return imported_full_order(toothed[body])
     if body == "ring" and spec.kind == "planetary_set":
         return ring_full_order(spec, **factor)
     return gear_full_order(spec, body, **factor)
-
-
-def _keep_scale(part: Any, name: str, scale: float | None) -> None:
-    """A usage error for a scale of finite elements made elsewhere."""
-    if getattr(part, "imported", None) is not None and scale is not None:
-        remedy = f"the finite elements of '{name}' are yours: coarsen your mesh, or leave --scale away"
-        raise click.BadParameter(remedy, param_hint="--scale")
-
-
-def _imported(spec: Any, gear: Any) -> FullOrder:
-    """The FullOrder of a gear from finite elements made elsewhere."""
-    from gearfmu.body.imported import imported_full_order, pair_geometry
-    from gearfmu.geometry.planetary import set_geometry
-
-    geometry_of = set_geometry if spec.kind == "planetary_set" else pair_geometry
-    return imported_full_order(gear, geometry_of(spec, gear.name))
 
 
 def table(trials: Sequence[Any], contest: Any) -> list[str]:

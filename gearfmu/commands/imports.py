@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,36 +32,36 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
+    from gearfmu.spec.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    names = ["sun", "planet", "ring", "carrier"] if spec.kind == "planetary_set" else [g.name for g in spec.gears]
+    names = body_names(spec)
     if gear is None or gear not in names:
         raise click.BadParameter(f"name a body of the stage: {', '.join(names)}", param_hint="GEAR")
     echo_pairs(body_facts(spec, gear, str(file), options))
-    table = "bodies" if spec.kind == "general" else "gears"
-    place = gear if spec.kind == "planetary_set" else f"{table}.{gear}"
+    place = members(spec)[gear].place if gear in members(spec) else gear
     click.echo("\n" + section(file, place, options))
 
 
 def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
-    from gearfmu.body.imported import check_gear, pair_geometry
-    from gearfmu.geometry.planetary import set_geometry
+    from gearfmu.body.imported import check_gear
     from gearfmu.reduction.imported_carrier import imported_carrier
+    from gearfmu.spec.general import RingBody
     from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
+    from gearfmu.spec.members import member_of
 
     if name == "carrier":
         if not options["bore"] or len(options["bolts"]) != spec.set.planets:
             raise click.UsageError(f"a carrier needs --bore and {spec.set.planets} times --bolt, each a node set")
         part = spec.carrier.model_copy(update={"imported": CarrierImportSpec(file=file, **options)})
         return imported_carrier(spec.model_copy(update={"carrier": part})).facts
-    gear = next(g for g in spec.gears if g.name == name)
-    ring = spec.kind == "planetary_set" and name == "ring"
+    member = member_of(spec, name)
+    ring = isinstance(member.gear, RingBody)
     chosen = {"rim" if ring and key == "bore" else key: value for key, value in options.items() if key != "bolts"}
     source = (RingImportSpec if ring else ImportSpec)(file=file, **chosen)
-    geometry = set_geometry(spec, name) if spec.kind == "planetary_set" else pair_geometry(spec, name)
-    return check_gear(gear.model_copy(update={"imported": source}), geometry).facts
+    return check_gear(replace(member, gear=member.gear.model_copy(update={"imported": source}))).facts
 
 
 def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) -> dict[str, Any]:

@@ -71,5 +71,5 @@ def _body(text: str) -> str:
 
 
 def by_text(progress: Progress) -> Callable[[str, float], None]:
-    """The progress function of reduce_stage, called with (what is being done, share done)."""
+    """The progress function of reduce_bodies, called with (what is being done, share done)."""
     return lambda text, share: progress(share, text)

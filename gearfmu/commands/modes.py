@@ -144,18 +144,16 @@ def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyMo
     _check(name, names)
     _, bodies = bodies_of(stage)
     from gearfmu.modes.gear import gear_modes
-    from gearfmu.spec.general import gear_as_pair
 
-    index = names.index(name)
     with progress_bar("shapes") as progress:
-        own = (gear_as_pair(spec, name), 0) if spec.kind == "general" else (spec, index)
-        return gear_modes(*own, bodies[index], count, by_text(progress))
+        return gear_modes(spec, bodies[names.index(name)], count, by_text(progress))
 
 
 def _of_set(spec: Any, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
-    from gearfmu.modes.planetary import BODIES, mounted_ring_modes, set_body_modes, uncoupled_carrier_modes
+    from gearfmu.modes.planetary import mounted_ring_modes, set_body_modes, uncoupled_carrier_modes
+    from gearfmu.spec.members import body_names
 
-    _check(name, BODIES)
+    _check(name, body_names(spec))
     with progress_bar("shapes") as progress:
         mounted, uncoupled = how
         if mounted:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +23,26 @@ from gearfmu.commands.shared import echo_pairs
 @click.option("--out", type=click.Path(path_type=Path), default=Path("."), help="Folder of the files.")
 def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out: Path) -> None:
     """Mesh the bodies of STAGE, print size and quality, write <body>.vtu."""
+    from gearfmu.body.sector import body_sector
     from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
+    from gearfmu.spec.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
-    for name in _chosen(_names(spec), only):
-        sector, facts = _sector(spec, name, scale)
+    toothed = members(spec)
+    for name in _chosen(body_names(spec), only):
+        sector, part = body_sector(spec, name, scale), toothed[name].gear if name in toothed else spec.carrier
+        own = name in toothed and part.imported is None
+        flank = (toothed[name].geometry.r_b, part.body.strip_half_width) if own else ()
         path = out / f"{name}.vtu"
         written = sector.full() if full else sector
         write_vtu(written, path)
         if deck:
-            write_deck(written, path.with_suffix(".inp"), _body(spec, name).material.model_dump())
+            write_deck(written, path.with_suffix(".inp"), part.material.model_dump())
         click.echo(name)
-        echo_pairs({**in_units(mesh_report(sector, *facts)), "written": str(path)}, "  ")
+        echo_pairs({**in_units(mesh_report(sector, *flank)), "written": str(path)}, "  ")
 
 
 @click.command()
@@ -98,44 +104,7 @@ def _cost(body: Any, kept: bool) -> str:
     )
 
 
-def _names(spec: Any) -> list[str]:
-    """Bodies of a stage in their order."""
-    from gearfmu.spec.planetary_body import SET_BODIES
-
-    return list(SET_BODIES) if spec.kind == "planetary_set" else [gear.name for gear in spec.gears]
-
-
-def _body(spec: Any, name: str) -> Any:
-    """What the spec says about a body."""
-    return spec.carrier if name == "carrier" else next(gear for gear in spec.gears if gear.name == name)
-
-
-def _sector(spec: Any, name: str, scale: float) -> tuple[Any, tuple]:
-    """The sector mesh of a body; and base radius and strip half-width of its flanks, where it has any."""
-    from gearfmu.body.imported import imported_sector_mesh, imported_set_sector, pair_geometry
-    from gearfmu.femesh import sector_mesh
-    from gearfmu.femesh.carrier import carrier_sector
-    from gearfmu.geometry.carrier import CarrierGeometry
-    from gearfmu.geometry.planetary import set_geometry
-    from gearfmu.spec.shapes import gear_shape
-
-    body = _body(spec, name)
-    if spec.kind == "planetary_set" and getattr(body, "imported", None):
-        return imported_set_sector(spec, name), ()
-    own = body.mesh if name == "carrier" else body.body.mesh
-    counts = own.model_copy(update={"scale": own.scale * scale})
-    if name == "carrier":
-        return carrier_sector(CarrierGeometry.of(spec), counts), ()
-    if spec.kind == "planetary_set":
-        geometry = set_geometry(spec, name)
-    else:
-        geometry = pair_geometry(spec, name) if spec.kind == "external_pair" else gear_shape(body)
-    if getattr(body, "imported", None):
-        return imported_sector_mesh(body, geometry), ()
-    return sector_mesh(geometry, body.face_width, counts), (geometry.r_b, body.body.strip_half_width)
-
-
-def _chosen(names: list[str], only: str | None) -> list[str]:
+def _chosen(names: Sequence[str], only: str | None) -> list[str]:
     if only is not None and only not in names:
         raise click.BadParameter(f"no gear '{only}'; the stage has {', '.join(names)}", param_hint="--gear")
     return [name for name in names if only in (None, name)]

@@ -7,32 +7,27 @@ from dataclasses import replace
 import numpy as np
 
 from gearfmu.body import ReducedBody
-from gearfmu.body.imported import imported_sector_mesh
+from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
-from gearfmu.femesh import gear_sector
-from gearfmu.geometry import GearGeometry
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.general import GeneralStage, RingBody
+from gearfmu.spec.members import member_of
+from gearfmu.spec.pair import StageSpec
 
 AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 
 
 def gear_modes(
-    spec: StageSpec, gear_index: int, stored: ReducedBody, count: int, progress: Progress | None = None
+    spec: StageSpec | GeneralStage, stored: ReducedBody, count: int, progress: Progress | None = None
 ) -> BodyModes:
-    """The `count` lowest elastic modes of a gear (one more where that would split a pair).
+    """The `count` lowest elastic modes of a gear of `spec` (one more where that would split a pair).
 
     stored : the gear's reduced body, whose frequencies they must have: BodyError where they differ (a file made by
     another program version).
     """
-    gear = spec.gears[gear_index]
-    geometry = GearGeometry.of(gear, spec.pair, hand=(1, -1)[gear_index])
-    if gear.imported is None:
-        mesh = gear_sector(geometry, gear.face_width, gear.body.mesh)
-    else:
-        mesh = imported_sector_mesh(gear, geometry)
-    rigid = mesh.sets["bore"] if gear.rigid_bore else None
+    gear, mesh = member_of(spec, stored.name).gear, body_sector(spec, stored.name)
+    rigid = mesh.sets["rim" if isinstance(gear, RingBody) else "bore"] if gear.rigid_bore else None
     found = cyclic_modes(gear.name, mesh, gear.material, min(count, stored.modes), progress, rigid)
     return as_stored(found, stored.frequency, stored.damping_ratio)
 

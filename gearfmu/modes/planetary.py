@@ -7,20 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body.imported import imported_full_order, imported_set_sector
+from gearfmu.body.imported import imported_full_order
+from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
-from gearfmu.femesh import FeMesh
-from gearfmu.femesh.carrier import carrier_sector, whole_carrier
-from gearfmu.femesh.ring import sector_mesh
+from gearfmu.femesh.carrier import whole_carrier
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.geometry.planetary import set_geometry
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
-
-BODIES = ("sun", "planet", "ring", "carrier")
+from gearfmu.spec.members import member_of
 
 
 def set_body_modes(spec: Any, name: str, count: int, progress: Progress | None = None, scale: float = 1.0) -> BodyModes:
@@ -33,7 +30,7 @@ def set_body_modes(spec: Any, name: str, count: int, progress: Progress | None =
     if name == "carrier" and gear.imported is None:
         found = _carrier(spec, count, progress, scale)
     else:
-        found = cyclic_modes(name, set_sector(spec, name, scale), gear.material, count, progress)
+        found = cyclic_modes(name, body_sector(spec, name, scale), gear.material, count, progress)
     return _damped(found, gear.modal_damping)
 
 
@@ -47,7 +44,7 @@ def uncoupled_carrier_modes(spec: Any, count: int, progress: Progress | None = N
     if spec.carrier.imported is not None or not np.allclose(angles, even, atol=1e-9):
         why = "only a carrier meshed here, of evenly spaced planets, is taken without couplings"
         raise BodyError(f"{spec.source}: {why}")
-    sector = set_sector(spec, "carrier", scale)
+    sector = body_sector(spec, "carrier", scale)
     found = cyclic_modes("carrier_uncoupled", sector, spec.carrier.material, count, progress)
     return _damped(found, spec.carrier.modal_damping)
 
@@ -61,32 +58,19 @@ def mounted_ring_modes(spec: Any, count: int, progress: Progress | None = None, 
         raise BodyError(f"{spec.source}: the ring has no mounts: leave --mounted away, or add [ring.mounts]")
     if progress:
         progress("finite elements", 0.1)
-    mesh = set_sector(spec, "ring", scale).full()
+    mesh = body_sector(spec, "ring", scale).full()
     if spec.ring.imported is None:
         full = ring_full_order(spec, scale)
     else:
-        full = imported_full_order(spec.ring, set_geometry(spec, "ring"))
+        full = imported_full_order(member_of(spec, "ring"))
     found = whole_modes(full, mesh, {}, spec.ring.material, count)
     return _damped(replace(found, name="ring_on_mounts"), spec.ring.modal_damping)
-
-
-def set_sector(spec: Any, name: str, scale: float = 1.0) -> FeMesh:
-    """Finite elements of one sector of a body of a PlanetarySpec. scale : factor on all element counts, those of an
-    imported gear excepted. BodyError for an imported carrier and for imported gears without a sector of hexahedra."""
-    part = getattr(spec, name)
-    if part.imported is not None:
-        return imported_set_sector(spec, name)
-    if name == "carrier":
-        counts = part.mesh.model_copy(update={"scale": part.mesh.scale * scale})
-        return carrier_sector(CarrierGeometry.of(spec), counts)
-    counts = part.body.mesh.model_copy(update={"scale": part.body.mesh.scale * scale})
-    return sector_mesh(set_geometry(spec, name), part.face_width, counts)
 
 
 def _carrier(spec: Any, count: int, progress: Progress | None, scale: float) -> BodyModes:
     if progress:
         progress("finite elements", 0.1)
-    sector = set_sector(spec, "carrier", scale)
+    sector = body_sector(spec, "carrier", scale)
     mesh = whole_carrier(CarrierGeometry.of(spec), sector)
     slaves = {f"bolt{k}": sector.sector_nodes(k)[sector.sets["bolt"]] for k in range(sector.teeth)}
     return whole_modes(

@@ -14,10 +14,11 @@ from gearfmu.fem import hex20
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.femesh.ring import ring_sector
 from gearfmu.femesh.sector import gear_sector
-from gearfmu.geometry import PairGeometry
-from gearfmu.geometry.planetary import set_geometries
+from gearfmu.geometry import GearGeometry
+from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
+from gearfmu.spec.members import member_of
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5
@@ -29,8 +30,8 @@ def ring_full_order(spec: Any, scale: float = RING_SCALE, mounted: bool = True) 
     mounted : its springs are in the stiffness, and nothing else holds it. Otherwise the body is free, and the mounts
     (averaging nodes mount0 …) are interfaces and the ground when it is judged.
     """
-    *_, geometry = set_geometries(spec)
-    counts = spec.ring.body.mesh
+    geometry, counts = member_of(spec, "ring").geometry, spec.ring.body.mesh
+    assert isinstance(geometry, InternalGearGeometry)
     sector = ring_sector(geometry, spec.ring.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, spec.ring.material)
     couplings, mounts = _teeth(sector, body), ring_mounts(sector, body, spec.ring.mounts)
@@ -42,18 +43,14 @@ def ring_full_order(spec: Any, scale: float = RING_SCALE, mounted: bool = True) 
 
 
 def gear_full_order(spec: Any, name: str, scale: float = GEAR_SCALE) -> FullOrder:
-    """The gear `name` ("sun", "planet") of a PlanetarySpec, or of a StageSpec, with one input node a tooth and the node
-    of its bore (averaging, or rigid where the gear says so), which is the ground when it is judged."""
-    if spec.kind == "planetary_set":
-        gears = (spec.sun, spec.planet)
-        shapes = set_geometries(spec)[:2]
-    else:
-        gears, shapes = spec.gears, PairGeometry.of(spec).gears
-    gear, geometry = next((gear, shape) for gear, shape in zip(gears, shapes, strict=True) if gear.name == name)
-    counts = gear.body.mesh
+    """The external gear `name` of any stage, with one input node a tooth and the node of its bore (averaging, or rigid
+    where the gear says so), which is the ground when it is judged."""
+    member = member_of(spec, name)
+    gear, geometry, counts = member.gear, member.geometry, member.gear.body.mesh
+    assert isinstance(geometry, GearGeometry)
     sector = gear_sector(geometry, gear.face_width, counts.model_copy(update={"scale": counts.scale * scale}))
     body = _whole(sector, gear.material)
-    kind = "rigid" if getattr(gear, "rigid_bore", False) else "averaging"
+    kind = "rigid" if gear.rigid_bore else "averaging"
     bore = Coupling("bore", kind, sector.full().sets["bore"], np.zeros(3))
     return full_order(name, body, [*_teeth(sector, body), bore], Judgement(("bore",), geometry.r))
 

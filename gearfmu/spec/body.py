@@ -4,32 +4,42 @@ from __future__ import annotations
 
 import hashlib
 import json
+from pathlib import Path
 from typing import Any
 
 from gearfmu.spec.flanks import TOOTHING
+from gearfmu.spec.general import GearBody, GeneralStage, RingBody
 from gearfmu.spec.imported import import_inputs
-from gearfmu.spec.planetary import RingSpec
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.members import Member, member_of
+from gearfmu.spec.pair import StageSpec
+from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.planetary_body import set_body_inputs
 
 
-def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
-    """Everything that shapes the body of a gear, in SI, and nothing else.
+def body_inputs(spec: StageSpec | GeneralStage | PlanetarySpec, name: str) -> dict[str, Any]:
+    """Everything that shapes the body `name` of a stage, in SI, and nothing else.
 
-    Backlash, what is said of the flanks (`flanks.Toothing`), misalignment, contact, ports, levels, names and bearings
-    do not. The helix angle is the gear's own, positive for a right-handed one: that of the wheel is minus the pair's.
+    Backlash, what is said of the flanks (`flanks.Toothing`), misalignment, contact, ports, levels, names, torques and
+    bearings do not. The helix angle is the gear's own, positive for a right-handed one. The same gear has the same
+    inputs in a pair and in a general stage.
 
     The rack's addendum is left out too: the tip diameter says where the tooth ends. An imported body depends on the
     contents of its files, and not on the counts of our own mesh; SpecError when a file is missing.
     """
-    gear, pair = spec.gears[gear_index], spec.pair
-    if isinstance(gear, RingSpec):
-        return _ring_inputs(spec, gear)
+    if isinstance(spec, PlanetarySpec):
+        return set_body_inputs(spec, name)
+    member = member_of(spec, name)
+    inputs = _ring_inputs(member.gear) if isinstance(member.gear, RingBody) else _gear_inputs(member.gear)
+    return inputs | _imported_inputs(member, inputs["body"], spec.source)
+
+
+def _gear_inputs(gear: GearBody) -> dict[str, Any]:
     inputs: dict[str, Any] = {
-        "kind": spec.kind,
+        "kind": "external_pair",
         "teeth": gear.teeth,
-        "normal_module": pair.normal_module,
-        "pressure_angle": pair.pressure_angle,
-        "helix_angle": -pair.helix_angle if gear_index else pair.helix_angle,
+        "normal_module": gear.normal_module,
+        "pressure_angle": gear.pressure_angle,
+        "helix_angle": gear.helix_angle,
         "profile_shift": gear.profile_shift,
         "tip_diameter": gear.tip_diameter,
         "tip_edge_radius": gear.tip_edge_radius,
@@ -40,31 +50,23 @@ def body_inputs(spec: StageSpec, gear_index: int) -> dict[str, Any]:
         "modal_damping": gear.modal_damping,
         "body": gear.body.model_dump(),
     }
-    if gear.rigid_bore:
-        inputs["bore_coupling"] = gear.bore_coupling
-    if gear.imported is not None:
-        inputs["import"] = import_inputs(gear.imported, spec.source, f"{gear_table(spec, gear.name)}.import")
-        inputs["body"].pop("mesh")
-    return inputs
+    return inputs | ({"bore_coupling": gear.bore_coupling} if gear.rigid_bore else {})
 
 
-def gear_table(spec: Any, name: str) -> str:
-    """The table of a gear in its stage file: "gears.pinion", in a general stage "bodies.pinion"."""
-    return f"{getattr(spec, 'tables', 'gears')}.{name}"
-
-
-def _ring_inputs(spec: StageSpec, ring: RingSpec) -> dict[str, Any]:
-    """`body_inputs` of the ring of a general stage."""
+def _ring_inputs(ring: RingBody) -> dict[str, Any]:
     others = {"name", "kind", "mounts", "imported", "rim_coupling"} | TOOTHING
     inputs = {"kind": "ring"} | ring.model_dump(exclude=others)
     if not inputs["helix_angle"]:
         inputs.pop("helix_angle")  # files of spur rings are older than helical ones
-    if getattr(ring, "rigid_bore", False):  # a ring of a general stage
-        inputs["rim_coupling"] = "rigid"
-    if ring.imported is not None:
-        inputs["import"] = import_inputs(ring.imported, spec.source, f"bodies.{ring.name}.import")
-        inputs["body"].pop("mesh")
-    return inputs
+    return inputs | ({"rim_coupling": ring.rim_coupling} if ring.rigid_bore else {})
+
+
+def _imported_inputs(member: Member, body: dict[str, Any], source: Path) -> dict[str, Any]:
+    """What finite elements made elsewhere add; the counts of our own mesh leave `body`."""
+    if member.gear.imported is None:
+        return {}
+    body.pop("mesh")
+    return {"import": import_inputs(member.gear.imported, source, f"{member.place}.import")}
 
 
 def body_hash(inputs: dict[str, Any]) -> str:

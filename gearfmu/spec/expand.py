@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.geometry.planetary import HANDS, planet_angles
-from gearfmu.spec.gear import Bearing, GearSpec
+from gearfmu.geometry.planetary import planet_angles
+from gearfmu.spec.gear import Bearing
 from gearfmu.spec.general import (
     CarrierBody,
     EngagementSpec,
-    GearBody,
     GeneralStage,
     PlacedPort,
-    RingBody,
     RotorSpec,
-    ShaftBody,
     SupportSpec,
 )
 from gearfmu.spec.general_checks import with_relief_rolls
-from gearfmu.spec.planetary import CarrierSpec, PlanetarySpec, RingSpec, SetGearSpec
+from gearfmu.spec.members import CARRIER, body_names, members, set_gear, set_ring
+from gearfmu.spec.pair import StageSpec
+from gearfmu.spec.planetary import CarrierSpec, PlanetarySpec
 from gearfmu.spec.planetary_checks import mesh_torque
-from gearfmu.spec.stage import StageSpec
+
+Body = TypeVar("Body")
 
 
 def as_general(spec: StageSpec | GeneralStage | PlanetarySpec) -> GeneralStage:
@@ -37,19 +37,14 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
     """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
     the origin, wheel on +x."""
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
-    angles: dict[str, Any] = {"normal_module": pair.normal_module, "pressure_angle": pair.pressure_angle}
     pinion, wheel = spec.gears
-    bodies: dict[str, GearBody | RingBody | ShaftBody | CarrierBody] = {}
-    for gear, hand in zip(spec.gears, (1, -1), strict=True):
-        known = {name: getattr(gear, name) for name in GearSpec.model_fields} | {"bearing": None}
-        bodies[gear.name] = GearBody(**known, **angles, helix_angle=hand * pair.helix_angle + 0.0)
     return GeneralStage(
         name=spec.name,
         description=spec.description,
         source=spec.source,
         slices=spec.contact.slices,
         nodal=spec.contact.nodal,
-        bodies=bodies,
+        bodies={name: member.gear for name, member in members(spec).items()},
         rotors={g.name: RotorSpec(axis=axis, bodies={g.name: 0.0}) for g, axis in zip(spec.gears, axes, strict=True)},
         engagements=(
             EngagementSpec(
@@ -92,13 +87,11 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
         raise SpecError(problems)
     assert spec.contact is not None
     planets = [f"planet{k + 1}" for k in range(spec.set.planets)]
-    bodies: dict[str, Any] = {"sun": _set_gear(spec.sun, "sun", _rack(spec, "sun"))}
+    bodies: dict[str, Any] = {"sun": set_gear(spec.sun, spec.set)}
     for k, name in enumerate(planets):
         eccentricity = spec.set.planet_eccentricity.get(k, spec.planet.eccentricity)
-        planet = spec.planet.model_copy(update={"eccentricity": eccentricity})
-        bodies[name] = _set_gear(planet, name, _rack(spec, "planet"))
-    ring = {name: getattr(spec.ring, name) for name in RingSpec.model_fields} | {"mounts": None}
-    bodies["ring"] = RingBody(**ring, kind="ring", **_rack(spec, "ring"))
+        bodies[name] = set_gear(spec.planet, spec.set, name=name, eccentricity=eccentricity)
+    bodies["ring"] = set_ring(spec.ring, spec.set)
     carrier = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
     bodies["carrier"] = CarrierBody(**carrier, name="carrier", kind="carrier")
     stage = GeneralStage(
@@ -120,10 +113,14 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
     return with_relief_rolls(stage)
 
 
-def set_gears(spec: PlanetarySpec, bodies: Sequence[Any]) -> list[Any]:
-    """Sun, every planet, ring and carrier of the reduced bodies sun, planet, ring, carrier of a set."""
-    sun, planet, ring, carrier = bodies
-    return [sun, *[planet] * spec.set.planets, ring, carrier]
+def spread(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Body]) -> dict[str, Body]:
+    """One of `bodies` (or of what stands for them, such as their hashes), in the order of `body_names`, for every body
+    of `as_general(spec)` by name: the planets of a set share one."""
+    own = dict(zip(body_names(spec), bodies, strict=True))
+    if isinstance(spec, PlanetarySpec):
+        planets = {f"planet{k + 1}": own["planet"] for k in range(spec.set.planets)}
+        return {"sun": own["sun"], **planets, "ring": own["ring"], CARRIER: own[CARRIER]}
+    return own
 
 
 def motion_problems(spec: PlanetarySpec) -> list[Problem]:
@@ -151,20 +148,6 @@ def motion_problems(spec: PlanetarySpec) -> list[Problem]:
         )
         found.append(Problem(str(spec.source), "ports", ", ".join(spec.ports) or "missing", f'{remedy} = "torque"'))
     return found
-
-
-def _rack(spec: PlanetarySpec, name: str) -> dict[str, Any]:
-    """Module and angles of sun, planet or ring."""
-    s = spec.set
-    return {
-        "normal_module": s.normal_module, "pressure_angle": s.pressure_angle,
-        "helix_angle": HANDS[name] * s.helix_angle + 0.0,
-    }  # fmt: skip
-
-
-def _set_gear(gear: SetGearSpec, name: str, angles: dict[str, Any]) -> GearBody:
-    known = {field: getattr(gear, field) for field in SetGearSpec.model_fields}
-    return GearBody(**known | {"name": name, "bearing": None}, **angles)
 
 
 def _set_rotors(spec: PlanetarySpec, planets: list[str]) -> dict[str, RotorSpec]:

@@ -286,21 +286,3 @@ class GeneralStage(Spec):
     def place(self, body: str, at: float | None) -> float:
         """Place of a node on a body: as said, or the body's own."""
         return self.rotors[self.rotor_of(body)].bodies[body] if at is None else at
-
-
-def gear_as_pair(stage: GeneralStage, name: str) -> Any:
-    """What `body_inputs(…, 0)` reads of a stage, for one gear: the same gear has the same body, whatever stage it is
-    in."""
-    gear = stage.bodies[name]
-    assert isinstance(gear, ToothedBody)
-    return _GearAlone(stage.source, gear)
-
-
-class _GearAlone:
-    """One gear as a stage of kind external_pair shows it."""
-
-    kind = "external_pair"
-    tables = "bodies"
-
-    def __init__(self, source: Path, gear: ToothedBody) -> None:
-        self.source, self.gears, self.pair = source, (gear,), gear

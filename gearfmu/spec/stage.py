@@ -1,19 +1,15 @@
-"""stage.toml → StageSpec, one external gear pair with its bodies, contact and ports, or PlanetarySpec."""
+"""stage.toml → StageSpec, PlanetarySpec or GeneralStage, read and checked with the geometry."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
-
-from pydantic import Field, field_validator, model_validator
+from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
-from gearfmu.geometry import GearGeometry, PairGeometry
-from gearfmu.geometry.planetary import set_geometry
-from gearfmu.spec.base import Name, Quantity, Spec, Text, refuse, validate
+from gearfmu.geometry import PairGeometry
+from gearfmu.spec.base import Spec, validate
 from gearfmu.spec.changes import Changes, changed_tables
 from gearfmu.spec.checks import geometry_problems
 from gearfmu.spec.flank_checks import located, topography_problems, with_rolls
@@ -24,46 +20,11 @@ from gearfmu.spec.imported import missing_files
 from gearfmu.spec.judge import read_and_judge
 from gearfmu.spec.layers import Layers, read_layers
 from gearfmu.spec.library import find_stage
+from gearfmu.spec.members import members
+from gearfmu.spec.pair import StageSpec as StageSpec
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.planetary_checks import set_problems
-from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
-from gearfmu.spec.shapes import gear_shape
 from gearfmu.units import to_si
-
-
-class StageSpec(Spec):
-    """A gear stage as its file gives it; SI floats. `source` is that file."""
-
-    name: Name = Field(description="name of the stage, also of its FMU")
-    description: Text = Field(default="", description="one line about the stage")
-    source: Path
-    kind: Literal["external_pair"] = Field(default="external_pair", description="kind of stage")
-    torque_max: Annotated[float, Quantity("torque_max")] = Field(
-        description="largest pinion torque the model is made for"
-    )
-    speed_max: Annotated[float, Quantity("speed_max")] = Field(description="largest pinion speed the model is made for")
-    pair: PairSpec = Field(description="the pair")
-    gears: tuple[GearSpec, GearSpec] = Field(description="pinion, then wheel")
-    contact: ContactSpec = Field(description="tooth contact")
-    ports: dict[str, PortSpec] = Field(description="one port a shaft")
-    levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
-
-    @field_validator("gears", mode="before")
-    @classmethod
-    def _named(cls, value: Any) -> Any:
-        if not isinstance(value, dict):
-            return value
-        if len(value) != 2 or not all(isinstance(table, dict) for table in value.values()):
-            raise refuse("a pair has two gears: write the tables [gears.pinion] and [gears.wheel]")
-        return tuple(table | {"name": name} for name, table in value.items())
-
-    @model_validator(mode="after")
-    def _ports_of_shafts(self) -> StageSpec:
-        names = {gear.name for gear in self.gears}
-        if set(self.ports) != names:
-            tables = ", ".join(f"[ports.{name}]" for name in sorted(names))
-            raise refuse(f"every shaft needs its port and every port its shaft: write {tables}")
-        return self
 
 
 def load_stage(stage: str | os.PathLike[str], changes: Changes | None = None) -> Any:
@@ -175,17 +136,8 @@ def _judged(spec: Loaded | None, layers: Layers, problems: list[Problem]) -> Loa
 
 def _topography_problems(spec: Any, layers: Layers) -> list[Problem]:
     """What is wrong with the topographies of all gears."""
-    members: list[tuple[str, Any, Any]]
-    if isinstance(spec, PlanetarySpec):
-        members = [(gear.name, gear, set_geometry(spec, gear.name)) for gear in spec.gears]
-    elif isinstance(spec, GeneralStage):
-        members = [(f"bodies.{gear.name}", gear, gear_shape(gear)) for gear in spec.gears]
-    else:
-        members = [
-            (f"gears.{gear.name}", gear, GearGeometry.of(gear, spec.pair, hand))
-            for gear, hand in zip(spec.gears, (1, -1), strict=True)
-        ]
-    return [problem for place, gear, shape in members for problem in topography_problems(gear, shape, layers, place)]
+    found = members(spec).values()
+    return [problem for m in found for problem in topography_problems(m.gear, m.geometry, layers, m.place)]
 
 
 def _unknown(key: str, raw: dict[str, Any]) -> Problem:

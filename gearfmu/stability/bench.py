@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.flanks import DeviationClass, Eccentricity, ProfileSpec, Wobble
@@ -36,7 +36,7 @@ DEVIATIONS: dict[str, Any] = {  # of both gears, each its own draw; a coarse gea
 
 @lru_cache(maxsize=1)
 def _bodies() -> list[ReducedBody]:
-    return load_stage_bodies(load_stage(PLAIN))
+    return load_bodies(load_stage(PLAIN))
 
 
 @dataclass(frozen=True)

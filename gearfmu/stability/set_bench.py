@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from gearfmu.body import ReducedBody, load_bodies
-from gearfmu.body.reduce import reduced_gear
-from gearfmu.geometry.planetary import set_geometry
+from gearfmu.body.toothed import reduced_gear
 from gearfmu.kernel import Kernel
 from gearfmu.spec.gear import MeshSpec
+from gearfmu.spec.members import member_of
 from gearfmu.spec.planetary import PlanetarySpec, RingSpec
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import load_stage
@@ -88,7 +88,7 @@ def thin_ring() -> tuple[RingSpec, ReducedBody]:
     mesh = MeshSpec(flank=6, thickness=2, root=3, rim=1, width=2)
     body = spec.ring.body.model_copy(update={"mesh": mesh, "modes": 160, "roll_points": 12})
     ring = spec.ring.model_copy(update={"rim_diameter": 148e-3, "body": body})
-    return ring, reduced_gear(ring, set_geometry(spec.model_copy(update={"ring": ring}), "ring"), "0" * 64)
+    return ring, reduced_gear(member_of(spec.model_copy(update={"ring": ring}), "ring"), "0" * 64)
 
 
 @lru_cache(maxsize=2)
@@ -130,7 +130,7 @@ def base_radius() -> float:
     """Base radius of the sun, m."""
     spec = load_stage(SET)
     assert isinstance(spec, PlanetarySpec)
-    return set_geometry(spec, "sun").r_b
+    return member_of(spec, "sun").geometry.r_b
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK
 from gearfmu.cosim.scene_run import run as run_scene
 from gearfmu.cosim.scene_run import stage_model
@@ -38,7 +38,7 @@ CLOSURE = 0.08  # s: the first part of the shipped scene, the clutch is at its f
 def train() -> StageModel:
     """The shipped train, assembled."""
     spec = load_stage(TRAIN)
-    return assemble(spec, load_stage_bodies(spec))
+    return assemble(spec, load_bodies(spec))
 
 
 @dataclass(frozen=True)

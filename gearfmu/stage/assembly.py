@@ -13,7 +13,7 @@ import numpy as np
 
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
-from gearfmu.spec.expand import as_general, set_gears
+from gearfmu.spec.expand import as_general, spread
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.ports import PortSpec
@@ -120,11 +120,8 @@ def _parted(
     spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]
 ) -> tuple[GeneralStage, Sequence[Any], dict[str, InterfaceBody]]:
     """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""
-    stage = as_general(spec)
-    if not isinstance(spec, PlanetarySpec):
-        return stage, bodies, {}
-    *gears, carrier = set_gears(spec, bodies)
-    return stage, gears, {stage.carriers[0].name: carrier}
+    stage, found = as_general(spec), spread(spec, bodies)
+    return stage, [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
 
 
 def _carried_sections(layout: Layout) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Kernel, Variable
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.members import body_names
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import StageSpec
 from gearfmu.spec.turning import Shafts, shafts_of, with_ports
@@ -76,8 +77,7 @@ class StageModel(Shown):
     @property
     def bodies(self) -> dict[str, str]:
         """Hash of every reduced body that the model was made from, by name: of a set sun, planet, ring, carrier."""
-        names = [gear.name for gear in self.spec.gears] + ["carrier"] * isinstance(self.spec, PlanetarySpec)
-        return dict(zip(names, self.body_hashes, strict=True))
+        return dict(zip(body_names(self.spec), self.body_hashes, strict=True))
 
     @property
     def pair(self) -> StageSpec:

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.expand import as_general, set_gears
+from gearfmu.spec.expand import as_general, spread
 from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.stage.free import NODE_MEMBERS
 from gearfmu.stage.groups import Group, families
 from gearfmu.stage.model import StageModel
@@ -54,8 +53,8 @@ def observed_sections(index: int, bodies: Sequence[Any], groups: Sequence[Group]
 def gear_bodies(spec: Any, bodies: Sequence[Any]) -> dict[str, Any]:
     """One of `bodies` (or what stands for them, such as their hashes) for every gear of a stage by name: of a set its
     sun, planet, ring and carrier are given."""
-    of_gears = set_gears(spec, bodies)[:-1] if isinstance(spec, PlanetarySpec) else bodies
-    return {gear.name: body for gear, body in zip(as_general(spec).gears, of_gears, strict=True)}
+    found = spread(spec, bodies)
+    return {gear.name: found[gear.name] for gear in as_general(spec).gears}
 
 
 def gear_hashes(model: StageModel) -> dict[str, str]:

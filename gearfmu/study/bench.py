@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.cosim.coupled import OK, Result
 from gearfmu.cosim.kernel_unit import KernelHandle, KernelUnit
 from gearfmu.cosim.scene_run import in_drivetrain, run_once
@@ -135,7 +135,7 @@ def models_for(scene: SceneSpec, bodies: Sequence[Any] | None = None, rolls: int
     """The scene's stage with the ports of its drivetrain; bodies: others than those of the library; rolls: of the grid
     along a flank; changes: of the StageSpec."""
     spec = load_stage(scene.stage.name).model_copy(update=changes)
-    return assemble(in_drivetrain(scene, spec), bodies or load_stage_bodies(spec), rolls)
+    return assemble(in_drivetrain(scene, spec), bodies or load_bodies(spec), rolls)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.spec.ports import LevelSpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
@@ -41,7 +41,7 @@ def cut_rows(
 ) -> tuple[list[CutRow], Reference]:
     """Rows over CUTS and STEPS against the scene's reference; a cut that leaves the number of modes as it was is left
     out. Raises what a run of the scene raises."""
-    tell, bodies = progress or (lambda fraction, text="": None), load_stage_bodies(load_stage(scene.stage.name))
+    tell, bodies = progress or (lambda fraction, text="": None), load_bodies(load_stage(scene.stage.name))
     model, slices = models_for(scene, bodies), scene.stage.slices
     base, reference = measure(scene, model, base_point(scene)), make_reference(scene, model, slices, quick)
     rows: list[CutRow] = []

@@ -10,8 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gearfmu.body import load_stage_bodies
-from gearfmu.body.reduce import reduce_gear
+from gearfmu.body import load_bodies, reduce_body
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage.dashpot import same_loss
@@ -90,7 +89,7 @@ def body_rows(
 ) -> list[BodyRow]:
     """Rows of all scenes, which share one stage, for every variant (default: all of `variants`)."""
     tell, spec = progress or (lambda fraction, text="": None), load_stage(scenes[0].stage.name)
-    own_bodies, rows = load_stage_bodies(spec), []
+    own_bodies, rows = load_bodies(spec), []
     slices = scenes[0].stage.slices
     own = {scene.name: _run(scene, own_bodies, Variant("own", None, slices, ROLLS), h) for scene in scenes}
     chosen = variants(spec, slices) if chosen is None else chosen
@@ -99,7 +98,7 @@ def body_rows(
         started, bodies = clock.process_time(), own_bodies
         if variant.gears:
             changed = spec.model_copy(update={"gears": variant.gears})
-            bodies = [reduce_gear(changed, index) for index in range(2)]
+            bodies = [reduce_body(changed, gear.name) for gear in variant.gears]
         cpu = clock.process_time() - started if variant.gears else 0.0
         rows += [_row(scene, variant, own[scene.name], bodies, (h, cpu)) for scene in scenes]
     return rows
@@ -109,7 +108,7 @@ def _run(scene: SceneSpec, bodies: Sequence[Any], variant: Variant, h: float) ->
     changes: dict[str, Any] = {}
     if variant.gears:
         spec = load_stage(scene.stage.name)
-        contact = spec.contact.model_copy(update={"damping": same_loss(spec, load_stage_bodies(spec), bodies)})
+        contact = spec.contact.model_copy(update={"damping": same_loss(spec, load_bodies(spec), bodies)})
         changes = {"gears": variant.gears, "contact": contact}
     model = models_for(scene, bodies, variant.rolls, **changes)
     return measure(scene, model, Point("full", h=h, slices=variant.slices))

@@ -16,8 +16,7 @@ from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from gearfmu.body import load_bodies
-from gearfmu.body.planetary import reduce_set_body
+from gearfmu.body import load_bodies, reduce_body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
@@ -193,7 +192,7 @@ class _SetStudy:
     def _with_planets(self, planets: int) -> StageModel:
         self.tell(0.0, f"carrier of {planets} planets")
         spec = with_planets(self.spec, planets)
-        return self._model_of(spec, [*self.bodies[:3], reduce_set_body(spec, "carrier")])
+        return self._model_of(spec, [*self.bodies[:3], reduce_body(spec, "carrier")])
 
     def _fitting(self, wished: float) -> float:
         return fitting(self.scene.coupling.step, wished)

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.body import inspect_file, load_body, load_stage_bodies, reduce_stage
+from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies
 from gearfmu.body.layout import GROUPS, entries_of
 from gearfmu.body.parts import drawn_counts, kept_offsets
-from gearfmu.body.reduce import body_path
 from gearfmu.body.reduced import value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
@@ -37,16 +36,16 @@ def made(tmp_path_factory) -> SimpleNamespace:
     gears = "".join(f"[gears.{g}.body]\n{COUNTS}[gears.{g}.body.mesh]\n{MESH}" for g in ("pinion", "wheel"))
     path.write_text(base + gears, encoding="utf-8")
     spec = load_stage(path)
-    return SimpleNamespace(path=path, spec=spec, bodies=reduce_stage(spec))
+    return SimpleNamespace(path=path, spec=spec, bodies=reduce_bodies(spec))
 
 
 def test_a_helical_body_reads_back_as_it_was_written(made: SimpleNamespace) -> None:
     for index, body in enumerate(made.bodies):
-        again = load_body(body_path(made.spec, index))
+        again = load_body(body_path(made.spec, made.spec.gears[index].name))
         assert body.groups == again.groups == ("helix", "tangent", "shapes", "spin")
         for entry in entries_of(body.groups):
             assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
-    assert [b.name for b in load_stage_bodies(made.spec)] == ["pinion", "wheel"]
+    assert [b.name for b in load_bodies(made.spec)] == ["pinion", "wheel"]
 
 
 def test_pinion_and_wheel_are_of_opposite_hand(made: SimpleNamespace) -> None:
@@ -100,7 +99,7 @@ def test_a_body_with_few_offsets_reads_back_by_its_offset(made: SimpleNamespace,
 
 
 def test_shipped_spur_gears_know_their_profile_and_what_turning_does() -> None:
-    for body in load_stage_bodies(load_stage("fzg_c")):
+    for body in load_bodies(load_stage("fzg_c")):
         assert body.groups == ("tangent", "shapes", "spin") and body.base_helix_angle == 0.0
         assert body.knows_profile
     assert set(GROUPS) == {"rim", "helix", "tangent", "shapes", "surface", "spin"}
@@ -132,7 +131,7 @@ def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path
     assert code == 0 and "scaled_jacobian_min" in out
     code, out, _ = call("reduce", made.path, capsys=capsys)
     assert code == 0 and "0 bodies reduced, 2 read" in out
-    code, out, _ = call("inspect", body_path(made.spec, 1), "--json", capsys=capsys)
+    code, out, _ = call("inspect", body_path(made.spec, "wheel"), "--json", capsys=capsys)
     assert code == 0 and json.loads(out)["facts"]["base_helix_angle_deg"] == pytest.approx(-18.7472, abs=1e-3)
     code, out, _ = call("inspect", made.path, "--json", capsys=capsys)
     derived = json.loads(out)["derived"]

@@ -9,20 +9,19 @@ import numpy as np
 import pytest
 
 from gearfmu.body import (
+    body_path,
     inspect_file,
+    load_bodies,
     load_body,
     load_interface_body,
-    load_set_bodies,
-    load_stage_bodies,
     mounted,
-    reduce_set,
-    reduce_stage,
+    reduce_bodies,
+    reduce_body,
 )
 from gearfmu.body.interface_body import ENTRIES, TEXTS, InterfaceBody, save_interface_body
 from gearfmu.body.layout import RIM_ENTRIES
-from gearfmu.body.planetary import reduce_set_body, set_body_path
 from gearfmu.body.store import save_body
-from gearfmu.errors import BodyError, SpecError
+from gearfmu.errors import BodyError
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.spec.gear import MeshSpec
@@ -40,17 +39,17 @@ COARSE = SPEC.model_copy(
 
 @pytest.fixture(scope="module")
 def shipped() -> dict:
-    return dict(zip(SET_BODIES, load_set_bodies(SPEC), strict=True))
+    return dict(zip(SET_BODIES, load_bodies(SPEC), strict=True))
 
 
 @pytest.fixture(scope="module")
 def carrier() -> InterfaceBody:
-    return reduce_set_body(COARSE, "carrier")
+    return reduce_body(COARSE, "carrier")
 
 
 def test_shipped_bodies_are_current_small_and_trusted_over_the_band(shipped):
     for name, body in shipped.items():
-        assert set_body_path(SPEC, name).stat().st_size <= LARGEST
+        assert body_path(SPEC, name).stat().st_size <= LARGEST
         assert name == "carrier" or (body.knows_profile and body.spin is not None)
         error, band = (body.max_error, body.band) if name == "carrier" else (body.frf.max_error, body.frf.band)
         assert error < 0.01 and tuple(band) == pytest.approx((50.0, 10e3))
@@ -60,15 +59,15 @@ def test_shipped_bodies_are_current_small_and_trusted_over_the_band(shipped):
 
 def test_shipped_bodies_of_the_helical_set_are_current_small_and_of_their_hands():
     spec = load_stage("helical_set")
-    *gears, carrier = load_set_bodies(spec)
+    *gears, carrier = load_bodies(spec)
     assert [np.sign(gear.base_helix_angle) for gear in gears] == [1, -1, -1]
     for gear in gears:
-        assert set_body_path(spec, gear.name).stat().st_size <= LARGEST
+        assert body_path(spec, gear.name).stat().st_size <= LARGEST
         assert gear.frf.max_error < 0.01 and gear.knows_profile and gear.spin is not None
     assert carrier.max_error < 1e-6
     with pytest.raises(BodyError, match="keeps a few tooth offsets"):
         mounted(gears[2]).mean_residual(120e3)
-    assert "mounted_frequencies_Hz" in inspect_file(set_body_path(spec, "ring"))["facts"]
+    assert "mounted_frequencies_Hz" in inspect_file(body_path(spec, "ring"))["facts"]
 
 
 def test_masses_and_inertias_are_the_analytic_ones(shipped):
@@ -165,15 +164,15 @@ def test_a_carrier_body_that_cannot_be_is_refused(carrier):
 
 def test_missing_and_stale_bodies_are_refused(carrier, tmp_path):
     with pytest.raises(BodyError, match="sun.h5: no such body file"):
-        load_set_bodies(SPEC, tmp_path)
+        load_bodies(SPEC, tmp_path)
     for name in SET_BODIES:
-        (tmp_path / f"{name}.h5").write_bytes(set_body_path(SPEC, name).read_bytes())
+        (tmp_path / f"{name}.h5").write_bytes(body_path(SPEC, name).read_bytes())
     save_interface_body(carrier, tmp_path / "carrier.h5")
     with pytest.raises(BodyError, match="carrier.h5: stale: made from other numbers"):
-        load_set_bodies(SPEC, tmp_path)
+        load_bodies(SPEC, tmp_path)
     save_interface_body(replace(carrier, algorithm_version=1), tmp_path / "carrier.h5")
     with pytest.raises(BodyError, match="carrier.h5: stale: made by version 1 of the reduction.*gearfmu reduce"):
-        load_set_bodies(SPEC, tmp_path)
+        load_bodies(SPEC, tmp_path)
 
 
 def test_a_set_is_reduced_whole_and_left_alone_when_it_is_current(carrier, tmp_path):
@@ -183,20 +182,14 @@ def test_a_set_is_reduced_whole_and_left_alone_when_it_is_current(carrier, tmp_p
     spec = COARSE.model_copy(update=gears)
     save_interface_body(carrier, tmp_path / "carrier.h5")  # current already
     before, said = (tmp_path / "carrier.h5").stat().st_mtime_ns, []
-    bodies = reduce_set(spec, tmp_path, progress=lambda what, share: said.append(what))
+    bodies = reduce_bodies(spec, tmp_path, progress=lambda what, share: said.append(what))
     assert [body.name for body in bodies] == list(SET_BODIES) and any("ring" in what for what in said)
     assert (tmp_path / "carrier.h5").stat().st_mtime_ns == before and bodies[2].internal
     (tmp_path / "sun.h5").unlink()
     stamps = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
-    reduce_set(spec, tmp_path)
+    reduce_bodies(spec, tmp_path)
     assert (tmp_path / "sun.h5").is_file()
     assert stamps == {name: (tmp_path / name).stat().st_mtime_ns for name in stamps}
-
-
-def test_pair_functions_refuse_a_set():
-    for function in (load_stage_bodies, reduce_stage):
-        with pytest.raises(SpecError, match="this is about one pair"):
-            function(SPEC)
 
 
 def test_the_layout_is_documented():
@@ -211,7 +204,7 @@ def test_the_layout_is_documented():
 def test_gearfmu_reduce_remakes_the_shipped_set(shipped, tmp_path):
     """Same hashes, frequencies of gears to 1e-8, statics to 1e-6. Oscillators of the carrier, of a Krylov space, follow
     the rounding of the factors: to 1e-6 below 50 kHz, to 1e-5 above."""
-    for made in reduce_set(SPEC, tmp_path):
+    for made in reduce_bodies(SPEC, tmp_path):
         old = shipped[made.name]
         assert made.input_hash == old.input_hash
         ours, theirs = made.frequency[:100], old.frequency[:100]

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BarycentricInterpolator
 
-from gearfmu.body import load_stage_bodies, reduce_stage
-from gearfmu.body.reduce import body_path, gears_of
+from gearfmu.body import body_path, load_bodies, reduce_bodies
 from gearfmu.geometry import GearGeometry
 from gearfmu.spec.library import library_roots, shipped_stages
 from gearfmu.spec.stage import load_stage
@@ -22,8 +21,8 @@ ROUNDED = 5e-6  # of what is scaled to ones: tables in steps of 2^-23 to 2^-22 o
 @pytest.mark.parametrize("stage", [name for name in shipped_stages() if load_stage(name).kind != "planetary_set"])
 def test_no_shipped_body_is_stale_large_or_incomplete(stage):
     spec = load_stage(stage)
-    for (own, index), body in zip(gears_of(spec), load_stage_bodies(spec), strict=True):
-        assert body_path(own, index).stat().st_size <= LARGEST
+    for body in load_bodies(spec):
+        assert body_path(spec, body.name).stat().st_size <= LARGEST
         assert body.frf.max_error < 0.01 or spec.kind != "external_pair"  # those of a train say how far they reach
         assert body.knows_profile and body.spin is not None
 
@@ -99,7 +98,7 @@ def test_stiffness_of_one_tooth_pair_against_iso_6336():
     the bores: without the twist of the discs down to them the finite elements lie within 15 % of it. With it they are
     softer, near the c' = 0.8 c'th that ISO takes from measurements."""
     spec = load_stage("fzg_c")
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     assert pair_stiffness(bodies, spec, twist=False) == pytest.approx(15.78, rel=0.15)
     assert pair_stiffness(bodies, spec, twist=True) == pytest.approx(0.8 * 15.78, rel=0.05)
 
@@ -108,7 +107,7 @@ def test_a_symmetric_load_does_not_notice_that_motion_out_of_the_plane_is_held()
     """Even width functions move the bore neither along z nor about x and y, statically or by any mode, nor couple to
     them through the bore or the inertia; odd ones do, so zero is not the answer to everything."""
     planar, out = [0, 1, 5], [2, 3, 4]
-    for body in load_stage_bodies(load_stage("fzg_c")):
+    for body in load_bodies(load_stage("fzg_c")):
         even = np.arange(body.static_fb.shape[2]) % 2 == 0
         symmetric = body.parity > 0
         scale = np.abs(body.static_fb[:, :, ~even][..., out]).max(axis=(0, 1, 2))
@@ -124,7 +123,7 @@ def test_a_symmetric_load_does_not_notice_that_motion_out_of_the_plane_is_held()
 
 
 def test_neighbour_teeth_move_along_less_than_the_loaded_one():
-    for body in load_stage_bodies(load_stage("fzg_c")):
+    for body in load_bodies(load_stage("fzg_c")):
         middle = len(body.roll) // 2
         own, neighbour = (bore_held(body, m)[middle, middle] for m in (0, 1))
         assert 0 < neighbour < 0.35 * own
@@ -133,7 +132,7 @@ def test_neighbour_teeth_move_along_less_than_the_loaded_one():
 @pytest.mark.parametrize("modes", [0, 40, 400])
 def test_residual_of_any_cut_is_positive_semidefinite(modes):
     """C_static − Σ N Nᵀ/ω² on both flanks of a tooth and the bore, whichever modes are dynamic."""
-    for body in load_stage_bodies(load_stage("fzg_c")):
+    for body in load_bodies(load_stage("fzg_c")):
         points = body.static_fb[..., 0].size
         flank = body.static_ff[:, :, 0].transpose(0, 2, 4, 1, 3, 5).reshape(points, points)
         bore = body.static_fb.reshape(points, 6)
@@ -157,11 +156,11 @@ def test_gearfmu_reduce_remakes_the_shipped_bodies(tmp_path):
     """Same input hash, frequencies to 1e-6 (modes end by one step, of error 1e-7), statics to 1e-6, the frequency
     response's error to 1e-3 of itself."""
     spec = load_stage("fzg_c")
-    for shipped, made in zip(load_stage_bodies(spec), reduce_stage(spec, tmp_path), strict=True):
+    for shipped, made in zip(load_bodies(spec), reduce_bodies(spec, tmp_path), strict=True):
         assert made.input_hash == shipped.input_hash
         assert np.allclose(made.frequency, shipped.frequency, rtol=1e-6)
         for name in ("static_ff", "static_fb", "static_bb"):
             stored = common_offsets(shipped, name)
             assert np.abs(common_offsets(made, name) - stored).max() <= 1e-6 * np.abs(stored).max()
         assert np.allclose(made.frf.error, shipped.frf.error, rtol=1e-3, atol=1e-9)
-        assert Path(body_path(spec, 0, tmp_path)).is_file()
+        assert Path(body_path(spec, spec.gears[0].name, tmp_path)).is_file()

@@ -8,9 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gearfmu.body import apart, body_needs, reduce, reduce_set
+from gearfmu.body import apart, body_needs, reduce_bodies, reduce_body
 from gearfmu.body.layout import entries_of
-from gearfmu.body.planetary import reduce_set_body
 from gearfmu.body.reduced import value_of
 from gearfmu.errors import MeshError
 from gearfmu.femesh import sector_mesh
@@ -37,11 +36,11 @@ def spec(tmp_path: Path) -> object:
 def test_gears_side_by_side_are_those_made_one_after_the_other(
     spec: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    alone = reduce.reduce_stage(spec, tmp_path / "alone")
+    alone = reduce_bodies(spec, tmp_path / "alone")
     monkeypatch.setattr(apart, "_WORTH", 0)
     monkeypatch.setattr(apart.os, "cpu_count", lambda: 2)
     told: list[str] = []
-    together = reduce.reduce_stage(spec, tmp_path / "together", progress=lambda text, share: told.append(text))
+    together = reduce_bodies(spec, tmp_path / "together", progress=lambda text, share: told.append(text))
     assert {text.split(":")[0] for text in told} == {"pinion", "wheel"}
     for one, other in zip(alone, together, strict=True):
         assert one.name == other.name and other.provenance["cpu_s"] > 0
@@ -57,7 +56,7 @@ def test_what_a_process_raises_is_raised_here(spec: object, tmp_path: Path, monk
     monkeypatch.setattr(apart.os, "cpu_count", lambda: 2)
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     with pytest.raises(OSError, match="file"):
-        reduce.reduce_stage(spec, tmp_path / "file" / "below")
+        reduce_bodies(spec, tmp_path / "file" / "below")
 
 
 def test_a_gear_that_does_not_fit_is_refused_with_the_counts_to_lower(
@@ -67,7 +66,7 @@ def test_a_gear_that_does_not_fit_is_refused_with_the_counts_to_lower(
     table.write_text("MemTotal: 8000000 kB\nMemAvailable:   100000 kB\n", encoding="ascii")
     monkeypatch.setattr(memory, "_MEMORY_TABLE", table)
     with pytest.raises(MeshError, match=r"pinion.*about 0\.2 GB.*0\.1 GB are free: lower .*flank = 2.*width = 1"):
-        reduce.reduce_stage(spec, tmp_path)
+        reduce_bodies(spec, tmp_path)
     monkeypatch.setattr(memory, "_MEMORY_TABLE", tmp_path / "none")
     memory.require_memory(Need(10**6, 1e15), "")  # a system that does not tell
 
@@ -117,7 +116,7 @@ def test_a_carrier_that_does_not_fit_is_refused_with_the_counts_to_lower(
 ) -> None:
     monkeypatch.setattr(memory, "available_memory", lambda: 1e9)
     with pytest.raises(MeshError, match=r"carrier.*about 1\d\.\d GB .*carrier\.mesh \(around = 4.*scale = 1\)"):
-        reduce_set_body(load_stage("planetary54"), "carrier")
+        reduce_body(load_stage("planetary54"), "carrier")
 
 
 def test_every_body_of_a_stage_has_its_need_before_the_work(spec: object) -> None:
@@ -133,8 +132,8 @@ def test_gears_of_a_set_are_made_side_by_side(tmp_path: Path, monkeypatch: pytes
     gears = "".join(f"[{g}.body]\n{COUNTS}[{g}.body.mesh]\n{MESH}" for g in ("sun", "planet", "ring"))
     (tmp_path / "stage.toml").write_text(base + gears + "[carrier.mesh]\nscale = 0.2\n", encoding="utf-8")
     spec, told = load_stage(tmp_path / "stage.toml"), list[str]()
-    bodies = reduce_set(spec, progress=lambda text, share: told.append(text))
+    bodies = reduce_bodies(spec, progress=lambda text, share: told.append(text))
     assert [body.name for body in bodies] == ["sun", "planet", "ring", "carrier"]
     assert {text.split(":")[0] for text in told} == {"sun", "planet", "ring", "carrier"}
-    again = reduce_set_body(spec, "planet")
+    again = reduce_body(spec, "planet")
     assert np.allclose(again.frequency, bodies[1].frequency, rtol=1e-9)

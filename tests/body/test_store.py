@@ -13,9 +13,8 @@ import h5py
 import numpy as np
 import pytest
 
-from gearfmu.body import inspect_file, load_body, load_stage_bodies, reduce_stage
+from gearfmu.body import body_path, inspect_file, load_bodies, load_body, reduce_bodies, reduce_body
 from gearfmu.body.layout import GROUPS, entries_of
-from gearfmu.body.reduce import body_path, reduce_gear
 from gearfmu.body.reduced import value_of
 from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
@@ -38,14 +37,14 @@ def tiny_stage(folder: Path) -> StageSpec:
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stage")
     spec = tiny_stage(folder)
-    return spec, reduce_stage(spec), folder
+    return spec, reduce_bodies(spec), folder
 
 
 def test_a_reduction_is_stored_to_what_the_layout_says_and_packed_once(made, tmp_path):
     """What is stored in steps returns within a step, and two more times within the same; written again, a file has the
     same bytes."""
     spec, _, _ = made
-    body, first, second = reduce_gear(spec, 0), tmp_path / "pinion.h5", tmp_path / "again.h5"
+    body, first, second = reduce_body(spec, "pinion"), tmp_path / "pinion.h5", tmp_path / "again.h5"
     save_body(body, first)
     again = load_body(first)
     save_body(again, second)
@@ -65,7 +64,7 @@ def test_a_reduction_is_stored_to_what_the_layout_says_and_packed_once(made, tmp
 def test_a_body_reads_back_as_it_was_written(made):
     spec, bodies, _ = made
     for index, body in enumerate(bodies):
-        again = load_body(body_path(spec, index))
+        again = load_body(body_path(spec, spec.gears[index].name))
         for entry in entries_of(body.groups):
             assert np.array_equal(value_of(body, entry.field), value_of(again, entry.field)), entry.path
         assert (again.name, again.input_hash, again.mesh, again.material) == (
@@ -78,7 +77,7 @@ def test_a_body_reads_back_as_it_was_written(made):
 
 def test_every_dataset_says_its_unit_and_meaning(made):
     spec, bodies, _ = made
-    with h5py.File(body_path(spec, 0)) as file:
+    with h5py.File(body_path(spec, "pinion")) as file:
         found = []
         file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
         assert sorted(found) == sorted(entry.path for entry in entries_of(bodies[0].groups))
@@ -87,37 +86,37 @@ def test_every_dataset_says_its_unit_and_meaning(made):
 
 def test_a_stored_body_is_taken_when_its_hash_matches_and_made_again_when_not(made):
     spec, bodies, folder = made
-    before = body_path(spec, 0).stat().st_mtime_ns
-    assert np.array_equal(reduce_stage(spec)[0].frequency, bodies[0].frequency)
-    assert body_path(spec, 0).stat().st_mtime_ns == before
-    assert [b.name for b in load_stage_bodies(spec)] == ["pinion", "wheel"]
+    before = body_path(spec, "pinion").stat().st_mtime_ns
+    assert np.array_equal(reduce_bodies(spec)[0].frequency, bodies[0].frequency)
+    assert body_path(spec, "pinion").stat().st_mtime_ns == before
+    assert [b.name for b in load_bodies(spec)] == ["pinion", "wheel"]
     softer = spec.gears[0].material.model_copy(update={"youngs_modulus": 103e9})
     other = spec.model_copy(update={"gears": (spec.gears[0].model_copy(update={"material": softer}), spec.gears[1])})
     with pytest.raises(BodyError, match="pinion.h5: stale: made from other numbers.*gearfmu reduce"):
-        load_stage_bodies(other)
-    remade = reduce_stage(other, folder / "other")[0]
+        load_bodies(other)
+    remade = reduce_bodies(other, folder / "other")[0]
     assert np.allclose(remade.frequency, bodies[0].frequency / np.sqrt(2), rtol=1e-7)
     assert np.allclose(remade.static_ff, 2 * bodies[0].static_ff, rtol=0, atol=1e-9 * bodies[0].static_ff.max())
 
 
 def test_a_body_of_an_older_reduction_is_refused_by_its_version(made, tmp_path):
     spec, bodies, _ = made
-    for index, body in enumerate(bodies):
-        save_body(replace(body, algorithm_version=1, input_hash="0" * 64), body_path(spec, index, tmp_path))
+    for body in bodies:
+        save_body(replace(body, algorithm_version=1, input_hash="0" * 64), body_path(spec, body.name, tmp_path))
     with pytest.raises(BodyError, match="pinion.h5: stale: made by version 1 of the reduction, this program has"):
-        load_stage_bodies(spec, tmp_path)
+        load_bodies(spec, tmp_path)
 
 
 def test_contact_ports_and_backlash_leave_the_body_alone(made):
     spec, _, _ = made
     pair = spec.pair.model_copy(update={"backlash": 3e-4})
     contact = spec.contact.model_copy(update={"slices": 9})
-    assert len(load_stage_bodies(spec.model_copy(update={"pair": pair, "contact": contact}))) == 2
+    assert len(load_bodies(spec.model_copy(update={"pair": pair, "contact": contact}))) == 2
 
 
 def test_inspect_tells_what_the_file_holds(made):
     spec, bodies, _ = made
-    report = inspect_file(body_path(spec, 1))
+    report = inspect_file(body_path(spec, "wheel"))
     assert report["kind"] == "body"
     assert report["facts"]["modes"] == len(bodies[1].frequency)
     assert report["facts"]["mass_kg"] == pytest.approx(0.885, rel=2e-3)
@@ -185,14 +184,14 @@ DAMAGE = {
 def test_a_bad_file_is_refused_with_the_reason_and_the_remedy(made, message):
     spec, _, _ = made
     with pytest.raises(BodyError, match=message) as caught:
-        load_body(damaged(body_path(spec, 0), DAMAGE[message]))
+        load_body(damaged(body_path(spec, "pinion"), DAMAGE[message]))
     assert "gearfmu reduce" in str(caught.value)
     assert "damaged.h5" in str(caught.value)
 
 
 def test_missing_truncated_flipped_and_foreign_files_are_refused(made, tmp_path):
     spec, _, _ = made
-    whole = body_path(spec, 0).read_bytes()
+    whole = body_path(spec, "pinion").read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes(b ^ 255 for b in whole[middle : middle + 64]) + whole[middle + 64 :]
     for name, content in {"cut.h5": whole[:middle], "text.h5": b"no hdf5", "flipped.h5": flipped}.items():
@@ -206,7 +205,7 @@ def test_missing_truncated_flipped_and_foreign_files_are_refused(made, tmp_path)
 def test_every_damaged_byte_is_noticed_before_hdf5_reads_it(made, tmp_path):
     """Without the seal a damaged index reads as zeros, and some damage keeps the HDF5 library busy for ever."""
     spec, _, _ = made
-    whole, rng = body_path(spec, 0).read_bytes(), np.random.default_rng(3)
+    whole, rng = body_path(spec, "pinion").read_bytes(), np.random.default_rng(3)
     places = [*range(0, 600, 7), *rng.integers(0, len(whole), 100)]
     for place in places:
         data = bytearray(whole)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_stage import unpack
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.fmu import export, validate
 from gearfmu.fmu.probes import Subject
 from gearfmu.fmu.terminals import shafts
@@ -22,7 +22,7 @@ STEPS, H = 20, 1e-4
 def train() -> StageModel:
     spec = load_stage("two_stage")
     fast = spec.levels.model_copy(update={"standard_cut": spec.levels.fast_cut})
-    return assemble(spec.model_copy(update={"levels": fast}), load_stage_bodies(spec))
+    return assemble(spec.model_copy(update={"levels": fast}), load_bodies(spec))
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from decks import STEEL, brick, write_deck
 from gears import hex20_deck, pinion, stage
 
-from gearfmu.body import reduce_stage
+from gearfmu.body import reduce_bodies
 from gearfmu.errors import GearfmuError, MeshError, SpecError
 from gearfmu.fem import solids
 from gearfmu.fem.coupling import rigid_modes
@@ -32,7 +32,7 @@ def refused(folder: Path, section: str = SECTION) -> str:
     """The message with which the stage's pinion is refused; nothing is written beside its files."""
     before = {path for path in folder.rglob("*") if path.suffix != ".toml"}
     with pytest.raises(GearfmuError) as caught:
-        reduce_stage(stage(folder, section))
+        reduce_bodies(stage(folder, section))
     assert {path for path in folder.rglob("*") if path.suffix != ".toml"} == before
     text = str(caught.value)
     assert "\n" not in text and str(folder) in text and "pinion" in text

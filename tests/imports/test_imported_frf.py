@@ -14,9 +14,9 @@ from scipy.spatial import cKDTree
 from gearfmu import cli
 from gearfmu.body.imported import imported_full_order
 from gearfmu.fem import solids
-from gearfmu.geometry import GearGeometry
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.toothed import gear_full_order
+from gearfmu.spec.members import member_of
 
 SECTION = 'file = "pinion.inp"\nlength = "1 mm"\n'
 READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
@@ -24,7 +24,7 @@ READY = 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
 
 def imported(folder: Path, section: str = SECTION) -> FullOrder:
     spec = stage(folder, section)
-    return imported_full_order(spec.gears[0], GearGeometry.of(spec.gears[0], spec.pair))
+    return imported_full_order(member_of(spec, spec.gears[0].name))
 
 
 def store_matrices(folder: Path, whole: bool) -> None:

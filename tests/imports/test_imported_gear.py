@@ -11,8 +11,8 @@ import scipy.sparse as sp
 from decks import write_deck
 from gears import hex20_deck, pinion, stage, tetrahedra
 
-from gearfmu.body import ReducedBody
-from gearfmu.body.reduce import expected_hash, reduce_gear, reduce_stage
+from gearfmu.body import ReducedBody, reduce_bodies, reduce_body
+from gearfmu.body.bodies import expected_hash
 from gearfmu.fem import solids
 from gearfmu.femesh import write_vtu
 from gearfmu.stage import Steady, assemble, loaded_te, simulate
@@ -23,11 +23,11 @@ TABLES = ("static_ff", "static_fb", "static_bb", "inertia")
 
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory) -> ReducedBody:
-    return reduce_gear(stage(tmp_path_factory.mktemp("native")), 0)
+    return reduce_body(stage(tmp_path_factory.mktemp("native")), "pinion")
 
 
 def imported(folder: Path, section: str = SECTION) -> ReducedBody:
-    return reduce_gear(stage(folder, section), 0)
+    return reduce_body(stage(folder, section), "pinion")
 
 
 def assert_same(body: ReducedBody, native: ReducedBody, tolerance: float) -> None:
@@ -163,20 +163,20 @@ def modes_and_rest(body: ReducedBody) -> None:
 def test_the_hash_covers_the_contents_of_the_file(tmp_path: Path) -> None:
     deck = hex20_deck(tmp_path / "pinion.inp")
     spec = stage(tmp_path, SECTION)
-    before = expected_hash(spec, 0)
+    before = expected_hash(spec, "pinion")
     deck.write_text(deck.read_text(encoding="utf-8") + "** a comment\n", encoding="utf-8")
-    assert expected_hash(spec, 0) != before
+    assert expected_hash(spec, "pinion") != before
     moved = deck.rename(tmp_path / "other.inp")
-    assert expected_hash(stage(tmp_path, SECTION.replace("pinion.inp", moved.name)), 0) != before
+    assert expected_hash(stage(tmp_path, SECTION.replace("pinion.inp", moved.name)), "pinion") != before
 
 
 def test_an_imported_pinion_runs_in_the_kernel(tmp_path: Path) -> None:
     """Transmission error, a few mesh periods in time, and nodal contact: as with the native body."""
     hex20_deck(tmp_path / "pinion.inp")
     spec, own = stage(tmp_path, SECTION), stage(tmp_path / "native")
-    bodies = reduce_stage(spec)
+    bodies = reduce_bodies(spec)
     wheel = bodies[1]
-    models = [assemble(spec, bodies), assemble(own, [reduce_gear(own, 0), wheel])]
+    models = [assemble(spec, bodies), assemble(own, [reduce_body(own, "pinion"), wheel])]
     results = [loaded_te(model, [302.0], 6, rigid_bearings=True).te for model in models]
     assert np.abs(results[0] / results[1] - 1).max() < 1e-6
     settings = {"level": 1, "effect.gyroscopic": 0}  # patterns of the imported body do not know how they whirl

@@ -14,20 +14,22 @@ import scipy.sparse as sp
 from decks import write_deck
 
 from gearfmu import cli
+from gearfmu.body import reduce_body
+from gearfmu.body.bodies import expected_hash
 from gearfmu.body.imported import imported_full_order
 from gearfmu.body.mounted import mounted
-from gearfmu.body.planetary import reduce_set_body, set_hash
+from gearfmu.body.sector import body_sector
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.fem import hex20
 from gearfmu.femesh import FeMesh
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.geometry.planetary import set_geometry
-from gearfmu.modes.planetary import mounted_ring_modes, set_sector
+from gearfmu.modes.planetary import mounted_ring_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.imported_carrier import circle_centre
 from gearfmu.reduction.toothed import ring_full_order
 from gearfmu.spec.library import find_stage
+from gearfmu.spec.members import member_of
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.stage import load_stage
 
@@ -96,29 +98,29 @@ def test_a_carrier_with_a_node_that_flies_away_is_refused(tmp_path: Path) -> Non
         sp.save_npz(tmp_path / f"{name}.npz", sp.csr_matrix(matrix))
     section = CARRIER + 'stiffness = "k.npz"\nmass = "m.npz"\nforce_unit = "1e-3 N"\n'
     with pytest.raises(MeshError, match="singular beyond the six rigid motions|not of one free solid body"):
-        reduce_set_body(stage(tmp_path, section), "carrier")
+        reduce_body(stage(tmp_path, section), "carrier")
 
 
 def test_an_imported_carrier_is_reduced_and_its_hash_covers_the_file(tmp_path: Path) -> None:
     deck = carrier_deck(tmp_path)
     spec, own = stage(tmp_path, CARRIER), stage(tmp_path / "own")
-    body, native = reduce_set_body(spec, "carrier"), reduce_set_body(own, "carrier")
-    assert body.input_hash == set_hash(spec, "carrier") != native.input_hash
+    body, native = reduce_body(spec, "carrier"), reduce_body(own, "carrier")
+    assert body.input_hash == expected_hash(spec, "carrier") != native.input_hash
     assert body.mass == pytest.approx(native.mass, rel=1e-9) and body.modes == native.modes
     assert np.allclose(body.frequency[:30], native.frequency[:30], rtol=1e-7)
     assert np.allclose(body.static, native.static, atol=1e-7 * np.abs(native.static).max())
     assert body.mesh["elements"] == {"hexahedron20": len(carrier_parts()[0].elements)}
     deck.write_text(deck.read_text(encoding="utf-8") + "** edited\n", encoding="utf-8")
-    assert set_hash(spec, "carrier") != body.input_hash and set_hash(spec, "sun") == set_hash(own, "sun")
+    assert expected_hash(spec, "carrier") != body.input_hash and expected_hash(spec, "sun") == expected_hash(own, "sun")
 
 
 def test_an_imported_planet_is_the_planet(tmp_path: Path) -> None:
     own = stage(tmp_path / "own")
-    mesh = set_sector(own, "planet")
+    mesh = body_sector(own, "planet")
     write_deck(tmp_path / "planet.inp", 1e3 * mesh.nodes, {"hexahedron20": mesh.elements}, {"BORE": mesh.sets["bore"]})
     spec = stage(tmp_path, PLANET)
-    assert np.allclose(set_sector(spec, "planet").nodes, mesh.nodes, atol=1e-9)
-    body, native = (reduce_set_body(one, "planet") for one in (spec, own))
+    assert np.allclose(body_sector(spec, "planet").nodes, mesh.nodes, atol=1e-9)
+    body, native = (reduce_body(one, "planet") for one in (spec, own))
     assert body.mesh["method"] == "cyclic" and body.modes == native.modes
     assert np.abs(body.frequency / native.frequency - 1).max() < 1e-9
     assert np.abs(body.static_ff - native.static_ff).max() < 1e-9 * np.abs(native.static_ff).max()
@@ -142,9 +144,9 @@ def ring_deck(folder: Path, mesh: FeMesh, angle: float = 0.0) -> Path:
 def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> None:
     """One sector, or the whole ring turned by an angle; rows, tables and what the mounts need."""
     own = stage(tmp_path / "own")
-    sector = set_sector(own, "ring")
+    sector = body_sector(own, "ring")
     ring_deck(tmp_path, sector.full() if whole else sector, 0.02 if whole else 0.0)
-    body, native = (reduce_set_body(spec, "ring") for spec in (stage(tmp_path, RING + rim), own))
+    body, native = (reduce_body(spec, "ring") for spec in (stage(tmp_path, RING + rim), own))
     assert body.internal and body.mesh["method"] == "cyclic" and body.modes == native.modes
     assert np.abs(body.frequency / native.frequency - 1).max() < 1e-8
     for name in ("static_ff", "static_fb", "static_bb", "inertia", "rim.static_fp", "rim.static_pp", "rim.flank_rigid"):
@@ -159,9 +161,9 @@ def test_an_imported_ring_is_the_ring(tmp_path: Path, whole: bool, rim: str) -> 
 def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
     """Before reduction, for every method: K with the springs, M and the inputs of our own; and its modes."""
     own = stage(tmp_path / "own")
-    ring_deck(tmp_path, set_sector(own, "ring"))
+    ring_deck(tmp_path, body_sector(own, "ring"))
     spec = stage(tmp_path, RING)
-    body, native = imported_full_order(spec.ring, set_geometry(spec, "ring")), ring_full_order(own, 1.0)
+    body, native = imported_full_order(member_of(spec, "ring")), ring_full_order(own, 1.0)
     assert body.rigid.size == 0 and body.ground == () and body.length == native.length
     assert [i.name for i in body.interfaces] == [i.name for i in native.interfaces]
     for name in ("stiffness", "mass"):
@@ -174,16 +176,16 @@ def test_the_whole_imported_ring_stands_on_its_mounts(tmp_path: Path) -> None:
 
 def test_rings_by_the_mean_tooth_and_other_rings_are_refused(tmp_path: Path) -> None:
     own = stage(tmp_path / "own")
-    sector = set_sector(own, "ring")
+    sector = body_sector(own, "ring")
     whole = sector.full()
     used, cells = np.unique(whole.elements[1:], return_inverse=True)
     rim = np.flatnonzero(np.isin(used, whole.sets["rim"]))
     ring_deck(tmp_path, FeMesh(whole.nodes[used], cells.reshape(-1, 20), {"rim": rim}))
     with pytest.raises(MeshError, match="sectors only"):
-        reduce_set_body(stage(tmp_path, RING), "ring")
+        reduce_body(stage(tmp_path, RING), "ring")
     ring_deck(tmp_path, replace(sector, nodes=1.01 * sector.nodes))
     with pytest.raises(MeshError, match="not the gear of the stage file|no involute"):
-        reduce_set_body(stage(tmp_path, RING), "ring")
+        reduce_body(stage(tmp_path, RING), "ring")
 
 
 def turned(angle: float) -> np.ndarray:
@@ -238,7 +240,7 @@ def test_the_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.outcome([*call, *bolts]) == 0
     assert f"bolts = {BOLTS}".replace("'", '"') in capsys.readouterr().out
     assert cli.outcome(call) == cli.USAGE_ERROR and "4 times --bolt" in capsys.readouterr().err
-    ring = ring_deck(tmp_path, set_sector(own, "ring"))
+    ring = ring_deck(tmp_path, body_sector(own, "ring"))
     call = ["import", str(ring), str(own.source), "ring", "--length", "1 mm", "--bore", "RIM"]
     assert cli.outcome(call) == 0
     assert '[ring.import]\nfile = "ring.inp"\nlength = "1 mm"\nrim = "RIM"' in capsys.readouterr().out

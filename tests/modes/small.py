@@ -6,11 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from gearfmu.body.sector import body_sector
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.geometry import GearGeometry
 from gearfmu.modes import BodyModes
 from gearfmu.modes.cyclic import cyclic_modes
-from gearfmu.modes.planetary import set_sector
 from gearfmu.spec.gear import Material
 from gearfmu.spec.stage import load_stage
 
@@ -28,7 +28,7 @@ def pinion() -> tuple[FeMesh, Material]:
 def set_body(name: str, scale: float) -> tuple[FeMesh, Material]:
     """One sector of a body of planetary54."""
     spec = load_stage("planetary54")
-    return set_sector(spec, name, scale), getattr(spec, name).material
+    return body_sector(spec, name, scale), getattr(spec, name).material
 
 
 @lru_cache

@@ -14,7 +14,7 @@ import pytest
 import scipy.linalg as sl
 from pair_by_parts import couple, gear_at, loaded_contacts
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.errors import SimulationError
 from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import LinearModel
@@ -45,7 +45,7 @@ class Stage:
 
 def shipped(name: str) -> Stage:
     spec = load_stage(name)
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     return Stage(spec, bodies, assemble(spec, bodies))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from train_by_parts import Load, frequencies
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.modes.linear import FULL, Linearised, linearised
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.shapes import mesh_shape
@@ -34,7 +34,7 @@ def plain(stage: GeneralStage) -> GeneralStage:
 
 @pytest.fixture(scope="module")
 def train() -> tuple[GeneralStage, list[Any], StageModel]:
-    stage, bodies = plain(load_stage("two_stage")), load_stage_bodies(load_stage("two_stage"))
+    stage, bodies = plain(load_stage("two_stage")), load_bodies(load_stage("two_stage"))
     return stage, bodies, assemble(stage, bodies)
 
 

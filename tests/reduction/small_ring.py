@@ -11,8 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from gearfmu.body.parts import tooth_flank
-from gearfmu.body.reduce import reduced_gear
 from gearfmu.body.reduced import ReducedBody
+from gearfmu.body.toothed import reduced_gear
 from gearfmu.fem import hex20
 from gearfmu.fem.free import FreeBody
 from gearfmu.femesh import ring_sector
@@ -22,6 +22,7 @@ from gearfmu.reduction.flank import flank_loads
 from gearfmu.reduction.sector import SectorBody
 from gearfmu.reduction.toothed import mount_springs, ring_mounts
 from gearfmu.spec.gear import BodySpec, MeshSpec
+from gearfmu.spec.members import member_of
 from gearfmu.spec.planetary import MountsSpec, PlanetarySpec, RingSpec
 from gearfmu.spec.stage import load_stage
 
@@ -61,7 +62,7 @@ def coarse(beta: float = 0.0) -> SectorBody:
 
 @lru_cache(maxsize=2)
 def reduced(modes: int = 81) -> ReducedBody:
-    return reduced_gear(ring_spec(modes), GEOMETRY, "0" * 64)
+    return reduced_gear(member_of(set_spec(modes=modes), "ring"), "0" * 64)
 
 
 @lru_cache(maxsize=2)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfmu.body import reduce_stage
+from gearfmu.body import reduce_bodies
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.femesh.mesh import rotated
 from gearfmu.geometry.planetary import PlanetaryGeometry
@@ -130,7 +130,7 @@ def test_kernel_carries_the_impact_of_the_finite_elements(modules: SimpleNamespa
     kernel, tables = importlib.import_module("kernel"), importlib.import_module("tables")
     reference = tables.read_columns(FOLDER / "curves_kernel.csv")["finite elements"]
     spec = load_stage(FOLDER / "pair" / "stage.toml")
-    bodies = reduce_stage(spec, tmp_path)
+    bodies = reduce_bodies(spec, tmp_path)
     parameters = {"level": kernel.FULL, "integrator": kernel.DG4, "h": kernel.SAMPLE}
     exact, found = (
         kernel.facts(reference, force) for force in (reference, kernel.kernel_force(spec, bodies, parameters))

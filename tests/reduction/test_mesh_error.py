@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearfmu.body import load_set_bodies
+from gearfmu.body import load_bodies
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.elastic import Elastic
 from gearfmu.reduction.mesh_error import COMPARED, FINER, carrier_mesh_error, free_frequencies
@@ -56,7 +56,7 @@ def test_the_mesh_error_falls_with_the_mesh() -> None:
 
 @pytest.mark.parametrize("stage", ["planetary54", "helical_set"])
 def test_shipped_carriers_say_how_far_their_mesh_can_be_trusted(stage: str) -> None:
-    said = load_set_bodies(load_stage(stage))[-1].mesh["frequency_error"]
+    said = load_bodies(load_stage(stage))[-1].mesh["frequency_error"]
     assert said["finer"] == FINER and said["modes"] == COMPARED
     assert 0 < said["max_error"] < ALLOWED[stage]
 
@@ -67,4 +67,4 @@ def test_free_frequencies_of_the_shipped_carriers_are_those_of_a_finer_mesh(stag
     found = carrier_mesh_error(load_stage(stage))
     print(stage, found)
     assert found["max_error"] < ALLOWED[stage]
-    assert found == pytest.approx(load_set_bodies(load_stage(stage))[-1].mesh["frequency_error"], rel=1e-4)
+    assert found == pytest.approx(load_bodies(load_stage(stage))[-1].mesh["frequency_error"], rel=1e-4)

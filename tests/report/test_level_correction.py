@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearfmu import report
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.report import levels
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.trace import Channel, Trace, write_columns
@@ -30,7 +30,7 @@ def test_list_reads_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize("fresh", [True, False])
 def test_shown_only_with_its_bodies(tmp_path: Path, fresh: bool) -> None:
     shipped = load_stage("fzg_c/stage_relief")
-    bodies = load_stage_bodies(shipped)
+    bodies = load_bodies(shipped)
     spec = shipped.model_copy(update={"source": tmp_path / "stage.toml"})
     made_with = levels.fingerprint(body.input_hash for body in bodies) if fresh else "0+0"
     write_list(levels.levels_path(spec), made_with)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report import picture
 from gearfmu.report.scene3d import Shape, draw
@@ -20,7 +20,7 @@ from gearfmu.stage.trace import Channel, Trace
 @pytest.fixture(scope="module")
 def stage() -> tuple[Any, list[Any]]:
     spec = load_stage("fzg_c/stage_relief")
-    return spec, load_stage_bodies(spec)
+    return spec, load_bodies(spec)
 
 
 @pytest.mark.parametrize("sg", [1, -1])

@@ -35,7 +35,7 @@ def with_field(field: str, value: Any, stage: StageSpec = STAGE) -> StageSpec:
 
 
 def fingerprint(stage: StageSpec, index: int = 0) -> str:
-    return body_hash(body_inputs(stage, index))
+    return body_hash(body_inputs(stage, stage.gears[index].name))
 
 
 SHAPING = [
@@ -110,7 +110,7 @@ def test_every_field_of_a_gear_is_in_one_of_the_two_lists() -> None:
 def test_the_hand_of_a_gear_is_part_of_its_body() -> None:
     """Pinion and wheel of one pair are of opposite hand, and turning the pair's hand round changes both bodies."""
     right, left = with_field("pair.helix_angle", 0.2), with_field("pair.helix_angle", -0.2)
-    assert [body_inputs(right, k)["helix_angle"] for k in (0, 1)] == [0.2, -0.2]
+    assert [body_inputs(right, gear.name)["helix_angle"] for gear in right.gears] == [0.2, -0.2]
     assert all(fingerprint(right, k) != fingerprint(left, k) for k in (0, 1))
 
 
@@ -127,7 +127,7 @@ def test_default_counts_are_those_of_the_shipped_bodies() -> None:
 
 
 def test_hash_is_of_the_values_not_of_their_spelling() -> None:
-    inputs = body_inputs(STAGE, 0)
+    inputs = body_inputs(STAGE, "pinion")
     assert body_hash(json.loads(json.dumps(inputs))) == body_hash(dict(reversed(inputs.items())))
     assert body_hash(inputs | {"profile_shift": -0.0}) == body_hash(inputs | {"profile_shift": 0.0})
     assert body_hash({"a": 0.1}) == "9e3d5635fc1c09ff15c19f1089a0bfe03fbd8329cca722f9a2227060ac77dcaa"  # {"a":0.1}

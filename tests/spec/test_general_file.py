@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from gearfmu.body.reduce import reduce_gear
+from gearfmu.body import reduce_body
 from gearfmu.errors import MeshError, SpecError
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import gear_as_pair
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import load_pair, load_stage
 
@@ -97,9 +96,9 @@ def test_a_pair_expands_into_two_rotors_and_keeps_its_bodies(name):
     stage = expand_pair(pair)
     assert stage.planar and list(stage.rotors) == list(stage.ports) == ["pinion", "wheel"]
     assert stage.rotors["wheel"].axis == (pair.pair.center_distance, 0.0)
-    for index, gear in enumerate(pair.gears):
-        same = body_inputs(gear_as_pair(stage, gear.name), 0)
-        assert body_hash(same) == body_hash(body_inputs(pair, index))
+    for gear in pair.gears:
+        same = body_inputs(stage, gear.name)
+        assert body_hash(same) == body_hash(body_inputs(pair, gear.name))
         assert stage.bodies[gear.name].tip_relief == gear.tip_relief
         assert stage.ports[gear.name].k == pair.ports[gear.name].k
 
@@ -108,11 +107,11 @@ def test_a_gear_that_cannot_be_meshed_is_named_by_its_table(monkeypatch):
     def fail(*_):
         raise MeshError("the rim is too thin")
 
-    monkeypatch.setattr("gearfmu.body.reduce.reduced_gear", fail)
+    monkeypatch.setattr("gearfmu.body.bodies.reduced_gear", fail)
     train = load_stage("two_stage")
-    for gear, table in ((gear_as_pair(train, "wheel1"), "bodies.wheel1"), (load_pair("fzg_c"), "gears.pinion")):
+    for stage, gear, table in ((train, "wheel1", "bodies.wheel1"), (load_pair("fzg_c"), "pinion", "gears.pinion")):
         with pytest.raises(MeshError, match=f": {table}: the rim"):
-            reduce_gear(gear, 0)
+            reduce_body(stage, gear)
 
 
 def test_a_gear_that_is_held_elsewhere_has_no_bearing(tmp_path):

@@ -9,10 +9,10 @@ import pytest
 
 from gearfmu.errors import SpecError
 from gearfmu.spec.base import read_toml
+from gearfmu.spec.body import body_inputs
 from gearfmu.spec.expand import as_general, motion_problems
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.new import new_stage
-from gearfmu.spec.planetary_body import set_body_inputs
 from gearfmu.spec.schema import set_schema
 from gearfmu.spec.stage import load_pair, load_stage
 
@@ -130,7 +130,7 @@ def test_a_body_depends_on_its_own_numbers_only(tmp_path):
     before = load_stage("planetary54")
     changed = load_stage(written(tmp_path, ('stiffness = "1e8 N/m"', 'stiffness = "2e8 N/m"'), ("0.06 mm", "0.05 mm")))
     names = ("sun", "ring", "carrier")
-    same = {name: set_body_inputs(before, name) == set_body_inputs(changed, name) for name in names}
+    same = {name: body_inputs(before, name) == body_inputs(changed, name) for name in names}
     assert same == {"sun": True, "ring": False, "carrier": True}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.stage import StageSpec, load_stage
 from gearfmu.stage import StageModel, assemble
@@ -22,7 +22,7 @@ def relief_spec() -> StageSpec:
 
 @pytest.fixture(scope="session")
 def bodies(spec: StageSpec) -> list[ReducedBody]:
-    return load_stage_bodies(spec)
+    return load_bodies(spec)
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from gearfmu.kernel import Kernel
 from gearfmu.kernel.linear import GROUND
 from gearfmu.kernel.linear import SPIN as TURNS
 from gearfmu.modes.linear import Linearised
-from gearfmu.spec.expand import set_gears
+from gearfmu.spec.expand import spread
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.stage import load_stage
@@ -269,9 +269,9 @@ class Motion:
     model: StageModel
 
     def group(self) -> Group:
-        stage, bodies = self.model.stage, self.rigid.bodies()
-        *gears, carrier = set_gears(self.model.spec, bodies)
-        return mount_sets(stage_layout(stage, gears, carriers={"carrier": carrier}))[0]
+        stage, bodies = self.model.stage, spread(self.model.spec, self.rigid.bodies())
+        gears = [bodies[gear.name] for gear in stage.gears]
+        return mount_sets(stage_layout(stage, gears, carriers={"carrier": bodies["carrier"]}))[0]
 
     def plane_modes(self, system: Linearised) -> tuple[np.ndarray, np.ndarray]:
         """Natural frequencies (k,) Hz, ascending, of the motions in the plane, and their shapes (9 + 3N, k)."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flank_reader import full_tables
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
@@ -24,13 +24,13 @@ def spec():
 
 
 def test_equal_inputs_give_equal_bytes(spec):
-    hashes = {assemble(spec, load_stage_bodies(spec)).hash for _ in range(3)}
+    hashes = {assemble(spec, load_bodies(spec)).hash for _ in range(3)}
     assert len(hashes) == 1
 
 
 def test_static_table_is_the_body_s_polynomial_on_an_even_grid(spec):
-    body = load_stage_bodies(spec)[0]
-    sections = read_blob(assemble(spec, [body, load_stage_bodies(spec)[1]]).blob)
+    body = load_bodies(spec)[0]
+    sections = read_blob(assemble(spec, [body, load_bodies(spec)[1]]).blob)
     table = full_tables(sections, 0, ROLLS).residual
     gear = dict(zip(GEAR_NUMBERS, sections["gear0"], strict=True))
     to_grid = resampling(body.roll, gear["s_form"], gear["s_tip"])
@@ -44,7 +44,7 @@ def test_static_table_is_the_body_s_polynomial_on_an_even_grid(spec):
 def test_stored_tables_are_those_of_the_even_grid(mirrored: bool) -> None:
     """Points, halves and images spread over the grid by a reader of its own: helical gears, odd width functions."""
     stage = load_stage("helical_demo")
-    bodies = load_stage_bodies(stage)
+    bodies = load_bodies(stage)
     sections = general_sections(stage, bodies)
     layout = stage_layout(as_general(stage), bodies)
     group = mount_sets(layout)[1]
@@ -79,7 +79,7 @@ def _by_ground_modes(body, offset: int) -> np.ndarray:
 
 def test_bearings_are_damped_by_their_ratio_and_the_mass_of_the_body(spec):
     """c = 2 D √(k m)."""
-    bodies = load_stage_bodies(spec)
+    bodies = load_bodies(spec)
     sections = read_blob(assemble(spec, bodies).blob)
     assert sections["support_names"].split("|") == [f"bearing.{g.name}.f{d}" for g in spec.gears for d in "xy"]
     for index, body in enumerate(bodies):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from gearfmu.body import ReducedBody, load_bodies, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel
 from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
@@ -211,7 +211,7 @@ def test_rattle_hits_less_often_with_oil(pair_free: FreePair) -> None:
 @pytest.fixture(scope="module")
 def helical() -> StageModel:
     stage = load_stage("helical_demo")
-    return assemble(stage, load_stage_bodies(stage))
+    return assemble(stage, load_bodies(stage))
 
 
 @pytest.mark.parametrize("torque", [1.0, 100.0])

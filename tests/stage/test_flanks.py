@@ -305,10 +305,10 @@ def test_one_tooth_of_a_topography_is_met_once_a_turn(
 # ---- helical gears, and both kinds of contact ------------------------------------------------------------------------
 def test_profile_and_lead_of_helical_gears_are_read_at_the_local_roll() -> None:
     """Unloaded, te is the smallest gap of all slices at the rolls of their middles, along the transverse normal."""
-    from gearfmu.body import load_stage_bodies
+    from gearfmu.body import load_bodies
 
     spec = load_stage("helical_demo")
-    bodies, pair = load_stage_bodies(spec), PairGeometry.of(spec)
+    bodies, pair = load_bodies(spec), PairGeometry.of(spec)
     modified = changed(
         spec,
         {"tip_relief": None, "lead": None, "profile": ProfileSpec(crowning=20e-6)},

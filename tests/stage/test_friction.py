@@ -13,7 +13,7 @@ import pytest
 from scipy.optimize import brentq
 
 import gearfmu as gf
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
@@ -37,7 +37,7 @@ def pair_free(spec: StageSpec, bodies: list[ReducedBody]) -> FreePair:
 @pytest.fixture(scope="module")
 def helical() -> StageModel:
     stage = load_stage("helical_demo")
-    return assemble(stage, load_stage_bodies(stage))
+    return assemble(stage, load_bodies(stage))
 
 
 # ---- a block on a spring: exact --------------------------------------------------------------------------------------
@@ -385,7 +385,7 @@ def test_a_stage_file_turns_friction_on(helical: StageModel) -> None:
     own = FrictionSpec(law="iso_tr_14179", viscosity=0.05, roughness=1e-6)
     stage = helical.pair
     stage = stage.model_copy(update={"contact": stage.contact.model_copy(update={"friction": own})})
-    kernel = assemble(stage, load_stage_bodies(stage)).kernel()
+    kernel = assemble(stage, load_bodies(stage)).kernel()
     names = ("effect.friction", "friction_law", "oil_viscosity", "flank_roughness")
     assert [kernel.get(name) for name in names] == [1.0, 2.0, 0.05, 1e-6]
 

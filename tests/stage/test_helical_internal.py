@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from gearfmu.body import ReducedBody
-from gearfmu.body.reduce import reduced_gear
+from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import GearGeometry
 from gearfmu.spec.gear import BodySpec, MeshSpec
 from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.shapes import gear_shape, mesh_shape
+from gearfmu.spec.members import members
+from gearfmu.spec.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 
@@ -48,7 +49,7 @@ def stage_at(beta: float) -> GeneralStage:
 
 @lru_cache(maxsize=4)
 def bodies_at(beta: float) -> tuple[ReducedBody, ...]:
-    return tuple(reduced_gear(gear, gear_shape(gear), "0" * 64) for gear in stage_at(beta).gears)
+    return tuple(reduced_gear(member, "0" * 64) for member in members(stage_at(beta)).values())
 
 
 def model_at(beta: float) -> StageModel:

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.kernel import Kernel
 from gearfmu.spec.lead import LeadSpec, Misalignment
@@ -28,7 +28,7 @@ SHAFTS = ("pinion", "wheel")
 @pytest.fixture(scope="module")
 def demo() -> SimpleNamespace:
     spec = load_stage("helical_demo")
-    return SimpleNamespace(spec=spec, pair=PairGeometry.of(spec), bodies=load_stage_bodies(spec))
+    return SimpleNamespace(spec=spec, pair=PairGeometry.of(spec), bodies=load_bodies(spec))
 
 
 def plain(spec: StageSpec, **pair: object) -> StageSpec:

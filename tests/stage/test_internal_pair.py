@@ -15,13 +15,14 @@ from by_hand import BORE, _at, slice_weights
 from scipy.optimize import minimize, minimize_scalar
 
 from gearfmu.body import ReducedBody
-from gearfmu.body.reduce import reduced_gear
+from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
 from gearfmu.geometry.planetary import RingMesh
 from gearfmu.spec.gear import BodySpec, MeshSpec
 from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.shapes import gear_shape, mesh_shape
+from gearfmu.spec.members import members
+from gearfmu.spec.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.meshes import tooth_phases
@@ -60,7 +61,7 @@ def mesh(stage: GeneralStage) -> RingMesh:
 
 @pytest.fixture(scope="module")
 def bodies(stage: GeneralStage) -> list[ReducedBody]:
-    return [reduced_gear(gear, gear_shape(gear), "0" * 64) for gear in stage.gears]
+    return [reduced_gear(member, "0" * 64) for member in members(stage).values()]
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from gearfmu.body import ReducedBody, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.kernel import instance
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
@@ -31,7 +31,7 @@ def test_nothing_is_written_beyond_the_buffers(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(instance, "aligned", guarded)
     instance._opened.cache_clear()  # models that are open already have their buffers
     spec = load_stage("helical_demo")
-    kernel = assemble(spec, [of_few_modes(body) for body in load_stage_bodies(spec)]).kernel(level=level, slices=10.0)
+    kernel = assemble(spec, [of_few_modes(body) for body in load_bodies(spec)]).kernel(level=level, slices=10.0)
     kernel.initialize()
     kernel.step(0.0, 1e-5)
     kernel.transmission(0.0, 150.0)

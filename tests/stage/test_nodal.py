@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gearfmu.body import ReducedBody, load_bodies, load_stage_bodies
+from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.scenes.rattle import Rattle, energies, free_pair, started
 from gearfmu.spec.expand import expand_pair
@@ -105,7 +105,7 @@ def test_mean_transmission_is_that_of_line_contact(relief_spec: StageSpec, bodie
 def test_helical_gears_and_their_axial_force() -> None:
     """Mean transmission as with line contact; the bearings carry the axial force of a normal to the flank."""
     spec = load_stage("helical_demo")
-    model = assemble(spec, load_stage_bodies(spec))
+    model = assemble(spec, load_bodies(spec))
     runs = []
     for law in (LINE, NODAL):
         trace = simulate(model, Steady(model, SPEED, 150.0), 6e-4, 2e-6, {"level": PAPER, "contact": law})

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gearfmu import cli
-from gearfmu.body import load_stage_bodies
-from gearfmu.body.reduce import expected_hash
+from gearfmu.body import load_bodies
+from gearfmu.body.bodies import expected_hash
 from gearfmu.errors import BodyError, SpecError
 from gearfmu.spec.bores import with_bores
 from gearfmu.spec.expand import as_general
@@ -70,7 +70,7 @@ def test_te_takes_rigid_bores_and_leaves_the_bodies_of_the_stage_alone(
     text = stage.read_text(encoding="utf-8").replace("[gears.wheel.body]", wheel)
     stage.write_text(text, encoding="utf-8")
     with pytest.raises(BodyError, match="stale"):
-        load_stage_bodies(load_stage(stage))
+        load_bodies(load_stage(stage))
     one = mean_te(stage)
     assert rigid < one < averaged
 
@@ -80,7 +80,7 @@ def test_a_rigid_bore_has_a_hash_and_a_default_that_changes_none() -> None:
         spec = load_stage(name)
         rigid, same = with_bores(spec, "rigid"), with_bores(spec, "averaging")
         assert same == spec
-        for gear in (0, 1):
+        for gear in ("pinion", "wheel"):
             assert expected_hash(rigid, gear) != expected_hash(spec, gear)
         assert [gear.rigid_bore for gear in as_general(rigid).gears] == [True, True]
     train = load_stage("two_stage")

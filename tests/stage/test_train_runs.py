@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearfmu.body import load_stage_bodies
+from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.base import read_toml
 from gearfmu.spec.expand import expand_pair
@@ -31,7 +31,7 @@ TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
 @pytest.fixture(scope="module")
 def two_stage() -> StageModel:
     spec = load_stage("two_stage")
-    return assemble(spec, load_stage_bodies(spec))
+    return assemble(spec, load_bodies(spec))
 
 
 def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[str, np.ndarray]:
@@ -240,7 +240,7 @@ def test_a_pair_written_as_a_general_stage_is_the_same_model(tmp_path: Path, bod
     path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in tables.items()), encoding="utf-8")
     spec = load_stage(path)
     assert isinstance(spec, GeneralStage)
-    assert load_stage_bodies(spec, find_stage("fzg_c").parent)[0].input_hash == bodies[0].input_hash
+    assert load_bodies(spec, find_stage("fzg_c").parent)[0].input_hash == bodies[0].input_hash
     assert assemble(spec, bodies).hash == plain.hash
 
 

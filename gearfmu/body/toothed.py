@@ -1,0 +1,138 @@
+"""The reduced body of an external or internal gear: mesh, finite elements, modes and static tables."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gearfmu.body.apart import Work
+from gearfmu.body.imported import imported_parts
+from gearfmu.body.parts import (
+    Parts,
+    drawn_counts,
+    kept_offsets,
+    pictured_loads,
+    rim_of,
+    sector_display,
+    sector_shapes,
+    tangent_of,
+    tooth_flank,
+)
+from gearfmu.body.provenance import provenance
+from gearfmu.body.reduced import ReducedBody
+from gearfmu.femesh import mesh_report, sector_mesh
+from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.display import outline
+from gearfmu.reduction.flank import Points, ToothFlank
+from gearfmu.reduction.frf import FrfCase, frf_error
+from gearfmu.reduction.memory import gear_need, lower_counts, require_memory
+from gearfmu.reduction.modal import elastic_modes
+from gearfmu.reduction.sector import SectorBody
+from gearfmu.reduction.statics import static_tables
+from gearfmu.spec.general import ToothedBody
+from gearfmu.spec.members import Member
+
+FRF_CUT = 120e3  # Hz, the cut of level `standard`
+Progress = Callable[[str, float], None]
+
+
+def gear_work(member: Member) -> Work | None:
+    """What the reduction of a gear meshed here takes; None of one meshed elsewhere. Raises MeshError."""
+    gear, geometry = member.gear, member.geometry
+    if gear.imported is not None:
+        return None
+    return Work(gear_need(sector_mesh(geometry, gear.face_width, gear.body.mesh), gear.body), geometry.z)
+
+
+def reduced_gear(member: Member, input_hash: str, progress: Progress | None = None) -> ReducedBody:
+    """The reduced body of an external or internal gear, by cyclic symmetry. Raises MeshError."""
+    gear, geometry = member.gear, member.geometry
+    report = _named(progress, gear.name)
+    started = time.process_time()
+    report("mesh and finite elements", 0.0)
+    flank, points = tooth_flank(geometry, gear, isinstance(geometry, InternalGearGeometry))
+    if gear.imported is not None:
+        made = imported_parts(member, FRF_CUT, report)
+    else:
+        made = _made_here(member, (flank, points), report)
+    modes, statics = made.modes, made.statics
+    return ReducedBody(
+        name=gear.name,
+        input_hash=input_hash,
+        material=gear.material.model_dump(),
+        mesh=made.facts,
+        provenance=provenance(time.process_time() - started),
+        teeth=geometry.z,
+        r_b=geometry.r_b,
+        psi_b=geometry.psi_b,
+        face_width=gear.face_width,
+        mass=float(made.inertia[0, 0]),
+        inertia=made.inertia[3:, 3:],
+        frequency=modes.frequency,
+        damping_ratio=np.full(len(modes.frequency), gear.modal_damping),
+        nodal_diameter=modes.nodal_diameter,
+        part=modes.part,
+        parity=modes.parity,
+        flank_rows=_by_point(modes.flank_rows, points),
+        bore_rows=modes.bore_rows,
+        roll_range=np.array(flank.roll_range),
+        roll=points.rolls,
+        strip_half_width=gear.body.strip_half_width,
+        static_ff=kept_offsets(statics.static_ff, whole=member.mounts is not None and not geometry.beta),
+        static_fb=statics.static_fb,
+        static_bb=statics.static_bb,
+        frf=made.frf,
+        display=made.display,
+        rim=made.rim,
+        tangent=tangent_of(modes, statics, points),
+        shapes=made.shapes,
+        spin=modes.spin,
+        base_helix_angle=geometry.beta_b,
+    )
+
+
+def _made_here(member: Member, load_points: tuple[ToothFlank, Points], report: Progress) -> Parts:
+    """A gear meshed here, reduced by cyclic symmetry."""
+    gear, geometry, (flank, points) = member.gear, member.geometry, load_points
+    sector = sector_mesh(geometry, gear.face_width, gear.body.mesh)
+    need = gear_need(sector, gear.body)
+    require_memory(need, lower_counts(gear.body.mesh, "body.mesh"))
+    report(f"finite elements, {need.text}", 0.0)
+    body = SectorBody(sector, gear.material, flank, points, gear.rigid_bore)
+    drawn = sector_mesh(geometry, gear.face_width, drawn_counts(geometry, gear.face_width))
+    surface = outline(drawn, sector.nodes)
+    modes = elastic_modes(body, gear.body.modes, _within(report, 0.1, 0.6), surface.sample)
+    statics = static_tables(body, pictured_loads(points), _within(report, 0.6, 0.8))
+    case = FrfCase(gear.modal_damping, FRF_CUT, geometry.r)
+    frf = frf_error(body, modes, statics, case, _within(report, 0.8, 1.0))
+    display = sector_display(surface, body, statics)
+    rim = rim_of(body, modes, statics, member.mounts)
+    shapes = sector_shapes(surface, modes)
+    return Parts(modes, statics, frf, _mesh_facts(body, gear), display, body.inertia, rim, shapes)
+
+
+def _named(progress: Progress | None, name: str) -> Progress:
+    return (lambda what, share: progress(f"{name}: {what}", share)) if progress else (lambda what, share: None)
+
+
+def _within(report: Progress, first: float, last: float) -> Progress:
+    """Progress of a part of the work as progress of the whole."""
+    return lambda what, share: report(what, first + (last - first) * share)
+
+
+def _by_point(rows: np.ndarray, points: Points) -> np.ndarray:
+    return rows.reshape(2, len(points.rolls), points.functions, -1)
+
+
+def _mesh_facts(body: SectorBody, gear: ToothedBody) -> dict[str, Any]:
+    facts = mesh_report(body.mesh, body.flank.r_b, gear.body.strip_half_width)
+    sector_dofs = 3 * (len(body.mesh.nodes) - len(body.mesh.cut_plus))
+    return {
+        **facts,
+        "counts": gear.body.mesh.model_dump(),
+        "dof_sector": sector_dofs,
+        "dof_body": body.teeth * sector_dofs,
+    }
