@@ -1,12 +1,12 @@
-"""How a gear yields on its shaft: one finite element body of gear and shaft, beside a gear with an averaged and one with
-a rigid bore on a Timoshenko beam.
+"""How a gear yields on its shaft: one finite element body of gear and shaft, beside a gear with an averaged bore and
+one with a rigid bore on a Timoshenko beam.
 
     python benchmarks/bore_on_shaft.py
 
-Gears of the helical pair z 31/73 (benchmarks/coarse.py), coarse mesh. The shaft fills the bore, is hollow (10 mm),
+Gears of the helical pair z 31/73 (benchmarks/coarse.py), mesh at a third. The shaft fills the bore, is hollow (10 mm),
 stands out by the face width on either side and is clamped at its ends. The load is one normal force along the pitch
 line, shared by three teeth 1 : 2 : 1. Prints and writes the compliance at the load by nodal diameter, all times the
-face width, mm µm/N. Of the first, column 2+ holds the shape of the bore alone; the beam acts in 0 and 1.
+face width, mm µm/N. Column 2+ is the shape of the bore alone; the beam acts in 0 and 1.
 """
 
 from __future__ import annotations
@@ -253,9 +253,11 @@ def rows() -> Iterator[dict[str, Any]]:
             stiffness, _ = assemble(body.nodes, body.elements, gear.material)
             found = compliances(Case(body, stiffness, held, shaft, gear.teeth), load)
             scaled = {name: float(1e9 * gear.face_width * c) for name, c in found.items()}
-            yield {"gear": gear.name, "bore": held} | {k: round(v, 5) for k, v in scaled.items()} | {
-                "all": round(sum(scaled.values()), 5)
-            }
+            yield (
+                {"gear": gear.name, "bore": held}
+                | {k: round(v, 5) for k, v in scaled.items()}
+                | {"all": round(sum(scaled.values()), 5)}
+            )
 
 
 def main() -> None:

@@ -32,9 +32,7 @@ def tiny(folder: Path) -> Path:
 
 
 def started(words: list[str], folder: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*GEARFMU, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    return subprocess.Popen([*GEARFMU, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def left_over(folder: Path) -> list[str]:
