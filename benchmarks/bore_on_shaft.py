@@ -24,11 +24,11 @@ import scipy.sparse as sp
 from coarse import PAIR
 from scipy.sparse.linalg import splu
 
-from gearfmu.body.reduce import gear_geometry
 from gearfmu.fem.coupling import rigid_modes
 from gearfmu.fem.hex20 import assemble
 from gearfmu.femesh import FeMesh, gear_sector
 from gearfmu.files import written_whole
+from gearfmu.spec.members import members
 from gearfmu.spec.proposal import new_from_numbers
 from gearfmu.spec.stage import load_stage
 
@@ -243,8 +243,8 @@ def rows() -> Iterator[dict[str, Any]]:
     """Both gears, three ways each."""
     with tempfile.TemporaryDirectory() as home:
         spec = load_stage(str(new_from_numbers("pair_31_73", PAIR, home)))
-    for index, gear in enumerate(spec.gears):
-        geometry = gear_geometry(spec, index)
+    for member in members(spec).values():
+        gear, geometry = member.gear, member.geometry
         mesh = gear_sector(geometry, gear.face_width, gear.body.mesh.model_copy(update={"scale": SCALE}))
         load = pitch_line_load(mesh, geometry)
         shaft = beam(gear.material, gear.face_width, gear.bore_diameter)
