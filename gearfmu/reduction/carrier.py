@@ -40,9 +40,9 @@ def carrier_need(spec: Any) -> Need:
     own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * spec.carrier.modes
     size, finer = own * sector.teeth, round(own * FINER**3)
     if cyclic_carrier(spec):
-        both: tuple[Need, ...] = parts_need(size, sector.teeth, vectors), modes_need(finer)
+        both = [parts_need(size, sector.teeth, vectors), modes_need(finer)]
     else:
-        both = tuple(whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (size, round(size * FINER**3)))
+        both = [whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (size, round(size * FINER**3))]
     return Need(size, max(need.memory for need in both), True)
 
 

@@ -15,7 +15,7 @@ _WHOLE_FACTOR = 30.0  # the same of a whole body: measured 29 to 33
 _SPACE = 36  # fields of the space of low modes per mode of a family
 CARRIER_FACTORS = 5  # of K, at the three points of Krylov's method and at one of the reference
 _PART_FACTORS = 3  # of one of its equal parts: K and at the last two points
-_PART_FACTOR = 37.0  # entries of a carrier's sector per unknown to the power 4/3
+_PART_FACTOR = 48.0  # entries of a carrier's sector per unknown to the power 4/3, and fronts that wait
 MESH_COARSER = "mesh the body coarser"  # the remedy for finite elements made elsewhere
 _MEMORY_TABLE = Path("/proc/meminfo")
 

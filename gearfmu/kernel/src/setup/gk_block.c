@@ -21,28 +21,22 @@ gk_block gk_block_of(const gk_node *n, int from, int to, int offset)
     return b;
 }
 
-typedef struct cells { /* of a table, each with its weight; none of weight 0: beyond a flank's ends one is left of 16 */
-    int count;
-    const gk_real *from[16];
-    double weight[16];
-} cells;
-
 /* out (n) = Σ of weighed cells (n), in order; a chunk of sums stays in a register */
-static void blend_cells(const cells *of, int n, double *out)
+static void blend_cells(const gk_real *const cell[16], const double weight[16], int n, double *out)
 {
     int c = 0;
     for (; c + 2 * GK_CHUNK <= n; c += 2 * GK_CHUNK) {
         gk_chunk a = {0}, b = {0};
-        for (int i = 0; i < of->count; i++) {
-            const gk_some *from = (const gk_some *)(of->from[i] + c);
-            a += of->weight[i] * __builtin_convertvector(from[0], gk_chunk);
-            b += of->weight[i] * __builtin_convertvector(from[1], gk_chunk);
+        for (int i = 0; i < 16; i++) {
+            const gk_some *from = (const gk_some *)(cell[i] + c);
+            a += weight[i] * __builtin_convertvector(from[0], gk_chunk);
+            b += weight[i] * __builtin_convertvector(from[1], gk_chunk);
         }
         ((gk_chunk *)(out + c))[0] = a, ((gk_chunk *)(out + c))[1] = b;
     }
     for (; c < n; c++) {
         out[c] = 0.0;
-        for (int i = 0; i < of->count; i++) out[c] += of->weight[i] * of->from[i][c];
+        for (int i = 0; i < 16; i++) out[c] += weight[i] * cell[i][c];
     }
 }
 
@@ -51,16 +45,14 @@ void gk_block_tabulate(const gk_node *n, gk_block b, const gk_spot *p, const gk_
 {
     const int A = n->model->functions, R = n->model->rolls;
     const gk_grid *first = b.swapped ? &q->grid : &p->grid, *second = b.swapped ? &p->grid : &q->grid;
-    double sum[MAX_FUNCTIONS * MAX_FUNCTIONS];
-    cells of = {0};
+    double sum[MAX_FUNCTIONS * MAX_FUNCTIONS], weight[16];
+    const gk_real *table[16];
     for (int c = 0; c < 16; c++) {
         const int i = c / 4, j = c % 4;
-        const double weight = first->weight[i] * second->weight[j];
-        if (weight == 0.0) continue;
-        of.weight[of.count] = weight;
-        of.from[of.count++] = b.table + (size_t)((first->index + i) * R + second->index + j) * (size_t)(A * A);
+        weight[c] = first->weight[i] * second->weight[j];
+        table[c] = b.table + (size_t)((first->index + i) * R + second->index + j) * (size_t)(A * A);
     }
-    blend_cells(&of, A * A, sum);
+    blend_cells(table, weight, A * A, sum);
     for (int a = 0; a < A; a++)
         for (int c = 0; c < A; c++) {
             const double value = sum[b.swapped ? c * A + a : a * A + c];

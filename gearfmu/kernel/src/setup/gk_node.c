@@ -37,7 +37,7 @@ void gk_node_blend(const gk_node *n, const gk_real *table, const gk_spot *p, int
     for (int i = 0; i < 4; i++)
         for (int a = 0; a < A; a++, t += width) {
             const double w = p->grid.weight[i] * p->width[a];
-            for (int k = 0; k < width && w != 0.0; k++) out[k] += w * t[k];
+            for (int k = 0; k < width; k++) out[k] += w * t[k];
         }
 }
 
