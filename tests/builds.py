@@ -7,19 +7,16 @@ import fcntl
 import hashlib
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
+
+from kernel_variants import double_states
 
 from gearfmu.kernel.build import FLAGS, build_library, compile_program, fmi_headers, source_hash, sources
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "build" / "tests"
 SANITIZE = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-
-sys.path.insert(0, str(ROOT / "benchmarks"))
-
-from kernel_variants import double_states  # noqa: E402  (found through the line above)
 
 
 def once(name: str, make: Callable[[Path], object], *own: Path) -> Path:

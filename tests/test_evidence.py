@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from evidence import GOLDEN, Ledger, check, content, make
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.append(str(ROOT / "benchmarks"))
-from evidence import GOLDEN, Ledger, check, content, make  # noqa: E402  (found through the line above)
 
 GENERATED = (
     r"benchmarks/.*\.(csv|json|png|svg)|docs/pictures/.*\.(png|svg)|docs/(stability|variables|effects)\.md|"

@@ -9,6 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+import ratchets
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted((ROOT / "gearfmu").rglob("*.py"))
@@ -113,6 +114,12 @@ def test_modules_say_what_they_are() -> None:
         public = [n for n in public if "overload" not in map(ast.unparse, n.decorator_list)]
         wrong += [f"{path}: {n.name} has no docstring" for n in public if not ast.get_docstring(n)]
     assert not wrong
+
+
+def test_counts_only_fall() -> None:
+    """tests/ratchets.json."""
+    now, most = ratchets.counts(), ratchets.limits()
+    assert now.keys() == most.keys() and not {name: now[name] for name in now if now[name] > most[name]}
 
 
 def test_names_of_test_modules_are_their_own() -> None:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from blocks import STEEL, ring
+from small_helical import coarse
 
 from gearfmu.fem import hex20, refined
 from gearfmu.fem.factor import CondensedFactor
 from gearfmu.fem.harmonic import flexibilities
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.fem.low_fields import LowFields
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reduction"))
-from small_helical import coarse  # noqa: E402
 
 COUNT = 6
 

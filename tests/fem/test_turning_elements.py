@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.linalg as sl
+import small_gear
 from blocks import STEEL, ring_sector
 
 from gearfmu.fem import hex20
@@ -17,10 +16,6 @@ from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.fem.spinning import growth, leave_axial, stress_stiffness, turn_quarter
 from gearfmu.reduction.modal import elastic_modes
 from gearfmu.reduction.spin import FamilySpin, family_spin
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
-
-import small_gear  # noqa: E402  (found through the line above)
 
 RADIUS, THICKNESS, HEIGHT, SECTORS = 0.05, 5e-4, 4e-3, 24
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from decks import write_deck
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reduction"))
-from decks import write_deck  # noqa: E402
-
-from gearfmu.fem import hex20  # noqa: E402
-from gearfmu.femesh import FeMesh, gear_sector  # noqa: E402
-from gearfmu.geometry import GearGeometry  # noqa: E402
-from gearfmu.spec.library import find_stage  # noqa: E402
-from gearfmu.spec.stage import StageSpec, load_stage  # noqa: E402
+from gearfmu.fem import hex20
+from gearfmu.femesh import FeMesh, gear_sector
+from gearfmu.geometry import GearGeometry
+from gearfmu.spec.library import find_stage
+from gearfmu.spec.stage import StageSpec, load_stage
 
 COUNTS = {"flank = 20": "flank = 6", "thickness = 5": "thickness = 2", "root = 6": "root = 3", "rim = 4": "rim = 2",
           "width = 6": "width = 2", "modes = 400": "modes = 60", "roll_points = 28": "roll_points = 8",

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from small_gear import GEAR, STEEL, coarse, flank
 
 from gearfmu.fem import patches, solids
 from gearfmu.fem.coupling import rigid_modes
@@ -19,9 +18,6 @@ from gearfmu.reduction.imported_flank import tooth_loads
 from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
 from gearfmu.reduction.modal import elastic_modes
 from gearfmu.reduction.statics import static_tables
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "reduction"))
-from small_gear import GEAR, STEEL, coarse, flank  # noqa: E402
 
 COUNT = 49
 

@@ -3,16 +3,12 @@ and libraries are compiled once."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
+from probes import Probes, compile_probes
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from probes import Probes, compile_probes  # noqa: E402  (found through the line above)
-
-from gearfmu.kernel import library_path  # noqa: E402
+from gearfmu.kernel import library_path
 
 
 @pytest.fixture(scope="session")

@@ -21,14 +21,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
+from golden_models import write_models
+from golden_stages import stage_digests
+from probes import build
+from small_model import pair_blob
 
-from golden_models import write_models  # noqa: E402  (found through the line above)
-from golden_stages import stage_digests  # noqa: E402
-from probes import build  # noqa: E402
-from small_model import pair_blob  # noqa: E402
-
-from gearfmu.kernel import Kernel  # noqa: E402
+from gearfmu.kernel import Kernel
 
 FILE = Path(__file__).parents[1] / "reference" / "golden_runs.json"
 REALS = ("float", "double")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +12,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+import small_gear
 
 from gearfmu.body import load_bodies
 from gearfmu.body.parts import DRAWN, sector_shapes
@@ -23,10 +23,6 @@ from gearfmu.reduction.display import outline, turn_sectors
 from gearfmu.reduction.modal import elastic_modes
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.deformation import Deformation, DeformationError, GearMotion
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
-
-import small_gear  # noqa: E402  (found through the line above)
 
 
 @pytest.fixture(scope="module", params=["sun", "ring"])

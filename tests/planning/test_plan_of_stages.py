@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
+from rigid_set import RigidSet
+from small_stage import body
 
 import gearfmu as gf
 from gearfmu.planning.book import Plan
@@ -18,11 +19,6 @@ from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble
 from gearfmu.sweeps.runners import in_this_process
-
-sys.path += [str(Path(__file__).resolve().parents[1] / room) for room in ("fmu", "stage")]
-
-from rigid_set import RigidSet  # noqa: E402
-from small_stage import body  # noqa: E402
 
 SCENE = """
 name = "loaded"

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+from blocks import STEEL, ring
 
 from gearfmu.fem import hex20
 from gearfmu.fem.coupling import averaging_rows_uniform, rigid_modes
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fem"))
-from blocks import STEEL, ring  # noqa: E402
 
 INNER, OUTER, HEIGHT = 0.02, 0.05, 0.012
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import Browser
+from test_set_report import set_run
 
 import gearfmu as gf
 from gearfmu import report
@@ -19,10 +20,6 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.stage.observed import gear_bodies
 from gearfmu.stage.trace import Trace
 from gearfmu.sweeps.page import write_page
-
-sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
-from browser import Browser  # noqa: E402
-from test_set_report import set_run  # noqa: E402
 
 pytestmark = [pytest.mark.full, pytest.mark.needs("chromium")]
 

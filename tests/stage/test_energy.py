@@ -7,20 +7,17 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import energy
+import light_rattle
 import numpy as np
 import pytest
+from kernel_variants import WITHOUT_ETA, variant
 
 from gearfmu.body import ReducedBody
 from gearfmu.scenes.light_rattle import run, statistics
 from gearfmu.scenes.rattle import FreePair, Rattle, energies, free_pair, started
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage import StageModel, Steady, simulate
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-
-import energy  # noqa: E402  (found through the line above)
-import light_rattle  # noqa: E402
-from kernel_variants import WITHOUT_ETA, variant  # noqa: E402
 
 FAST = 1
 LOAD = 302.0

@@ -3,20 +3,14 @@ explicit."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
+import central
+import energy_pieces
 import pytest
 
 from gearfmu.body import ReducedBody
 from gearfmu.errors import ModelError
 from gearfmu.scenes.rattle import FreePair, Rattle, free_pair, started
 from gearfmu.spec.stage import StageSpec
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-
-import central  # noqa: E402  (found through the line above)
-import energy_pieces  # noqa: E402
 
 FAST, FULL, EXPLICIT = 1, 3, 5
 CENTRAL = 4

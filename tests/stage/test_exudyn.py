@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-import sys
 from pathlib import Path
 
+import exudyn_rotor
 import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "benchmarks"))
 
-import exudyn_rotor  # noqa: E402  (found through the line above)
 
 REFERENCE = json.loads((ROOT / "tests" / "reference" / "exudyn_rotor.json").read_text(encoding="utf-8"))
 

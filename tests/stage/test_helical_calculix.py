@@ -4,17 +4,15 @@ and helical_fine.csv, our side computed here."""
 from __future__ import annotations
 
 import csv
-import sys
 from pathlib import Path
 from typing import Any
 
+import helical
 import numpy as np
 import pytest
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "calculix"
-sys.path.insert(0, str(BENCHMARK))
 
-import helical  # noqa: E402  (found through the line above)
 
 pytestmark = pytest.mark.full  # two reductions
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import small_gear
 
 from gearfmu.reduction.modal import elastic_modes
 from gearfmu.spec.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.inertia import gear_inertia, largest_speeds
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "reduction"))
-
-import small_gear  # noqa: E402  (found through the line above)
 
 
 def test_speeds_are_those_of_the_fastest_the_stage_may_turn() -> None:

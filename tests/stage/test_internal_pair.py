@@ -6,12 +6,12 @@ from __future__ import annotations
 import csv
 import importlib
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from by_hand import BORE, _at, slice_weights
+from inner import Inner
 from scipy.optimize import minimize, minimize_scalar
 
 from gearfmu.body import ReducedBody
@@ -28,9 +28,7 @@ from gearfmu.stage import StageModel, assemble, loaded_te
 from gearfmu.stage.meshes import tooth_phases
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "kernel"))
 
-from inner import Inner  # noqa: E402  (found through the line above)
 
 STAGE = ROOT / "benchmarks" / "calculix" / "internal" / "stage.toml"
 COARSE = BodySpec(

@@ -4,7 +4,6 @@ seen to fail; order in closed contact; central beside dg4. The names T1 to T10 a
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -13,14 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernel_variants import WITHOUT_ETA, variant
 
 from gearfmu.kernel import Kernel
 from gearfmu.stability.set_bench import ALL_MESHES, TORQUE, SetVariant, set_bodies, set_spec
 from gearfmu.stage import StageModel, assemble
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-
-from kernel_variants import WITHOUT_ETA, variant  # noqa: E402  (found through the line above)
 
 H, STEPS = 5e-6, 400
 CONSERVING = {

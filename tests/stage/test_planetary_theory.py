@@ -7,7 +7,6 @@ in double precision is held to it."""
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,8 +27,6 @@ from gearfmu.spec.stage import load_stage
 from gearfmu.stage import assemble
 from gearfmu.stage.place import place_of
 from gearfmu.stage.set_te import SetTeResult, set_te
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 KNOWN = lin_parker.published()["params"]
 ALONE = 0.2  # of a mesh period: every mesh has one pair in contact at a contact ratio of 1.02

@@ -4,18 +4,14 @@ a warning, refusal with the step to use."""
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from inner import Inner
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "kernel"))
-
-from inner import Inner  # noqa: E402  (found through the line above)
-
-from gearfmu.errors import ModelError, SimulationError  # noqa: E402
-from gearfmu.stage import StageModel, Steady  # noqa: E402
+from gearfmu.errors import ModelError, SimulationError
+from gearfmu.stage import StageModel, Steady
 
 LOAD = 302.0  # N·m
 LEVELS = {"rigid": 0, "fast": 1, "standard": 2, "full": 3}
