@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -10,6 +11,8 @@ from pathlib import Path
 
 from gearfmu.errors import OutputError
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk, quota and limit of a process
+
 
 @contextmanager
 def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -17,7 +20,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     A block that fails, and a process that is killed, leave the old file as it was. Missing folders are made. The
     temporary name keeps the suffix, for writers that choose the format by it. OutputError where nothing can be written
-    there.
+    there, or the disk is full.
     """
     target = Path(path)
     if target.is_dir():
@@ -27,6 +30,11 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, target)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        remedy = "make room, or choose another folder; what was there is as it was"
+        raise OutputError(f"{target}: cannot be written, {error.strerror or error}: {remedy}") from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -38,11 +38,13 @@ def pictures(cells: list[Any]) -> int:
 
 
 def test_first_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The mesh force is torque over base radius; two curves; FMU, report and table are there."""
+    """The mesh force is torque over base radius; four pictures; a trace is shown; FMU, report, table."""
     cells = executed("first_steps", tmp_path, monkeypatch)
     force = re.search(r"mean mesh force (\d+) N, outcome completed", printed(cells))
     assert force and float(force[1]) == pytest.approx(302 / BASE_RADIUS, rel=5e-3)
-    assert pictures(cells) == 2
+    assert pictures(cells) == 4
+    shown = [output.get("data", {}) for cell in cells for output in cell.outputs if cell.source == "trace"]
+    assert shown and "text/html" in shown[0] and "'mesh.force_drive'" in printed(cells)
     made = {path.name for path in (tmp_path / "out" / "first_steps").iterdir()}
     assert {"fzg_c_relief.fmu", "report.html", "bearing.csv"} <= made
 

@@ -35,31 +35,30 @@ def reduced_carrier(spec: PlanetarySpec, input_hash: str, progress: Progress | N
     if spec.carrier.imported is None:
         need = carrier_need(spec)
         require_memory(need, lower_counts(spec.carrier.mesh, "carrier.mesh"))
-        _tell(progress, f"carrier: finite elements, {need.text}", 0.0)
-        full, mesh = carrier_full_order(spec), None
+        _tell(progress, f"carrier: frequencies of a finer mesh, {need.text}", 0.0)
+        facts = _carrier_facts(spec)
+        _tell(progress, "carrier: finite elements", 0.3)
+        full = carrier_full_order(spec)
+        mesh = {**facts, "dof_body": full.size}
     else:
         full, mesh = imported_carrier_order(spec)
-    _tell(progress, f"carrier: {spec.carrier.method}", 0.2)
-    basis = METHODS[spec.carrier.method](full, Size(spec.carrier.modes))
-    model = oscillators(full, basis, spec.carrier.modal_damping)
-    _tell(progress, "carrier: frequency response", 0.6)
+    _tell(progress, f"carrier: {spec.carrier.method}", 0.5)
+    method, size = METHODS[spec.carrier.method], Size(spec.carrier.modes)
+    model = oscillators(full, method(full, size), spec.carrier.modal_damping)
+    _tell(progress, "carrier: frequency response", 0.7)
     judging = Judging.over(damping_ratio=spec.carrier.modal_damping)
     exact = reference(full, judging)
     error = relative_error(exact.matrix, transfer(model, judging, full.ground, residual=True))
-    if mesh is None:
-        _tell(progress, "carrier: frequencies of a finer mesh", 0.8)
-        mesh = _carrier_facts(spec, full.size)
     evidence = _Evidence(judging.frequency, error)
     made = {"mesh": mesh, "started": started, "input_hash": input_hash}
     return _interface_body(full, model, evidence, spec, made)
 
 
-def _carrier_facts(spec: PlanetarySpec, size: int) -> dict[str, Any]:
-    """Plain facts about our own mesh of a carrier of `size` unknowns, its error measured on a finer one."""
+def _carrier_facts(spec: PlanetarySpec) -> dict[str, Any]:
+    """Plain facts about our own mesh of a carrier, its error measured on a finer one."""
     facts = mesh_report(carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh))
-    size_facts = {"dof_body": size, "dof_sector": facts["dof"]}
     counts, error = spec.carrier.mesh.model_dump(), carrier_mesh_error(spec)
-    return {**facts, **size_facts, "counts": counts, "frequency_error": error}
+    return {**facts, "dof_sector": facts["dof"], "counts": counts, "frequency_error": error}
 
 
 class _Evidence:

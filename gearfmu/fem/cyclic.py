@@ -17,6 +17,7 @@ has six unknowns of its own in each, which are inner ones like any other.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -84,7 +85,13 @@ class SectorSpace:
             mirror[sector.patch] = first = sector.patch.min()  # stands for all of them
             inner = np.concatenate([inner, np.full(6, first)])
         self.stiffness = stiffness
-        self.factor = CondensedFactor(stiffness, _cells(sector.elements, mirror, inner), inner)
+        self._inner = _cells(sector.elements, mirror, inner), inner
+
+    @cached_property
+    def factor(self) -> CondensedFactor:
+        """Of the interior, condensed onto the cuts; made when it is asked for, so that the sector can be gone by
+        then."""
+        return CondensedFactor(self.stiffness, *self._inner)
 
     def harmonic(self, nodal_diameter: int) -> Harmonic:
         """The body restricted to one nodal diameter 0 ≤ ν ≤ z/2."""

@@ -23,6 +23,9 @@ _COLUMNS = 128
 _BLOCKED = 12  # mean length of a run from which on blocks are faster than columns
 
 
+Eliminate = Callable[..., tuple[Any, np.ndarray]]
+
+
 class FactorError(ArithmeticError):
     """The matrix is not positive definite (a body that is not held, or not finite)."""
 
@@ -79,11 +82,15 @@ class Factor:
 class CondensedFactor:
     """The first n unknowns of a real symmetric matrix (n + b, n + b) factorised and condensed onto the others.
 
-    cells, node_of_dof : as of `Factor`, of the first n unknowns, whose block must be positive definite. schur : (b, b)
-    S = A_BB − A_BI A_II⁻¹ A_IB, that the elimination leaves. Raises FactorError.
+    cells, node_of_dof : as of `Factor`, of the first n unknowns. eliminate : how their fronts are eliminated; by
+    Cholesky their block must be positive definite. schur : (b, b) S = A_BB − A_BI A_II⁻¹ A_IB, that the elimination
+    leaves. Raises FactorError.
     """
 
-    def __init__(self, matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray):
+    def __init__(
+        self, matrix: sp.csr_array, cells: np.ndarray, node_of_dof: np.ndarray, eliminate: Eliminate | None = None
+    ):
+        self._eliminate = eliminate or _eliminate
         self.inner, size = len(node_of_dof), matrix.shape[0]
         groups = dof_groups(nested_dissection(cells), node_of_dof)
         self._order = np.concatenate(groups)
@@ -91,7 +98,7 @@ class CondensedFactor:
 
     def _take(self, dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
         if start < self.inner:
-            return _eliminate(dense, start, stop, below)
+            return self._eliminate(dense, start, stop, below)
         return np.tril(dense) + np.tril(dense, -1).T, dense
 
     def forward(self, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -147,9 +154,7 @@ def dof_groups(groups: list[np.ndarray], node_of_dof: np.ndarray) -> list[np.nda
     return result
 
 
-def eliminated(
-    matrix: sp.csr_array, groups: list[np.ndarray], eliminate: Callable[..., tuple[Any, np.ndarray]]
-) -> list[Any]:
+def eliminated(matrix: sp.csr_array, groups: list[np.ndarray], eliminate: Eliminate) -> list[Any]:
     """Fronts of a symmetric matrix (n, n) whose unknowns are eliminated group by group.
 
     eliminate(dense, start, stop, below): of a gathered front with rows start:stop and `below` first, what is kept of it

@@ -32,6 +32,7 @@ FACES = np.array(
     ]
 )
 _BATCH = 256
+_SCATTERED = 4096  # elements that are added to the global matrices together
 
 
 class Material(Protocol):
@@ -135,20 +136,48 @@ def assemble(nodes: np.ndarray, elements: np.ndarray, material: Material) -> tup
     Raises MeshError for inside-out elements.
     """
     nodes, elements = np.asarray(nodes, float), np.asarray(elements)
-    stiffness, mass = [], []
-    for start in range(0, len(elements), _BATCH):
-        k, m = element_matrices(nodes[elements[start : start + _BATCH]], material)
-        stiffness.append(k)
-        mass.append(m)
     dofs = (3 * elements[:, :, None] + np.arange(3)).reshape(len(elements), 60)
-    k_global = scatter(np.concatenate(stiffness), dofs, 3 * len(nodes))
-    m_scalar = scatter(np.concatenate(mass), elements, len(nodes))
+    k_global = sp.csr_array((3 * len(nodes),) * 2)
+    m_scalar = sp.csr_array((len(nodes),) * 2)
+    for first in range(0, len(elements), _SCATTERED):
+        chunk = slice(first, first + _SCATTERED)
+        stiffness, mass = _element_matrices(nodes[elements[chunk]], material)
+        k_global = k_global + scattered(stiffness, dofs[chunk], 3 * len(nodes))
+        m_scalar = m_scalar + scattered(mass, elements[chunk], len(nodes))
+    del stiffness, mass
+    k_global, m_scalar = symmetric(k_global), symmetric(m_scalar)
     return k_global, sp.csr_array(sp.kron(m_scalar, sp.identity(3), format="csr"))
+
+
+def _element_matrices(positions: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """`element_matrices` of many elements, batch by batch."""
+    stiffness, mass = (np.empty((len(positions), size, size)) for size in (60, 20))
+    for start in range(0, len(positions), _BATCH):
+        batch = slice(start, start + _BATCH)
+        stiffness[batch], mass[batch] = element_matrices(positions[batch], material)
+    return stiffness, mass
 
 
 def scatter(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
     """Sum of element matrices (E, k, k) at the unknowns (E, k), symmetric: (size, size)."""
+    return symmetric(scattered(blocks, dofs, size))
+
+
+def scattered(blocks: np.ndarray, dofs: np.ndarray, size: int) -> sp.csr_array:
+    """As `scatter`, symmetric to rounding."""
+    dofs = dofs.astype(np.int32 if size < 2**31 else np.int64)
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-    matrix = sp.coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)).tocsr()
-    return sp.csr_array(0.5 * (matrix + matrix.T))
+    return sp.csr_array(sp.coo_array((blocks.ravel(), (rows, columns)), shape=(size, size)))
+
+
+def symmetric(matrix: sp.sparray) -> sp.csr_array:
+    """(A + Aᵀ)/2, without room for a sum where both have entries at the same places."""
+    own, other = sp.csr_array(matrix), sp.csr_array(matrix.T)
+    own.sort_indices()
+    other.sort_indices()
+    if np.array_equal(own.indptr, other.indptr) and np.array_equal(own.indices, other.indices):
+        return sp.csr_array((0.5 * (own.data + other.data), own.indices, own.indptr), shape=own.shape)
+    both = sp.csr_array(own + other)
+    both.data *= 0.5
+    return both

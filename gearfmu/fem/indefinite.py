@@ -10,6 +10,7 @@ Source: Duff & Reid, ACM Trans. Math. Softw. 9 (1983) 302; refinement: Arioli, D
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,8 @@ from gearfmu.fem.factor import FactorError, cholesky_front, dof_groups, eliminat
 _COLUMNS = 128
 _REFINED = 1e-9  # residual relative to the right-hand side; rounding leaves a tenth of it on solid bodies
 _ROUNDS = 3
+
+Product = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass
@@ -55,26 +58,11 @@ class SymmetricFactor:
         self.shape, self._matrix = matrix.shape, sp.csr_array(matrix)
         groups = dof_groups(nested_dissection(cells), node_of_dof)
         self._order = np.concatenate(groups)
-        self._fronts = eliminated(self._matrix, groups, _eliminate)
+        self._fronts = eliminated(self._matrix, groups, eliminate_symmetric)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """A⁻¹ rhs, rhs (n, k); refined."""
-        solution = self._solve_once(rhs)
-        size = np.linalg.norm(rhs, axis=0) + np.finfo(float).tiny
-        residual = rhs - self._matrix @ solution
-        error = (np.linalg.norm(residual, axis=0) / size).max(initial=0.0)
-        for _ in range(_ROUNDS):
-            if error < _REFINED:
-                break
-            better = solution + self._solve_once(residual)
-            residual = rhs - self._matrix @ better
-            last, error = error, (np.linalg.norm(residual, axis=0) / size).max(initial=0.0)
-            if not error < last:
-                break
-            solution = better
-            if error > 0.25 * last:
-                break
-        return solution
+        return refined(self._solve_once, lambda vectors: self._matrix @ vectors, rhs)
 
     def _solve_once(self, rhs: np.ndarray) -> np.ndarray:
         if np.iscomplexobj(rhs) and not np.iscomplexobj(self._matrix.data):
@@ -88,20 +76,44 @@ class SymmetricFactor:
         return result
 
 
-def _eliminate(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
+def refined(solve: Product, product: Product, rhs: np.ndarray) -> np.ndarray:
+    """A⁻¹ rhs (n, k) by `solve`, again for the residual while it is larger than rounding explains and shrinks.
+
+    product : A times vectors."""
+    solution = solve(rhs)
+    size = np.linalg.norm(rhs, axis=0) + np.finfo(float).tiny
+    residual = rhs - product(solution)
+    error = (np.linalg.norm(residual, axis=0) / size).max(initial=0.0)
+    for _ in range(_ROUNDS):
+        if error < _REFINED:
+            break
+        better = solution + solve(residual)
+        residual = rhs - product(better)
+        last, error = error, (np.linalg.norm(residual, axis=0) / size).max(initial=0.0)
+        if not error < last:
+            break
+        solution = better
+        if error > 0.25 * last:
+            break
+    return solution
+
+
+def eliminate_symmetric(dense: np.ndarray, start: int, stop: int, below: np.ndarray) -> tuple[Any, np.ndarray]:
+    """A gathered front of a symmetric matrix eliminated: what is kept of it, and the update of the rows below."""
     found = None if np.iscomplexobj(dense) else cholesky_front(dense, start, stop, below)
     if found is not None:
         return found
     size = stop - start
     block, coupling = dense[:size, :size], dense[size:, :size]
-    own = _lu(np.tril(block) + np.tril(block, -1).T)
+    own = lu(np.tril(block) + np.tril(block, -1).T)
     influence = sl.lu_solve(own, np.asfortranarray(coupling.T), check_finite=False)
     product = coupling @ influence
     update = np.subtract(dense.T[size:, size:], product, out=product)
     return _PivotedFront(start, stop, below, own, influence), update
 
 
-def _lu(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def lu(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """LU factors of a dense block, which is overwritten. Raises FactorError where it is singular."""
     factors, pivots, info = sl.get_lapack_funcs(("getrf",), (block,))[0](block, overwrite_a=True)
     diagonal = np.abs(factors.diagonal())
     if info or not diagonal.min() > 1e-14 * diagonal.max():

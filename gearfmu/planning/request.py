@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gearfmu.errors import GearfmuError, Problem, SpecError
+from gearfmu.errors import GearfmuError, Problem, SpecError, near_or_all
 from gearfmu.geometry.planetary import set_geometry
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
@@ -86,10 +86,15 @@ def _outputs(model: StageModel, names: Sequence[str], problems: list[Problem]) -
     for name in names:
         own = list(_named(model, name, known))
         if not own:
-            judged = sorted(n for n in known if n.startswith(("bearing.", "pin.")) or n.endswith((".te", ".force")))
-            remedy = f"the stage has no such output; among its outputs are te, {', '.join(judged)}"
+            remedy = f"the stage has no such output; {near_or_all(name, _judged(known), 'it has', mark='')}"
             problems.append(Problem(WHERE, "--output", name, remedy))
         yield from own
+
+
+def _judged(known: set[str]) -> list[str]:
+    """What is judged most: transmission errors and forces of meshes, supports with all their directions."""
+    supports = {".".join(name.split(".")[:2]) for name in known if name.startswith(("bearing.", "pin.", "seat."))}
+    return ["te", *sorted(n for n in known if n.endswith((".te", ".force"))), *sorted(supports)]
 
 
 def _named(model: StageModel, name: str, known: set[str]) -> Iterator[Output]:

@@ -12,6 +12,7 @@ from gearfmu.reduction.elastic import Elastic
 
 BAND = (50.0, 10e3)
 DEPENDENT = 1e-10  # norm, relative to that before projection, at which a direction counts as known
+_ROOM = 4  # by how much room for vectors grows: what is not written yet takes no memory
 
 
 @dataclass(frozen=True)
@@ -72,24 +73,18 @@ class Growing:
     def __init__(self, space: Elastic):
         self.space, self.size = space, 0
         self._v = np.empty((space.size, 0), order="F")
-        self._mv = np.empty((space.size, 0), order="F")
 
     @property
     def vectors(self) -> np.ndarray:
         """V (N, n)."""
         return self._v[:, : self.size]
 
-    @property
-    def inertia(self) -> np.ndarray:
-        """M V (N, n)."""
-        return self._mv[:, : self.size]
-
     def add(self, block: np.ndarray) -> np.ndarray:
         """Append what is new in `block` (N, k); returns M times the new vectors (N, ≤ k)."""
         block, inertia = self._new(block)
         first, self.size = self.size, self.size + block.shape[1]
         self._reserve()
-        self._v[:, first : self.size], self._mv[:, first : self.size] = block, inertia
+        self._v[:, first : self.size] = block
         return inertia
 
     def _new(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +93,7 @@ class Growing:
         limit = DEPENDENT**2
         for _ in range(2):
             block = self.space.gauge(block)
-            block = block - self.vectors @ (self.inertia.T @ block)
+            block = block - self.vectors @ (self.vectors.T @ self.space.mass(block))
             inertia = self.space.mass(block)
             values, turn = np.linalg.eigh(block.T @ inertia)
             keep = np.flatnonzero(values > limit)[::-1]
@@ -109,8 +104,6 @@ class Growing:
     def _reserve(self) -> None:
         if self.size <= self._v.shape[1]:
             return
-        for name in ("_v", "_mv"):
-            old = getattr(self, name)
-            larger = np.empty((self.space.size, max(self.size, 2 * old.shape[1])), order="F")
-            larger[:, : old.shape[1]] = old
-            setattr(self, name, larger)
+        old = self._v
+        self._v = np.empty((self.space.size, max(self.size, _ROOM * old.shape[1])), order="F")
+        self._v[:, : old.shape[1]] = old

@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from gearfmu.fem import hex20
+from gearfmu.fem.repeated import Parts
 from gearfmu.femesh.carrier import carrier_sector, whole_carrier
+from gearfmu.femesh.mesh import FeMesh
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported_carrier import imported_carrier
-from gearfmu.reduction.memory import CARRIER_FACTORS, Need, whole_need
+from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 
@@ -24,8 +28,9 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
     """
     if spec.carrier.imported is not None:
         return imported_carrier(spec).full
-    geometry = CarrierGeometry.of(spec)
-    return full_order("carrier", *carrier_elements(spec, scale), Judgement(("bore",), geometry.a))
+    geometry, sector = CarrierGeometry.of(spec), _sector(spec, scale)
+    full = full_order("carrier", *_whole_elements(spec, sector), Judgement(("bore",), geometry.a))
+    return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(spec) else full
 
 
 def carrier_need(spec: Any) -> Need:
@@ -33,17 +38,34 @@ def carrier_need(spec: Any) -> Need:
     finer mesh (`FINER`) by which its error is measured."""
     sector = carrier_sector(CarrierGeometry.of(spec), spec.carrier.mesh)
     own, vectors = 3 * (len(sector.nodes) - len(sector.cut_plus)), 3 * spec.carrier.modes
-    whole, finer = (
-        whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (own * sector.teeth, round(own * FINER**3))
-    )
-    return replace(whole, memory=max(whole.memory, finer.memory))
+    size, finer = own * sector.teeth, round(own * FINER**3)
+    if cyclic_carrier(spec):
+        both = [parts_need(size, sector.teeth, vectors), modes_need(finer)]
+    else:
+        both = [whole_need(unknowns, vectors, CARRIER_FACTORS) for unknowns in (size, round(size * FINER**3))]
+    return Need(size, max(need.memory for need in both), True)
+
+
+def cyclic_carrier(spec: Any) -> bool:
+    """Are the bolts of the carrier of a PlanetarySpec evenly spaced and coupled alike, and enough for cuts?"""
+    geometry = CarrierGeometry.of(spec)
+    kinds = {spec.carrier.coupling_of(f"bolt{k}") for k in range(geometry.planets)}
+    even = np.allclose(geometry.angles, 2 * np.pi * np.arange(geometry.planets) / geometry.planets, atol=1e-9)
+    return even and len(kinds) == 1 and geometry.planets >= 3
 
 
 def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:
     """Finite elements of the carrier as the file describes it, and the couplings of its bolts and bore."""
-    geometry = CarrierGeometry.of(spec)
+    return _whole_elements(spec, _sector(spec, scale))
+
+
+def _sector(spec: Any, scale: float) -> FeMesh:
     counts = spec.carrier.mesh
-    sector = carrier_sector(geometry, counts.model_copy(update={"scale": counts.scale * scale}))
+    return carrier_sector(CarrierGeometry.of(spec), counts.model_copy(update={"scale": counts.scale * scale}))
+
+
+def _whole_elements(spec: Any, sector: FeMesh) -> tuple[Elements, list[Coupling]]:
+    geometry = CarrierGeometry.of(spec)
     whole = whole_carrier(geometry, sector)
     body = Elements(whole.nodes, whole.elements, *hex20.assemble(whole.nodes, whole.elements, spec.carrier.material))
     couplings = [
@@ -57,3 +79,25 @@ def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coup
     ]
     couplings.append(Coupling("bore", spec.carrier.coupling_of("bore"), whole.sets["bore"], geometry.bore_centre))
     return body, couplings
+
+
+def _equal_parts(full: FullOrder, sector: FeMesh) -> Parts:
+    """What belongs to each bolt: its sector and master; cuts and the bore's master are shared."""
+    kinds = [interface.kind for interface in full.interfaces]
+    masters = sector.teeth * (len(sector.nodes) - len(sector.cut_plus))  # nodes from here on are masters
+    cuts = np.concatenate([sector.cut_minus, sector.cut_plus])
+    inside = np.setdiff1d(np.arange(len(sector.nodes)), cuts)
+    bore = [full.node_of_dof[-1]] if kinds[-1] == "rigid" else []
+    inner, border = [], []
+    for bolt in range(sector.teeth):
+        index = sector.sector_nodes(bolt)
+        own = [masters + bolt] if kinds[bolt] == "rigid" else []
+        inner.append(_unknowns(full, np.append(index[inside], own)))
+        border.append(_unknowns(full, np.append(index[cuts], bore)))
+    return Parts(np.array(inner), np.array(border))
+
+
+def _unknowns(full: FullOrder, nodes: np.ndarray) -> np.ndarray:
+    """Unknowns of these nodes in their order, none where a master stands for a node."""
+    first, last = (np.searchsorted(full.node_of_dof, nodes, side) for side in ("left", "right"))
+    return np.concatenate([np.arange(a, b) for a, b in zip(first, last, strict=True)])

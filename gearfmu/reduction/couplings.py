@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from gearfmu.errors import MeshError
 from gearfmu.fem import surface
 from gearfmu.fem.coupling import averaging_rows, averaging_rows_uniform, moved, rigid_fields, rigid_modes
+from gearfmu.fem.hex20 import symmetric
 from gearfmu.reduction.full_order import COMPONENTS, FullOrder, Interface
 
 
@@ -78,8 +79,8 @@ def full_order(
     interfaces = tuple(_interface(body, c, transform, rigid) for c in couplings)
     return FullOrder(
         name=name,
-        stiffness=_symmetric(transform.T @ stiffness @ transform),
-        mass=_symmetric(transform.T @ body.mass @ transform),
+        stiffness=symmetric(transform.T @ stiffness @ transform),
+        mass=symmetric(transform.T @ body.mass @ transform),
         rigid=_rigid_columns(body.nodes, rigid) if springs is None else np.zeros((transform.shape[1], 0)),
         interfaces=interfaces,
         ground=judgement.ground,
@@ -183,7 +184,3 @@ def _cells(body: Elements, rigid: Sequence[Coupling], springs: Springs | None) -
     for k, group in enumerate(groups):
         result[len(cells) + k, : len(group)] = group
     return result
-
-
-def _symmetric(matrix: sp.sparray) -> sp.csr_array:
-    return sp.csr_array(0.5 * (matrix + matrix.T))

@@ -24,6 +24,7 @@ import scipy.sparse as sp
 
 from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import lowest_modes
+from gearfmu.fem.repeated import Parts, RepeatedFactor
 from gearfmu.fem.solver import Solves, definite_factor, symmetric_factor
 from gearfmu.reduction.full_order import FullOrder
 
@@ -68,6 +69,7 @@ class Elastic:
         self.touched: set[str] = set()
         self.stiffness, self.mass_matrix = body.stiffness, body.mass
         self.cells, self.node_of_dof, self.size = body.cells, body.node_of_dof, body.size
+        self.parts = body.parts
         self._kernel = body.rigid
         empty = sp.csr_array((0, body.size))
         self.constraints = empty if body.constraints is None else body.constraints
@@ -117,28 +119,38 @@ class Elastic:
         return _SmallSystem((self.constraints @ self.constraints.T).toarray())
 
     @property
-    def _supported(self) -> tuple[np.ndarray, Solves]:
-        """Unknowns left free by statically determinate supports of the kernel of K, and the factor of their K."""
+    def _supported(self) -> Solves:
+        """The body on statically determinate supports of the kernel of K, where loads find nothing; K⁻¹ of it."""
         if self._twin is not None:
             return self._twin._supported
         return self.kept("factor of K", self._support)
 
-    def _support(self) -> tuple[np.ndarray, Solves]:
-        kernel = self._kernel
-        held = sl.qr(kernel.T, mode="r", pivoting=True)[1][: kernel.shape[1]] if kernel.shape[1] else []
-        free = np.setdiff1d(np.arange(self.size), held)
-        return free, definite_factor(sp.csr_array(self.stiffness[free][:, free]), self.cells, self.node_of_dof[free])
+    def _support(self) -> Solves:
+        kernel, shared = self._kernel, np.arange(self.size)
+        if self.parts is not None:
+            shared = np.unique(self.parts.border)
+        count = kernel.shape[1]
+        held = shared[sl.qr(kernel[shared].T, mode="r", pivoting=True)[1][:count]] if count else np.empty(0, int)
+        if self.parts is not None:
+            return self.by_parts(self.parts, 0.0, held)
+        return _Supported(self, np.setdiff1d(shared, held))
 
-    def _solve_supported(self, loads: np.ndarray) -> np.ndarray:
-        free, factor = self._supported
-        solution = np.zeros((self.size, loads.shape[1]))
-        solution[free] = factor.solve(loads[free])
-        return solution
+    def by_parts(self, parts: Parts, shift: float, held: np.ndarray | None = None) -> RepeatedFactor:
+        """K − σM factorised part by part; it is never made as a whole."""
+
+        def block(index: np.ndarray) -> sp.csr_array:
+            return sp.csr_array(self.stiffness[index][:, index] - shift * self.mass_matrix[index][:, index])
+
+        def product(vectors: np.ndarray) -> np.ndarray:
+            image: np.ndarray = self.stiffness @ vectors
+            return image - shift * self.mass(vectors) if shift else image
+
+        return RepeatedFactor(block, product, parts, (self.cells, self.node_of_dof), held)
 
     @cached_property
     def _holding(self) -> tuple[np.ndarray, _SmallSystem]:
         """Response to Cᵀ on the supports, and the system of λ and the rigid motion on the supports."""
-        response = self._solve_supported(self.constraints.T.toarray())
+        response = self._supported.solve(self.constraints.T.toarray())
         coupling, rows = self.constraints @ self._kernel, self.constraints.shape[0]
         zero = np.zeros((coupling.shape[1],) * 2)
         return response, _SmallSystem(np.block([[self.constraints @ response, -coupling], [-coupling.T, zero]]), rows)
@@ -146,7 +158,7 @@ class Elastic:
     def flexibility(self, loads: np.ndarray) -> np.ndarray:
         """The static response to loads (N, k): P K⁺ Pᵀ f for a free body, with what is held held."""
         balanced = self.balance(loads)
-        solution = self._solve_supported(balanced)
+        solution = self._supported.solve(balanced)
         if self.constraints.shape[0]:
             response, system = self._holding
             rows = self.constraints.shape[0]
@@ -190,16 +202,35 @@ class Elastic:
         return squared[:count], shapes[:, :count]
 
 
+class _Supported:
+    """K⁻¹ of a body of which only the unknowns `free` move."""
+
+    def __init__(self, space: Elastic, free: np.ndarray):
+        matrix = sp.csr_array(space.stiffness[free][:, free])
+        self._free, self._factor = free, definite_factor(matrix, space.cells, space.node_of_dof[free])
+
+    def solve(self, loads: np.ndarray) -> np.ndarray:
+        solution = np.zeros(loads.shape)
+        solution[self._free] = self._factor.solve(loads[self._free])
+        return solution
+
+
 class Shifted:
     """(K − σM)⁻¹ with what is held held. `shift` : σ as it is, perhaps moved."""
 
     def __init__(self, space: Elastic, shift: float):
         self.shift, self.space = shift, space
-        matrix = sp.csr_array(space.stiffness - shift * space.mass_matrix)
-        self._factor = symmetric_factor(matrix, space.cells, space.node_of_dof)
+        self._factor = self._factorised()
         self._response = self._factor.solve(space.constraints.T.toarray()) if space.constraints.shape[0] else None
         if self._response is not None:
             self._system = _SmallSystem(space.constraints @ self._response)
+
+    def _factorised(self) -> Solves:
+        space = self.space
+        if space.parts is not None:
+            return space.by_parts(space.parts, self.shift)
+        matrix = sp.csr_array(space.stiffness - self.shift * space.mass_matrix)
+        return symmetric_factor(matrix, space.cells, space.node_of_dof)
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """(K − σM)⁻¹ f under the constraints, loads (N, k)."""

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from gearfmu.fem.repeated import Parts
+
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
@@ -42,6 +44,7 @@ class FullOrder:
     cells, node_of_dof : (E, k) node numbers of each element (−1: none) and (N,) the node of each unknown, for
     `fem.factor.Factor`: two unknowns may be coupled only if their nodes share a cell (a rigid coupling is one cell).
     constraints : (c, N) rows C of what is held, None for nothing; `rigid` stays the kernel of K.
+    parts : the equal parts about z that K and M consist of; None where there are none.
     """
 
     name: str
@@ -54,6 +57,7 @@ class FullOrder:
     cells: np.ndarray
     node_of_dof: np.ndarray
     constraints: sp.csr_array | None = None
+    parts: Parts | None = None
 
     @property
     def size(self) -> int:

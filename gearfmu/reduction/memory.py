@@ -14,6 +14,8 @@ _SPARSE = 3000.0  # bytes per unknown of finite-element matrices, on the sector 
 _WHOLE_FACTOR = 30.0  # the same of a whole body: measured 29 to 33
 _SPACE = 36  # fields of the space of low modes per mode of a family
 CARRIER_FACTORS = 5  # of K, at the three points of Krylov's method and at one of the reference
+_PART_FACTORS = 3  # of one of its equal parts: K and at the last two points
+_PART_FACTOR = 48.0  # entries of a carrier's sector per unknown to the power 4/3, and fronts that wait
 MESH_COARSER = "mesh the body coarser"  # the remedy for finite elements made elsewhere
 _MEMORY_TABLE = Path("/proc/meminfo")
 
@@ -75,6 +77,17 @@ def whole_need(unknowns: int, vectors: int, factors: int) -> Need:
     """Need of a body that is reduced as a whole: so many factors of its matrices and full vectors beside them."""
     numbers = factors * _WHOLE_FACTOR * unknowns ** (4 / 3) + unknowns * vectors
     return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
+
+
+def parts_need(unknowns: int, parts: int, vectors: int) -> Need:
+    """Need of a body of equal parts (`fem.repeated`), of its `unknowns` in all, and full vectors beside the factors."""
+    numbers = _PART_FACTORS * _PART_FACTOR * (unknowns / parts) ** (4 / 3) + unknowns * vectors
+    return Need(unknowns, _BASE + 8 * numbers + _SPARSE * unknowns, True)
+
+
+def modes_need(unknowns: int) -> Need:
+    """Need of the lowest modes of a carrier by its sector of so many unknowns."""
+    return Need(unknowns, _BASE + 8 * _PART_FACTOR * unknowns ** (4 / 3) + 2 * _SPARSE * unknowns)
 
 
 def require_memory(need: Need, remedy: str) -> None:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from gearfmu.fem import hex20
-from gearfmu.fem.cyclic import Sector, sector_spaces
+from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.femesh.carrier import carrier_sector
 from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.reduction.carrier import FINER, carrier_full_order
+from gearfmu.reduction.carrier import FINER, carrier_full_order, cyclic_carrier
 from gearfmu.reduction.elastic import Elastic
 
 COMPARED = 20  # lowest elastic modes
@@ -30,22 +30,28 @@ def free_frequencies(spec: Any, scale: float, count: int) -> np.ndarray:
 
     By one sector where bolts are evenly spaced and coupled alike, by the whole body else. Raises MeshError.
     """
-    geometry, carrier = CarrierGeometry.of(spec), spec.carrier
-    kinds = {carrier.coupling_of(f"bolt{k}") for k in range(geometry.planets)}
-    even = np.allclose(geometry.angles, 2 * np.pi * np.arange(geometry.planets) / geometry.planets, atol=1e-9)
-    if not even or len(kinds) > 1 or geometry.planets < 3:
+    if not cyclic_carrier(spec):
         squared, _ = Elastic(carrier_full_order(spec, scale)).modes(count)
         return np.sqrt(squared) / (2 * np.pi)
-    mesh = carrier_sector(geometry, carrier.mesh.model_copy(update={"scale": carrier.mesh.scale * scale}))
-    matrices = hex20.assemble(mesh.nodes, mesh.elements, carrier.material)
-    bore = mesh.sets["bore"] if carrier.coupling_of("bore") == "rigid" else None
-    bolt = mesh.sets["bolt"] if kinds == {"rigid"} else None
-    (space,) = sector_spaces(
-        Sector(mesh.nodes, mesh.elements, *matrices, mesh.teeth, mesh.cut_minus, mesh.cut_plus, True, bore, bolt)
-    )
+    space = _space(spec, scale)
     families = []
-    for index in range(mesh.teeth // 2 + 1):
+    for index in range(space.teeth // 2 + 1):
         harmonic = space.harmonic(index)
         found, _ = lowest_modes(harmonic, -(-count // (1 if harmonic.is_real else 2)))
         families.append(found if harmonic.is_real else np.repeat(found, 2))
     return np.sqrt(np.sort(np.concatenate(families))[:count]) / (2 * np.pi)
+
+
+def _space(spec: Any, scale: float) -> SectorSpace:
+    """The fields of one bolt's sector."""
+    carrier = spec.carrier
+    mesh = carrier_sector(
+        CarrierGeometry.of(spec), carrier.mesh.model_copy(update={"scale": carrier.mesh.scale * scale})
+    )
+    matrices = hex20.assemble(mesh.nodes, mesh.elements, carrier.material)
+    bore = mesh.sets["bore"] if carrier.coupling_of("bore") == "rigid" else None
+    bolt = mesh.sets["bolt"] if carrier.coupling_of("bolt0") == "rigid" else None
+    (space,) = sector_spaces(
+        Sector(mesh.nodes, mesh.elements, *matrices, mesh.teeth, mesh.cut_minus, mesh.cut_plus, True, bore, bolt)
+    )
+    return space

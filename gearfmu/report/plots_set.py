@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -105,7 +105,8 @@ def sharing(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     panels = []
     for central, meshes in own.meshes.items():
         curves = [Curve(trace.time, over_time_[m], f"{planet}: {means[m]:.3f}") for planet, m in meshes.items()]
-        panels.append(Panel(f"share at the {central}", tuple(curves), height=160))
+        limits = _limits([curve.y for curve in curves], LEAST_SPAN)
+        panels.append(Panel(f"share at the {central}", tuple(curves), limits=limits, height=160))
     caption = (
         "Mesh force over the mean of all planets, running mean over one mesh period; in the legend the mean from "
         f"{window.start:.3g} s to {window.end:.3g} s ({window.reason})."
@@ -139,6 +140,7 @@ def planets(trace: Trace, own: PlanetSet, window: Window) -> Plot:
     return Plot("planets", "Planet by planet", caption, Chart(tuple(panels), across=len(COLUMNS_OF_PLANETS)), data)
 
 
+LEAST_SPAN = 0.01  # of an axis of shares
 COLUMNS_OF_PLANETS = ("mesh forces in kN", "share", "force on the pin in kN")
 
 
@@ -161,17 +163,24 @@ def _of_planet(
     ]
 
 
+def _limits(curves: Sequence[np.ndarray], least: float) -> tuple[float, float] | None:
+    """Limits round all values, at least so far apart: rounding noise is a line."""
+    values = np.concatenate([np.zeros(0), *curves])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    low, high = float(values.min()), float(values.max())
+    edge = max(0.05 * (high - low), 0.5 * (least - (high - low))) or 0.05 * abs(high) or 1.0
+    return low - edge, high + edge
+
+
 def _same_limits(panels: list[Panel]) -> list[Panel]:
     """The panels of a column with one scale."""
     found = []
     for number, panel in enumerate(panels):
         column = panels[number % len(COLUMNS_OF_PLANETS) :: len(COLUMNS_OF_PLANETS)]
-        values = np.concatenate([np.zeros(0), *(curve.y for other in column for curve in other.curves)])
-        values = values[np.isfinite(values)]
-        if values.size:
-            low, high = float(values.min()), float(values.max())
-            edge = 0.05 * (high - low) or 0.05 * abs(high) or 1.0
-            panel = replace(panel, limits=(low - edge, high + edge))
+        least = LEAST_SPAN if number % len(COLUMNS_OF_PLANETS) == COLUMNS_OF_PLANETS.index("share") else 0.0
+        panel = replace(panel, limits=_limits([curve.y for other in column for curve in other.curves], least))
         found.append(panel)
     return found
 

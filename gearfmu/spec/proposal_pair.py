@@ -14,6 +14,7 @@ from gearfmu.spec.proposal import GIVEN, Wish, begun, propose, put_gear, put_loa
 
 NAMES = ("pinion", "wheel")
 SHIFT_RULE = "equal specific sliding at both ends of the path of contact"
+SHAFT_RULE = "a shaft in the bore keeps it round"
 _TWIST = 0.03  # rad of a shaft at torque_max, as of fzg_c
 _DAMPING = 5e-6  # s, c/k of a shaft, as of fzg_c
 
@@ -35,6 +36,7 @@ def draft_pair(wish: Wish) -> Draft:
     rules = (SHIFT_RULE, f"sum of both {pair.total:.6f} from the centre distance")
     for name, gear, rule in zip(NAMES, geometry.gears, rules, strict=True):
         put_gear(draft, f"gears.{name}", gear, rule)
+        propose(draft, f"gears.{name}.bore_coupling", "rigid", SHAFT_RULE)
     _put_loads(draft, wish, geometry, width)
     put_slices(draft, rack, width)
     return draft

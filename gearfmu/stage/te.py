@@ -24,7 +24,10 @@ TANGENT = 1e-4
 LEAST = 1e-5  # of torque_max: below it te goes on along its tangent to the unloaded pair
 SHARES = 4
 SOFTER = 0.9  # of the mesh stiffness of ISO: below it the reason is given
-WHY_SOFTER = ": teeth on discs that do not yield; here bodies twist and bend, and averaging bores lose their shape"
+WHY_SOFTER = (
+    ": teeth on discs that do not yield; here bodies, and the shafts of a train, twist and bend, and averaging bores "
+    "lose their shape"
+)
 
 
 @dataclass(frozen=True, repr=False)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import gearfmu as gf
+from gearfmu import report
 from gearfmu.body import load_bodies
 from gearfmu.report.moving import moving_view
 from gearfmu.report.picture import _displacement
@@ -17,9 +18,11 @@ from gearfmu.spec.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.observed import gear_bodies
 from gearfmu.stage.trace import Trace
+from gearfmu.sweeps.page import write_page
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 from browser import Browser  # noqa: E402
+from test_set_report import set_run  # noqa: E402
 
 pytestmark = [pytest.mark.full, pytest.mark.needs("chromium")]
 
@@ -58,6 +61,21 @@ def test_nothing_hangs_over_the_edge(page: Path, tmp_path: Path, width: int) -> 
         assert browser.value("document.documentElement.scrollWidth") <= width
         wide = "[...document.querySelectorAll('section')].filter(s => s.getBoundingClientRect().right > innerWidth)"
         assert browser.value(f"{wide}.length") == 0 and browser.errors == []
+
+
+@pytest.mark.parametrize("kind", ["set", "sweep"])
+def test_sets_and_sweeps_fit_a_telephone(kind: str, tmp_path: Path) -> None:
+    if kind == "set":
+        trace = set_run()
+        report.write(trace, trace.meta, tmp_path)
+    else:
+        table = gf.sweep("fzg_c", {"torque": [50.0, 100.0], "positions": [4, 8]}, tmp_path, on=1)
+        write_page(table, "fzg_c", tmp_path)
+    page = tmp_path / {"set": "report.html", "sweep": "sweep.html"}[kind]
+    with Browser(tmp_path / "profile", 420, 900) as browser:
+        browser.open(page)
+        browser.draw_all()
+        assert browser.value("document.documentElement.scrollWidth") <= 420 and browser.errors == []
 
 
 def test_a_zoomed_curve_shows_the_samples_and_the_other_figures_follow(opened: Browser, trace: Trace) -> None:

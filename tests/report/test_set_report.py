@@ -11,8 +11,9 @@ import pytest
 
 from gearfmu import report
 from gearfmu.report import plots_set
+from gearfmu.report.chart import Chart
 from gearfmu.report.metrics import Spectrum, band_rms
-from gearfmu.report.plots_set import planet_set, shares
+from gearfmu.report.plots_set import LEAST_SPAN, planet_set, planets, shares, sharing
 from gearfmu.report.signals import Window, known_meshings
 from gearfmu.stage.trace import Channel, Trace
 
@@ -104,6 +105,19 @@ def test_shares_are_means_over_a_mesh_period_and_of_the_window() -> None:
         inner = over_time[f"ring_planet{k + 1}"]
         assert np.isnan(inner[0]) and np.isnan(inner[-1])
         assert np.nanmax(np.abs(inner - share)) < 2e-3, "the ripple of ±5 % is averaged out"
+
+
+def test_shares_that_differ_by_rounding_are_a_line() -> None:
+    trace = set_run()
+    own = planet_set(trace, known_meshings(trace))
+    assert own is not None
+    alike = {f"{central}_{planet}.force": trace.channels["sun_planet1.force"]
+             for central in own.meshes for planet in own.planets}  # fmt: skip
+    for chart in (sharing, planets):
+        plot = chart(Trace(trace.time, {**trace.channels, **alike}, trace.meta), own, Window(0.02, 0.2, "here"))
+        assert isinstance(plot.picture, Chart)
+        limits = [panel.limits or (0.0, 0.0) for panel in plot.picture.panels if "share" in panel.label]
+        assert limits and all(high - low == pytest.approx(LEAST_SPAN) for low, high in limits)
 
 
 def test_spectrum_of_the_ring_is_that_of_its_force_as_recorded() -> None:

@@ -1,0 +1,97 @@
+"""Plans of a train and of a planetary set, on bodies that are made without finite elements."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import gearfmu as gf
+from gearfmu.planning.book import Plan
+from gearfmu.planning.choice import FULL, FULL_STEP_OF_SETS
+from gearfmu.planning.make import Job, make
+from gearfmu.planning.request import request
+from gearfmu.planning.table import plan_text
+from gearfmu.spec.scene import load_scene
+from gearfmu.spec.shapes import gear_shape
+from gearfmu.spec.stage import load_stage
+from gearfmu.stage import StageModel, assemble
+from gearfmu.sweeps.runners import in_this_process
+
+sys.path += [str(Path(__file__).resolve().parents[1] / room) for room in ("fmu", "stage")]
+
+from rigid_set import RigidSet  # noqa: E402
+from small_stage import body  # noqa: E402
+
+SCENE = """
+name = "loaded"
+description = "constant load"
+duration = "8 ms"
+settle = "2 ms"
+[stage]
+name = "{stage}"
+level = "fast"
+slices = 1
+[coupling]
+step = "20 us"
+"""
+TRAIN = """
+[start]
+pinion_speed = "6000 rpm"
+[test_rig]
+torque = "100 N*m"
+"""
+SET = """
+[start]
+input_speed = "100 rad/s"
+[shaft_loads.carrier]
+constant = "600 N*m"
+[shaft_loads.sun]
+proportional = {{ torque = "-130 N*m", speed = "461.54 rad/s" }}
+"""
+
+
+def planned(text: str, stage: str, model: StageModel, folder: Path) -> Plan:
+    """A plan of the model in this scene, for 1 dB of the transmission error."""
+    path = folder / "loaded.toml"
+    path.write_text((SCENE + text).format(stage=stage), encoding="utf-8")
+    scene = load_scene(str(path))
+    asked = request(scene, model, ["te"], ("2 kHz", "5 kHz"), "1 dB")
+    return make(Job(scene, model, asked, in_this_process), "loaded")
+
+
+def is_cheaper_and_within_the_budget(plan: Plan) -> bool:
+    (segment,) = plan.segments
+    told = plan_text(plan)
+    assert "not on this stage" in told and "of processor time" in told
+    return segment.kept and segment.choice.h > FULL_STEP_OF_SETS and segment.choice.level != FULL
+
+
+def small_train() -> StageModel:
+    """two_stage on invented bodies."""
+    spec = load_stage("two_stage")
+    gears = [gear.model_copy(update={"modal_damping": 0.1}) for gear in spec.gears]
+    return assemble(spec, [body(gear, gear_shape(gear)) for gear in gears])
+
+
+def test_a_train_is_planned(tmp_path: Path) -> None:
+    plan = planned(TRAIN, "two_stage", small_train(), tmp_path)
+    assert is_cheaper_and_within_the_budget(plan)
+    assert plan.request["outputs"] == ["stage1.te", "stage2.te"]
+
+
+def test_a_planetary_set_is_planned(tmp_path: Path) -> None:
+    small = RigidSet(3, contact_ratio=1.4, damping_ratio=0.1, contact_damping=2e3)
+    plan = planned(SET, "planetary54", small.model(), tmp_path)
+    assert is_cheaper_and_within_the_budget(plan)
+    assert {line.effect: line for line in plan.segments[0].lines}["tip_contact"].verdict == "on"
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("scene", ["planetary_paper", "train_runup"])
+def test_a_shipped_scene_is_planned_in_python(scene: str) -> None:
+    found = gf.plan(
+        load_scene(scene, {"duration": "40 ms", "settle": "10 ms"}), ["te"], ("1 kHz", "5 kHz"), "1 dB", fresh=True
+    )
+    assert all(segment.kept for segment in found.segments)
