@@ -20,7 +20,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 STUDY, SETS, BODIES = (f"benchmarks/study/{name}.csv" for name in ("study", "sets", "bodies"))
-WAYS = "benchmarks/set_ways.csv"
+WAYS, HARNESS = "benchmarks/set_ways.csv", "benchmarks/harness.csv"
 KERNEL, IN_TIME, FRF = "benchmarks/in_time/kernel.csv", "benchmarks/in_time/errors.csv", "benchmarks/frf_{}.csv"
 METHODS = {"modal": "modal truncation", "craig_bampton": "Craig–Bampton", "rubin": "Rubin / MacNeal"}
 METHODS |= {"krylov": "block Krylov"}
@@ -132,6 +132,16 @@ def of_sets() -> Iterator[Quote]:
         yield Quote(f"gearfmu/scenes/{scene.name}", said, tuple(cells))
 
 
+def of_coupling() -> Iterator[Quote]:
+    """What a communication step costs beside the stage's."""
+    parts = {"the unit: set, step without kernel, get, record": "unit_us"}
+    parts |= {"the drivetrain: motion ahead, step (engine orders, tyre, road)": "drivetrain_us"}
+    parts |= {"signals": "signals_us", "making the trace afterwards": "trace_us"}
+    for shown, column in parts.items():
+        cells = tuple((HARNESS, {"unit": unit, "channels": "76"}, column) for unit in ("fmu", "kernel"))
+        yield Quote("docs/coupling.md", f"| {shown} | # µs | # µs |", cells)
+
+
 def of_reduction() -> Iterator[Quote]:
     """Reduction methods over frequency and in time."""
     page = "docs/reduction.md"
@@ -160,7 +170,7 @@ def of_reduction() -> Iterator[Quote]:
     yield Quote(page, "largest error #, # and #.", tuple(cells))
 
 
-QUOTES = [*of_pairs(), *of_sets(), *of_reduction()]
+QUOTES = [*of_pairs(), *of_sets(), *of_coupling(), *of_reduction()]
 
 
 @cache
