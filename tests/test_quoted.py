@@ -59,6 +59,8 @@ def of_pairs() -> Iterator[Quote]:
     """What accuracy costs, pairs."""
     loaded = "A second of the loaded pair takes # s at # % error in transmission error and # % in mesh force"
     yield Quote("README.md", loaded, ((STUDY, pair("fast", "1e-05"), "realtime_factor te_error% force_error%"),))
+    slices = [(STUDY, pair("fast", "6.66667e-06") | {"slices": count}, "cpu_ratio") for count in ("1", "10")]
+    yield Quote("docs/study.md", "One slice costs # of five, ten # times as much", tuple(slices))
     dear = "for # s (pair) to some # s (planetary set) of processor time a second"
     price = ((STUDY, pair("fast", "1e-05"), "realtime_factor"), (SETS, planets(), "realtime_factor"))
     yield Quote("README.md", dear, price, 0.15)
