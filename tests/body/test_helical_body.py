@@ -140,7 +140,7 @@ def test_verbs_about_bodies_take_a_helical_stage(made: SimpleNamespace, tmp_path
     code, out, _ = call("modes", made.path, "--body", "pinion", "--count", 4, "--out", tmp_path, capsys=capsys)
     assert code == 0 and "torsion" in out or "lobes" in out
     code, out, _ = call(
-        "frf", made.path, "pinion", "--methods", "modal", "--size", 20, "--lines", 8, "--scale", 1, "--out", tmp_path,
+        "frf", made.path, "pinion", "--methods", "modal", "--size", 20, "--lines", 8, "--scale", 0.5, "--out", tmp_path,
         capsys=capsys,
     )  # fmt: skip
     assert code == 0 and "modal" in out
