@@ -61,7 +61,8 @@ def is_cheaper_and_within_the_budget(plan: Plan) -> bool:
     (segment,) = plan.segments
     told = plan_text(plan)
     assert "not on this stage" in told and "of processor time" in told
-    return segment.kept and segment.choice.h > FULL_STEP_OF_SETS and segment.choice.level != FULL
+    fewer = segment.choice.level != FULL or segment.choice.slices < 5
+    return segment.kept and segment.choice.h > FULL_STEP_OF_SETS and fewer
 
 
 def small_train() -> StageModel:
