@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 STAGE, TORQUE, SPEED = "fzg_c/stage_relief", 302.0, 209.44
@@ -27,9 +28,15 @@ LEVELS = {"rigid": 0.0, "fast": 1.0, "standard": 2.0, "full": 3.0}
 H, STEP, WARM, PERIOD, TIMED = 50e-6, 5e-6, 10, 38, 100  # communication steps, of one mesh period too; periods timed
 
 
+def stored_bodies(spec: Any) -> Any:
+    """The bodies of a stage, by the package that this process imports: earlier commits have another name for it."""
+    from gearfmu import body
+
+    return (body.load_stage_bodies if hasattr(body, "load_stage_bodies") else body.load_bodies)(spec)
+
+
 def write(folder: Path, level: float) -> None:
     """Blob, library and arguments of the host program, by the package that this process imports."""
-    from gearfmu.body import load_bodies
     from gearfmu.kernel.build import build_library
     from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
@@ -37,7 +44,7 @@ def write(folder: Path, level: float) -> None:
     build_library()  # where this package looks for it
     build_library(out=folder / "kernel.so")
     spec = load_stage(STAGE)
-    model = assemble(spec, load_bodies(spec))
+    model = assemble(spec, stored_bodies(spec))
     (folder / "blob").write_bytes(model.blob)
     known, drive = model.kernel().variables, Steady(model, SPEED, TORQUE)
     start, next_one = drive(0.0), drive(H)
@@ -48,13 +55,12 @@ def write(folder: Path, level: float) -> None:
 
 def least(folder: Path, level: float) -> float:
     """Time (s) of an internal step in the quickest of `TIMED` mesh periods, by the package of this process."""
-    from gearfmu.body import load_bodies
     from gearfmu.kernel import Kernel
     from gearfmu.spec.stage import load_stage
     from gearfmu.stage import Steady, assemble
 
     spec = load_stage(STAGE)
-    model = assemble(spec, load_bodies(spec))
+    model = assemble(spec, stored_bodies(spec))
     drive = Steady(model, SPEED, TORQUE)
     kernel = Kernel(model.blob, {"level": level, "h": STEP, "slices": 5.0}, folder / "kernel.so")
     best, inputs = float("inf"), [drive(k * H) for k in range(PERIOD * TIMED)]

@@ -22,7 +22,7 @@ from gearfmu.reduction.memory import Need
 from gearfmu.spec.body import body_hash, body_inputs
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.library import model_folder
-from gearfmu.spec.members import body_names, members
+from gearfmu.spec.members import CARRIER, body_names, members
 from gearfmu.spec.pair import StageSpec
 from gearfmu.spec.planetary import PlanetarySpec
 
@@ -128,7 +128,7 @@ def body_needs(spec: Stage) -> dict[str, Need]:
     them. Raises MeshError."""
     own_carrier = isinstance(spec, PlanetarySpec) and spec.carrier.imported is None
     needs = {name: work.need for name, work in _works(spec, body_names(spec)).items()}
-    return needs | ({"carrier": carrier_need(spec)} if own_carrier else {})
+    return needs | ({CARRIER: carrier_need(spec)} if own_carrier else {})
 
 
 def _works(spec: Stage, names: Sequence[str]) -> dict[str, Work]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh, sector_mesh
-from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.geometry.carrier import CarrierGeometry
+from gearfmu.reduction.carrier import scaled_sector
 from gearfmu.spec.general import GeneralStage
 from gearfmu.spec.members import members
 from gearfmu.spec.pair import StageSpec
@@ -30,10 +29,9 @@ def body_sector(spec: StageSpec | GeneralStage | PlanetarySpec, name: str, scale
 
 
 def _carrier_sector(spec: PlanetarySpec, scale: float) -> FeMesh:
-    own = spec.carrier.mesh
     if spec.carrier.imported is not None:
         raise BodyError(
             f"{spec.carrier.imported.file}: an imported carrier is taken as a whole and has no sector: use the "
             "pictures of your own finite-element program"
         )
-    return carrier_sector(CarrierGeometry.of(spec), own.model_copy(update={"scale": own.scale * scale}))
+    return scaled_sector(spec, scale)

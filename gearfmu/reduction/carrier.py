@@ -28,7 +28,7 @@ def carrier_full_order(spec: Any, scale: float = 1.0) -> FullOrder:
     """
     if spec.carrier.imported is not None:
         return imported_carrier(spec).full
-    geometry, sector = CarrierGeometry.of(spec), _sector(spec, scale)
+    geometry, sector = CarrierGeometry.of(spec), scaled_sector(spec, scale)
     full = full_order("carrier", *_whole_elements(spec, sector), Judgement(("bore",), geometry.a))
     return replace(full, parts=_equal_parts(full, sector)) if cyclic_carrier(spec) else full
 
@@ -56,10 +56,11 @@ def cyclic_carrier(spec: Any) -> bool:
 
 def carrier_elements(spec: Any, scale: float = 1.0) -> tuple[Elements, list[Coupling]]:
     """Finite elements of the carrier as the file describes it, and the couplings of its bolts and bore."""
-    return _whole_elements(spec, _sector(spec, scale))
+    return _whole_elements(spec, scaled_sector(spec, scale))
 
 
-def _sector(spec: Any, scale: float) -> FeMesh:
+def scaled_sector(spec: Any, scale: float) -> FeMesh:
+    """One bolt's sector of the carrier of a PlanetarySpec. scale : factor on all element counts."""
     counts = spec.carrier.mesh
     return carrier_sector(CarrierGeometry.of(spec), counts.model_copy(update={"scale": counts.scale * scale}))
 

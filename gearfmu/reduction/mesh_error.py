@@ -9,9 +9,7 @@ import numpy as np
 from gearfmu.fem import hex20
 from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
-from gearfmu.femesh.carrier import carrier_sector
-from gearfmu.geometry.carrier import CarrierGeometry
-from gearfmu.reduction.carrier import FINER, carrier_full_order, cyclic_carrier
+from gearfmu.reduction.carrier import FINER, carrier_full_order, cyclic_carrier, scaled_sector
 from gearfmu.reduction.elastic import Elastic
 
 COMPARED = 20  # lowest elastic modes
@@ -45,9 +43,7 @@ def free_frequencies(spec: Any, scale: float, count: int) -> np.ndarray:
 def _space(spec: Any, scale: float) -> SectorSpace:
     """The fields of one bolt's sector."""
     carrier = spec.carrier
-    mesh = carrier_sector(
-        CarrierGeometry.of(spec), carrier.mesh.model_copy(update={"scale": carrier.mesh.scale * scale})
-    )
+    mesh = scaled_sector(spec, scale)
     matrices = hex20.assemble(mesh.nodes, mesh.elements, carrier.material)
     bore = mesh.sets["bore"] if carrier.coupling_of("bore") == "rigid" else None
     bolt = mesh.sets["bolt"] if carrier.coupling_of("bolt0") == "rigid" else None
