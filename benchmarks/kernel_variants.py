@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
-from gearfmu.kernel.build import FLAGS, HERE, build_library, fmi_headers
+from gearfmu.kernel.build import FLAGS, HERE, PORTABLE, build_library, fmi_headers
 
 WITHOUT_ETA = {r"\bBALANCE = 1e-\d+": "BALANCE = 1e30", r"STEADY_BALANCE = 1e-\d+": "STEADY_BALANCE = 1e30"}
 LOOSE_SOLVER = {r"\bSOLVED = 1e-\d+": "SOLVED = 1e-5"}
@@ -43,6 +43,7 @@ def variant(folder: Path, name: str, edits: Mapping[str, str]) -> Path:
         "cc",
         *FLAGS,
         "-O1",  # the same bits in half the time of the compiler
+        PORTABLE,
         "-DGK_DOUBLE_MODES",
         "-fPIC",
         "-shared",

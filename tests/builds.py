@@ -10,12 +10,12 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from gearfmu.kernel.build import FLAGS, build_library, compile_program, fmi_headers, source_hash, sources
+from gearfmu.kernel.build import FLAGS, PORTABLE, build_library, compile_program, fmi_headers, source_hash, sources
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "build" / "tests"
-O1 = ("cc", "-O1", "-Wl,--no-as-needed", "-lm")  # without -O3 the compiler calls sqrt of libm, which is exact
-SANITIZE = ("-O1", "-g", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+O1 = ("cc", "-O1", PORTABLE, "-Wl,--no-as-needed", "-lm")  # at -O1 sqrt is libm's, which is exact
+SANITIZE = ("-O1", "-g1", "-fno-omit-frame-pointer", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 def once(name: str, make: Callable[[Path], object], *own: Path) -> Path:

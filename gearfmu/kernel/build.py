@@ -49,8 +49,8 @@ FLAGS = (
     "-Werror",
 )
 TWIN_FLAGS = ("-O1",)  # of sources that run/gk_wide.c holds once more for AVX2: as fast as -O3 there, in half the time
-WIDE_CHECKED = ("-Og",)  # of run/gk_wide.c with sanitizers: half the time of -O1
-_SANITIZERS = "-fsanitize=address,undefined"
+PORTABLE = "-DGK_PORTABLE"  # without run/gk_wide.c: the same sources once, half the time of the compiler
+_SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 _TWIN = re.compile(r'^#include "(\w+/\w+\.c)"', re.MULTILINE)
 _LINKER = ("-l", "-Wl,")  # flags that no compilation takes
 _EVERY = 5.0  # s between lines of progress
@@ -244,8 +244,6 @@ def _compilations(
     commands = {}
     for path in sorted(files, key=lambda p: (p != wide, -p.stat().st_size)):
         cheap = TWIN_FLAGS if f"{path.parent.name}/{path.name}" in twins else ()
-        if path == wide and _SANITIZERS in line:
-            cheap = WIDE_CHECKED
         target = folder / f"{path.stem}.o"
         commands[target] = [*line, *cheap, *own_flags, "-c", str(path), "-o", str(target)]
     return commands
@@ -297,7 +295,7 @@ def _compilers(name: str, sanitize: bool) -> list[tuple[str, ...]]:
 def _variant_flags(sanitize: bool, pattern: bool, real: str) -> list[str]:
     flags = ["-DGK_DOUBLE_MODES"] if real == "double" else []
     flags += ["-ftrivial-auto-var-init=pattern"] if pattern else []
-    checks = ["-g", "-O1", "-fno-omit-frame-pointer", _SANITIZERS, "-fno-sanitize-recover=all"]
+    checks = [PORTABLE, "-g1", "-O1", "-fno-omit-frame-pointer", *_SANITIZERS]  # -g: twice the time of the compiler
     return flags + (checks if sanitize else [])
 
 

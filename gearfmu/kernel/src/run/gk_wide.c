@@ -1,7 +1,7 @@
 /* The step in wider vectors: the same sources once more as one unit for AVX2, in which functions marked GK_HOT are
  * static. Our own cpuid chooses it (the compilers' dispatch does not link everywhere). Sums have fixed lanes and
- * nothing is contracted, so that both give the same bits. */
-#if defined(__x86_64__) && defined(__GNUC__)
+ * nothing is contracted, so that both give the same bits. Builds of tests leave it out by GK_PORTABLE. */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(GK_PORTABLE)
 #include <cpuid.h>
 #include <math.h>
 #include <stddef.h>
