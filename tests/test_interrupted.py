@@ -41,9 +41,10 @@ def left_over(folder: Path) -> list[str]:
 
 
 SLOW = pytest.param("study", marks=pytest.mark.full)
+OVER = ["--over", "torque=10:300:200 N*m", "--over", "positions=4"]
 WORK = {  # verb with its arguments, and the file or line that shows that it is at work
     "reduce": (["reduce", "tiny"], ""),
-    "sweep": (["sweep", "fzg_c", "--over", "torque=10:300:200 N*m", "--over", "positions=4", "--jobs", "1", "--out", "out"], "points.jsonl"),
+    "sweep": (["sweep", "fzg_c", *OVER, "--jobs", "1", "--out", "out"], "points.jsonl"),
     "study": (["study", "pair_loaded", "--quick", "--out", "out"], "study.csv"),
 }
 

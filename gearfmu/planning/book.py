@@ -23,8 +23,8 @@ HEAD = """# Made by `gearfmu plan`: what each segment of a scene is run with for
 @dataclass(frozen=True)
 class Line:
     """One effect of a segment. verdict: "on", "off", a level, a step, a number of slices; by: policy, formula or
-    measured; formula: predicted error of the knob as far down as it goes, budgets; error: what one step
-    down changes, measured; share: of the cost of a step. NaN: not known."""
+    measured; formula: predicted error of the knob as far down as it goes, budgets; error: what one step down changes,
+    measured; share: of the price, measured on this stage, that the same step down saves. NaN: not known."""
 
     effect: str
     verdict: str

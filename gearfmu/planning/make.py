@@ -27,11 +27,6 @@ LONGER = 4  # windows that the chosen set is run alone for, to see slow growth
 LONGEST_ALONE = 0.4  # s of that
 GROWTH = 0.5  # of the budget (of 1 dB where none is given in dB) over these windows
 RETRIES = 3
-COUNTED_ON = "fzg_c"
-COUNTED = (
-    "shares of a step were counted on fzg_c and planetary54, not on this stage: they order the trials and keep effects "
-    f"below {100 * LEAST_SHARE:g} %; prices are measured on this stage"
-)
 Tell = Callable[[str], None]
 
 
@@ -69,8 +64,7 @@ def make(job: Job, name: str) -> Plan:
         segments.append(made.segment())
         cpu, unit = cpu + made.bench.cpu, unit + made.bench.full.run
     asked, step = job.request.plain, job.scene.coupling.step
-    notes = () if job.model.name.startswith(COUNTED_ON) else (COUNTED,)
-    return Plan(name, job.identity, step, asked, tuple(segments), cpu / unit, cpu, notes, job.model.hash)
+    return Plan(name, job.identity, step, asked, tuple(segments), cpu / unit, cpu, (), job.model.hash)
 
 
 class _Made:
@@ -218,20 +212,25 @@ class _Made:
         chosen, lower = found.chosen, found.refused.get(knob.name)
         verdict = _verdict(knob, chosen.choice)
         formula = predicted(knob, self.space.cheapest(knob.name), known) if not _by_nature(knob) else math.nan
-        alone = math.nan if pair is None else self._between(*pair)
+        alone, saved = (math.nan, math.nan) if pair is None else (self._between(*pair), _saved(*pair))
         if knob.kept:
-            return Line(knob.name, verdict, "policy", knob.kept, formula, alone, knob.share)
+            return Line(knob.name, verdict, "policy", knob.kept, formula, alone, saved)
         if lower is None:
             reason = f"the set without it is {chosen.bound:.2g} budgets"
         elif lower.bound > most:
             reason = f"{_step_down(knob, lower.choice)} makes the set {lower.bound:.2g} budgets, {most:.2g} is allowed"
         else:
             reason = f"{_step_down(knob, lower.choice)} saves nothing"
-        return Line(knob.name, verdict, "measured", reason, formula, alone, knob.share)
+        return Line(knob.name, verdict, "measured", reason, formula, alone, saved)
 
     def _between(self, lower: Measured, richer: Measured) -> float:
         """Distance of two runs, budgets."""
         return error(lower.trial.signals, richer.trial.signals, self.job.request).whole
+
+
+def _saved(lower: Measured, richer: Measured) -> float:
+    """Share of the richer set's price that the step down saves on this stage."""
+    return 1.0 - lower.price / richer.price
 
 
 def _by_nature(knob: Knob) -> bool:

@@ -1,4 +1,4 @@
-"""A plan on the terminal: effect, error if it is dropped, share of the time, verdict."""
+"""A plan on the terminal: effect, error if it is dropped, share of the time that this saves, verdict."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from gearfmu.planning.book import Line, Plan, Segment
 
-HEADER = ("effect", "error if dropped", "by formula", "share of a step", "verdict", "why")
+HEADER = ("effect", "error if dropped", "by formula", "saves", "verdict", "why")
 
 
 def plan_text(plan: Plan) -> str:
@@ -38,7 +38,7 @@ def _segment_text(segment: Segment) -> Iterator[str]:
 
 def cells(line: Line) -> tuple[str, ...]:
     """The cells of one effect."""
-    share = "" if math.isnan(line.share) else f"{100 * line.share:.1f} %"
+    share = "" if math.isnan(line.share) else f"{100 * line.share:.0f} %"
     return line.effect, number(line.error), number(line.formula), share, line.verdict, f"{line.by}: {line.reason}"
 
 

@@ -14,7 +14,7 @@ from gearfmu.report.style import COLOURS, panels, png, styled
 LEAST = 1e-3  # budgets: the smallest error on the chart
 MOST_SHOWN = 4.0  # budgets: the longest bar
 TICKS = tuple(digit * 10.0**power for power in range(-3, 4) for digit in (1, 2, 5))
-HEADER = ("effect", "error if dropped, budgets", "share of a step", "verdict", "why")
+HEADER = ("effect", "error if dropped, budgets", "saves", "verdict", "why")
 
 
 def plan_sections(plan: Mapping[str, Any] | None) -> list[str]:
@@ -51,7 +51,7 @@ def asked(request: Mapping[str, Any]) -> str:
 
 
 def _row(line: Mapping[str, Any]) -> tuple[str, ...]:
-    share = "" if line["share"] is None or line["share"] < 0 else f"{100 * line['share']:.1f} %"
+    share = "" if line["share"] is None or line["share"] < 0 else f"{100 * line['share']:.0f} %"
     return line["effect"], _number(line["error"]), share, line["verdict"], f"{line['by']}: {line['reason']}"
 
 
@@ -114,7 +114,7 @@ def _precision(panel: Any, segment: Mapping[str, Any]) -> None:
 
 
 def _bars(left: Any, right: Any, lines: Sequence[Mapping[str, Any]]) -> None:
-    """Errors, and shares of a step, of what was a choice."""
+    """Errors, and savings, of what was a choice."""
     known = [line for line in lines if line["error"] is not None or line["effect"] in ("modes", "slices", "step")]
     places = list(range(len(known)))
     error = [min(line["error"] or 0.0, MOST_SHOWN) for line in known]
@@ -126,6 +126,6 @@ def _bars(left: Any, right: Any, lines: Sequence[Mapping[str, Any]]) -> None:
     right.barh(places, share, 0.6, color="#9aa0a6")
     right.set_yticks(places, [""] * len(places))
     right.set_xlim(0.0, 100.0)
-    right.set_xlabel("share of a step, %")
+    right.set_xlabel("saves, % of the price")
     for panel in (left, right):
         panel.invert_yaxis()

@@ -11,7 +11,7 @@ import numpy as np
 from gearfmu.report import metrics
 from gearfmu.report.chart import Chart, Curve, Mark, Panel, Plot, level_limits, over_time
 from gearfmu.report.names import mesh_words
-from gearfmu.report.plots import channels, columns
+from gearfmu.report.plots import RPM, channels, columns
 from gearfmu.report.plots_nvh import SHOWN_TO, segment, spectrum_curve
 from gearfmu.report.signals import GEAR_SPEED, Window, noise_floor
 from gearfmu.spec.turning import Meshing
@@ -49,17 +49,19 @@ def planet_set(trace: Trace, known: Mapping[str, Meshing]) -> PlanetSet | None:
 
 
 def speeds(trace: Trace, own: PlanetSet) -> Plot | None:
-    """Speeds of carrier, planets and central gears in rad/s, with their signs."""
+    """Speeds of carrier, planets and central gears in rpm, with their signs."""
     groups = [[own.carrier], own.planets, [name for name in own.meshes if name]]
     shown = [[f"{name}{GEAR_SPEED}" for name in group if f"{name}{GEAR_SPEED}" in trace] for group in groups]
     shown = [[name for name in group if np.any(trace[name])] for group in shown]
     rows = [group for group in shown if group]
     if not rows:
         return None
-    panels = [Panel("speed in rad/s", channels(trace, names), height=150) for names in rows]
-    means = ", ".join(f"{n.removesuffix(GEAR_SPEED)} {np.mean(trace[n]):.2f}" for group in rows for n in group)
+    curves = [[Curve(trace.time, trace[name] * RPM, name, "rpm") for name in group] for group in rows]
+    panels = [Panel("speed in rpm", tuple(group), height=150) for group in curves]
     names = [name for group in rows for name in group]
-    return Plot("set_speed", "Speeds", f"Mean in rad/s: {means}.", over_time(panels), columns(trace, names))
+    means = ", ".join(f"{n.removesuffix(GEAR_SPEED)} {np.mean(trace[n]) * RPM:.1f}" for n in names)
+    told = f"Mean in rpm: {means}; the data are in rad/s."
+    return Plot("set_speed", "Speeds", told, over_time(panels), columns(trace, names))
 
 
 def forces(trace: Trace, own: PlanetSet, window: tuple[float, float] | None = None) -> Plot:

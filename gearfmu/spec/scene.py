@@ -10,12 +10,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, Field
 
-from gearfmu.errors import Problem, SpecError
+from gearfmu.errors import Problem, SpecError, near_or_all
 from gearfmu.spec.base import Count, Name, Quantity, Spec, Switch, Text, Whole, read_toml, validate
 from gearfmu.spec.changes import Changes, changed_tables
 from gearfmu.spec.deformation import DeformationChoice, deformation_problems
 from gearfmu.spec.drivetrain import PassengerCar, TestRig
 from gearfmu.spec.layers import merged_tables
+from gearfmu.spec.library import shipped_stages
 from gearfmu.spec.parts import ClutchSpec, Drivetrain, drivetrain_problems
 from gearfmu.spec.shaft_loads import ShaftLoad, load_problems, time_problems
 
@@ -170,22 +171,18 @@ def full_key(tables: Mapping[str, Any], key: str, file: str) -> str:
 
 
 def scene_path(path_or_name: str | Path) -> Path:
-    """File of a scene. SpecError when there is none."""
+    """File of a scene. SpecError when there is none, or a stage."""
     given, shipped = Path(path_or_name), SHIPPED / f"{path_or_name}.toml"
-    if given.is_file():
+    if given.is_file() and not {"kind", "base"} & set(read_toml(given)):
         return given
-    if str(path_or_name) in shipped_scenes():
+    if not given.exists() and str(path_or_name) in shipped_scenes():
         return shipped
-    raise SpecError(
-        [
-            Problem(
-                str(path_or_name),
-                "",
-                "",
-                f"no such file and no shipped scene; shipped are {', '.join(shipped_scenes())}",
-            )
-        ]
-    )
+    file = str(path_or_name)
+    if given.exists() or file in shipped_stages():
+        remedy = "this is a stage: name it in a scene under [stage] (docs/howto-scene.md), or use the verb simulate"
+        raise SpecError([Problem(file, "", "", remedy)])
+    hint = near_or_all(file, shipped_scenes(), "shipped are", cutoff=0.6)
+    raise SpecError([Problem(file, "", "", f"no such file and no shipped scene: {hint}")])
 
 
 def _problems(scene: SceneSpec, file: str) -> Iterator[Problem]:

@@ -34,6 +34,17 @@ def test_shipped_scenes():
         assert (scene.stage.level, scene.stage.slices) == (level, 7 if train else 5)
 
 
+@pytest.mark.parametrize("stage", ["fzg_c", "reduced_models/planetary54", "reduced_models/fzg_c/stage_relief.toml"])
+def test_a_stage_is_no_scene_and_says_so(stage):
+    with pytest.raises(SpecError, match=r"this is a stage: name it in a scene under \[stage\]"):
+        load_scene(stage)
+
+
+def test_a_misspelt_scene_is_asked_about():
+    with pytest.raises(SpecError, match='did you mean "pair_loaded"'):
+        load_scene("pair_loded")
+
+
 def test_clutch_closure_is_the_demo():
     scene = load_scene("clutch_closure")
     assert (scene.start.slip, scene.duration, scene.coupling.step, scene.coupling.master) == (
@@ -172,4 +183,4 @@ def test_whatever_stands_in_a_field_it_loads_or_lists_problems(tmp_path, name):
 
 def test_unknown_scene_names_the_shipped_ones():
     with pytest.raises(SpecError, match="clutch_closure, clutch_closure_train, clutch_dump"):
-        load_scene("clutch_clousre")
+        load_scene("nothing")

@@ -92,7 +92,8 @@ def test_damaged_model_is_refused_by_the_binary(members, tmp_path):
 
 @pytest.mark.needs("gcc")
 def test_leaked_symbols_are_found(members, tmp_path):
-    leaky = build_library(out=tmp_path / "leaky.so", compiler=("gcc", "-O0", PORTABLE, "-Wl,--defsym=leaked=fmi2GetVersion"))
+    one_more = ("gcc", "-O0", PORTABLE, "-Wl,--defsym=leaked=fmi2GetVersion")
+    leaky = build_library(out=tmp_path / "leaky.so", compiler=one_more)
     problems = findings(members, {binary_of(members): leaky.read_bytes()}, tmp_path)
     assert [problem.value for problem in problems] == ["leaked is exported"]
 
