@@ -28,7 +28,10 @@ LIMITS = {  # largest torque (N·m) and speed (rad/s) of the input
     "planetary54": (600.0, 300.0),
     "helical_set": (600.0, 150.0),
 }
-ENERGY, CUT_SHORT = 1e-4, 1e-3  # left by the balance; by pairs whose force ends with their flanks: sets, tip contact off
+ENERGY, CUT_SHORT = (
+    1e-4,
+    1e-3,
+)  # left by the balance; by pairs whose force ends with their flanks: sets, tip contact off
 DURATION = {PAIRS: 10e-3, TRAINS: 4e-3, SETS: 2e-3}  # s
 SWITCHES = ("hertz", "coast_flank", "contact_damping", "tip_relief", "tip_contact", "bearings", "modal_damping")
 OUTER = {"ports.carrier.kind": "spring", "ports.carrier.k": 5e4, "ports.carrier.c": 10.0}
@@ -76,7 +79,10 @@ def ranged(key: str, low: float, high: float) -> Field:
 def flanks(gear: str) -> list[Field]:
     """What may be drawn of a gear's flanks."""
     return [
-        lambda dice: {f"{gear}.deviations.class": dice.one(*range(4, 12)), f"{gear}.deviations.seed": dice.one(1, 2, 3)},
+        lambda dice: {
+            f"{gear}.deviations.class": dice.one(*range(4, 12)),
+            f"{gear}.deviations.seed": dice.one(1, 2, 3),
+        },
         ranged(f"{gear}.eccentricity.amount", 0.0, 60e-6),
         ranged(f"{gear}.modal_damping", 2e-3, 0.1),
     ]
