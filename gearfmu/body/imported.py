@@ -42,7 +42,7 @@ from gearfmu.reduction.modal import Progress, elastic_modes
 from gearfmu.reduction.statics import Statics, static_tables
 from gearfmu.spec.general import RingBody
 from gearfmu.spec.imported import ImportSpec, RingImportSpec
-from gearfmu.spec.members import Member
+from gearfmu.spec.members import Form, Member, carrier_of
 
 
 def check_gear(member: Member) -> CheckedGear:
@@ -93,16 +93,17 @@ def imported_sector_mesh(member: Member) -> FeMesh:
     return FeMesh(cut.nodes, cut.elements["hexahedron20"], sets, member.geometry.z, cut.cut_minus, cut.cut_plus)
 
 
-def imported_carrier_order(spec: Any) -> tuple[FullOrder, dict[str, Any]]:
-    """The imported carrier of a PlanetarySpec before reduction, known to be one solid, and plain facts. MeshError."""
-    found = imported_carrier(spec)
+def imported_carrier_order(spec: Form) -> tuple[FullOrder, dict[str, Any]]:
+    """The imported carrier of a planetary set before reduction, known to be one solid, and plain facts. MeshError."""
+    found, source = imported_carrier(spec), carrier_of(spec).part.imported
+    assert source is not None
     problem, space = None, elastic(found.full)
     try:
         problem = hinge_problem(space, float(space.modes(1)[0][0]))
     except (FactorError, ModesError) as error:
         problem = f"the stiffness matrix cannot be factorised ({error}): it is not of one free solid body"
     if problem:
-        raise MeshError(f"{spec.carrier.imported.file}: {problem}")
+        raise MeshError(f"{source.file}: {problem}")
     return found.full, found.facts
 
 

@@ -101,7 +101,6 @@ def _numbers(stage: str) -> dict[str, str]:
     """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
-    from gearfmu.spec.planetary import PlanetarySpec
     from gearfmu.spec.shapes import gear_shape
     from gearfmu.stage.effects import torque_on_flanks_alone
     from gearfmu.stage.flanks import FlankField
@@ -110,9 +109,9 @@ def _numbers(stage: str) -> dict[str, str]:
     model = model_of(stage)
     spec = model.stage
     meshes, gears, turning = spec.engagements, spec.gears, "no carrier: it costs nothing"
-    if isinstance(model.spec, PlanetarySpec):
-        meshes = meshes[:: model.spec.set.planets]
-        turning = f"up to {model.spec.speed_max:g} rad/s of the carrier"
+    if spec.carriers:
+        meshes = meshes[:: len(meshes) // 2]
+        turning = f"up to {model.spec.limits[1][0]:g} rad/s of the carrier"
     stored, modes = _modes(model)
     widths = [min(g.face_width for g in gears if g.name in mesh.gears) for mesh in meshes]
     alone = [torque_on_flanks_alone(model, mesh.name) for mesh in meshes]

@@ -106,8 +106,8 @@ def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrde
         return carrier_full_order(spec, **factor)
     if imported is not None:
         return imported_full_order(toothed[body])
-    if body == "ring" and spec.kind == "planetary_set":
-        return ring_full_order(spec, **factor)
+    if toothed[body].gear.kind == "ring":
+        return ring_full_order(spec, name=body, **factor)
     return gear_full_order(spec, body, **factor)
 
 

@@ -131,14 +131,16 @@ def table(body: Any) -> list[str]:
 
 def _shapes(stage: str, name: str, count: int, how: tuple[bool, bool]) -> BodyModes:
     """how: the ring on its mounts, the carrier without couplings."""
+    from gearfmu.spec.members import CARRIER, carriers
     from gearfmu.spec.stage import load_stage
 
     spec, (mounted, uncoupled) = load_stage(stage), how
-    if uncoupled and (spec.kind != "planetary_set" or name != "carrier"):
+    of_set = bool(carriers(spec))
+    if uncoupled and not (of_set and name == CARRIER):
         raise click.BadParameter("only the carrier of a planetary set has couplings", param_hint="--uncoupled")
-    if mounted and (spec.kind != "planetary_set" or name != "ring"):
+    if mounted and not (of_set and name == "ring"):
         raise click.BadParameter("only the ring of a planetary set has mounts", param_hint="--mounted")
-    if spec.kind == "planetary_set":
+    if of_set:
         return _of_set(spec, name, count, how)
     names = [gear.name for gear in spec.gears]
     _check(name, names)

@@ -43,12 +43,13 @@ def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bo
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices; of a planetary set also
     over the number of planets and single effects (sets.csv)."""
     from gearfmu.commands.models import bodies_for_motion
+    from gearfmu.spec.members import carriers
     from gearfmu.spec.scene import load_scene
     from gearfmu.spec.stage import load_stage, require_pair
 
     specs = [load_scene(scene) for scene in scenes]
     stages = {spec.stage.name: load_stage(spec.stage.name) for spec in specs}
-    sets = {name for name, stage in stages.items() if stage.kind == "planetary_set"}
+    sets = {name for name, stage in stages.items() if carriers(stage)}
     if sets and set(tables) != {"errors"}:
         raise click.UsageError(f"{', '.join(sorted(sets))} is a planetary set: it has the table errors alone")
     for name, stage in stages.items():

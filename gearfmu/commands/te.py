@@ -60,7 +60,7 @@ def te(stage: str, torques: tuple[float, ...], bore: str | None, out: Path, **wh
 
     The torque acts on the input, the first port: a pair's pinion. The output is the second port."""
     model = model_of(stage, bores=bore)
-    if model.spec.kind == "planetary_set":
+    if model.stage.carriers:
         return _of_set(model, list(torques), out, **where)
     from gearfmu.report.te import write_plot
     from gearfmu.stage import loaded_te

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
 from gearfmu.stage.effects import EFFECTS, Effect, costs
@@ -118,7 +117,7 @@ def space(scene: SceneSpec, model: StageModel, least_share: float = LEAST_SHARE,
     """What may be chosen for a scene. Effects that the scene switches off stay off; of the others the table of effects
     says which are kept. least_share: effects that cost less stay on, but those of `force`."""
     step = scene.coupling.step
-    finest = FULL_STEP_OF_SETS if isinstance(model.spec, PlanetarySpec) else FULL_STEP
+    finest = FULL_STEP_OF_SETS if model.stage.carriers else FULL_STEP
     steps = sorted({fitting(step, h) for h in (*STEPS, finest) if h >= finest})
     own = scene.stage.slices
     slices = tuple(sorted({n for n in SLICES if n < own} | {own}))

@@ -21,6 +21,7 @@ from gearfmu.reduction.full_order import FullOrder
 from gearfmu.reduction.imported import Matrices, SetInterface, set_coupling
 from gearfmu.reduction.imported_files import mesh_facts, naming, ready_matrices, sound_mesh
 from gearfmu.reduction.memory import CARRIER_FACTORS, MESH_COARSER, require_memory, whole_need
+from gearfmu.spec.members import Form, carrier_of
 
 _OFF = 2e-3  # of the bolt circle's radius: how far an axis may lie from where the stage file has it
 
@@ -33,13 +34,15 @@ class ImportedCarrier:
     facts: dict[str, Any]
 
 
-def imported_carrier(spec: Any) -> ImportedCarrier:
-    """The imported carrier of a PlanetarySpec: interfaces bolt0 … and bore, each coupled as the file says.
+def imported_carrier(spec: Form) -> ImportedCarrier:
+    """The imported carrier of a planetary set: interfaces bolt0 … and bore, each coupled as the file says.
 
     Masters lie on the bolts' axes at z = 0 and on the set's axis in the middle of the bore. MeshError lists every node
     set that does not lie where the set has it, and says what is wrong with mesh or matrices.
     """
-    source, geometry, carrier = spec.carrier.imported, CarrierGeometry.of(spec), spec.carrier
+    geometry, carrier = (member := carrier_of(spec)).geometry, member.part
+    source = carrier.imported
+    assert source is not None
     mesh = sound_mesh(source)
     with naming(Path(source.file)):
         require_memory(whole_need(mesh.nodes.size, 3 * carrier.modes, CARRIER_FACTORS), MESH_COARSER)

@@ -15,7 +15,7 @@ from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.signals import GEAR_PHI, SETTLED, Window
-from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.spec.general import EngagementSpec, Stage
 from gearfmu.stage import assemble
 from gearfmu.stage.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.meshes import EXTERNAL, kind_of, mesh_geometry
@@ -62,7 +62,7 @@ def folded(position: np.ndarray, values: np.ndarray) -> np.ndarray | None:
     return np.bincount(bins, values, BINS) / count if np.all(count) else None
 
 
-def position_of(trace: Trace, stage: GeneralStage, mesh: EngagementSpec) -> np.ndarray | None:
+def position_of(trace: Trace, stage: Stage, mesh: EngagementSpec) -> np.ndarray | None:
     """(n,) pitches by which gear A of an engagement would have turned on without load, from the angle of gear B, in the
     axes of what carries them; None where that was not recorded."""
     rotor, frame = stage.rotor_of(mesh.gears[1]), stage.frame_of(mesh)
@@ -75,7 +75,7 @@ def position_of(trace: Trace, stage: GeneralStage, mesh: EngagementSpec) -> np.n
 
 
 def transmission_error(
-    trace: Trace, window: Window, stage: GeneralStage, names: Sequence[str], loads: Mapping[str, FlankLoads]
+    trace: Trace, window: Window, stage: Stage, names: Sequence[str], loads: Mapping[str, FlankLoads]
 ) -> Plot | None:
     """Transmission error of engagements over the mesh cycle with its harmonics: quasi-static where `loads` has it, and
     of a steady run its mean over all cycles of the window; None without either."""
@@ -118,7 +118,7 @@ def transmission_error(
     return Plot(file, title, f"{caption}{told[:1].upper()}{told[1:]}.", Chart(panels, across=2), data)
 
 
-def contact_pattern(trace: Trace, stage: GeneralStage, mesh: str, loads: FlankLoads) -> Plot:
+def contact_pattern(trace: Trace, stage: Stage, mesh: str, loads: FlankLoads) -> Plot:
     """Force per width on the flanks of both gears of an engagement, and its load over the width in the run where forces
     of slices were recorded."""
     engagement = next(e for e in stage.engagements if e.name == mesh)

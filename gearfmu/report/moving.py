@@ -21,7 +21,7 @@ from gearfmu.report.packed import Pack
 from gearfmu.report.picture import SHOWN_FRACTION, contacts_at, mirrored, round_scale
 from gearfmu.report.signals import GEAR_PHI
 from gearfmu.report.structure import AROUND, parts, turned
-from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.spec.general import EngagementSpec, Stage
 from gearfmu.stage.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.trace import Trace
 
@@ -95,7 +95,7 @@ class View:
 
 
 def moving_view(
-    trace: Trace, stage: GeneralStage, bodies: Mapping[str, Any], window: tuple[float, float],
+    trace: Trace, stage: Stage, bodies: Mapping[str, Any], window: tuple[float, float],
     recorded: Sequence[tuple[DeformedGear, np.ndarray]] = (),
 ) -> View | None:  # fmt: skip
     """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: ReducedBody
@@ -123,7 +123,7 @@ def moving_view(
     return View(time, drawn, scale, most, _close(stage, trace, time), tuple(g.name for g, _ in recorded))
 
 
-def _structure(trace: Trace, stage: GeneralStage, time: np.ndarray) -> list[Body]:
+def _structure(trace: Trace, stage: Stage, time: np.ndarray) -> list[Body]:
     """Shafts and carriers whose angle was recorded."""
     found = []
     for name, rotor, profile, (x, y), z in parts(stage):
@@ -139,7 +139,7 @@ def _structure(trace: Trace, stage: GeneralStage, time: np.ndarray) -> list[Body
     return found
 
 
-def _body(trace: Trace, stage: GeneralStage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Body:
+def _body(trace: Trace, stage: Stage, named: tuple[str, Any], time: np.ndarray, phase: float) -> Body:
     (name, body), rotor = named, stage.rotor_of(named[0])
     display, carrier = body.display, stage.carrier_of(rotor)
     turned = _rotor_angle(trace, stage, rotor)
@@ -159,7 +159,7 @@ def _body(trace: Trace, stage: GeneralStage, named: tuple[str, Any], time: np.nd
     )  # fmt: skip
 
 
-def _rotor_angle(trace: Trace, stage: GeneralStage, rotor: str) -> np.ndarray | None:
+def _rotor_angle(trace: Trace, stage: Stage, rotor: str) -> np.ndarray | None:
     """Angle (n,) rad of a rotor in the fixed axes; a rotor that stands does not turn."""
     if stage.rotors[rotor].stands:
         return np.zeros(trace.time.size)
@@ -181,7 +181,7 @@ def _periodic(points: np.ndarray, quads: np.ndarray, teeth: int) -> bool:
 
 
 def _load(
-    trace: Trace, stage: GeneralStage, mesh: EngagementSpec, gears: tuple[dict[str, Body], Mapping[str, Any]],
+    trace: Trace, stage: Stage, mesh: EngagementSpec, gears: tuple[dict[str, Body], Mapping[str, Any]],
     time: np.ndarray,
 ) -> None:  # fmt: skip
     """Add the tooth pairs in contact of an engagement to its two bodies."""
@@ -204,7 +204,7 @@ def _load(
             body.rolls, body.unit = _unit_loads(bodies[name].display)
 
 
-def _carried(trace: Trace, stage: GeneralStage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
+def _carried(trace: Trace, stage: Stage, mesh: EngagementSpec, time: np.ndarray) -> np.ndarray:
     """Angle (F,) rad of the axes in which an engagement rolls."""
     frame = stage.frame_of(mesh)
     return np.zeros_like(time) if frame is None else np.interp(time, trace.time, trace[f"{frame}{GEAR_PHI}"])
@@ -233,7 +233,7 @@ def _record(body: Body, gear: DeformedGear, times: np.ndarray, window: tuple[flo
     body.contacts, body.unit, body.rolls = {}, None, None
 
 
-def _turn_together(stage: GeneralStage, made: dict[str, Body]) -> None:
+def _turn_together(stage: Stage, made: dict[str, Body]) -> None:
     """Turn of every rotor per unit of enlargement that closes the gaps which the enlarged displacement opens: from the
     last gears B, which stay, back to the input, by equal lengths on the base circles."""
     turned: dict[str, list[np.ndarray]] = {}
@@ -281,7 +281,7 @@ def _largest(body: Body) -> float:
     return max(found, default=0.0)
 
 
-def _close(stage: GeneralStage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _close(stage: Stage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Pitch point of the first engagement, x and y (F,) m, and a radius (m) around it."""
     mesh = stage.engagements[0]
     (x, y), (u, v) = mesh_axes(stage, mesh)

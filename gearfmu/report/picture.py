@@ -15,7 +15,7 @@ from gearfmu.report.chart import Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.scene3d import Shape, draw
 from gearfmu.report.signals import GEAR_PHI
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.general import Stage
 from gearfmu.spec.shapes import MeshShape
 from gearfmu.stage.meshes import mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.trace import Trace
@@ -31,7 +31,7 @@ class Contact:
     rolls: tuple[float, float]
 
 
-def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence[Any]) -> Plot | None:
+def deformed_pair(trace: Trace, stage: Stage, mesh: str, bodies: Sequence[Any]) -> Plot | None:
     """Two gears in mesh at the largest |force| of their engagement: their elastic displacement, enlarged, under that
     force applied statically and split evenly over the tooth pairs in contact. Drawn with gear A at the origin and gear
     B on +x. None without the force or the angle of gear A.
@@ -83,7 +83,7 @@ def deformed_pair(trace: Trace, stage: GeneralStage, mesh: str, bodies: Sequence
     return Plot(file, title, caption, image, _columns(shapes, moved))
 
 
-def _turned(trace: Trace, stage: GeneralStage, gear: str) -> np.ndarray | None:
+def _turned(trace: Trace, stage: Stage, gear: str) -> np.ndarray | None:
     """Angle (n,) rad of a gear in the axes in which the axes of the stage stand: those of its carrier, where it has
     one."""
     rotor = stage.rotor_of(gear)

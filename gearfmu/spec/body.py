@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.spec.flanks import TOOTHING
-from gearfmu.spec.general import GearBody, GeneralStage, RingBody
+from gearfmu.spec.general import GearBody, RingBody
 from gearfmu.spec.imported import import_inputs
-from gearfmu.spec.members import Member, member_of
-from gearfmu.spec.pair import StageSpec
+from gearfmu.spec.members import Form, Member, member_of
 from gearfmu.spec.planetary import PlanetarySpec
 from gearfmu.spec.planetary_body import set_body_inputs
 
 
-def body_inputs(spec: StageSpec | GeneralStage | PlanetarySpec, name: str) -> dict[str, Any]:
+def body_inputs(spec: Form, name: str) -> dict[str, Any]:
     """Everything that shapes the body `name` of a stage, in SI, and nothing else.
 
     Backlash, what is said of the flanks (`flanks.Toothing`), misalignment, contact, ports, levels, names, torques and

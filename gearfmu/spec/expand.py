@@ -12,13 +12,13 @@ from gearfmu.spec.gear import Bearing
 from gearfmu.spec.general import (
     CarrierBody,
     EngagementSpec,
-    GeneralStage,
     PlacedPort,
     RotorSpec,
+    Stage,
     SupportSpec,
 )
 from gearfmu.spec.general_checks import with_relief_rolls
-from gearfmu.spec.members import CARRIER, body_names, members, set_gear, set_ring
+from gearfmu.spec.members import CARRIER, Form, body_names, members, set_gear, set_ring
 from gearfmu.spec.pair import StageSpec
 from gearfmu.spec.planetary import CarrierSpec, PlanetarySpec
 from gearfmu.spec.planetary_checks import mesh_torque
@@ -26,19 +26,19 @@ from gearfmu.spec.planetary_checks import mesh_torque
 Body = TypeVar("Body")
 
 
-def as_general(spec: StageSpec | GeneralStage | PlanetarySpec) -> GeneralStage:
+def as_general(spec: Form) -> Stage:
     """The stage in the terms of any stage, whichever way its file is written. SpecError: `expand_set`."""
     if isinstance(spec, PlanetarySpec):
         return expand_set(spec)
     return expand_pair(spec) if isinstance(spec, StageSpec) else spec
 
 
-def expand_pair(spec: StageSpec) -> GeneralStage:
+def expand_pair(spec: StageSpec) -> Stage:
     """A pair in the terms of any stage: two rotors of one gear each, on an isotropic bearing at mid-width; pinion at
     the origin, wheel on +x."""
     pair, axes = spec.pair, ((0.0, 0.0), (spec.pair.center_distance, 0.0))
     pinion, wheel = spec.gears
-    return GeneralStage(
+    return Stage(
         name=spec.name,
         description=spec.description,
         source=spec.source,
@@ -75,7 +75,7 @@ def expand_pair(spec: StageSpec) -> GeneralStage:
     )
 
 
-def expand_set(spec: PlanetarySpec) -> GeneralStage:
+def expand_set(spec: PlanetarySpec) -> Stage:
     """A planetary set in the terms of any stage: carrier on the ground, sun, planets and ring in the axes of the
     carrier, in which they roll like gears on fixed axes; planets on the carrier's bolts. Sun and ring rest on isotropic
     springs, which are constant in any axes: of the ring, all its mounts together, smeared round its rim. With a port of
@@ -94,7 +94,7 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
     bodies["ring"] = set_ring(spec.ring, spec.set)
     carrier = {name: getattr(spec.carrier, name) for name in CarrierSpec.model_fields}
     bodies["carrier"] = CarrierBody(**carrier, name="carrier", kind="carrier")
-    stage = GeneralStage(
+    stage = Stage(
         name=spec.name,
         description=spec.description,
         source=spec.source,
@@ -113,7 +113,7 @@ def expand_set(spec: PlanetarySpec) -> GeneralStage:
     return with_relief_rolls(stage)
 
 
-def spread(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Body]) -> dict[str, Body]:
+def spread(spec: Form, bodies: Sequence[Body]) -> dict[str, Body]:
     """One of `bodies` (or of what stands for them, such as their hashes), in the order of `body_names`, for every body
     of `as_general(spec)` by name: the planets of a set share one."""
     own = dict(zip(body_names(spec), bodies, strict=True))

@@ -28,7 +28,7 @@ from gearfmu.spec.gear import (
 )
 from gearfmu.spec.lead import Misalignment
 from gearfmu.spec.planetary import CarrierSpec, MountsSpec, RingSpec
-from gearfmu.spec.ports import FilmSpec, FrictionSpec, LevelSpec, NodalSpec, PortSpec
+from gearfmu.spec.ports import FilmSpec, FrictionSpec, LevelSpec, Limits, NodalSpec, PortSpec
 
 Place = Annotated[float, Quantity("place")]
 Axis = Annotated[float, Quantity("axis")]
@@ -209,7 +209,7 @@ class PlacedPort(PortSpec):
     node: Name | None = Field(default=None, description="node of a carrier: bore, bolt0, bolt1 …")
 
 
-class GeneralStage(Spec):
+class Stage(Spec):
     """A stage as bodies, rotors, engagements, supports and ports; SI floats. `source` is its file."""
 
     name: Name = Field(description="name of the stage, also of its FMU")
@@ -236,6 +236,11 @@ class GeneralStage(Spec):
             name: {"kind": "gear"} | body | {"name": name} if isinstance(body, dict) else body
             for name, body in value.items()
         }
+
+    @property
+    def limits(self) -> Limits:
+        """None of the stage: every engagement has its own."""
+        return ()
 
     @property
     def gears(self) -> tuple[ToothedBody, ...]:

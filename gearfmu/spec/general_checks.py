@@ -13,7 +13,7 @@ from gearfmu.ranges import kernel_limits
 from gearfmu.spec.checks import geometry_problems, millimetres
 from gearfmu.spec.flank_checks import with_rolls
 from gearfmu.spec.gear import PairSpec
-from gearfmu.spec.general import EngagementSpec, GeneralStage, RingBody, ShaftBody, ToothedBody
+from gearfmu.spec.general import EngagementSpec, RingBody, ShaftBody, Stage, ToothedBody
 from gearfmu.spec.planetary_checks import RingPair, ring_pair_problems
 from gearfmu.spec.shapes import centre_distance, mesh_shape, toothed
 
@@ -21,7 +21,7 @@ Found = Iterator[tuple[str, str, str]]
 _SAME_RACK = ("normal_module", "pressure_angle")
 
 
-def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
+def general_problems(file: str, stage: Stage) -> list[Problem]:
     """Everything that is wrong with a stage whose single fields can be read."""
     problems = [Problem(file, *entry) for entry in (*_counts(stage), *_rotors(stage), *_names(stage))]
     known = _what_can_be_judged(stage)
@@ -31,7 +31,7 @@ def general_problems(file: str, stage: GeneralStage) -> list[Problem]:
     return list(dict.fromkeys(problems))
 
 
-def _what_can_be_judged(stage: GeneralStage) -> GeneralStage:
+def _what_can_be_judged(stage: Stage) -> Stage:
     """The stage without what names a body that there is not, or one that has no rotor of its own."""
     counts = Counter(name for rotor in stage.rotors.values() for name in rotor.bodies)
     good = {name for name in stage.bodies if counts[name] == 1}
@@ -49,7 +49,7 @@ def _what_can_be_judged(stage: GeneralStage) -> GeneralStage:
     return stage.model_copy(update=kept)
 
 
-def _counts(stage: GeneralStage) -> Found:
+def _counts(stage: Stage) -> Found:
     """Numbers of things that the kernel has room for."""
     directions = {"radial": 2, "axial": 1, "tilt": 2, "torsion": 1}
     held = sum(n for s in stage.supports for field, n in directions.items() if getattr(s, field) is not None)
@@ -66,7 +66,7 @@ def _counts(stage: GeneralStage) -> Found:
             yield field, str(count), f"out of range: the kernel holds at most {most} {what}; leave some away"
 
 
-def _rotors(stage: GeneralStage) -> Found:
+def _rotors(stage: Stage) -> Found:
     """Every body in exactly one rotor, and bodies that exist; carriers only where builders write them."""
     for carrier in stage.carriers:
         yield f"bodies.{carrier.name}.kind", "carrier", "a carrier belongs to a set: write a file of kind planetary_set"
@@ -84,7 +84,7 @@ def _rotors(stage: GeneralStage) -> Found:
             yield f"bodies.{body}", f"in {counts[body]} rotors", remedy
 
 
-def _names(stage: GeneralStage) -> Found:
+def _names(stage: Stage) -> Found:
     """What engagements, supports and ports name."""
     gears = {gear.name for gear in stage.gears}
     for mesh in stage.engagements:
@@ -113,7 +113,7 @@ def _names(stage: GeneralStage) -> Found:
                 yield f"{group}.{name}.name", name, "used twice: give every one its own name"
 
 
-def _places(stage: GeneralStage) -> Found:
+def _places(stage: Stage) -> Found:
     """Nodes lie on their bodies: at a gear's mid-width, on a shaft's length."""
     nodes = [(f"supports.{s.name}.at", body, s.at) for s in stage.supports for body in (s.body, s.to) if body]
     nodes += [(f"ports.{name}.at", port.body, port.at) for name, port in stage.ports.items()]
@@ -133,7 +133,7 @@ def _places(stage: GeneralStage) -> Found:
             )
 
 
-def _on_shaft(stage: GeneralStage, field: str, at: float | None) -> float | None:
+def _on_shaft(stage: Stage, field: str, at: float | None) -> float | None:
     """Place of a node on a shaft; where a gear sits on one, the gear's place counts."""
     if at is not None or not field.startswith("supports."):
         return at
@@ -142,7 +142,7 @@ def _on_shaft(stage: GeneralStage, field: str, at: float | None) -> float | None
     return stage.place(gears[0], None) if gears else None
 
 
-def _held(stage: GeneralStage) -> Found:
+def _held(stage: Stage) -> Found:
     """What is held to what: bodies of one rotor with torsion, bodies of two without."""
     for support in stage.supports:
         if support.to is None:
@@ -162,7 +162,7 @@ def _held(stage: GeneralStage) -> Found:
                 yield f"rotors.{name}.bodies.{body}", body, remedy
 
 
-def _joined(stage: GeneralStage, bodies: list[str]) -> set[str]:
+def _joined(stage: Stage, bodies: list[str]) -> set[str]:
     """Those of `bodies` that springs against twist connect to the first."""
     joints = [(s.body, s.to) for s in stage.supports if s.to is not None and s.torsion is not None]
     joined, size = {bodies[0]}, 0
@@ -172,7 +172,7 @@ def _joined(stage: GeneralStage, bodies: list[str]) -> set[str]:
     return joined
 
 
-def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]:
+def _mesh(file: str, stage: Stage, mesh: EngagementSpec) -> list[Problem]:
     """One engagement as the pair that it is; fields under their names here."""
     a, b = (stage.bodies[name] for name in mesh.gears)
     assert isinstance(a, ToothedBody) and isinstance(b, ToothedBody)
@@ -214,7 +214,7 @@ def _mesh(file: str, stage: GeneralStage, mesh: EngagementSpec) -> list[Problem]
     return found
 
 
-def with_relief_rolls(stage: GeneralStage) -> GeneralStage:
+def with_relief_rolls(stage: Stage) -> Stage:
     """The same stage with points of single contact turned into rolls, those of a gear's first engagement."""
     bodies = dict(stage.bodies)
     for mesh in reversed(stage.engagements):
@@ -223,7 +223,7 @@ def with_relief_rolls(stage: GeneralStage) -> GeneralStage:
     return stage.model_copy(update={"bodies": bodies})
 
 
-def _unknown_body(stage: GeneralStage) -> str:
+def _unknown_body(stage: Stage) -> str:
     return f"no such body: one of {', '.join(sorted(stage.bodies))}"
 
 

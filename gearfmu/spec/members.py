@@ -1,18 +1,21 @@
-"""The reduced bodies that a stage of any kind has, and its toothed ones with their own module and angles."""
+"""The reduced bodies of a stage, whichever way its file is written: toothed ones with their own module and angles, and
+the carrier of a planetary set."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
+from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.gear import GearSpec, PairSpec
-from gearfmu.spec.general import GearBody, GeneralStage, RingBody, ToothedBody
+from gearfmu.spec.general import GearBody, RingBody, Stage, ToothedBody
 from gearfmu.spec.pair import StageSpec
-from gearfmu.spec.planetary import MountsSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
+from gearfmu.spec.planetary import CarrierSpec, MountsSpec, PlanetarySpec, RingSpec, SetGearSpec, SetSpec
 from gearfmu.spec.shapes import GearShape, gear_shape
 
 CARRIER = "carrier"
+Form: TypeAlias = StageSpec | Stage | PlanetarySpec  # what a stage file is read as
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,15 @@ class Member:
         return gear_shape(self.gear)
 
 
-def members(spec: StageSpec | GeneralStage | PlanetarySpec) -> dict[str, Member]:
+@dataclass(frozen=True)
+class CarrierMember:
+    """The carrier of a planetary set, with the places of its bolts."""
+
+    part: CarrierSpec
+    geometry: CarrierGeometry
+
+
+def members(spec: Form) -> dict[str, Member]:
     """Toothed bodies by name, in the order of the file; of a set sun, planet and ring."""
     if isinstance(spec, PlanetarySpec):
         sun, planet = (Member(gear.name, set_gear(gear, spec.set)) for gear in (spec.sun, spec.planet))
@@ -51,14 +62,24 @@ def members(spec: StageSpec | GeneralStage | PlanetarySpec) -> dict[str, Member]
     return {member.name: member for member in found}
 
 
-def member_of(spec: StageSpec | GeneralStage | PlanetarySpec, name: str) -> Member:
+def member_of(spec: Form, name: str) -> Member:
     """The toothed body `name`. KeyError for a name that is none."""
     return members(spec)[name]
 
 
-def body_names(spec: StageSpec | GeneralStage | PlanetarySpec) -> tuple[str, ...]:
+def carriers(spec: Form) -> dict[str, CarrierMember]:
+    """Carriers by name: one of a planetary set, else none."""
+    return {CARRIER: CarrierMember(spec.carrier, CarrierGeometry.of(spec))} if isinstance(spec, PlanetarySpec) else {}
+
+
+def carrier_of(spec: Form) -> CarrierMember:
+    """The carrier of a planetary set. KeyError for a stage without one."""
+    return carriers(spec)[CARRIER]
+
+
+def body_names(spec: Form) -> tuple[str, ...]:
     """Names of the reduced bodies: toothed ones, then the carrier. Shafts need no reduction."""
-    return *members(spec), *((CARRIER,) if isinstance(spec, PlanetarySpec) else ())
+    return *members(spec), *carriers(spec)
 
 
 def pair_gear(gear: GearSpec, pair: PairSpec, hand: int) -> GearBody:

@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from gearfmu.spec.base import Name, Quantity, Spec, Text, refuse
 from gearfmu.spec.gear import GearSpec, PairSpec
-from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
+from gearfmu.spec.ports import ContactSpec, LevelSpec, Limits, PortSpec
 
 
 class StageSpec(Spec):
@@ -28,6 +28,11 @@ class StageSpec(Spec):
     contact: ContactSpec = Field(description="tooth contact")
     ports: dict[str, PortSpec] = Field(description="one port a shaft")
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+
+    @property
+    def limits(self) -> Limits:
+        """Torque and speed of the pinion that the model is made for."""
+        return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
 
     @field_validator("gears", mode="before")
     @classmethod

@@ -30,7 +30,7 @@ from gearfmu.spec.gear import (
     TipEdge,
 )
 from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
-from gearfmu.spec.ports import ContactSpec, LevelSpec, PortSpec
+from gearfmu.spec.ports import ContactSpec, LevelSpec, Limits, PortSpec
 
 PinError = Annotated[float, Quantity("pin_error")]
 Pin = Annotated[int, Whole("pin")]
@@ -214,6 +214,11 @@ class PlanetarySpec(Spec):
         description="ports: carrier and sun, input first; a third, ring, holds the ring, which stands without it",
     )
     levels: LevelSpec = Field(default_factory=LevelSpec, description="cut frequencies")
+
+    @property
+    def limits(self) -> Limits:
+        """Torque and speed of the carrier that the model is made for."""
+        return (self.torque_max, "N*m"), (self.speed_max, "rad/s")
 
     @property
     def gears(self) -> tuple[SetGearSpec, SetGearSpec, RingSpec]:

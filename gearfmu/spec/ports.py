@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,7 @@ Stiffness = Annotated[float, Quantity("torsional_stiffness")]
 Damping = Annotated[float, Quantity("torsional_damping")]
 Inertia = Annotated[float, Quantity("inertia")]
 Cut = Annotated[float, Quantity("cut")]
+Limits: TypeAlias = tuple[tuple[float | None, str], ...]  # largest values that a stage is made for, with units
 
 
 class NodalSpec(Spec):

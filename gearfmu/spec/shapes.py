@@ -7,7 +7,7 @@ import math
 from gearfmu.geometry import GearGeometry, PairGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.general import EngagementSpec, GeneralStage, RingBody, ToothedBody
+from gearfmu.spec.general import EngagementSpec, RingBody, Stage, ToothedBody
 
 GearShape = GearGeometry | InternalGearGeometry
 MeshShape = PairGeometry | RingMesh
@@ -18,7 +18,7 @@ def gear_shape(gear: ToothedBody) -> GearShape:
     return InternalGearGeometry.of(gear, gear, 1) if isinstance(gear, RingBody) else GearGeometry.of(gear, gear, 1)
 
 
-def mesh_shape(stage: GeneralStage, mesh: EngagementSpec) -> MeshShape:
+def mesh_shape(stage: Stage, mesh: EngagementSpec) -> MeshShape:
     """The engagement by itself; its `gears` are A and B. ValueError where the axes are too near."""
     a, b = (gear_shape(toothed(stage, name)) for name in mesh.gears)
     distance = centre_distance(stage, mesh)
@@ -28,14 +28,14 @@ def mesh_shape(stage: GeneralStage, mesh: EngagementSpec) -> MeshShape:
     return PairGeometry((a, b), distance, mesh.backlash)
 
 
-def toothed(stage: GeneralStage, name: str) -> ToothedBody:
+def toothed(stage: Stage, name: str) -> ToothedBody:
     """The toothed body of that name."""
     body = stage.bodies[name]
     assert isinstance(body, ToothedBody)
     return body
 
 
-def centre_distance(stage: GeneralStage, mesh: EngagementSpec) -> float:
+def centre_distance(stage: Stage, mesh: EngagementSpec) -> float:
     """Distance (m) of the axes of an engagement."""
     (x, y), (u, v) = (stage.rotors[stage.rotor_of(gear)].axis for gear in mesh.gears)
     return math.hypot(u - x, v - y)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import EngagementSpec, GeneralStage, ToothedBody
+from gearfmu.spec.general import EngagementSpec, Stage, ToothedBody
 from gearfmu.spec.ports import PortSpec
 
 
@@ -23,7 +23,7 @@ class Shafts:
     ratio: float
 
 
-def shafts_of(stage: GeneralStage) -> Shafts:
+def shafts_of(stage: Stage) -> Shafts:
     """Input and output of a stage: its first and its second port. SpecError where it has fewer, or where no meshes lead
     from one to the other."""
     if len(stage.ports) < 2:
@@ -36,7 +36,7 @@ def shafts_of(stage: GeneralStage) -> Shafts:
     return Shafts(first, second, float(1 / turning[driven]))
 
 
-def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
+def turns(stage: Stage, port: str) -> dict[str, Fraction]:
     """Speeds of the rotors that are geared to the rotor of `port`, itself among them, and of those that stand, by name:
     per its unit speed. Engagements roll in the axes of the rotor that carries them (Willis). Where a stage has
     carriers, ports beyond input and output stand."""
@@ -48,14 +48,14 @@ def turns(stage: GeneralStage, port: str) -> dict[str, Fraction]:
     return solved(equations + [(factors, Fraction(0)) for factors in rolling(stage)])
 
 
-def rolling(stage: GeneralStage) -> list[dict[str, Fraction]]:
+def rolling(stage: Stage) -> list[dict[str, Fraction]]:
     """What the meshes say of the rotors' speeds, and those that stand: sums of factors times speeds (by name) that are
     zero, one for each engagement and standing rotor."""
     standing = [{name: Fraction(1)} for name, rotor in stage.rotors.items() if rotor.stands]
     return [_rolling(stage, mesh) for mesh in stage.engagements] + standing
 
 
-def _rolling(stage: GeneralStage, mesh: EngagementSpec) -> dict[str, Fraction]:
+def _rolling(stage: Stage, mesh: EngagementSpec) -> dict[str, Fraction]:
     """Factors of the rotors' speeds in z_A (w_A − w_f) ± z_B (w_B − w_f) = 0."""
     z_a, z_b = (_teeth(stage, gear) for gear in mesh.gears)
     z_b *= -1 if stage.internal(mesh) else 1
@@ -116,7 +116,7 @@ class Meshing:
         return cls(str(rotor), str(carrier[0]) if carrier else None, int(teeth))
 
 
-def meshings(stage: GeneralStage) -> dict[str, Meshing]:
+def meshings(stage: Stage) -> dict[str, Meshing]:
     """The `Meshing` of every engagement by name."""
     return {
         m.name: Meshing(stage.rotor_of(m.gears[0]), stage.frame_of(m), _teeth(stage, m.gears[0]))
@@ -125,7 +125,7 @@ def meshings(stage: GeneralStage) -> dict[str, Meshing]:
 
 
 def with_ports(spec: Any, ports: dict[str, PortSpec]) -> Any:
-    """The StageSpec or GeneralStage with other ports of the same names, at the places where they were."""
+    """The StageSpec or Stage with other ports of the same names, at the places where they were."""
     own = {
         name: old.model_copy(update={field: getattr(ports[name], field) for field in PortSpec.model_fields})
         if name in ports
@@ -151,11 +151,11 @@ def require_driven(stage: Any, driven: Collection[str], by: str) -> None:
         raise SpecError(problems)
 
 
-def _teeth(stage: GeneralStage, gear: str) -> int:
+def _teeth(stage: Stage, gear: str) -> int:
     body = stage.bodies[gear]
     assert isinstance(body, ToothedBody)
     return body.teeth
 
 
-def _refused(stage: GeneralStage, value: str, remedy: str) -> SpecError:
+def _refused(stage: Stage, value: str, remedy: str) -> SpecError:
     return SpecError([Problem(str(stage.source), "ports", value, remedy)])

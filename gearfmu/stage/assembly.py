@@ -14,11 +14,10 @@ import numpy as np
 from gearfmu.body.interface_body import InterfaceBody
 from gearfmu.errors import ModelError
 from gearfmu.spec.expand import as_general, spread
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.general import Stage
+from gearfmu.spec.members import Form
 from gearfmu.spec.ports import PortSpec
 from gearfmu.spec.shapes import gear_shape
-from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.blob import write_blob
 from gearfmu.stage.compact import flank_tables, ground_tables, is_mirrored
 from gearfmu.stage.far import far_sections
@@ -45,7 +44,7 @@ FIXED_K = 1e7  # N·m/rad: what a fixed port without a stiffness of its own is h
 
 
 def assemble(
-    spec: StageSpec | GeneralStage | PlanetarySpec,
+    spec: Form,
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
@@ -64,7 +63,7 @@ def assemble(
 
 
 def general_sections(
-    spec: StageSpec | GeneralStage | PlanetarySpec,
+    spec: Form,
     bodies: Sequence[Any],
     rolls: int = ROLLS,
     observe: Sequence[str] = (),
@@ -110,15 +109,13 @@ def general_sections(
     return sections
 
 
-def stage_group(spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]) -> Group:
+def stage_group(spec: Form, bodies: Sequence[Any]) -> Group:
     """The ground oscillators of a stage as supported; bodies as of `assemble`."""
     stage, bodies, carriers = _parted(spec, bodies)
     return mount(stage_layout(stage, bodies, carriers=carriers))
 
 
-def _parted(
-    spec: StageSpec | GeneralStage | PlanetarySpec, bodies: Sequence[Any]
-) -> tuple[GeneralStage, Sequence[Any], dict[str, InterfaceBody]]:
+def _parted(spec: Form, bodies: Sequence[Any]) -> tuple[Stage, Sequence[Any], dict[str, InterfaceBody]]:
     """The stage in general terms, the bodies of its gears in their order, and its carriers' by name."""
     stage, found = as_general(spec), spread(spec, bodies)
     return stage, [found[gear.name] for gear in stage.gears], {own.name: found[own.name] for own in stage.carriers}
@@ -153,7 +150,7 @@ def mount_sets(layout: Layout) -> list[Group]:
         return [mount(layout)]
 
 
-def _port_sections(stage: GeneralStage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
+def _port_sections(stage: Stage, group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str, Any]:
     """Kinds, numbers and static compliances of the ports, in the order of the stage."""
     rotors = list(stage.rotors)
     numbers = [_port_numbers(port) for port in stage.ports.values()]
@@ -192,7 +189,7 @@ def port_compliances(group: Group, nodes: Sequence[tuple[int, int]]) -> dict[str
 
 
 def _gear_sections(
-    stage: GeneralStage,
+    stage: Stage,
     index: int,
     body: Any,
     groups: Sequence[Group],
@@ -275,9 +272,7 @@ def set_sections(number: int, group: Group, nodes: Sequence[tuple[int, int]]) ->
     )
 
 
-def port_nodes(
-    stage: GeneralStage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})
-) -> list[tuple[int, int]]:
+def port_nodes(stage: Stage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> list[tuple[int, int]]:
     """(body, node) of every port, in the order of the stage. carriers: reduced, by name."""
     nodes = stage_nodes(stage, carriers)
     return [nodes.find(stage, port.body, port.at, port.node) for port in stage.ports.values()]

@@ -6,13 +6,13 @@ from __future__ import annotations
 import math
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.general import Stage
 
 REACH = 100e-6  # m: of the kernel, GK_FILM_REACH
 NEXT_TO_NONE = 1e-4  # Pa·s: of an engagement that says nothing beside one that does
 
 
-def film_starts(stage: GeneralStage) -> dict[str, float]:
+def film_starts(stage: Stage) -> dict[str, float]:
     """Parameter → start. Empty where no engagement says anything about a film; else it is on, and an engagement that
     says nothing has oil of next to no viscosity.
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.general import Stage
 
 LAWS = ("constant", "benedict_kelley", "iso_tr_14179")  # in the kernel's order
 
 
-def friction_starts(stage: GeneralStage) -> dict[str, float]:
+def friction_starts(stage: Stage) -> dict[str, float]:
     """Parameter → start. Empty where no engagement says anything about friction; else it is on, and an engagement that
     says nothing has none."""
     if not any(mesh.friction for mesh in stage.engagements):

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.general import Stage
 from gearfmu.spec.shapes import gear_shape
 from gearfmu.spec.turning import turns
 from gearfmu.stage.groups import Group
@@ -69,7 +69,7 @@ class GearInertia:
     by_speed: float
 
 
-def largest_speeds(stage: GeneralStage) -> dict[str, float]:
+def largest_speeds(stage: Stage) -> dict[str, float]:
     """rad/s, of every rotor that is geared to the first port: the stage turns so fast that one engagement has its
     speed_max, in the axes in which it stands."""
     per = {name: float(speed) for name, speed in turns(stage, next(iter(stage.ports))).items()}
@@ -101,7 +101,7 @@ def gear_inertia(name: str, body: Any, speed: float, force: float, cut: float) -
     )
 
 
-def inertia_terms(stage: GeneralStage, bodies: Mapping[str, Any]) -> list[GearInertia]:
+def inertia_terms(stage: Stage, bodies: Mapping[str, Any]) -> list[GearInertia]:
     """Of the gears of a stage whose files tell; bodies: by name (`observed.gear_bodies`)."""
     speeds, force = largest_speeds(stage), largest_forces(stage)
     found = [
@@ -112,7 +112,7 @@ def inertia_terms(stage: GeneralStage, bodies: Mapping[str, Any]) -> list[GearIn
     return [gear for gear in found if gear is not None]
 
 
-def largest_forces(stage: GeneralStage) -> dict[str, float]:
+def largest_forces(stage: Stage) -> dict[str, float]:
     """N, normal to the flanks, on every gear: from torque_max of its engagements."""
     forces: dict[str, float] = {}
     gears = {gear.name: gear for gear in stage.gears}
@@ -123,7 +123,7 @@ def largest_forces(stage: GeneralStage) -> dict[str, float]:
     return forces
 
 
-def whirl_shift(stage: GeneralStage, group: Group, cut: float) -> float:
+def whirl_shift(stage: Stage, group: Group, cut: float) -> float:
     """Largest |Δω/ω| of the ground oscillators up to `cut` (Hz) by gyroscopic forces, at the largest speeds."""
     known = largest_speeds(stage)
     speeds = [known.get(name, 0.0) for name in stage.rotors]

@@ -1,4 +1,4 @@
-"""GeneralStage and reduced gears → the layout of its ground group: free bodies, rotors, springs between nodes."""
+"""Stage and reduced gears → the layout of its ground group: free bodies, rotors, springs between nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from gearfmu.body.beam import Section, Shaft, Steel, reduce_shaft
 from gearfmu.body.interface_body import InterfaceBody
-from gearfmu.spec.general import GeneralStage, ShaftBody, SupportSpec, ToothedBody
+from gearfmu.spec.general import ShaftBody, Stage, SupportSpec, ToothedBody
 from gearfmu.spec.shapes import gear_shape
 from gearfmu.stage.free import FreeBody, free_carrier, free_gear, free_shaft
 from gearfmu.stage.groups import Layout, Support
@@ -33,7 +33,7 @@ class Nodes:
     places: dict[str, list[float]]
     names: dict[str, list[str]]
 
-    def find(self, stage: GeneralStage, body: str, at: float | None, node: str | None = None) -> tuple[int, int]:
+    def find(self, stage: Stage, body: str, at: float | None, node: str | None = None) -> tuple[int, int]:
         """(body, node) at a place; a gear has one node, its bore or its rim, a carrier those that have names."""
         if body in self.names:
             return self.numbers[body], self.names[body].index(node or "bore")
@@ -43,7 +43,7 @@ class Nodes:
         return self.numbers[body], int(np.argmin(np.abs(np.array(self.places[body]) - wanted)))
 
 
-def stage_nodes(stage: GeneralStage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> Nodes:
+def stage_nodes(stage: Stage, carriers: Mapping[str, InterfaceBody] = MappingProxyType({})) -> Nodes:
     """The nodes of all bodies: those that supports and ports name. carriers: reduced, by name."""
     shafts = [body for body in stage.bodies.values() if isinstance(body, ShaftBody)]
     ordered = [body.name for body in (*stage.gears, *shafts, *stage.carriers)]
@@ -56,7 +56,7 @@ def stage_nodes(stage: GeneralStage, carriers: Mapping[str, InterfaceBody] = Map
     return Nodes({name: i for i, name in enumerate(ordered)}, places, names)
 
 
-def place_of(stage: GeneralStage, support: SupportSpec) -> float:
+def place_of(stage: Stage, support: SupportSpec) -> float:
     """Place of a support along the axis: as said, or where its gear lies."""
     if support.at is not None:
         return support.at
@@ -65,14 +65,14 @@ def place_of(stage: GeneralStage, support: SupportSpec) -> float:
     return stage.place((gears or names)[0], None)
 
 
-def width_degrees(stage: GeneralStage, bodies: Sequence[Any]) -> np.ndarray:
+def width_degrees(stage: Stage, bodies: Sequence[Any]) -> np.ndarray:
     """Degrees of the width functions that the stage excites: even ones where all is symmetric about mid-width."""
     count = min(body.width_functions for body in bodies)
     return symmetric_functions(count) if stage.even else np.arange(min(count, MOST_FUNCTIONS))
 
 
 def stage_layout(
-    stage: GeneralStage,
+    stage: Stage,
     bodies: Sequence[Any],
     carriers: Mapping[str, InterfaceBody] = MappingProxyType({}),
     points: Sequence[np.ndarray] | None = None,
@@ -106,13 +106,13 @@ def stage_layout(
     return replace(bare, supports=[_support(stage, nodes, bare, support) for support in stage.supports])
 
 
-def even_grids(stage: GeneralStage, bodies: Sequence[Any], rolls: int) -> list[np.ndarray]:
+def even_grids(stage: Stage, bodies: Sequence[Any], rolls: int) -> list[np.ndarray]:
     """(rolls, R) of every gear: weights of its body's rolls on the even grid."""
     shapes = [gear_shape(gear) for gear in stage.gears]
     return [resampling(body.roll, s.s_form, s.s_tip, rolls) for s, body in zip(shapes, bodies, strict=True)]
 
 
-def _gear(stage: GeneralStage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
+def _gear(stage: Stage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> FreeBody:
     chosen = excited_modes(body, degrees) if stage.even else _all_modes(body, degrees)
     return free_gear(body, chosen, degrees, weights, stage.levels)
 
@@ -127,7 +127,7 @@ def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
     return np.flatnonzero(seen)
 
 
-def _shaft(stage: GeneralStage, shaft: ShaftBody, places: Sequence[float]) -> FreeBody:
+def _shaft(stage: Stage, shaft: ShaftBody, places: Sequence[float]) -> FreeBody:
     m, origin = shaft.material, stage.place(shaft.name, None)
     sections = [Section(s.length, s.outer_diameter, s.bore_diameter) for s in shaft.sections]
     steel = Steel(m.youngs_modulus, m.poisson_ratio, m.density)
@@ -135,7 +135,7 @@ def _shaft(stage: GeneralStage, shaft: ShaftBody, places: Sequence[float]) -> Fr
     return free_shaft(shaft.name, beam, shaft.modal_damping)
 
 
-def _support(stage: GeneralStage, nodes: Nodes, layout: Layout, support: SupportSpec) -> Support:
+def _support(stage: Stage, nodes: Nodes, layout: Layout, support: SupportSpec) -> Support:
     at, directions, compliance, damping = place_of(stage, support), [], [], []
     first = nodes.find(stage, support.body, at, support.node if support.to is None else None)
     for field, own in STIFFNESS.items():
@@ -158,7 +158,7 @@ def _support(stage: GeneralStage, nodes: Nodes, layout: Layout, support: Support
     )
 
 
-def _kind(stage: GeneralStage, support: SupportSpec) -> str:
+def _kind(stage: Stage, support: SupportSpec) -> str:
     """What a support is called: a bearing on the ground, a pin between a carrier and what it carries, else a seat."""
     if support.to is None:
         return "bearing"

@@ -11,7 +11,7 @@ import numpy as np
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.general import EngagementSpec, GeneralStage
+from gearfmu.spec.general import EngagementSpec, Stage
 from gearfmu.spec.shapes import MeshShape, mesh_shape
 
 EXTERNAL, INTERNAL = 1, -1
@@ -19,24 +19,24 @@ H_MAX = 7.5e-6  # s: largest default step
 SAME_ANGLE = 1e-9  # rad
 
 
-def mesh_geometry(stage: GeneralStage, mesh: EngagementSpec) -> MeshShape:
+def mesh_geometry(stage: Stage, mesh: EngagementSpec) -> MeshShape:
     """The engagement by itself; of an external one A is at the origin and B on +x."""
     return mesh_shape(stage, mesh)
 
 
-def mesh_axes(stage: GeneralStage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
+def mesh_axes(stage: Stage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
     """Positions (x, y) m of A and B, in the axes of what carries them, where their teeth are as they should be."""
     a, b = (stage.rotors[stage.rotor_of(name)].axis for name in mesh.gears)
     return a, b
 
 
-def _axes_as_they_are(stage: GeneralStage, mesh: EngagementSpec) -> list[float]:
+def _axes_as_they_are(stage: Stage, mesh: EngagementSpec) -> list[float]:
     """`mesh_axes` one after the other, with the deviations of the axes."""
     rotors = [stage.rotors[stage.rotor_of(name)] for name in mesh.gears]
     return [at + off for rotor in rotors for at, off in zip(rotor.axis, rotor.offset, strict=True)]
 
 
-def tooth_phases(stage: GeneralStage) -> dict[str, float]:
+def tooth_phases(stage: Stage) -> dict[str, float]:
     """Angle (rad) of tooth 0 of every gear at φ = 0: in every engagement the drive flanks of tooth 0 of both gears
     touch; of a ring it is the flanks of space 0.
 
@@ -47,7 +47,7 @@ def tooth_phases(stage: GeneralStage) -> dict[str, float]:
     return _placed(stage)[0]
 
 
-def _placed(stage: GeneralStage) -> tuple[dict[str, float], list[int]]:
+def _placed(stage: Stage) -> tuple[dict[str, float], list[int]]:
     """`tooth_phases`, and of every engagement the tooth of B whose drive flank touches that of A's tooth 0: not 0 where
     engagements close a loop, as those of sun, planets and ring."""
     phases: dict[str, float] = {}
@@ -92,7 +92,7 @@ def _phase_of_a(pair: MeshShape, second: float, gamma: float) -> float:
     return gamma - (second - gamma - pair.wheel_phase) * pair.gears[1].r_b / pair.gears[0].r_b
 
 
-def stage_sections(stage: GeneralStage) -> dict[str, Any]:
+def stage_sections(stage: Stage) -> dict[str, Any]:
     """Sections of names, limits and engagements."""
     gears = [gear.name for gear in stage.gears]
     engaged, numbers, periods = [], [], []
@@ -119,7 +119,7 @@ def stage_sections(stage: GeneralStage) -> dict[str, Any]:
     )
 
 
-def _frame_section(stage: GeneralStage) -> dict[str, Any]:
+def _frame_section(stage: Stage) -> dict[str, Any]:
     """Rotors in whose axes the others stand; nothing where all stand on the ground."""
     rotors, carriers = list(stage.rotors), [rotor.carried_by for rotor in stage.rotors.values()]
     if not any(carriers):

@@ -12,10 +12,8 @@ import numpy as np
 from gearfmu.errors import ModelError, Problem, SpecError
 from gearfmu.kernel import Kernel, Variable
 from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import GeneralStage
-from gearfmu.spec.members import body_names
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.stage import StageSpec
+from gearfmu.spec.general import Stage
+from gearfmu.spec.members import Form, body_names
 from gearfmu.spec.turning import Shafts, shafts_of, with_ports
 from gearfmu.stage.blob import blob_hash, read_blob, write_blob
 from gearfmu.stage.shown import Card, Shown, grouped
@@ -36,7 +34,7 @@ def integrator_of(level: str, asked: str, clutch: bool) -> str:
 class StageModel(Shown):
     """A stage ready to run: the blob is all the kernel needs; spec and bodies' hashes say where it came from."""
 
-    spec: StageSpec | GeneralStage | PlanetarySpec
+    spec: Form
     blob: bytes
     body_hashes: tuple[str, ...]
 
@@ -48,8 +46,7 @@ class StageModel(Shown):
         ports = [f"{name}: {port.kind}" for name, port in self.stage.ports.items()]
         names = {sort: [v.name for v in known if v.causality == sort] for sort in ("input", "parameter", "output")}
         spec = self.spec
-        limits = () if isinstance(spec, GeneralStage) else ((spec.torque_max, "N*m"), (spec.speed_max, "rad/s"))
-        most = " and ".join(quantity_text(value, unit) for value, unit in limits if value is not None)
+        most = " and ".join(quantity_text(value, unit) for value, unit in spec.limits if value is not None)
         rows = [
             ("ports", ", ".join(ports) + "; input first, then output"),
             ("meshes", ", ".join(meshes)),
@@ -65,7 +62,7 @@ class StageModel(Shown):
         return self.spec.name
 
     @cached_property
-    def stage(self) -> GeneralStage:
+    def stage(self) -> Stage:
         """The stage in the terms of any stage: a pair file or a set expanded."""
         return as_general(self.spec)
 
@@ -78,13 +75,6 @@ class StageModel(Shown):
     def bodies(self) -> dict[str, str]:
         """Hash of every reduced body that the model was made from, by name: of a set sun, planet, ring, carrier."""
         return dict(zip(body_names(self.spec), self.body_hashes, strict=True))
-
-    @property
-    def pair(self) -> StageSpec:
-        """The spec of a stage that is written as one pair. ModelError for any other."""
-        if not isinstance(self.spec, StageSpec):
-            raise ModelError(f"stage {self.name} is not written as one pair: this is for pair files only")
-        return self.spec
 
     @property
     def hash(self) -> str:

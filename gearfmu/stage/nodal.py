@@ -9,7 +9,7 @@ import numpy as np
 
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.general import EngagementSpec, GeneralStage, ToothedBody
+from gearfmu.spec.general import EngagementSpec, Stage, ToothedBody
 from gearfmu.spec.shapes import mesh_shape, toothed
 
 SHARE_OF_A = {"both": 0.5, "a": 1.0, "b": 0.0}
@@ -17,14 +17,14 @@ MOST = 513  # nodes that the kernel takes along or across
 STIFFEST = 1e22  # N/m³ that it takes
 
 
-def nodal_sections(stage: GeneralStage) -> dict[str, Any]:
+def nodal_sections(stage: Stage) -> dict[str, Any]:
     """Sections of nodes and penalties."""
     numbers = [[mesh_penalty(stage, mesh), SHARE_OF_A[stage.nodal.nodes_of]] for mesh in stage.engagements]
     nodes = {f"nodes{i}": np.array(flank_nodes(stage, gear), np.int32) for i, gear in enumerate(stage.gears)}
     return {"nodal": np.array(numbers)} | nodes
 
 
-def flank_nodes(stage: GeneralStage, gear: ToothedBody) -> tuple[int, int]:
+def flank_nodes(stage: Stage, gear: ToothedBody) -> tuple[int, int]:
     """Nodes along a flank and across the face width: as said, or corners and middles of the edges of the gear's own
     mesh."""
     nodal, mesh = stage.nodal, gear.body.mesh
@@ -33,7 +33,7 @@ def flank_nodes(stage: GeneralStage, gear: ToothedBody) -> tuple[int, int]:
     return along, across
 
 
-def mesh_penalty(stage: GeneralStage, mesh: EngagementSpec) -> float:
+def mesh_penalty(stage: Stage, mesh: EngagementSpec) -> float:
     """Penalty stiffness (N/m³) of an engagement: as said, or of "hertz" 3 pi E*/(8 b).
 
     An elastic foundation of that stiffness has Hertz's half-width b under the same load: that of torque_max on one

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.spec.expand import as_general, spread
-from gearfmu.spec.general import GeneralStage
+from gearfmu.spec.general import Stage
 from gearfmu.stage.free import NODE_MEMBERS
 from gearfmu.stage.groups import Group, families
 from gearfmu.stage.model import StageModel
@@ -22,7 +22,7 @@ from gearfmu.stage.model import StageModel
 MOTION, MODE = ".motion.", ".mode_"
 
 
-def observed_number(stage: GeneralStage, name: str) -> int:
+def observed_number(stage: Stage, name: str) -> int:
     """Number of a gear in the stage. ModelError for any other body."""
     names = [gear.name for gear in stage.gears]
     if name not in names:

@@ -17,17 +17,19 @@ import numpy as np
 
 from gearfmu.errors import ModelError
 from gearfmu.kernel import Kernel, TeState
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.general import Stage
+from gearfmu.spec.shapes import gear_shape, toothed
 from gearfmu.stage.limits import limit_named
-from gearfmu.stage.meshes import mesh_geometry
 from gearfmu.stage.model import StageModel
 from gearfmu.stage.place import place_of
 from gearfmu.stage.shown import Card, Shown
 from gearfmu.stage.te import (
     LEAST,
     TANGENT,
+    TeResult,
     common_columns,
     error_text,
+    loaded_te,
     mesh_harmonics,
     plot_te,
     statics_of,
@@ -98,6 +100,27 @@ class SetTeResult(Shown):
         return found
 
 
+def set_error(stage: Stage) -> tuple[float, float]:
+    """(r_b,s, 1 + z_r/z_s) of te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), the transmission error of a planetary set."""
+    sun, ring = (toothed(stage, name) for name in GEARS)
+    return gear_shape(sun).r_b, 1 + ring.teeth / sun.teeth
+
+
+def stage_te(
+    model: StageModel,
+    torques: Sequence[float],
+    positions: int = 41,
+    rigid_bearings: bool = False,
+    mesh: str | None = None,
+    pitches: int = 1,
+    **parameters: float,
+) -> TeResult | SetTeResult:
+    """`set_te` of a stage with a carrier, of which bearings and mesh mean nothing; `loaded_te` of any other."""
+    if model.stage.carriers:
+        return set_te(model, torques, positions, pitches, None, **parameters)
+    return loaded_te(model, torques, positions, rigid_bearings, mesh, pitches, **parameters)
+
+
 def set_te(
     model: StageModel,
     torques: Sequence[float],
@@ -114,11 +137,11 @@ def set_te(
     part done and the torque. parameters: of the kernel, e.g. slices=10. ModelError where the stage is no planetary set;
     SimulationError(no_equilibrium) where there is none.
     """
-    if not isinstance(model.spec, PlanetarySpec):
+    if not model.stage.carriers:
         raise ModelError(f"{model.name} is no planetary set: its meshes have transmission errors of their own")
     kernel, place = statics_of(model, **parameters), place_of(model, f"{GEARS[0]}_planet1")
     least, position = LEAST * place.most, np.arange(periods * positions) / positions
-    planets = model.spec.set.planets
+    planets = len(model.stage.engagements) // len(GEARS)
     te, stiffness = np.empty((2, len(torques), position.size))
     force = np.empty((len(torques), position.size, len(GEARS), planets))
     for (i, torque), (j, part) in product(enumerate(torques), enumerate(position)):
@@ -139,11 +162,9 @@ def set_te(
 
 def _error(model: StageModel, kernel: Kernel, at: float, torque: float, keep: bool = False) -> float:
     """te (m), the output's bore at an angle (rad)."""
-    spec, shafts = model.spec, model.shafts
-    assert isinstance(spec, PlanetarySpec)
+    shafts, (r_b, ratio) = model.shafts, set_error(model.stage)
     phi = {shafts.input: kernel.transmission(at, torque, keep=keep).phi, shafts.output: at}
-    sun = mesh_geometry(model.stage, model.stage.engagements[0]).gears[0]
-    return float(sun.r_b * (phi["sun"] - (1 + spec.ring.teeth / spec.sun.teeth) * phi["carrier"]))
+    return float(r_b * (phi["sun"] - ratio * phi["carrier"]))
 
 
 def _forces(kernel: Kernel, at: float, torque: float, planets: int) -> np.ndarray:

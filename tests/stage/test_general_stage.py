@@ -13,7 +13,7 @@ import pytest
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import EngagementSpec, GeneralStage, PlacedPort, RotorSpec, SupportSpec
+from gearfmu.spec.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
 from gearfmu.stage.assembly import MODEL_VERSION, general_sections
 from gearfmu.stage.fields import order_sections
 from gearfmu.stage.groups import mount
@@ -30,7 +30,7 @@ SHAFT = {
 
 
 @pytest.fixture(scope="module")
-def train(spec) -> GeneralStage:
+def train(spec) -> Stage:
     """Twice the FZG pair in series, the second stage at 50 degrees, on three shafts."""
     pair = expand_pair(spec)
     gears = {
@@ -49,7 +49,7 @@ def train(spec) -> GeneralStage:
     ]
     common = {"backlash": 1e-4, "damping": 2e5, "speed_max": 600.0}
     out = (A + A * math.cos(math.radians(50)), A * math.sin(math.radians(50)))
-    return GeneralStage(
+    return Stage(
         name="train",
         source=spec.source,
         bodies=gears | {name: SHAFT for name in ("in", "mid", "out")},

@@ -46,7 +46,7 @@ def observed(spec: StageSpec, bodies: list[ReducedBody]) -> StageModel:
 def started(model: StageModel, level: float) -> Kernel:
     """The pair wound up by some 300 N·m."""
     kernel = model.kernel(level=level)
-    pinion = model.pair.ports["pinion"]
+    pinion = model.spec.ports["pinion"]
     assert pinion.k is not None
     kernel.set("pinion.phi", 300.0 / pinion.k)
     kernel.initialize()

@@ -15,7 +15,7 @@ from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.base import read_toml
 from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import GeneralStage, RotorSpec
+from gearfmu.spec.general import RotorSpec, Stage
 from gearfmu.spec.library import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.spec.turning import shafts_of, turns
@@ -51,7 +51,7 @@ def run(model: StageModel, drives: dict[str, Any], **parameters: float) -> dict[
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
-def side_by_side(pair: GeneralStage) -> GeneralStage:
+def side_by_side(pair: Stage) -> Stage:
     """The pair twice in one stage, far apart; names of the second begin with "b_"."""
 
     def named(name: str) -> str:
@@ -98,7 +98,7 @@ def test_two_pairs_in_one_model_run_as_two_models_do(relief_spec, bodies, reliev
         assert np.ptp(alone["mesh.force"]) > 10
 
 
-def turned(stage: GeneralStage, angle: float) -> GeneralStage:
+def turned(stage: Stage, angle: float) -> Stage:
     """The whole stage about the z axis."""
     c, s = math.cos(angle), math.sin(angle)
     rotors = {
@@ -239,7 +239,7 @@ def test_a_pair_written_as_a_general_stage_is_the_same_model(tmp_path: Path, bod
     path = tmp_path / "stage.toml"
     path.write_text("\n".join(f"{key} = {toml(value)}" for key, value in tables.items()), encoding="utf-8")
     spec = load_stage(path)
-    assert isinstance(spec, GeneralStage)
+    assert isinstance(spec, Stage)
     assert load_bodies(spec, find_stage("fzg_c").parent)[0].input_hash == bodies[0].input_hash
     assert assemble(spec, bodies).hash == plain.hash
 
