@@ -20,8 +20,8 @@ from pathlib import Path
 
 from gearfmu.body import load_bodies
 from gearfmu.kernel.build import library_path
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import RotorSpec, Stage
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.general import RotorSpec, Stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble
 

@@ -10,15 +10,15 @@ from typing import Any, Protocol, TypeAlias
 
 from gearfmu.body import body_hashes, reduce_apart, reduce_bodies
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.bores import with_bores
-from gearfmu.spec.changes import Changes
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.library import model_folder
-from gearfmu.spec.members import Form
+from gearfmu.spec.forms.bores import with_bores
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.members import Form
+from gearfmu.spec.forms.turning import with_ports
+from gearfmu.spec.reading.changes import Changes
+from gearfmu.spec.reading.library import model_folder
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.scene import load_scene as load_scene_file
 from gearfmu.spec.stage import load_stage as load_stage_file
-from gearfmu.spec.turning import with_ports
 from gearfmu.stage import StageModel
 from gearfmu.stage import assemble as assemble_model
 

@@ -19,12 +19,12 @@ from gearfmu.errors import GearfmuError, Problem, SpecError
 from gearfmu.fmu.opened import read_fmu
 from gearfmu.report import write
 from gearfmu.report.run import Run
-from gearfmu.spec.members import Form
+from gearfmu.spec.forms.members import Form
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.deformation import Deformation
-from gearfmu.stage.exchange import convert as convert_trace
-from gearfmu.stage.steady import parameters
-from gearfmu.stage.windup import wound_starts, write_starts
+from gearfmu.stage.run.deformation import Deformation
+from gearfmu.stage.run.exchange import convert as convert_trace
+from gearfmu.stage.run.steady import parameters
+from gearfmu.stage.run.windup import wound_starts, write_starts
 
 
 def export(

@@ -13,15 +13,15 @@ from gearfmu.api.models import AnyStage, PathLike, Progress, load, load_scene, m
 from gearfmu.api.quantities import Quantity, checked, in_si
 from gearfmu.api.settings import RunSettings, Settings
 from gearfmu.cosim.scene_run import Staged
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.members import Form
-from gearfmu.spec.profile import Profile, read_profile
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.members import Form
 from gearfmu.spec.scene import SceneSpec
+from gearfmu.spec.tables.profile import Profile, read_profile
 from gearfmu.stage import StageModel, Steady, TeResult, Trace
 from gearfmu.stage import simulate as simulate_model
-from gearfmu.stage.set_te import SetTeResult, stage_te
-from gearfmu.stage.simulate import Inputs
-from gearfmu.stage.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.set_te import SetTeResult, stage_te
+from gearfmu.stage.run.simulate import Inputs
+from gearfmu.stage.run.steady import Drive, parameters, steady_run
 
 
 def te(
@@ -70,7 +70,7 @@ def simulate(
     settle : from here on the report takes results and spectra.
     settings : of the kernel (docs/variables.md): level="fast", slices=10, **{"effect.hertz": False}.
     profile : among the keyword arguments, torque, speed or both over time in place of the arguments: a CSV file with a
-        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.spec.profile.Profile` of arrays in SI.
+        head like time_[s],torque_[N*m],speed_[rpm], or a `gearfmu.spec.tables.profile.Profile` of arrays in SI.
 
     The trace's meta says the outcome: a run that stops early keeps its samples. Raises ModelError for an unknown
     setting, SpecError for a port that this cannot turn, for a profile that cannot be used and for a torque or a speed

@@ -19,12 +19,12 @@ from gearfmu.body.toothed import gear_work, reduced_gear
 from gearfmu.errors import BodyError, MeshError
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
-from gearfmu.spec.body import body_hash, body_inputs
-from gearfmu.spec.general import Stage
-from gearfmu.spec.library import model_folder
-from gearfmu.spec.members import Form, body_names, carriers, members
-from gearfmu.spec.pair import StageSpec
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.body import body_hash, body_inputs
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import Form, body_names, carriers, members
+from gearfmu.spec.forms.pair import StageSpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.reading.library import model_folder
 
 Body: TypeAlias = ReducedBody | InterfaceBody
 Folder: TypeAlias = "str | os.PathLike[str] | None"

@@ -21,7 +21,7 @@ from gearfmu.reduction.mesh_error import carrier_mesh_error
 from gearfmu.reduction.methods import METHODS
 from gearfmu.reduction.oscillators import Oscillators, oscillators
 from gearfmu.reduction.transfer import Judging, reference, relative_error, transfer
-from gearfmu.spec.members import Form, carrier_of
+from gearfmu.spec.forms.members import Form, carrier_of
 
 TRUSTED_ERROR = 0.01
 Progress = Callable[[str, float], None]

@@ -21,12 +21,14 @@ from gearfmu.fem.factor import FactorError
 from gearfmu.fem.lanczos import ModesError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.geometry.internal import InternalGearGeometry
+from gearfmu.reduction.cyclic.frf import FrfCase, frf_error
+from gearfmu.reduction.cyclic.modal import Progress, elastic_modes
+from gearfmu.reduction.cyclic.statics import Statics, static_tables
 from gearfmu.reduction.display import Display, outline, whole_surface
 from gearfmu.reduction.elastic import Elastic, elastic
-from gearfmu.reduction.frf import FrfCase, frf_error
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported_carrier import imported_carrier
-from gearfmu.reduction.imported_gear import (
+from gearfmu.reduction.imported.carrier import imported_carrier
+from gearfmu.reduction.imported.gear import (
     BORE,
     CheckedGear,
     ImportedGear,
@@ -35,14 +37,12 @@ from gearfmu.reduction.imported_gear import (
     hinge_problem,
     imported_gear,
 )
-from gearfmu.reduction.imported_sector import ImportedSector
-from gearfmu.reduction.imported_whole import Held, imported_gear_order
-from gearfmu.reduction.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
-from gearfmu.reduction.modal import Progress, elastic_modes
-from gearfmu.reduction.statics import Statics, static_tables
-from gearfmu.spec.general import RingBody
-from gearfmu.spec.imported import ImportSpec, RingImportSpec
-from gearfmu.spec.members import Form, Member, carrier_of
+from gearfmu.reduction.imported.mean_tooth import WholeGear, mean_frf, mean_modes, mean_statics
+from gearfmu.reduction.imported.sector import ImportedSector
+from gearfmu.reduction.imported.whole import Held, imported_gear_order
+from gearfmu.spec.forms.general import RingBody
+from gearfmu.spec.forms.members import Form, Member, carrier_of
+from gearfmu.spec.tables.imported import ImportSpec, RingImportSpec
 
 
 def check_gear(member: Member) -> CheckedGear:

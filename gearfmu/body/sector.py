@@ -6,7 +6,7 @@ from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.carrier import scaled_sector
-from gearfmu.spec.members import CarrierMember, Form, carriers, members
+from gearfmu.spec.forms.members import CarrierMember, Form, carriers, members
 
 
 def body_sector(spec: Form, name: str, scale: float = 1.0) -> FeMesh:

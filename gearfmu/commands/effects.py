@@ -29,7 +29,7 @@ paper, bodies and modes against rigid ones, tip corners at 80 N·m, pitch errors
 def effects(stage: str | None) -> None:
     """The effects there are: formula, when each matters, what it costs, how to switch it; with STAGE its numbers."""
     from gearfmu.stage.effects import EFFECTS, costs
-    from gearfmu.stage.inertia import NEGLECTED
+    from gearfmu.stage.run.inertia import NEGLECTED
 
     found, numbers = costs(), _numbers(stage) if stage else {}
     for effect in EFFECTS:
@@ -66,7 +66,7 @@ def effects_page() -> str:
 
 
 def _left_out_page() -> str:
-    from gearfmu.stage.inertia import NEGLECTED
+    from gearfmu.stage.run.inertia import NEGLECTED
 
     rows = [f"| {term.name} | {_cell(term.formula)} | {term.why} |\n" for term in NEGLECTED]
     return (
@@ -101,10 +101,10 @@ def _numbers(stage: str) -> dict[str, str]:
     """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
-    from gearfmu.spec.shapes import gear_shape
+    from gearfmu.spec.forms.shapes import gear_shape
+    from gearfmu.stage.build.flanks import FlankField
+    from gearfmu.stage.build.meshes import mesh_geometry
     from gearfmu.stage.effects import torque_on_flanks_alone
-    from gearfmu.stage.flanks import FlankField
-    from gearfmu.stage.meshes import mesh_geometry
 
     model = model_of(stage)
     spec = model.stage
@@ -163,8 +163,8 @@ def _film(spec: Any, mesh: Any) -> str:
     """Momentum that the film of a mesh takes, spur teeth at the pitch point."""
     if mesh.film is None:
         return "none is stated: it costs nothing"
-    from gearfmu.stage.film import REACH, film_impulse
-    from gearfmu.stage.meshes import mesh_geometry
+    from gearfmu.stage.build.film import REACH, film_impulse
+    from gearfmu.stage.build.meshes import mesh_geometry
 
     pair = mesh_geometry(spec, mesh)
     a, b = (gear.r_b for gear in pair.gears)
@@ -180,9 +180,9 @@ def _film(spec: Any, mesh: Any) -> str:
 def _whirling(model: Any) -> str:
     """What turning does to the frequencies of gears on their bearings, and of elastic patterns, at speed_max."""
     from gearfmu.body import load_bodies
-    from gearfmu.stage.assembly import stage_group
-    from gearfmu.stage.inertia import inertia_terms, whirl_shift
-    from gearfmu.stage.observed import gear_bodies
+    from gearfmu.stage.build.assembly import stage_group
+    from gearfmu.stage.build.observed import gear_bodies
+    from gearfmu.stage.run.inertia import inertia_terms, whirl_shift
 
     bodies = load_bodies(model.spec)
     shift = whirl_shift(model.stage, stage_group(model.spec, bodies), WHIRL_BAND)
@@ -199,9 +199,9 @@ def _whirling(model: Any) -> str:
 def _left_out(stage: str) -> Iterable[str]:
     """Sizes of what is left out, a line for every gear whose file tells."""
     from gearfmu.commands.models import bodies_of
-    from gearfmu.spec.expand import as_general
-    from gearfmu.stage.inertia import inertia_terms
-    from gearfmu.stage.observed import gear_bodies
+    from gearfmu.spec.forms.expand import as_general
+    from gearfmu.stage.build.observed import gear_bodies
+    from gearfmu.stage.run.inertia import inertia_terms
 
     spec, bodies = bodies_of(stage)
     for gear in inertia_terms(as_general(spec), gear_bodies(spec, bodies)):

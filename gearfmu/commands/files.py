@@ -83,7 +83,7 @@ def facts_of(path: Path, plain: bool = True) -> dict[str, Any]:
 def _shipped(name: Path) -> Path:
     """File of a shipped scene, or of a stage as `find_stage` knows it; an error that names all when there is none."""
     from gearfmu.errors import GearfmuError, SpecError
-    from gearfmu.spec.library import find_stage, shipped_stages
+    from gearfmu.spec.reading.library import find_stage, shipped_stages
     from gearfmu.spec.scene import SHIPPED, shipped_scenes
 
     scenes = shipped_scenes()
@@ -101,8 +101,8 @@ def _hdf5(path: Path) -> dict[str, Any]:
     from gearfmu.body.interface_body import FORMAT as INTERFACE_FORMAT
     from gearfmu.body.layout import FORMAT
     from gearfmu.hdf5 import format_of
-    from gearfmu.stage.deformation import FILE as DEFORMATION
-    from gearfmu.stage.trace import Trace
+    from gearfmu.stage.run.deformation import FILE as DEFORMATION
+    from gearfmu.stage.run.trace import Trace
 
     if format_of(path) in (FORMAT, INTERFACE_FORMAT):
         return inspect_file(path)
@@ -125,7 +125,7 @@ def _hdf5(path: Path) -> dict[str, Any]:
 
 
 def _deformation(path: Path) -> dict[str, Any]:
-    from gearfmu.stage.deformation import Deformation
+    from gearfmu.stage.run.deformation import Deformation
 
     found = Deformation.load(path)
     return {
@@ -140,8 +140,8 @@ def _deformation(path: Path) -> dict[str, Any]:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    from gearfmu.spec.base import read_toml
-    from gearfmu.spec.derived import derived
+    from gearfmu.spec.forms.derived import derived
+    from gearfmu.spec.reading.base import read_toml
     from gearfmu.spec.scene import load_scene
     from gearfmu.spec.stage import load_stage
 
@@ -173,8 +173,8 @@ def _needs(spec: Any) -> Any:
 
 
 def _toml_with_units(path: Path) -> dict[str, Any]:
+    from gearfmu.spec.reading.shown import shown
     from gearfmu.spec.scene import load_scene
-    from gearfmu.spec.shown import shown
     from gearfmu.spec.stage import load_stage
 
     found = _toml(path)

@@ -86,7 +86,7 @@ def frf(stage: str, body: str, **options: Any) -> None:
 
 def full_order_of(stage: str, body: str, scale: float | None = None) -> FullOrder:
     """The FullOrder of a body of STAGE: gear, ring or carrier; a usage error for a body it does not have."""
-    from gearfmu.spec.members import body_names, members
+    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)

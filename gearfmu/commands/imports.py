@@ -32,7 +32,7 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
     if stage is None:
         echo_pairs(mesh_facts(file, options["length"], options["ignore"], options["axis"]))
         return
-    from gearfmu.spec.members import body_names, members
+    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -47,10 +47,10 @@ def import_(file: Path, stage: str | None, gear: str | None, **options: Any) -> 
 def body_facts(spec: Any, name: str, file: str, options: dict[str, Any]) -> dict[str, Any]:
     """What the finite elements in `file` are as the body `name` of a stage; MeshError when they are not that body."""
     from gearfmu.body.imported import check_gear
-    from gearfmu.reduction.imported_carrier import imported_carrier
-    from gearfmu.spec.general import RingBody
-    from gearfmu.spec.imported import CarrierImportSpec, ImportSpec, RingImportSpec
-    from gearfmu.spec.members import member_of
+    from gearfmu.reduction.imported.carrier import imported_carrier
+    from gearfmu.spec.forms.general import RingBody
+    from gearfmu.spec.forms.members import member_of
+    from gearfmu.spec.tables.imported import CarrierImportSpec, ImportSpec, RingImportSpec
 
     if name == "carrier":
         if not options["bore"] or len(options["bolts"]) != spec.set.planets:

@@ -27,7 +27,7 @@ def mesh(stage: str, only: str | None, scale: float, full: bool, deck: bool, out
     from gearfmu.commands.files import in_units
     from gearfmu.femesh import mesh_report, write_vtu
     from gearfmu.femesh.deck import write_deck
-    from gearfmu.spec.members import body_names, members
+    from gearfmu.spec.forms.members import body_names, members
     from gearfmu.spec.stage import load_stage
 
     spec = load_stage(stage)
@@ -62,7 +62,7 @@ def reduce(stage: str, out: Path | None, force: bool, coarse: bool) -> None:
     import time
 
     from gearfmu.body import current_bodies, reduce_bodies
-    from gearfmu.spec.coarse import STATED_ERROR, coarse_stage
+    from gearfmu.spec.proposals.coarse import STATED_ERROR, coarse_stage
     from gearfmu.spec.stage import load_stage
 
     if coarse:

@@ -43,7 +43,7 @@ def study(scenes: tuple[str, ...], out: Path, tables: tuple[str, ...], quick: bo
     """Error and price of the fidelity levels in SCENE, over the internal step and the slices; of a planetary set also
     over the number of planets and single effects (sets.csv)."""
     from gearfmu.commands.models import bodies_for_motion
-    from gearfmu.spec.members import carriers
+    from gearfmu.spec.forms.members import carriers
     from gearfmu.spec.scene import load_scene
     from gearfmu.spec.stage import load_stage, require_pair
 

@@ -10,11 +10,11 @@ from gearfmu.cosim.shaft_loads import Law
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.start import Start
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import Stage
-from gearfmu.spec.parts import GROUND, Drivetrain
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import undriven
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.turning import undriven
+from gearfmu.spec.scenes.parts import GROUND, Drivetrain
+from gearfmu.spec.tables.ports import PortSpec
 
 
 def part_ports(scene: SceneSpec, stage: Stage) -> dict[str, PortSpec]:

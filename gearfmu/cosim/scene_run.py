@@ -29,15 +29,15 @@ from gearfmu.cosim.units import Unit
 from gearfmu.errors import CouplingError
 from gearfmu.files import write_text
 from gearfmu.fmu.opened import read_fmu
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import Stage
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import require_driven, shafts_of, with_ports
 from gearfmu.spec.scene import SceneSpec, load_scene
 from gearfmu.spec.stage import StageSpec, load_stage
-from gearfmu.spec.turning import require_driven, shafts_of, with_ports
 from gearfmu.stage import StageModel, assemble
-from gearfmu.stage.deformation import FILE_NAME
-from gearfmu.stage.observed import gear_hashes
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.observed import gear_hashes
+from gearfmu.stage.run.deformation import FILE_NAME
+from gearfmu.stage.run.trace import Trace
 
 WHOLE = Wiring()
 

@@ -24,11 +24,11 @@ import numpy as np
 from gearfmu.cosim.signals import Ramp
 from gearfmu.cosim.units import Unit, Variable
 from gearfmu.errors import CouplingError, Problem, SpecError
-from gearfmu.spec.general import Stage
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import turns, undriven
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.shaft_loads import ShaftLoad
-from gearfmu.spec.turning import turns, undriven
+from gearfmu.spec.scenes.shaft_loads import ShaftLoad
+from gearfmu.spec.tables.ports import PortSpec
 
 ORDERS = {"gs_mean": 2, "jacobi": 1}
 CARRIED_ON = 4  # steps whose mean change of speed is carried on

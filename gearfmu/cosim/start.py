@@ -17,10 +17,10 @@ import numpy as np
 from gearfmu.cosim.shaft_loads import Law
 from gearfmu.cosim.signals import Ramp
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.general import Stage
-from gearfmu.spec.parts import GROUND, Drivetrain
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.turning import rolling, solved
 from gearfmu.spec.scene import SceneSpec
-from gearfmu.spec.turning import rolling, solved
+from gearfmu.spec.scenes.parts import GROUND, Drivetrain
 
 SAME = 1e-9  # relative to the largest speed: speeds that do not differ
 SMALL = 1e-9  # N·m: torques that are none

@@ -11,8 +11,8 @@ from gearfmu.body.sector import body_sector
 from gearfmu.errors import BodyError
 from gearfmu.modes.cyclic import Progress, cyclic_modes
 from gearfmu.modes.shapes import BodyModes
-from gearfmu.spec.general import RingBody
-from gearfmu.spec.members import Form, member_of
+from gearfmu.spec.forms.general import RingBody
+from gearfmu.spec.forms.members import Form, member_of
 
 AGREEMENT = 1e-6  # relative: frequencies made again against those of the file
 

@@ -15,9 +15,9 @@ from gearfmu.modes.shapes import BodyModes
 from gearfmu.modes.whole import whole_modes
 from gearfmu.reduction.carrier import carrier_full_order
 from gearfmu.reduction.toothed import RING_SCALE, ring_full_order
-from gearfmu.spec.general import ToothedBody
-from gearfmu.spec.members import CARRIER, Form, carrier_of, member_of
-from gearfmu.spec.planetary import CarrierSpec
+from gearfmu.spec.forms.general import ToothedBody
+from gearfmu.spec.forms.members import CARRIER, Form, carrier_of, member_of
+from gearfmu.spec.forms.planetary import CarrierSpec
 
 
 def set_body_modes(

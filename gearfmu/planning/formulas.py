@@ -20,9 +20,9 @@ from gearfmu.planning.choice import MODES, SLICED, STEP, Choice, Knob
 from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Trial
 from gearfmu.stage import StageModel
-from gearfmu.stage.blob import read_blob
-from gearfmu.stage.place import place_of
-from gearfmu.stage.set_te import stage_te
+from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.set_te import stage_te
 
 POSITIONS = 16
 DECIBEL = 20.0 / math.log(10.0)  # of a small relative error

@@ -12,9 +12,9 @@ from gearfmu.femesh.carrier import carrier_sector, whole_carrier
 from gearfmu.femesh.mesh import FeMesh
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.reduction.imported_carrier import imported_carrier
+from gearfmu.reduction.imported.carrier import imported_carrier
 from gearfmu.reduction.memory import CARRIER_FACTORS, Need, modes_need, parts_need, whole_need
-from gearfmu.spec.members import CarrierMember, Form, carrier_of
+from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
 
 FINER = 1.6  # factor on all element counts of the mesh that a carrier is judged by
 

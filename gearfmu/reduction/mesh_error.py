@@ -11,7 +11,7 @@ from gearfmu.fem.cyclic import Sector, SectorSpace, sector_spaces
 from gearfmu.fem.lanczos import lowest_modes
 from gearfmu.reduction.carrier import FINER, carrier_full_order, cyclic_carrier, scaled_sector
 from gearfmu.reduction.elastic import Elastic
-from gearfmu.spec.members import CarrierMember, Form, carrier_of
+from gearfmu.spec.forms.members import CarrierMember, Form, carrier_of
 
 COMPARED = 20  # lowest elastic modes
 

@@ -18,7 +18,7 @@ from gearfmu.geometry import GearGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.reduction.couplings import Coupling, Elements, Judgement, Springs, averaging, full_order
 from gearfmu.reduction.full_order import FullOrder
-from gearfmu.spec.members import Form, member_of
+from gearfmu.spec.forms.members import Form, member_of
 
 RING_SCALE = 0.4  # of the element counts in the file: about 100 000 unknowns instead of a million
 GEAR_SCALE = 0.5

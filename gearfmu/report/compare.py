@@ -22,8 +22,8 @@ from gearfmu.report.plots_nvh import SHOWN_TO, averaging, force_channels, octave
 from gearfmu.report.results import dynamic_factors, key_results
 from gearfmu.report.run import Run
 from gearfmu.report.signals import meshes
-from gearfmu.stage.te import mesh_harmonics
-from gearfmu.stage.trace import write_columns
+from gearfmu.stage.run.te import mesh_harmonics
+from gearfmu.stage.run.trace import write_columns
 
 ORDERS = 6
 ALIKE = 0.05  # dB, or %: smaller differences are not called better or worse

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from gearfmu.files import written_whole
 from gearfmu.report.style import COLOURS, WIDTH, styled
-from gearfmu.spec.general import Stage
-from gearfmu.spec.shapes import gear_shape
-from gearfmu.stage.flanks import FlankField
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import gear_shape
+from gearfmu.stage.build.flanks import FlankField
 
 ROW = 2.2  # inches of a gear
 

@@ -15,13 +15,13 @@ from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.signals import GEAR_PHI, SETTLED, Window
-from gearfmu.spec.general import EngagementSpec, Stage
+from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.stage import assemble
-from gearfmu.stage.flank_loads import FlankLoads, flank_loads
-from gearfmu.stage.meshes import EXTERNAL, kind_of, mesh_geometry
-from gearfmu.stage.place import place_of
-from gearfmu.stage.te import mesh_harmonics, statics_of
-from gearfmu.stage.trace import Trace
+from gearfmu.stage.build.meshes import EXTERNAL, kind_of, mesh_geometry
+from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
+from gearfmu.stage.run.place import place_of
+from gearfmu.stage.run.te import mesh_harmonics, statics_of
+from gearfmu.stage.run.trace import Trace
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
 LEAST_LOAD = 0.01  # of torque_max: below it flanks part, and there is no cycle to speak of

@@ -21,9 +21,9 @@ from gearfmu.report.packed import Pack
 from gearfmu.report.picture import SHOWN_FRACTION, contacts_at, mirrored, round_scale
 from gearfmu.report.signals import GEAR_PHI
 from gearfmu.report.structure import AROUND, parts, turned
-from gearfmu.spec.general import EngagementSpec, Stage
-from gearfmu.stage.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.general import EngagementSpec, Stage
+from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
+from gearfmu.stage.run.trace import Trace
 
 FRAMES, CONTACTS, PITCHES = 160, 4, 8
 STEPS = 127  # of a displacement, in the page

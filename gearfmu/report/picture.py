@@ -15,10 +15,10 @@ from gearfmu.report.chart import Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.scene3d import Shape, draw
 from gearfmu.report.signals import GEAR_PHI
-from gearfmu.spec.general import Stage
-from gearfmu.spec.shapes import MeshShape
-from gearfmu.stage.meshes import mesh_axes, mesh_geometry, tooth_phases
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import MeshShape
+from gearfmu.stage.build.meshes import mesh_axes, mesh_geometry, tooth_phases
+from gearfmu.stage.run.trace import Trace
 
 SHOWN_FRACTION = 0.35  # of the module: how large the largest displacement is drawn
 

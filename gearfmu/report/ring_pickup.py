@@ -19,8 +19,8 @@ from scipy.signal import lfilter
 from gearfmu.report import metrics
 from gearfmu.report.plots_set import PlanetSet, mean_or_sample
 from gearfmu.report.signals import GEAR_PHI
-from gearfmu.spec.expand import as_general
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.stage.run.trace import Trace
 
 NYQUIST_PART = 0.8  # of it: modes above this part are left out
 RING = "ring"

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from gearfmu.report.metrics import mesh_angle
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.turning import Meshing, meshings
-from gearfmu.stage.trace import Trace
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.turning import Meshing, meshings
+from gearfmu.stage.run.trace import Trace
 
 GEAR_SPEED = ".gear.w"
 GEAR_PHI = ".gear.phi"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearfmu.spec.general import CarrierBody, ShaftBody, Stage
+from gearfmu.spec.forms.general import CarrierBody, ShaftBody, Stage
 
 AROUND = 40  # sectors of a surface of revolution
 Profile = Sequence[tuple[float, float]]

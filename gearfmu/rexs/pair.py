@@ -19,9 +19,8 @@ from gearfmu.rexs.gears import (
     shaft_torque,
 )
 from gearfmu.rexs.model import Component, RexsModel
-from gearfmu.spec.base import validate
-from gearfmu.spec.checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
-from gearfmu.spec.draft import (
+from gearfmu.spec.forms.pair_checks import STRIP_PER_HERTZ, largest_half_width, rounded_up
+from gearfmu.spec.proposals.draft import (
     BACKLASH_PER_MODULE,
     PITCH_SPEED,
     STRIP_PER_MODULE,
@@ -30,7 +29,8 @@ from gearfmu.spec.draft import (
     millimetres,
     usual_torque,
 )
-from gearfmu.spec.gear import GearSpec, PairSpec
+from gearfmu.spec.reading.base import validate
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
 from gearfmu.units import to_si
 
 NAMES = ("pinion", "wheel")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from gearfmu.spec.base import Spec
-from gearfmu.spec.general import Stage
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.reading.base import Spec
 from gearfmu.spec.stage import StageSpec
 
 

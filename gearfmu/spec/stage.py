@@ -9,21 +9,21 @@ from typing import Any, TypeVar
 
 from gearfmu.errors import Problem, SpecError, UnitError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.base import Spec, validate
-from gearfmu.spec.changes import Changes, changed_tables
-from gearfmu.spec.checks import geometry_problems
-from gearfmu.spec.flank_checks import located, topography_problems, with_rolls
-from gearfmu.spec.gear import GearSpec, PairSpec
-from gearfmu.spec.general import Stage
-from gearfmu.spec.general_checks import general_problems, with_relief_rolls
-from gearfmu.spec.imported import missing_files
-from gearfmu.spec.judge import read_and_judge
-from gearfmu.spec.layers import Layers, read_layers
-from gearfmu.spec.library import find_stage
-from gearfmu.spec.members import members
-from gearfmu.spec.pair import StageSpec as StageSpec
-from gearfmu.spec.planetary import PlanetarySpec
-from gearfmu.spec.planetary_checks import set_problems
+from gearfmu.spec.forms.flank_checks import located, topography_problems, with_rolls
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.general_checks import general_problems, with_relief_rolls
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.forms.pair import StageSpec as StageSpec
+from gearfmu.spec.forms.pair_checks import geometry_problems
+from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary_checks import set_problems
+from gearfmu.spec.reading.base import Spec, validate
+from gearfmu.spec.reading.changes import Changes, changed_tables
+from gearfmu.spec.reading.judge import read_and_judge
+from gearfmu.spec.reading.layers import Layers, read_layers
+from gearfmu.spec.reading.library import find_stage
+from gearfmu.spec.tables.gear import GearSpec, PairSpec
+from gearfmu.spec.tables.imported import missing_files
 from gearfmu.units import to_si
 
 

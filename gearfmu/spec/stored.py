@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from gearfmu.errors import Problem, SpecError
-from gearfmu.spec.base import Spec, validate
+from gearfmu.spec.reading.base import Spec, validate
 from gearfmu.spec.stage import stage_class
 
 FILES_OF_IMPORT = ("file", "stiffness", "mass", "unknowns")

@@ -14,11 +14,11 @@ import numpy as np
 from gearfmu.body import ReducedBody, load_bodies
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.kernel import Kernel
-from gearfmu.spec.gear import MeshSpec
-from gearfmu.spec.members import member_of
-from gearfmu.spec.planetary import PlanetarySpec, RingSpec
-from gearfmu.spec.ports import PortSpec
+from gearfmu.spec.forms.members import member_of
+from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec
 from gearfmu.spec.stage import load_set
+from gearfmu.spec.tables.gear import MeshSpec
+from gearfmu.spec.tables.ports import PortSpec
 from gearfmu.stability.bench import kernel
 from gearfmu.stability.case import Case, Finding
 from gearfmu.stability.checks import CLEARANCE, deep, judged, near

@@ -24,8 +24,8 @@ from gearfmu.kernel import Kernel
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Trace, assemble
-from gearfmu.stage.model import integrator_of
-from gearfmu.stage.tables import ROLLS
+from gearfmu.stage.build.model import integrator_of
+from gearfmu.stage.build.tables import ROLLS
 from gearfmu.study.norm import Signals, set_signals, signals_of
 
 CHUNK = 100  # communication steps that are timed at once

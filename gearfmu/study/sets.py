@@ -20,7 +20,7 @@ from gearfmu.body import load_bodies, reduce_body
 from gearfmu.errors import ModelError, SimulationError
 from gearfmu.files import write_text
 from gearfmu.kernel.build import fingerprint
-from gearfmu.spec.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_set
 from gearfmu.stage import StageModel

@@ -14,8 +14,8 @@ from gearfmu.report.results import REACHED_THE_END, key_results
 from gearfmu.report.signals import bearings, mesh_angles, meshes, window_of_interest
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel, Trace
-from gearfmu.stage.set_te import GEARS, SetTeResult, stage_te
-from gearfmu.stage.steady import Drive, parameters, steady_run
+from gearfmu.stage.run.set_te import GEARS, SetTeResult, stage_te
+from gearfmu.stage.run.steady import Drive, parameters, steady_run
 from gearfmu.sweeps.plan import OWN, SIMULATE, TE
 from gearfmu.units import to_si
 

@@ -24,9 +24,9 @@ from gearfmu.body.store import save_body
 from gearfmu.errors import BodyError
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.spec.gear import MeshSpec
-from gearfmu.spec.planetary_body import SET_BODIES
+from gearfmu.spec.forms.planetary_body import SET_BODIES
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import MeshSpec
 
 LARGEST = 1.4e6  # bytes of a file, as of other shipped bodies
 SPEC = load_stage("planetary54")

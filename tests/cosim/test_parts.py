@@ -14,8 +14,8 @@ from gearfmu.cosim.parts import part_network, part_ports
 from gearfmu.cosim.py_unit import PyUnit
 from gearfmu.cosim.start import start_of, start_speeds_of
 from gearfmu.errors import SpecError
-from gearfmu.spec.expand import as_general
-from gearfmu.spec.general import Stage
+from gearfmu.spec.forms.expand import as_general
+from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.scene import SHIPPED, SceneSpec, load_scene
 from gearfmu.spec.stage import load_stage
 

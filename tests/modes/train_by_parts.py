@@ -21,9 +21,9 @@ from pair_by_parts import LEAST_HALF_WIDTH, on_tooth, weights_between
 from gearfmu.body import ReducedBody
 from gearfmu.body.beam import ORDER, Section, Shaft, Steel, bending_matrices, rod_matrices
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.general import EngagementSpec, ShaftBody, Stage
-from gearfmu.spec.shapes import mesh_shape
-from gearfmu.stage.tables import resampling
+from gearfmu.spec.forms.general import EngagementSpec, ShaftBody, Stage
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.tables import resampling
 
 STIFFNESS = {"radial": (0, 1), "axial": (2,), "tilt": (3, 4), "torsion": (5,)}
 UNSEEN = 1e-9  # of the largest row: modes that nothing excites are left out

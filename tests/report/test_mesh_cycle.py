@@ -20,12 +20,12 @@ from gearfmu.report.mesh_cycle import (
 )
 from gearfmu.report.results import dynamic_factors
 from gearfmu.report.signals import Window, window_of_interest
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.flank_loads import flank_loads
-from gearfmu.stage.meshes import mesh_geometry
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.build.meshes import mesh_geometry
+from gearfmu.stage.run.flank_loads import flank_loads
+from gearfmu.stage.run.trace import Channel, Trace
 
 TORQUE = 302.0
 

@@ -14,11 +14,11 @@ from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack, unpacked
 from gearfmu.report.picture import contacts_at, meshing_angles
 from gearfmu.report.structure import AROUND, parts, turned
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.meshes import mesh_geometry
-from gearfmu.stage.observed import gear_bodies
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.build.meshes import mesh_geometry
+from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.run.trace import Channel, Trace
 
 SPEED, FORCE = 200.0, 8000.0  # rad/s, N
 TIME = np.linspace(0.0, 0.02, 2001)

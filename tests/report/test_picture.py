@@ -12,9 +12,9 @@ from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report import picture
 from gearfmu.report.scene3d import Shape, draw
-from gearfmu.spec.expand import as_general
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
-from gearfmu.stage.trace import Channel, Trace
+from gearfmu.stage.run.trace import Channel, Trace
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,13 @@ import pytest
 
 from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
-from gearfmu.stage.assembly import MODEL_VERSION, general_sections
-from gearfmu.stage.fields import order_sections
-from gearfmu.stage.groups import mount
-from gearfmu.stage.layout import stage_layout
-from gearfmu.stage.meshes import mesh_geometry, tooth_phases
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
+from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
+from gearfmu.stage.build.fields import order_sections
+from gearfmu.stage.build.groups import mount
+from gearfmu.stage.build.layout import stage_layout
+from gearfmu.stage.build.meshes import mesh_geometry, tooth_phases
 
 A = 0.0915
 SHAFT = {

@@ -14,11 +14,11 @@ from gearfmu.body import ReducedBody
 from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import GearGeometry
-from gearfmu.spec.gear import BodySpec, MeshSpec
-from gearfmu.spec.general import Stage
-from gearfmu.spec.members import members
-from gearfmu.spec.shapes import mesh_shape
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
 
 STAGE = Path(__file__).parents[2] / "benchmarks" / "calculix" / "internal" / "stage.toml"

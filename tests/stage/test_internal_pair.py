@@ -19,13 +19,13 @@ from gearfmu.body.toothed import reduced_gear
 from gearfmu.errors import SpecError
 from gearfmu.geometry import involute
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.gear import BodySpec, MeshSpec
-from gearfmu.spec.general import Stage
-from gearfmu.spec.members import members
-from gearfmu.spec.shapes import mesh_shape
+from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import members
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import load_stage
+from gearfmu.spec.tables.gear import BodySpec, MeshSpec
 from gearfmu.stage import StageModel, assemble, loaded_te
-from gearfmu.stage.meshes import tooth_phases
+from gearfmu.stage.build.meshes import tooth_phases
 
 ROOT = Path(__file__).parents[2]
 

@@ -13,16 +13,16 @@ import pytest
 
 from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
-from gearfmu.spec.base import read_toml
-from gearfmu.spec.expand import expand_pair
-from gearfmu.spec.general import RotorSpec, Stage
-from gearfmu.spec.library import find_stage
+from gearfmu.spec.forms.expand import expand_pair
+from gearfmu.spec.forms.general import RotorSpec, Stage
+from gearfmu.spec.forms.turning import shafts_of, turns
+from gearfmu.spec.reading.base import read_toml
+from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
-from gearfmu.spec.turning import shafts_of, turns
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
-from gearfmu.stage.meshes import mesh_geometry
-from gearfmu.stage.steady import Drive, steady_run
-from gearfmu.stage.te import statics_of
+from gearfmu.stage.build.meshes import mesh_geometry
+from gearfmu.stage.run.steady import Drive, steady_run
+from gearfmu.stage.run.te import statics_of
 
 FAST, STEPS, H = 1, 60, 5e-5
 TORQUE, SPEED = 120.0, 150.0  # of the input, N·m and rad/s
