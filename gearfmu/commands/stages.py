@@ -95,7 +95,7 @@ def _described(body: Any, kept: bool) -> str:
 def _cost(body: Any, kept: bool) -> str:
     """Size of the finite elements behind a body, and the processor time and memory its reduction took."""
     mesh, made = body.mesh, body.provenance
-    memory, sectors = made["peak_memory_GB"], getattr(body, "teeth", mesh["teeth"])
+    memory, sectors = made["peak_memory_GB"], mesh["teeth"]
     return (
         f"{mesh['dof_body']} DOF, {sectors} sectors of {mesh['dof_sector']}; "
         + ("up to date, only read; it was reduced in " if kept else "reduced in ")

@@ -120,6 +120,7 @@ def _other(table: str, specs: Sequence[Any], out: Path, quick: bool) -> None:
 
 
 def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | None) -> list[Any]:
+    from gearfmu.stage.build.levels import LEVELS
     from gearfmu.study import cuts, limits, order, refined
     from gearfmu.study.ladder import quick_scene
 
@@ -127,7 +128,7 @@ def _rows(table: str, specs: Sequence[Any], quick: bool, progress: Progress | No
     if table == "cuts":
         return [row for scene in windows for row in cuts.cut_rows(scene, quick, progress)[0]]
     if table == "limits":
-        levels = ("fast",) if quick else limits.LEVELS
+        levels = ("fast",) if quick else LEVELS
         return [row for scene in windows for row in limits.limit_rows(scene, levels, progress=progress)]
     if table == "bodies":
         stages = {spec.stage.name for spec in specs}

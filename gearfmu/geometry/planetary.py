@@ -157,7 +157,7 @@ class PlanetaryGeometry:
     @property
     def ratio(self) -> float:
         """Speed of the sun over that of the carrier with the ring at rest, 1 + z_r/z_s."""
-        return 1 + self.ring_mesh.ring.z / self.sun_mesh.gears[0].z
+        return set_ratio(self.sun_mesh.gears[0].z, self.ring_mesh.ring.z)
 
     def planet_centre(self, planet: int) -> np.ndarray:
         """(2,) m, with the carrier at angle 0."""
@@ -191,6 +191,11 @@ class PlanetaryGeometry:
         """Whether the planets fit: their angles are multiples of 2π/(z_s + z_r)."""
         teeth = self.sun_mesh.gears[0].z + self.ring_mesh.ring.z
         return all(abs(math.remainder(angle, 2 * math.pi / teeth)) < SAME_ANGLE for angle in self.angles)
+
+
+def set_ratio(sun: int, ring: int) -> float:
+    """1 + z_r/z_s: speed of the sun over that of the carrier with the ring at rest; numbers of teeth."""
+    return 1 + ring / sun
 
 
 def set_geometry(spec: Any, name: str) -> GearGeometry | InternalGearGeometry:

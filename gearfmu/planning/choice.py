@@ -8,8 +8,9 @@ from typing import Any
 
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.stage import StageModel
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.effects import EFFECTS, Effect, costs
-from gearfmu.study.ladder import LEVELS, SLICES, STEPS, fitting
+from gearfmu.study.ladder import SLICES, STEPS, fitting
 
 LEAST_SHARE = 0.03  # of the cost of a step: what saves less stays on
 FULL = "full"

@@ -21,6 +21,7 @@ from gearfmu.planning.request import Request
 from gearfmu.planning.trials import Trial
 from gearfmu.stage import StageModel
 from gearfmu.stage.build.blob import read_blob
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.set_te import stage_te
 
@@ -77,7 +78,7 @@ def _modes(level: str, known: Conditions) -> float:
     """(f/f₁)² of the highest frequency of the band and the first mode that is quasi-static: what its inertia would
     add."""
     sections = {name: v for name, v in read_blob(known.model.blob).items() if isinstance(v, np.ndarray)}
-    cuts = dict(zip(("rigid", "fast", "standard"), [1.0, *map(float, sections["limits"][:2])], strict=True))
+    cuts = dict(zip(LEVELS[:3], [1.0, *map(float, sections["limits"][:2])], strict=True))
     if level not in cuts:
         return 0.0
     modes = [v.ravel() / (2 * math.pi) for name, v in sections.items() if re.fullmatch(r"omega\d+", name)]

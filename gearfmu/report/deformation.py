@@ -23,11 +23,11 @@ from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.chart import Plot
 from gearfmu.report.picture import round_scale
 from gearfmu.report.scene3d import STEEL
-from gearfmu.report.signals import GEAR_PHI
 from gearfmu.report.style import INK, MUTED, WIDTH, png, styled
 from gearfmu.spec.forms.general import Stage
 from gearfmu.stage.build.meshes import mesh_axes
 from gearfmu.stage.run.deformation import Deformation
+from gearfmu.stage.run.touching import GEAR_PHI
 from gearfmu.stage.run.trace import Trace
 
 SHOWN = 0.035  # of the gear's diameter: how large the largest elastic displacement is drawn

@@ -14,13 +14,14 @@ from gearfmu.errors import ModelError, SimulationError
 from gearfmu.geometry import involute
 from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
-from gearfmu.report.signals import GEAR_PHI, SETTLED, Window
-from gearfmu.spec.forms.general import EngagementSpec, Stage
+from gearfmu.report.signals import SETTLED, Window
+from gearfmu.spec.forms.general import Stage
 from gearfmu.stage import assemble
 from gearfmu.stage.build.meshes import EXTERNAL, kind_of, mesh_geometry
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import mesh_harmonics, statics_of
+from gearfmu.stage.run.touching import position_of
 from gearfmu.stage.run.trace import Trace
 
 HARMONICS, BINS, LEAST_PERIODS = 8, 48, 8
@@ -60,18 +61,6 @@ def folded(position: np.ndarray, values: np.ndarray) -> np.ndarray | None:
     bins = (np.mod(position, 1.0) * BINS).astype(int) % BINS
     count = np.bincount(bins, minlength=BINS)
     return np.bincount(bins, values, BINS) / count if np.all(count) else None
-
-
-def position_of(trace: Trace, stage: Stage, mesh: EngagementSpec) -> np.ndarray | None:
-    """(n,) pitches by which gear A of an engagement would have turned on without load, from the angle of gear B, in the
-    axes of what carries them; None where that was not recorded."""
-    rotor, frame = stage.rotor_of(mesh.gears[1]), stage.frame_of(mesh)
-    names = [name + GEAR_PHI for name in (rotor, frame) if name is not None]
-    pair = mesh_geometry(stage, mesh)
-    if any(name not in trace for name in names):
-        return None
-    angle = trace[names[0]] - (trace[names[1]] if len(names) > 1 else 0.0)
-    return np.asarray(-kind_of(pair) * angle * pair.gears[1].z / (2 * math.pi))
 
 
 def transmission_error(

@@ -18,11 +18,11 @@ from scipy.spatial import cKDTree
 
 from gearfmu.modes.deformed import DeformedGear
 from gearfmu.report.packed import Pack
-from gearfmu.report.picture import SHOWN_FRACTION, contacts_at, mirrored, round_scale
-from gearfmu.report.signals import GEAR_PHI
+from gearfmu.report.picture import SHOWN_FRACTION, mirrored, round_scale
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.spec.forms.general import EngagementSpec, Stage
 from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
+from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
 
 FRAMES, CONTACTS, PITCHES = 160, 4, 8
@@ -100,7 +100,7 @@ def moving_view(
 ) -> View | None:  # fmt: skip
     """The view of a stage within a window (s); None where an angle or every mesh force is missing. bodies: ReducedBody
     by gear; recorded: gears with the times (s) of their frames."""
-    gears = [gear.name for gear in stage.gears if getattr(bodies.get(gear.name), "display", None) is not None]
+    gears = [gear.name for gear in stage.gears if gear.name in bodies and bodies[gear.name].display is not None]
     time = np.linspace(*window, FRAMES)
     if not gears or any(_rotor_angle(trace, stage, stage.rotor_of(name)) is None for name in gears):
         return None

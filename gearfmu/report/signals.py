@@ -14,7 +14,6 @@ from gearfmu.spec.forms.turning import Meshing, meshings
 from gearfmu.stage.run.trace import Trace
 
 GEAR_SPEED = ".gear.w"
-GEAR_PHI = ".gear.phi"
 LOCKED = ".locked"
 MESH_CHANNELS = ("force", "force_mean", "te", "contact", "impacts")
 NOISE = 1e-4  # of the largest mesh force: forces that cancel leave less

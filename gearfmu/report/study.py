@@ -10,6 +10,7 @@ from matplotlib import rc_context
 
 from gearfmu.files import written_whole
 from gearfmu.report.style import COLOURS, MUTED, panels, styled
+from gearfmu.stage.build.levels import LEVELS
 
 QUANTITIES = {"te": "transmission error", "force": "mesh force", "bearing": "bearing force"}
 MARKS = {"rk45": "s", "dg4": "o"}
@@ -79,7 +80,7 @@ def _label(key: tuple[str, str, int]) -> str:
 
 
 def _rank(level: str) -> int:
-    order = ("rigid", "fast", "standard", "full", "paper")
+    order = (*LEVELS, "paper")
     return order.index(level) if level in order else len(order)
 
 

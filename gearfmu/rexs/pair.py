@@ -7,6 +7,7 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
@@ -140,7 +141,7 @@ def root_diameter(draft: Draft, place: str, gear: RexsGear) -> float:
 
 def assumed_torque(gears: list[RexsGear]) -> float:
     """Torque (N·m) on the first gear at the usual load K."""
-    width = min(gear.face_width for gear in gears)
+    width = common_width(gears)
     return usual_torque(2 * gears[0].reference_radius, gears[1].teeth / gears[0].teeth, width)
 
 

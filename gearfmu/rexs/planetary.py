@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from gearfmu.errors import Problem
+from gearfmu.geometry.planetary import set_ratio
 from gearfmu.geometry.shifts import sum_of_shifts
 from gearfmu.rexs.gears import (
     RexsGear,
@@ -250,7 +251,7 @@ def _put_loads(
     model: RexsModel, draft: Draft, stage: Component, gears: list[RexsGear], planets: list[Component]
 ) -> None:
     sun, planet, ring = gears
-    ratio = 1 + ring.teeth / sun.teeth
+    ratio = set_ratio(sun.teeth, ring.teeth)
     torque, speed = shaft_torque(model, sun.component), shaft_speed(model, sun.component)
     if torque:
         text = f"{rounded_up(torque * ratio, 3):g} N*m"

@@ -24,8 +24,9 @@ from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.scene import SceneSpec
 from gearfmu.spec.stage import load_set
 from gearfmu.stage import StageModel
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.study.bench import Point, Replay, Run, measure, models_for, replayed_price
-from gearfmu.study.ladder import LEVELS, fitting
+from gearfmu.study.ladder import fitting
 from gearfmu.study.norm import Errors, Signals, errors
 from gearfmu.study.run import identity
 from gearfmu.study.table import KeptTable

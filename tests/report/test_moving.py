@@ -12,12 +12,12 @@ from gearfmu.body import load_bodies
 from gearfmu.geometry import PairGeometry
 from gearfmu.report.moving import FRAMES, View, moving_view
 from gearfmu.report.packed import Pack, unpacked
-from gearfmu.report.picture import contacts_at, meshing_angles
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage.build.meshes import mesh_geometry
 from gearfmu.stage.build.observed import gear_bodies
+from gearfmu.stage.run.touching import contacts_at, meshing_angles
 from gearfmu.stage.run.trace import Channel, Trace
 
 SPEED, FORCE = 200.0, 8000.0  # rad/s, N

@@ -271,7 +271,7 @@ def test_statics_find_their_equilibrium_at_level_fast(model: StageModel) -> None
 
 def test_a_pair_is_no_set(model: StageModel) -> None:
     with pytest.raises(ModelError, match="is no planetary set"):
-        set_te(replace(model, spec=model.stage), [TORQUE], 2)
+        set_te(replace(model, spec=load_stage("fzg_c")), [TORQUE], 2)
 
 
 @pytest.mark.full

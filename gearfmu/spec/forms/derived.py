@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gearfmu.geometry import PairGeometry
+from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.planetary import PlanetaryGeometry
 from gearfmu.spec.forms.members import Form, carrier_of
 from gearfmu.spec.forms.pair import StageSpec
@@ -42,7 +43,7 @@ def _derived_pair(pair: Any, names: Sequence[str]) -> dict[str, Any]:
 
 def _derived_helix(spec: StageSpec, pair: PairGeometry) -> dict[str, Any]:
     """What a helical pair has besides: angles of the transverse section, overlap of the common face width."""
-    overlap = pair.overlap_ratio(min(gear.face_width for gear in spec.gears))
+    overlap = pair.overlap_ratio(common_width(spec.gears))
     return {
         "transverse_pressure_angle_deg": math.degrees(pair.gears[0].alpha_t),
         "base_helix_angle_deg": math.degrees(pair.gears[0].beta_b),
@@ -80,7 +81,7 @@ def _derived_set_helix(spec: PlanetarySpec, g: PlanetaryGeometry) -> dict[str, A
     apart = g.sun_mesh.r_w[1] + g.ring_mesh.planet_pitch_radius
     return {
         "base_helix_angle_deg": math.degrees(sun.beta_b),
-        "overlap_ratio": sun.overlap_ratio(min(gear.face_width for gear in spec.gears)),
+        "overlap_ratio": sun.overlap_ratio(common_width(spec.gears)),
         "axial_force_of_a_mesh": axial,
         "tilting_moment_on_a_pin": axial * apart,
     }

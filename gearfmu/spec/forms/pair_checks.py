@@ -11,7 +11,7 @@ from typing import Any
 
 from gearfmu.errors import Problem
 from gearfmu.geometry import GearGeometry, PairGeometry, involute
-from gearfmu.geometry.hertz import contact_modulus, half_width, largest_relative_radius
+from gearfmu.geometry.hertz import common_width, contact_modulus, half_width, largest_relative_radius
 from gearfmu.geometry.reference import ReferenceGear
 from gearfmu.spec.forms.flank_checks import flank_problems
 from gearfmu.spec.tables.flanks import TOOTHING
@@ -214,7 +214,7 @@ def largest_half_width(gears: Sequence[GearSpec], geometry: PairGeometry, torque
     One tooth pair carries the whole pinion torque (N·m) over the common face width. Of helical flanks the normal force
     and the length of its line of contact both grow by 1/cos β_b, the radius of curvature normal to it too.
     """
-    load = torque / geometry.gears[0].r_b / min(gear.face_width for gear in gears)
+    load = torque / geometry.gears[0].r_b / common_width(gears)
     a, b = (gear.material for gear in gears)
     e_star = contact_modulus((a.youngs_modulus, b.youngs_modulus), (a.poisson_ratio, b.poisson_ratio))
     path = geometry.path

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from gearfmu.geometry.planetary import HANDS
-from gearfmu.spec.forms.planetary import PlanetarySpec
+from gearfmu.spec.forms.planetary import PlanetarySpec, RingSpec, SetGearSpec
 from gearfmu.spec.tables.flanks import TOOTHING
 from gearfmu.spec.tables.imported import import_inputs
-
-SET_BODIES = ("sun", "planet", "ring", "carrier")
 
 
 def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
@@ -39,12 +37,14 @@ def set_body_inputs(spec: PlanetarySpec, name: str) -> dict[str, Any]:
             carrier.pop("mesh")
             carrier["import"] = import_inputs(spec.carrier.imported, spec.source, "carrier.import")
         return common | place | carrier | {"coupling": {c: spec.carrier.coupling_of(c) for c in couplings}}
-    gear = spec.gears[SET_BODIES.index(name)].model_dump(exclude={"name", "imported", "bearing"} | TOOTHING)
+    parts: dict[str, SetGearSpec | RingSpec] = dict(zip(HANDS, spec.gears, strict=True))
+    part = parts[name]
+    gear = part.model_dump(exclude={"name", "imported", "bearing"} | TOOTHING)
     if gear.get("mounts"):
         gear["mounts"].pop("damping_ratio")
     if name != "ring":
         gear["rack"].pop("addendum")  # the tip diameter says where the tooth ends
-    if (imported := getattr(spec, name).imported) is not None:
+    if part.imported is not None:
         gear["body"].pop("mesh")
-        gear["import"] = import_inputs(imported, spec.source, f"{name}.import")
+        gear["import"] = import_inputs(part.imported, spec.source, f"{name}.import")
     return common | tooth | gear

@@ -15,9 +15,9 @@ from gearfmu.errors import Problem
 from gearfmu.geometry import involute
 from gearfmu.geometry.carrier import CarrierGeometry
 from gearfmu.geometry.gear import GearGeometry
-from gearfmu.geometry.hertz import contact_modulus, half_width
+from gearfmu.geometry.hertz import common_width, contact_modulus, half_width
 from gearfmu.geometry.internal import InternalGearGeometry
-from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles, set_geometries, set_geometry
+from gearfmu.geometry.planetary import RingMesh, least_apart, planet_angles, set_geometries, set_geometry, set_ratio
 from gearfmu.ranges import range_of
 from gearfmu.spec.forms.flank_checks import flank_problems
 from gearfmu.spec.forms.pair_checks import (
@@ -91,7 +91,7 @@ def ring_pair_problems(file: str, pair: RingPair) -> list[Problem]:
 
 def mesh_torque(spec: PlanetarySpec) -> float:
     """Torque (N·m) on the sun in its mesh with the most loaded planet at torque_max, K_γ T_s/N."""
-    sun = spec.torque_max / (1 + spec.ring.teeth / spec.sun.teeth)
+    sun = spec.torque_max / set_ratio(spec.sun.teeth, spec.ring.teeth)
     return spec.set.load_sharing * sun / spec.set.planets
 
 
@@ -193,7 +193,7 @@ def ring_half_width(spec: PlanetarySpec, mesh: RingMesh) -> float:
 def internal_half_width(gears: tuple[Any, Any], mesh: RingMesh, force: float) -> float:
     """Largest Hertz half-width b (m) of a pinion in a ring, one tooth pair carrying `force` (N, transverse;
     `largest_half_width` for helical flanks)."""
-    load = force / min(gear.face_width for gear in gears)
+    load = force / common_width(gears)
     materials = [gear.material for gear in gears]
     e_star = contact_modulus(
         (materials[0].youngs_modulus, materials[1].youngs_modulus),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from gearfmu.geometry import GearGeometry, PairGeometry
+from gearfmu.geometry.hertz import common_width
 from gearfmu.geometry.internal import InternalGearGeometry
 from gearfmu.geometry.planetary import RingMesh
 from gearfmu.spec.forms.general import EngagementSpec, RingBody, Stage, ToothedBody
@@ -33,6 +34,11 @@ def toothed(stage: Stage, name: str) -> ToothedBody:
     body = stage.bodies[name]
     assert isinstance(body, ToothedBody)
     return body
+
+
+def face_width(stage: Stage, mesh: EngagementSpec) -> float:
+    """Common face width (m) of an engagement."""
+    return common_width(toothed(stage, name) for name in mesh.gears)
 
 
 def centre_distance(stage: Stage, mesh: EngagementSpec) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from gearfmu.errors import Problem, SpecError
 from gearfmu.geometry.gear import GearGeometry
 from gearfmu.geometry.hertz import largest_relative_radius
-from gearfmu.geometry.planetary import RingMesh, least_apart
+from gearfmu.geometry.planetary import RingMesh, least_apart, set_ratio
 from gearfmu.geometry.shifts import (
     DEDENDUM,
     RING_FILLET,
@@ -165,7 +165,7 @@ def _put_loads(draft: Draft, wish: Wish, pair: OpenPair, shift: float, mesh: Rin
     """Torque and speed of the carrier, load patches of all gears."""
     geometry, width = pair.at(shift), wish.width or 0.0
     sun, planet = geometry.gears
-    ratio, count = 1 + mesh.ring.z / sun.z, wish.planets or 1
+    ratio, count = set_ratio(sun.z, mesh.ring.z), wish.planets or 1
     usual = usual_torque(2 * sun.r, planet.z / sun.z, width) * count / _SHARING[count] * ratio
     torque, _ = put_load(draft, wish, usual, PITCH_SPEED / sun.r / ratio)
     load = _SHARING[count] * torque / ratio / count / sun.r_b / width

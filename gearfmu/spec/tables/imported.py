@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field, model_validator
 
 from gearfmu.errors import Problem, SpecError
+from gearfmu.geometry.planetary import HANDS
 from gearfmu.spec.reading.base import Quantity, Spec, Text, refuse
 from gearfmu.spec.reading.layers import Layers
 
 _FILES = ("file", "stiffness", "mass", "unknowns")
-_SET_BODIES = ("sun", "planet", "ring", "carrier")
 
 Files = TypeVar("Files", bound="FilesSpec")
 
@@ -120,7 +120,7 @@ def _sections(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
         for group in ("gears", "bodies")
         for name, table in (tables[group].items() if isinstance(tables.get(group), dict) else ())
     }
-    bodies |= {name: tables[name] for name in _SET_BODIES if name in tables}
+    bodies |= {name: tables[name] for name in (*HANDS, "carrier") if name in tables}
     found = {f"{place}.import": table.get("import") for place, table in bodies.items() if isinstance(table, dict)}
     return {place: section for place, section in found.items() if isinstance(section, dict)}
 

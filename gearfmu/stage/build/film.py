@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 
 from gearfmu.errors import ModelError
-from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.general import EngagementSpec, Stage
+from gearfmu.spec.forms.shapes import face_width, mesh_shape
 
 REACH = 100e-6  # m: of the kernel, GK_FILM_REACH
 NEXT_TO_NONE = 1e-4  # Pa·s: of an engagement that says nothing beside one that does
@@ -43,6 +44,16 @@ def film_resistance(gap: float, viscosity: float, roughness: float, radius: floa
         return 0.0
     ends = (gap + roughness) ** -1.5 - (REACH + roughness) ** -1.5
     return 3 * math.sqrt(2) * math.pi * viscosity * width * radius**1.5 * ends
+
+
+def film_stop(stage: Stage, mesh: EngagementSpec) -> float:
+    """`film_impulse` of an engagement with a film from REACH on, spur teeth at the pitch point."""
+    assert mesh.film is not None
+    pair, internal = mesh_shape(stage, mesh), stage.internal(mesh)
+    a, b = (gear.r_b for gear in pair.gears)
+    first, second = (pair.length * r_b / (b - a if internal else a + b) for r_b in (a, b))
+    radius = first * second / (second - first if internal else first + second)
+    return film_impulse(REACH, mesh.film.viscosity, mesh.film.roughness, radius, face_width(stage, mesh))
 
 
 def film_impulse(gap: float, viscosity: float, roughness: float, radius: float, width: float) -> float:

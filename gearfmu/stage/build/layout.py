@@ -120,8 +120,8 @@ def _gear(stage: Stage, body: Any, degrees: np.ndarray, weights: np.ndarray) -> 
 def _all_modes(body: Any, degrees: np.ndarray) -> np.ndarray:
     """Modes that flanks or bore see, pairs whole."""
     rows = np.abs(body.flank_rows[:, :, degrees]).max(axis=(0, 1, 2)) / np.abs(body.flank_rows).max()
-    bore = (np.abs(body.bore_rows) / np.abs(body.bore_rows).max(axis=1, keepdims=True)).max(axis=0)
-    seen = (rows > SEEN) | (bore > SEEN)
+    bore = np.abs(body.bore_rows)
+    seen = (rows > SEEN) | (bore > SEEN * bore.max(axis=1, keepdims=True)).any(axis=0)
     second = np.flatnonzero(body.part == 2)
     seen[second] = seen[second - 1] = seen[second] | seen[second - 1]
     return np.flatnonzero(seen)

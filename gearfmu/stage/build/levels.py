@@ -8,7 +8,8 @@ import numpy as np
 from gearfmu.ranges import kernel_number
 from gearfmu.spec.tables.ports import LevelSpec
 
-RIGID, FAST, STANDARD, FULL = range(4)
+LEVELS = ("rigid", "fast", "standard", "full")
+RIGID, FAST, STANDARD, FULL = range(len(LEVELS))
 SHARED_BELOW = kernel_number(
     "SHARED_BELOW"
 )  # of the cut of level fast: modes below are dynamic at every level (rigid: of shared gears only)

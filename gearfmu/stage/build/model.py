@@ -16,6 +16,7 @@ from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import Form, body_names
 from gearfmu.spec.forms.turning import Shafts, shafts_of, with_ports
 from gearfmu.stage.build.blob import blob_hash, read_blob, write_blob
+from gearfmu.stage.build.levels import LEVELS
 from gearfmu.stage.build.shown import Card, Shown, grouped
 from gearfmu.units import quantity_text
 
@@ -104,6 +105,16 @@ class StageModel(Shown):
         kinds[[list(self.stage.ports).index(name) for name in two], 1] = SPRING
         changed: dict[str, Any] = {name: port.model_copy(update={"kind": "spring"}) for name, port in ports.items()}
         return replace(self, spec=with_ports(self.spec, changed), blob=write_blob(sections | {"port_kinds": kinds}))
+
+    def modes_of_levels(self) -> dict[str, int]:
+        """How many modes are dynamic at which level; at full all that are stored."""
+        found = {}
+        for level, name in enumerate(LEVELS):
+            kernel = self.kernel(level=float(level))
+            kernel.prepare()
+            kernel.initialize()
+            found[name] = int(kernel.get("solver.n_dyn"))
+        return found
 
     def with_starts(self, starts: Mapping[str, float]) -> StageModel:
         """The same model whose parameters start with other values, SI, an enumeration by its number: what an importer

@@ -10,7 +10,7 @@ import numpy as np
 from gearfmu.geometry.hertz import contact_modulus, half_width
 from gearfmu.geometry.planetary import RingMesh
 from gearfmu.spec.forms.general import EngagementSpec, Stage, ToothedBody
-from gearfmu.spec.forms.shapes import mesh_shape, toothed
+from gearfmu.spec.forms.shapes import face_width, mesh_shape, toothed
 
 SHARE_OF_A = {"both": 0.5, "a": 1.0, "b": 0.0}
 MOST = 513  # nodes that the kernel takes along or across
@@ -47,5 +47,5 @@ def mesh_penalty(stage: Stage, mesh: EngagementSpec) -> float:
     first = shape.path["C"]
     second = first + shape.length if isinstance(shape, RingMesh) else shape.length - first
     radius = first * second / shape.length / math.cos(shape.gears[0].beta_b)
-    load = mesh.torque_max / shape.gears[0].r_b / min(gear.face_width for gear in gears)
+    load = mesh.torque_max / shape.gears[0].r_b / face_width(stage, mesh)
     return min(3 * math.pi * e_star / (8 * half_width(load, radius, e_star)), STIFFEST)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.kernel import Kernel
+from gearfmu.spec.forms.shapes import face_width
 from gearfmu.stage.build.meshes import direction_of, mesh_axes, mesh_geometry, tooth_phases
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.limits import limit_named
@@ -57,7 +58,7 @@ def flank_loads(
     frame = tooth_phases(stage)[engagement.gears[0]] - direction_of(pair, *mesh_axes(stage, engagement))
     te, rolls, forces, at, sums = np.empty(positions), [], [], [], np.zeros(2)
     behind = np.zeros(positions)
-    slices, face = int(kernel.get("slices")), _face_width(model, engagement.gears)
+    slices, face = int(kernel.get("slices")), face_width(model.stage, engagement)
     width = ((np.arange(slices) + 0.5) / slices - 0.5) * face
     for i, part in enumerate(np.arange(positions) / positions):
         with limit_named(model, torque):
@@ -85,8 +86,3 @@ def flank_loads(
         np.array(forces),
         np.array(at),
     )
-
-
-def _face_width(model: StageModel, names: tuple[str, str]) -> float:
-    """Common face width (m) of two gears."""
-    return min(float(gear.face_width) for gear in model.stage.gears if gear.name in names)

@@ -7,18 +7,24 @@ A gear's numbers need its file's group "spin" (`ReducedBody.spin`); what has non
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from gearfmu.spec.forms.expand import as_general
 from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.members import Form
 from gearfmu.spec.forms.shapes import gear_shape
 from gearfmu.spec.forms.turning import turns
+from gearfmu.stage.build.assembly import stage_group
 from gearfmu.stage.build.groups import Group
+from gearfmu.stage.build.observed import gear_bodies
 from gearfmu.stage.build.spinning import turn_rates
 from gearfmu.stage.build.whirls import whirl_rows
+
+WHIRL_BAND = 15e3  # Hz
 
 
 @dataclass(frozen=True)
@@ -121,6 +127,15 @@ def largest_forces(stage: Stage) -> dict[str, float]:
         for name in mesh.gears:
             forces[name] = max(mesh.torque_max / shape.r_b, forces.get(name, 0.0))
     return forces
+
+
+def whirling(spec: Form, bodies: Sequence[Any]) -> tuple[float, float, list[str]]:
+    """At the largest speeds `whirl_shift` below WHIRL_BAND, the largest `GearInertia.whirl`, and gears whose files do
+    not tell; bodies as of `assemble`."""
+    stage, toothed = as_general(spec), gear_bodies(spec, bodies)
+    coupled = max((gear.whirl for gear in inertia_terms(stage, toothed)), default=0.0)
+    silent = sorted({body.name for body in toothed.values() if body.spin is None})
+    return whirl_shift(stage, stage_group(spec, bodies), WHIRL_BAND), coupled, silent
 
 
 def whirl_shift(stage: Stage, group: Group, cut: float) -> float:

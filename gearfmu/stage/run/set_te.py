@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gearfmu.errors import ModelError
+from gearfmu.geometry.planetary import set_ratio
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.shapes import gear_shape, toothed
@@ -103,7 +104,7 @@ class SetTeResult(Shown):
 def set_error(stage: Stage) -> tuple[float, float]:
     """(r_b,s, 1 + z_r/z_s) of te = r_b,s (φ_s − (1 + z_r/z_s) φ_c), the transmission error of a planetary set."""
     sun, ring = (toothed(stage, name) for name in GEARS)
-    return gear_shape(sun).r_b, 1 + ring.teeth / sun.teeth
+    return gear_shape(sun).r_b, set_ratio(sun.teeth, ring.teeth)
 
 
 def stage_te(
