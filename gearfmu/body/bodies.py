@@ -6,7 +6,7 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, overload
+from typing import Any, TypeAlias
 
 from gearfmu.body.apart import Work, reduce_apart_together, side_by_side
 from gearfmu.body.carrier import reduced_carrier
@@ -20,10 +20,7 @@ from gearfmu.errors import BodyError, MeshError
 from gearfmu.reduction.carrier import carrier_need
 from gearfmu.reduction.memory import Need
 from gearfmu.spec.forms.body import body_hash, body_inputs
-from gearfmu.spec.forms.general import Stage
 from gearfmu.spec.forms.members import Form, body_names, carriers, members
-from gearfmu.spec.forms.pair import StageSpec
-from gearfmu.spec.forms.planetary import PlanetarySpec
 from gearfmu.spec.reading.library import model_folder
 
 Body: TypeAlias = ReducedBody | InterfaceBody
@@ -46,10 +43,6 @@ def body_path(spec: Form, name: str, folder: Folder = None) -> Path:
     return (Path(folder) if folder is not None else model_folder(spec)) / f"{name}.h5"
 
 
-@overload
-def load_bodies(spec: StageSpec | Stage, folder: Folder = None) -> list[ReducedBody]: ...
-@overload
-def load_bodies(spec: PlanetarySpec, folder: Folder = None) -> list[Body]: ...
 def load_bodies(spec: Form, folder: Folder = None) -> Any:
     """The stored bodies: gears in the order of the stage, then the carrier of a set. BodyError when one is missing,
     damaged or stale."""

@@ -6,7 +6,7 @@ from gearfmu.body.imported import imported_sector_mesh
 from gearfmu.errors import BodyError
 from gearfmu.femesh import FeMesh, sector_mesh
 from gearfmu.reduction.carrier import scaled_sector
-from gearfmu.spec.forms.members import CarrierMember, Form, carriers, members
+from gearfmu.spec.forms.members import Form, carrier_of, members
 
 
 def body_sector(spec: Form, name: str, scale: float = 1.0) -> FeMesh:
@@ -16,18 +16,15 @@ def body_sector(spec: Form, name: str, scale: float = 1.0) -> FeMesh:
     """
     toothed = members(spec)
     if name not in toothed:
-        return _carrier_sector(carriers(spec)[name], scale)
+        carrier = carrier_of(spec)
+        if carrier.part.imported is None:
+            return scaled_sector(carrier, scale)
+        raise BodyError(
+            f"{carrier.part.imported.file}: an imported carrier is taken as a whole and has no sector: use the "
+            "pictures of your own finite-element program"
+        )
     member = toothed[name]
     if member.gear.imported is not None:
         return imported_sector_mesh(member)
     own = member.gear.body.mesh
     return sector_mesh(member.geometry, member.gear.face_width, own.model_copy(update={"scale": own.scale * scale}))
-
-
-def _carrier_sector(carrier: CarrierMember, scale: float) -> FeMesh:
-    if carrier.part.imported is not None:
-        raise BodyError(
-            f"{carrier.part.imported.file}: an imported carrier is taken as a whole and has no sector: use the "
-            "pictures of your own finite-element program"
-        )
-    return scaled_sector(carrier, scale)

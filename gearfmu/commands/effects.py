@@ -100,9 +100,8 @@ def _numbers(stage: str) -> dict[str, str]:
     """What a stage has of each effect, by its name: of every mesh, gear or bearing in the order of the file; of a
     planetary set its meshes with one planet."""
     from gearfmu.commands.models import model_of
-    from gearfmu.spec.forms.shapes import face_width, gear_shape
+    from gearfmu.spec.forms.shapes import face_width, gear_shape, mesh_shape
     from gearfmu.stage.build.flanks import FlankField
-    from gearfmu.stage.build.meshes import mesh_geometry
     from gearfmu.stage.effects import torque_on_flanks_alone
 
     model = model_of(stage)
@@ -124,7 +123,7 @@ def _numbers(stage: str) -> dict[str, str]:
         "residual": "of what is not dynamic",
         "hertz": f"local law up to {_listed(f'{mesh.torque_max:g} N·m' for mesh in meshes)}",
         "slices": f"{spec.slices} over {_listed(f'{1e3 * width:g} mm' for width in widths)}",
-        "coast_flank": _listed(f"{1e6 * mesh_geometry(spec, mesh).normal_backlash:.1f} µm" for mesh in meshes)
+        "coast_flank": _listed(f"{1e6 * mesh_shape(spec, mesh).normal_backlash:.1f} µm" for mesh in meshes)
         + " of backlash along the normal",
         "contact_damping": _listed(f"{mesh.damping:g} N·s/m" for mesh in meshes) + " per metre of face width",
         "tip_relief": _listed(f"{amount:g} µm" for amount in reliefs) + _idle(not any(reliefs)),

@@ -69,25 +69,18 @@ def mesh_facts(file: Path, length: float, ignore: tuple[str, ...], axis: str) ->
     import numpy as np
 
     from gearfmu.errors import MeshError
-    from gearfmu.fem import solids
     from gearfmu.fem.mesh_checks import mesh_problems
     from gearfmu.femesh.imported import read_mesh
+    from gearfmu.reduction.imported import files
 
     mesh = read_mesh(file, length, ignore)
     if problems := mesh_problems(mesh.nodes, mesh.elements, mesh.labels):
         raise MeshError(f"{file}: " + "; ".join(problems))
-    quality = np.concatenate(
-        [solids.jacobian_quality(mesh.nodes, block, kind) for kind, block in mesh.elements.items()]
-    )
     return {
+        **files.mesh_facts(mesh),
         "file": str(file),
-        "nodes": len(mesh.nodes),
-        "elements": {kind: len(block) for kind, block in mesh.elements.items()},
-        "raised_to_quadratic": mesh.raised,
         "size_mm": [float(1e3 * size) for size in np.ptp(mesh.nodes, axis=0)],
         "axis": axis,
-        "scaled_jacobian_min": float(quality.min()),
-        "scaled_jacobian_mean": float(quality.mean()),
         "sets": {name: f"{len(nodes)} nodes" for name, nodes in sorted(mesh.sets.items())} or "none",
     }
 

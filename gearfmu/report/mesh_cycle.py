@@ -16,8 +16,9 @@ from gearfmu.report.chart import Chart, Curve, Heat, Panel, Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.signals import SETTLED, Window
 from gearfmu.spec.forms.general import Stage
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage import assemble
-from gearfmu.stage.build.meshes import EXTERNAL, kind_of, mesh_geometry
+from gearfmu.stage.build.meshes import EXTERNAL, kind_of
 from gearfmu.stage.run.flank_loads import FlankLoads, flank_loads
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.te import mesh_harmonics, statics_of
@@ -44,7 +45,7 @@ def static_loads(
         try:
             place = place_of(model, mesh)
             torque = float(np.mean(part[f"{mesh}.force"])) * place.lever
-            torque *= math.cos(mesh_geometry(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
+            torque *= math.cos(mesh_shape(model.stage, model.stage.engagements[place.number]).gears[0].beta_b)
             if abs(torque) >= LEAST_LOAD * place.most:
                 kernel = kernel or statics_of(model, slices=slices)
                 found[mesh] = flank_loads(model, torque, mesh, positions, kernel)
@@ -111,7 +112,7 @@ def contact_pattern(trace: Trace, stage: Stage, mesh: str, loads: FlankLoads) ->
     """Force per width on the flanks of both gears of an engagement, and its load over the width in the run where forces
     of slices were recorded."""
     engagement = next(e for e in stage.engagements if e.name == mesh)
-    pair = mesh_geometry(stage, engagement)
+    pair = mesh_shape(stage, engagement)
     pressed = loads.roll[loads.force > 0]
     rolls = np.linspace(pressed.min(), pressed.max(), ROLLS)
     z = np.linspace(-500, 500, WIDTHS) * loads.face_width

@@ -21,7 +21,8 @@ from gearfmu.report.packed import Pack
 from gearfmu.report.picture import SHOWN_FRACTION, mirrored, round_scale
 from gearfmu.report.structure import AROUND, parts, turned
 from gearfmu.spec.forms.general import EngagementSpec, Stage
-from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, mesh_geometry, tooth_phases
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.meshes import direction_of, kind_of, mesh_axes, tooth_phases
 from gearfmu.stage.run.touching import GEAR_PHI, contacts_at
 from gearfmu.stage.run.trace import Trace
 
@@ -186,7 +187,7 @@ def _load(
 ) -> None:  # fmt: skip
     """Add the tooth pairs in contact of an engagement to its two bodies."""
     made, bodies = gears
-    pair, force = mesh_geometry(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
+    pair, force = mesh_shape(stage, mesh), np.interp(time, trace.time, trace[f"{mesh.name}.force"])
     carried = _carried(trace, stage, mesh, time)
     gamma = direction_of(pair, *mesh_axes(stage, mesh))
     found: list[Contacts] = [np.zeros((3, time.size, CONTACTS)) for _ in mesh.gears]
@@ -240,7 +241,7 @@ def _turn_together(stage: Stage, made: dict[str, Body]) -> None:
     for mesh in reversed(stage.engagements):
         if not set(mesh.gears) <= set(made):
             continue
-        pair = mesh_geometry(stage, mesh)
+        pair = mesh_shape(stage, mesh)
         a, b = (stage.rotor_of(name) for name in mesh.gears)
         behind = np.mean(turned[b], axis=0) if b in turned else np.zeros(FRAMES)
         recede = sum(_recede(made[name], mesh.name, own) for name, own in zip(mesh.gears, pair.gears, strict=True))
@@ -285,7 +286,7 @@ def _close(stage: Stage, trace: Trace, time: np.ndarray) -> tuple[np.ndarray, np
     """Pitch point of the first engagement, x and y (F,) m, and a radius (m) around it."""
     mesh = stage.engagements[0]
     (x, y), (u, v) = mesh_axes(stage, mesh)
-    pair = mesh_geometry(stage, mesh)
+    pair = mesh_shape(stage, mesh)
     part = pair.gears[0].z / (pair.gears[0].z + pair.gears[1].z)
     at = complex(x + part * (u - x), y + part * (v - y)) * np.exp(1j * _carried(trace, stage, mesh, time))
     return at.real, at.imag, 4.0 * float(stage.gears[0].normal_module)

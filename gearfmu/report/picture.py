@@ -14,7 +14,8 @@ from gearfmu.report.chart import Plot
 from gearfmu.report.plots import of_mesh
 from gearfmu.report.scene3d import Shape, draw
 from gearfmu.spec.forms.general import Stage
-from gearfmu.stage.build.meshes import mesh_axes, mesh_geometry, tooth_phases
+from gearfmu.spec.forms.shapes import mesh_shape
+from gearfmu.stage.build.meshes import mesh_axes, tooth_phases
 from gearfmu.stage.run.touching import Contact, angle_of, contacts_at, meshing_angles
 from gearfmu.stage.run.trace import Trace
 
@@ -37,7 +38,7 @@ def deformed_pair(trace: Trace, stage: Stage, mesh: str, bodies: Sequence[Any]) 
         return None
     sample = int(np.argmax(np.abs(trace[f"{mesh}.force"])))
     force = float(trace[f"{mesh}.force"][sample])
-    pair = mesh_geometry(stage, engagement)
+    pair = mesh_shape(stage, engagement)
     if not isinstance(pair, PairGeometry):
         return None  # of a ring the recorded deformation is drawn (deformation.py)
     sg = 1 if force >= 0 else -1

@@ -14,11 +14,12 @@ from gearfmu.errors import ModelError
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.forms.general import EngagementSpec, PlacedPort, RotorSpec, Stage, SupportSpec
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.stage.build.assembly import MODEL_VERSION, general_sections
 from gearfmu.stage.build.fields import order_sections
 from gearfmu.stage.build.groups import mount
 from gearfmu.stage.build.layout import stage_layout
-from gearfmu.stage.build.meshes import mesh_geometry, tooth_phases
+from gearfmu.stage.build.meshes import tooth_phases
 
 A = 0.0915
 SHAFT = {
@@ -123,7 +124,7 @@ def test_teeth_touch_in_every_engagement_at_angle_zero(train):
         ),
     )).wheel_phase  # fmt: skip
     for mesh in train.engagements:
-        pair = mesh_geometry(train, mesh)
+        pair = mesh_shape(train, mesh)
         a, b = pair.gears
         (x, y), (u, v) = (train.rotors[train.rotor_of(gear)].axis for gear in mesh.gears)
         t = math.atan2(v - y, u - x) - pair.alpha_wt

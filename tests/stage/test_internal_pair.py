@@ -268,7 +268,7 @@ def test_no_interference_over_a_pitch(mesh: RingMesh) -> None:
             off = np.abs(there - 2 * math.pi / ring.z * np.round(there * ring.z / (2 * math.pi)))
             form = float(involute.radius_at_roll(ring.s_form, ring.r_b))
             inside = (radius > ring.r_a + ring.tip_edge) & (radius < form)
-            over = (off[inside] - ring.space_angle(radius[inside])) * radius[inside]
+            over = (off[inside] - ring.thickness_angle(radius[inside])) * radius[inside]
             deepest = max(deepest, float(over.max(initial=-1.0)))
             assert radius.max() < ring.r_f
     print(f"deepest {deepest:.2e} m")

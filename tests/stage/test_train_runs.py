@@ -15,12 +15,12 @@ from gearfmu.body import load_bodies
 from gearfmu.errors import ModelError, SpecError
 from gearfmu.spec.forms.expand import expand_pair
 from gearfmu.spec.forms.general import RotorSpec, Stage
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.forms.turning import shafts_of, turns
 from gearfmu.spec.reading.base import read_toml
 from gearfmu.spec.reading.library import find_stage
 from gearfmu.spec.stage import load_stage
 from gearfmu.stage import StageModel, Steady, assemble, loaded_te
-from gearfmu.stage.build.meshes import mesh_geometry
 from gearfmu.stage.run.steady import Drive, steady_run
 from gearfmu.stage.run.te import statics_of
 
@@ -145,7 +145,7 @@ def test_torque_comes_through_a_train_by_its_ratio(two_stage) -> None:
     for number, (mesh, torque) in enumerate(zip(stage.engagements, (TORQUE, TORQUE * 61 / 25), strict=True)):
         forces = kernel.transmission(0.0, TORQUE, number).forces
         carried = sum(sum(slices) for slices in forces.values())
-        gear = mesh_geometry(stage, mesh).gears[0]
+        gear = mesh_shape(stage, mesh).gears[0]
         assert carried == pytest.approx(torque / (gear.r_b * math.cos(gear.beta_b)), rel=1e-5), mesh.name
     found = at_rest(two_stage)
     assert -found["output.tau"] / found["input.tau"] == pytest.approx(shafts.ratio, rel=0.01)
@@ -161,7 +161,7 @@ def test_axial_forces_on_the_intermediate_shaft_oppose(two_stage) -> None:
     found = at_rest(two_stage, **{"effect.tip_relief": 0.0, "effect.tip_contact": 0.0})
     pushed = {}
     for mesh, gear, index, torque in (("stage1", "wheel1", 1, TORQUE), ("stage2", "pinion2", 0, TORQUE * 61 / 25)):
-        shape = mesh_geometry(two_stage.stage, next(m for m in two_stage.stage.engagements if m.name == mesh))
+        shape = mesh_shape(two_stage.stage, next(m for m in two_stage.stage.engagements if m.name == mesh))
         first = shape.gears[0]
         pushed[gear] = torque / (first.m_t * first.z / 2) * math.tan(abs(first.beta))
         assert abs(found[f"seat.{gear}.fz"]) == pytest.approx(pushed[gear], rel=5e-3), gear

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gearfmu.geometry import PairGeometry
@@ -29,16 +29,16 @@ def derived(spec: Form) -> dict[str, Any]:
 
 def _derived_pair(pair: Any, names: Sequence[str]) -> dict[str, Any]:
     """What follows from the numbers of two gears in mesh."""
-    radii = {
-        name: {"r_b": shape.r_b, "r_f": shape.r_f, "r_a": shape.r_a}
-        for name, shape in zip(names, pair.gears, strict=True)
-    }
     return {
         "working_pressure_angle_deg": math.degrees(pair.alpha_wt),
         "contact_ratio": pair.contact_ratio,
         "base_pitch": pair.base_pitch,
-        **radii,
+        **_radii(dict(zip(names, pair.gears, strict=True))),
     }
+
+
+def _radii(shapes: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    return {name: {"r_b": s.r_b, "r_f": s.r_f, "r_a": s.r_a} for name, s in shapes.items()}
 
 
 def _derived_helix(spec: StageSpec, pair: PairGeometry) -> dict[str, Any]:
@@ -69,7 +69,7 @@ def _derived_set(spec: PlanetarySpec) -> dict[str, Any]:
         "sun_torque_in_one_mesh": mesh_torque(spec),
         "largest_hertz_half_width_planet_ring": ring_half_width(spec, g.ring_mesh),
         "carrier_mass": carrier.volume * spec.carrier.material.density,
-        **{name: {"r_b": s.r_b, "r_f": s.r_f, "r_a": s.r_a} for name, s in shapes.items()},
+        **_radii(shapes),
         **(_derived_set_helix(spec, g) if spec.set.helix_angle else {}),
     }  # fmt: skip
 

@@ -19,11 +19,6 @@ H_MAX = 7.5e-6  # s: largest default step
 SAME_ANGLE = 1e-9  # rad
 
 
-def mesh_geometry(stage: Stage, mesh: EngagementSpec) -> MeshShape:
-    """The engagement by itself; of an external one A is at the origin and B on +x."""
-    return mesh_shape(stage, mesh)
-
-
 def mesh_axes(stage: Stage, mesh: EngagementSpec) -> tuple[tuple[float, float], tuple[float, float]]:
     """Positions (x, y) m of A and B, in the axes of what carries them, where their teeth are as they should be."""
     a, b = (stage.rotors[stage.rotor_of(name)].axis for name in mesh.gears)
@@ -53,7 +48,7 @@ def _placed(stage: Stage) -> tuple[dict[str, float], list[int]]:
     phases: dict[str, float] = {}
     shifts = []
     for mesh in stage.engagements:
-        pair = mesh_geometry(stage, mesh)
+        pair = mesh_shape(stage, mesh)
         gamma = direction_of(pair, *mesh_axes(stage, mesh))
         a, b = mesh.gears
         if b in phases and a not in phases:
@@ -97,7 +92,7 @@ def stage_sections(stage: Stage) -> dict[str, Any]:
     gears = [gear.name for gear in stage.gears]
     engaged, numbers, periods = [], [], []
     for mesh in stage.engagements:
-        pair, (a, b) = mesh_geometry(stage, mesh), mesh_axes(stage, mesh)
+        pair, (a, b) = mesh_shape(stage, mesh), mesh_axes(stage, mesh)
         engaged.append([gears.index(mesh.gears[0]), gears.index(mesh.gears[1]), kind_of(pair), _coast_shift(pair)])
         force = mesh.torque_max / (pair.gears[0].r_b * math.cos(pair.gears[0].beta_b))
         place = _axes_as_they_are(stage, mesh)

@@ -10,9 +10,9 @@ import numpy as np
 
 from gearfmu.body import ReducedBody
 from gearfmu.kernel.linear import LinearModel
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.stage import StageSpec
 from gearfmu.stage.build.assembly import assemble
-from gearfmu.stage.build.meshes import mesh_geometry
 from gearfmu.stage.build.model import StageModel
 
 POSITIONS = 16  # of one pitch
@@ -24,7 +24,7 @@ def own_path(model: StageModel, torque: float) -> float:
     the pinion. SimulationError(no_equilibrium) where the pair finds none."""
     kernel = model.kernel(level=0.0, contact_damping=1.0)
     kernel.prepare()
-    pitch, paths = 2 * math.pi / mesh_geometry(model.stage, model.stage.engagements[0]).gears[1].z, []
+    pitch, paths = 2 * math.pi / mesh_shape(model.stage, model.stage.engagements[0]).gears[1].z, []
     for part in np.arange(POSITIONS) / POSITIONS:
         kernel.transmission(-part * pitch, torque)
         paths += _paths(kernel.linearise())

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from gearfmu.geometry.planetary import RingMesh
-from gearfmu.spec.forms.shapes import MeshShape
+from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
 from gearfmu.spec.forms.turning import meshings, turns
-from gearfmu.stage.build.meshes import mesh_geometry
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.place import place_of
 from gearfmu.stage.run.simulate import Steady, simulate
@@ -125,7 +124,7 @@ def mesh_efficiency(
     meshes = {}
     for mesh in stage.engagements:
         first, last = np.interp([settles, settles + span], trace.time, trace[f"{mesh.name}.friction_loss"])
-        shape, (_, rolls) = mesh_geometry(stage, mesh), known[mesh.name]
+        shape, (_, rolls) = mesh_shape(stage, mesh), known[mesh.name]
         force = abs(torque / place_of(model, mesh.name).lever)
         coefficient = float(trace[f"{mesh.name}.friction_ratio"][settled].mean())
         lost = float(last - first) / span

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearfmu.kernel import Kernel
-from gearfmu.spec.forms.shapes import face_width
-from gearfmu.stage.build.meshes import direction_of, mesh_axes, mesh_geometry, tooth_phases
+from gearfmu.spec.forms.shapes import face_width, mesh_shape
+from gearfmu.stage.build.meshes import direction_of, mesh_axes, tooth_phases
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.run.limits import limit_named
 from gearfmu.stage.run.place import place_of
@@ -53,7 +53,7 @@ def flank_loads(
     kernel, place = kernel or statics_of(model), place_of(model, mesh)
     stage = model.stage
     engagement = stage.engagements[place.number]
-    pair = mesh_geometry(stage, engagement)
+    pair = mesh_shape(stage, engagement)
     gear = pair.gears[0]
     frame = tooth_phases(stage)[engagement.gears[0]] - direction_of(pair, *mesh_axes(stage, engagement))
     te, rolls, forces, at, sums = np.empty(positions), [], [], [], np.zeros(2)

@@ -10,8 +10,9 @@ from typing import Any
 
 from gearfmu.errors import ModelError
 from gearfmu.spec.forms.general import EngagementSpec
+from gearfmu.spec.forms.shapes import mesh_shape
 from gearfmu.spec.forms.turning import turns
-from gearfmu.stage.build.meshes import kind_of, mesh_geometry
+from gearfmu.stage.build.meshes import kind_of
 from gearfmu.stage.build.model import StageModel
 
 
@@ -39,7 +40,7 @@ def place_of(model: StageModel, mesh: str | None) -> MeshPlace:
     rotors = [stage.rotor_of(gear) for gear in engagement.gears]
     if any(rotor not in turning for rotor in rotors):
         raise ModelError(f"{model.name}: the engagement '{engagement.name}' does not turn with its ports: name another")
-    pair = mesh_geometry(stage, engagement)
+    pair = mesh_shape(stage, engagement)
     a, b = pair.gears
     frame = stage.frame_of(engagement)
     carried = float(turning[frame]) if frame is not None else 0.0
@@ -61,7 +62,7 @@ def _lever_of_planets(model: StageModel, engagement: EngagementSpec, turning: Ma
     planets = max(count.values())
     central = (gear for gear in count if count[gear] == planets and turning[stage.rotor_of(gear)])
     mesh, gear = next((mesh, gear) for gear in central for mesh in meshes if gear in mesh.gears)
-    rotor, shape = stage.rotor_of(gear), mesh_geometry(stage, mesh).gears[mesh.gears.index(gear)]
+    rotor, shape = stage.rotor_of(gear), mesh_shape(stage, mesh).gears[mesh.gears.index(gear)]
     drives = rotor == stage.rotor_of(stage.ports[model.shafts.input].body)
     lever = planets * shape.r_b * float(turning[rotor]) * (1 if drives else -1)
     return lever if gear in engagement.gears else -lever

@@ -14,8 +14,7 @@ import numpy as np
 from gearfmu.geometry.iso6336 import mesh_stiffness
 from gearfmu.kernel import Kernel, TeState
 from gearfmu.spec.forms.general import GearBody, RingBody
-from gearfmu.spec.forms.shapes import face_width
-from gearfmu.stage.build.meshes import mesh_geometry
+from gearfmu.spec.forms.shapes import face_width, mesh_shape
 from gearfmu.stage.build.model import StageModel
 from gearfmu.stage.build.shown import Card, Shown, plot_over
 from gearfmu.stage.run.limits import limit_named
@@ -184,7 +183,7 @@ def _by_iso(model: StageModel, name: str | None) -> float:
     a, b = (model.stage.bodies[gear] for gear in mesh.gears)
     assert isinstance(a, (GearBody, RingBody)) and isinstance(b, (GearBody, RingBody))
     e_a, e_b = a.material.youngs_modulus, b.material.youngs_modulus
-    shape, dedendum = mesh_geometry(model.stage, mesh), a.rack.dedendum if isinstance(a, GearBody) else 1.25
+    shape, dedendum = mesh_shape(model.stage, mesh), a.rack.dedendum if isinstance(a, GearBody) else 1.25
     return face_width(model.stage, mesh) * mesh_stiffness(shape, dedendum, 2 * e_a * e_b / (e_a + e_b))
 
 

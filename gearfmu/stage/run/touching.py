@@ -10,8 +10,8 @@ import numpy as np
 
 from gearfmu.geometry import PairGeometry
 from gearfmu.spec.forms.general import EngagementSpec, Stage
-from gearfmu.spec.forms.shapes import MeshShape
-from gearfmu.stage.build.meshes import kind_of, mesh_geometry
+from gearfmu.spec.forms.shapes import MeshShape, mesh_shape
+from gearfmu.stage.build.meshes import kind_of
 from gearfmu.stage.run.trace import Trace
 
 GEAR_PHI = ".gear.phi"
@@ -38,7 +38,7 @@ def angle_of(trace: Trace, stage: Stage, gear: str) -> np.ndarray | None:
 def position_of(trace: Trace, stage: Stage, mesh: EngagementSpec) -> np.ndarray | None:
     """(n,) pitches by which gear A of an engagement would have turned on without load, from the angle of gear B; None
     where that was not recorded."""
-    pair, angle = mesh_geometry(stage, mesh), angle_of(trace, stage, mesh.gears[1])
+    pair, angle = mesh_shape(stage, mesh), angle_of(trace, stage, mesh.gears[1])
     return None if angle is None else np.asarray(-kind_of(pair) * angle * pair.gears[1].z / (2 * math.pi))
 
 
