@@ -192,7 +192,7 @@ def _along(
     body: Any, chosen: np.ndarray, degrees: np.ndarray, to_grid: np.ndarray, patterns: np.ndarray
 ) -> Along | None:
     """None for a body without displacement along the profile. patterns: along the normal."""
-    if (tangent := body.tangent) is None:
+    if (tangent := getattr(body, "tangent", None)) is None:
         return None
     low = body.nodal_diameter[chosen] <= 1
     omega = 2 * np.pi * body.frequency[chosen[low]]

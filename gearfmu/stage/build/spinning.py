@@ -54,7 +54,7 @@ def gear_spinning(body: Any, mass: np.ndarray, low: np.ndarray) -> Spinning:
     """Of a reduced gear with the patterns `low` of nodal diameter 0 and 1; elastic where its file tells
     (`ReducedBody.spin`), else rigid."""
     rigid = rigid_spinning(mass, low.size)
-    if body.spin is None:
+    if getattr(body, "spin", None) is None:
         return rigid
     h, q = rigid.gyroscopic, rigid.coriolis
     own = (body.nodal_diameter[low] == 1) & (2 * np.pi * body.frequency[low] < HIGHEST)
@@ -72,7 +72,7 @@ def gear_spinning(body: Any, mass: np.ndarray, low: np.ndarray) -> Spinning:
 def turn_rates(body: Any, chosen: np.ndarray) -> np.ndarray | None:
     """(m,): Coriolis coupling of the pairs among the modes `chosen` of a gear group, first member into second; other
     couplings move frequencies by the square of Ω/ω. None where its file does not tell."""
-    if body.spin is None:
+    if getattr(body, "spin", None) is None:
         return None
     part = body.part[chosen]
     rates = np.zeros(chosen.size)
